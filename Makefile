@@ -1,0 +1,55 @@
+# make validate | test | lint | bench | clean. The first one used sets up .venv; later ones find it there.
+
+PYTHON ?= python3
+BIN    := .venv/bin
+STAMP  := .venv/.stamp
+
+# make validate QUICK=1 ARGS="--only hits"
+QUICK  ?=
+ARGS   ?=
+
+# Languages that this project does without: everything here is Python.
+FOREIGN := c cc cpp cxx c++ cu h hh hpp hxx pyx pxd pxi rs
+
+.DEFAULT_GOAL := help
+.PHONY: help validate test lint bench clean
+
+help:
+	@echo "make validate   prove hits and pictures against the references; writes reports/index.html"
+	@echo "                QUICK=1 for the short run, ARGS='--only hits' for a part"
+	@echo "make test       run the tests; ARGS='-k octree' for some"
+	@echo "make lint       check style, types, import order and the absence of other languages"
+	@echo "make bench      measure run time and error"
+	@echo "make clean      remove everything that make made, .venv included"
+
+validate: $(STAMP)
+	$(BIN)/python -m validation $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)
+
+test: $(STAMP)
+	$(BIN)/python -m pytest $(ARGS)
+
+bench: $(STAMP)
+	$(BIN)/python -m validation --only efficiency $(ARGS)
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	@foreign=$$(find . \( -path ./.venv -o -path ./.git \) -prune -o -type f \( -false $(FOREIGN:%=-o -name '*.%') \) -print); \
+	if [ -n "$$foreign" ]; then echo "lint: only Python here, but found:" $$foreign >&2; exit 1; fi
+
+clean:
+	rm -rf .venv build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
+	find renderer validation tests scenes -name __pycache__ -prune -exec rm -rf {} +
+	find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name baseline.json -exec rm -rf {} +
+
+$(STAMP): pyproject.toml requirements.lock
+	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found; install Python 3.11 or newer, or set PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	|| { echo "make: Python 3.11 or newer is needed, but $(PYTHON) is $$($(PYTHON) -V 2>&1); set PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null \
+	|| { echo "make: $(PYTHON) has no venv module; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@

@@ -1,0 +1,24 @@
+"""An octree ray tracer for triangle meshes: ray queries, and Whitted pictures of scenes."""
+
+from renderer.errors import MeshError, SceneError
+from renderer.image import Image
+from renderer.mesh import Mesh
+from renderer.mesh_io import load_mesh
+from renderer.octree import BruteForce, Octree
+from renderer.query import Hits
+from renderer.render import render
+from renderer.scene import Scene, load_scene
+
+__all__ = [
+    "BruteForce",
+    "Hits",
+    "Image",
+    "Mesh",
+    "MeshError",
+    "Octree",
+    "Scene",
+    "SceneError",
+    "load_mesh",
+    "load_scene",
+    "render",
+]

@@ -1,0 +1,103 @@
+"""Cameras, and the affine map from film to rays that the kernels read.
+
+Every camera here is affine in the film position (x, y), measured in pixels with (0, 0) the
+top left corner of the film and (0.5, 0.5) the centre of its first pixel:
+
+    origin(x, y)    = rows[0] + x rows[1] + y rows[2]
+    direction(x, y) = rows[3] + x rows[4] + y rows[5]      (not normalised)
+"""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Vector = tuple[float, float, float]
+FiniteVector = tuple[
+    Annotated[float, Field(allow_inf_nan=False)],
+    Annotated[float, Field(allow_inf_nan=False)],
+    Annotated[float, Field(allow_inf_nan=False)],
+]
+
+
+class _Camera(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    eye: FiniteVector
+    target: FiniteVector
+    up: FiniteVector = (0.0, 1.0, 0.0)
+
+    @model_validator(mode="after")
+    def _has_a_view_direction(self) -> "_Camera":
+        forward = np.subtract(self.target, self.eye)
+        if not np.linalg.norm(np.cross(forward, self.up)) > 0.0:
+            raise ValueError("expected target != eye and up not parallel to the view direction")
+        return self
+
+    def frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Unit vectors (right, up, forward) in world space, each (3,) float64."""
+        forward = np.subtract(self.target, self.eye)
+        forward = forward / np.linalg.norm(forward)
+        right = np.cross(forward, self.up)
+        right = right / np.linalg.norm(right)
+        return right, np.cross(right, forward), forward
+
+
+class PerspectiveCamera(_Camera):
+    """A pinhole camera; ``fov`` is the vertical field of view in degrees."""
+
+    type: Literal["perspective"] = "perspective"
+    fov: Annotated[float, Field(gt=0.0, lt=180.0)] = 45.0
+
+    def rows(self, width: int, height: int) -> NDArray[np.float64]:
+        """The affine map of the module's docstring, (6, 3) float64."""
+        right, up, forward = self.frame()
+        pixel = 2.0 * math.tan(math.radians(self.fov) / 2.0) / height
+        zero = np.zeros(3)
+        corner = forward - right * (pixel * width / 2.0) + up * (pixel * height / 2.0)
+        return np.array([self.eye, zero, zero, corner, right * pixel, -up * pixel])
+
+
+class OrthographicCamera(_Camera):
+    """Parallel rays; ``height`` is the height of the film in scene units."""
+
+    type: Literal["orthographic"]
+    height: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+    def rows(self, width: int, height: int) -> NDArray[np.float64]:
+        """The affine map of the module's docstring, (6, 3) float64."""
+        right, up, forward = self.frame()
+        pixel = self.height / height
+        zero = np.zeros(3)
+        corner = np.asarray(self.eye) - right * (pixel * width / 2.0) + up * (pixel * height / 2.0)
+        return np.array([corner, right * pixel, -up * pixel, forward, zero, zero])
+
+
+Camera = PerspectiveCamera | OrthographicCamera
+
+
+def sample_offsets(samples: int) -> NDArray[np.float64]:
+    """Positions of a regular k x k grid in the unit pixel, (samples, 2) float64; the centre for one sample."""
+    k = math.isqrt(samples)
+    if k < 1 or k * k != samples:
+        raise ValueError(f"samples: expected a square number (1, 4, 9, ...), got {samples}")
+    centres = (np.arange(k) + 0.5) / k
+    y, x = np.meshgrid(centres, centres, indexing="ij")
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+def primary_rays(
+    camera: Camera, width: int, height: int, offset: tuple[float, float] = (0.5, 0.5)
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rays through one position in every pixel, in scanline order from the top left.
+
+    Returns origins and unit directions, each (height * width, 3) float64.
+    """
+    rows = camera.rows(width, height)
+    y, x = np.meshgrid(np.arange(height) + offset[1], np.arange(width) + offset[0], indexing="ij")
+    x, y = x.reshape(-1, 1), y.reshape(-1, 1)
+    origins = rows[0] + x * rows[1] + y * rows[2]
+    directions = rows[3] + x * rows[4] + y * rows[5]
+    return origins, directions / np.linalg.norm(directions, axis=1, keepdims=True)

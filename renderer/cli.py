@@ -1,0 +1,120 @@
+"""The command line: arguments in, calls to the library, one line and exit code 2 for anything wrong."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from renderer.errors import expect
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run ``octree-render``; returns the exit code: 0, 2 for bad input, 130 after Ctrl-C."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.command(options)
+    except KeyboardInterrupt:
+        print("octree-render: interrupted, nothing written", file=sys.stderr)
+        return 130
+    except (ValueError, OSError) as error:
+        print(f"octree-render: {_one_line(error)}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _one_line(error: Exception) -> str:
+    """The error's message on one line; pydantic's start with a headline that says less than the rest."""
+    from pydantic import ValidationError
+
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        where = ".".join(str(k) for k in first["loc"])
+        return f"{where}: {first['msg']}, got {first['input']!r}" if where else first["msg"]
+    return " ".join(str(error).split())
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="octree-render", description="Octree ray tracer for triangle meshes.")
+    parser.add_argument("--version", action="version", version=version("octree-renderer"))
+    commands = parser.add_subparsers(required=True, metavar="command")
+    render = commands.add_parser("render", help="render a scene file to a picture")
+    render.add_argument("scene", type=Path)
+    render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=".png, or .npy for linear radiance")
+    render.add_argument("--resolution", type=_resolution, metavar="WxH", help="pixels, such as 512x512")
+    render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
+    render.add_argument("--samples", type=int, metavar="N", help="samples a pixel: 1, 4, 9, ...")
+    render.add_argument("--min-weight", type=float, metavar="W", help="end rays that weigh less")
+    render.add_argument("--accelerator", choices=("octree", "brute"), default="octree")
+    render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help="how the octree is cut")
+    render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
+    render.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    render.set_defaults(command=_render)
+    info = commands.add_parser("info", help="say what a scene holds and what its octree looks like")
+    info.add_argument("scene", type=Path)
+    info.add_argument("--split", choices=("midpoint", "sah"), default="midpoint")
+    info.set_defaults(command=_info)
+    return parser
+
+
+def _resolution(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT such as 512x512, got {text!r}")
+    return int(width), int(height)
+
+
+def _render(options: argparse.Namespace) -> None:
+    # Imported here so that --help and --version need no compiler.
+    from renderer.image import check_picture_path
+    from renderer.render import render
+    from renderer.scene import load_scene
+
+    check_picture_path(options.output)
+    scene = load_scene(options.scene)
+    image = render(
+        scene,
+        resolution=options.resolution,
+        samples=options.samples,
+        max_depth=options.max_depth,
+        min_weight=options.min_weight,
+        accelerator=options.accelerator,
+        split=options.split,
+        threads=options.threads,
+        progress=not options.quiet,
+    )
+    image.save(options.output)
+    if not options.quiet:
+        height, width = image.depth.shape
+        rays = int(image.rays.sum())
+        print(
+            f"{options.output}: {width} x {height}, {rays} rays in {image.render_seconds:.2f} s "
+            f"({rays / image.render_seconds / 1e6:.1f} million a second), {options.accelerator} ready in "
+            f"{image.build_seconds:.2f} s"
+        )
+
+
+def _info(options: argparse.Namespace) -> None:
+    from renderer.octree import Octree
+    from renderer.scene import load_scene
+    from renderer.world import pack
+
+    scene = load_scene(options.scene)
+    expect(bool(scene.instances), "scene", "at least one object or a floor", "none")
+    print(f"{options.scene}: {len(scene.instances)} meshes, {len(scene.lights)} lights, {scene.camera.type} camera")
+    for instance in scene.instances:
+        material = scene.materials[instance.material]
+        normals = "smooth" if instance.smooth else "flat"
+        print(
+            f"  {instance.mesh.name or 'mesh':<20} {len(instance.mesh.faces):>9} faces  {normals:<7} "
+            f"{instance.material} ({material.type})"
+        )
+    stats = Octree.from_mesh(pack(scene)[0], split=options.split).stats
+    print(
+        f"octree ({options.split}): {stats.nodes} nodes, {stats.leaves} leaves, depth {stats.depth}, "
+        f"{stats.references} references in {stats.blocks} blocks ({stats.fill:.0%} full), {stats.bytes / 1e6:.1f} MB"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

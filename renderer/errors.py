@@ -1,0 +1,19 @@
+"""The errors that this package raises for bad input.
+
+All of them are ``ValueError``s, so a caller who does not care which part
+complained can catch that; the command line turns them into one line.
+"""
+
+
+class MeshError(ValueError):
+    """A mesh file or mesh arrays that cannot be used; names the file or argument and the fault."""
+
+
+class SceneError(ValueError):
+    """A scene that cannot be used; names the file, the key's path, what was expected and what stood there."""
+
+
+def expect(condition: bool, argument: str, expected: str, got: object) -> None:
+    """Raise ``ValueError`` naming ``argument``, what was expected and what came, unless ``condition``."""
+    if not condition:
+        raise ValueError(f"{argument}: expected {expected}, got {got}")

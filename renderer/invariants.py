@@ -1,0 +1,87 @@
+"""A check of everything that a traversal takes for granted about a tree. Slow and plain, for tests and reports."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.mesh import Mesh
+
+
+def faults(tree: Tree, depth: int, mesh: Mesh) -> list[str]:
+    """What is wrong with ``tree`` as the octree of ``mesh``, in words; empty when all of these hold.
+
+    Every node and block is reached exactly once. A child's box contains its descendants' and every vertex of its
+    faces. Every face with its own vertices stands in exactly one place. No path is longer than ``depth``. Unused places
+    hold no face and no area; unused octants have inverted boxes.
+    """
+    found = _block_faults(tree, mesh)
+    nodes = len(tree.nodes) // NODE_WORDS
+    reached, blocks_reached = np.zeros(nodes, np.int64), np.zeros(len(tree.faces) // LANES, np.int64)
+    infinite = (np.full(3, -np.inf), np.full(3, np.inf))
+    pending = [(0, 1, *infinite)]
+    while pending:
+        node, level, lower, upper = pending.pop()
+        if not 0 <= node < nodes:
+            found.append(f"a link to node {node} of {nodes}")
+            continue
+        reached[node] += 1
+        if reached[node] > 1:
+            continue
+        if level > depth:
+            found.append(f"node {node}: level {level} is deeper than {depth}")
+        for place in range(8):
+            low, high, child = _octant(tree, node, place)
+            where = f"node {node}, octant {place}"
+            if (low > high).any():
+                if not (np.isposinf(low).all() and np.isneginf(high).all()):
+                    found.append(f"{where}: inverted box that is not the empty one")
+                continue
+            if (low < lower).any() or (high > upper).any():
+                found.append(f"{where}: box reaches outside its parent's")
+            if child >= 0:
+                pending.append((child, level + 1, low, high))
+            else:
+                found += _leaf_faults(tree, mesh, ~child, (low, high), blocks_reached, where)
+    found += [f"node {i}: reached {n} times" for i, n in enumerate(reached) if n != 1]
+    found += [f"block {i}: reached {n} times" for i, n in enumerate(blocks_reached) if n != 1]
+    return found
+
+
+def _octant(tree: Tree, node: int, place: int) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
+    words = tree.nodes[node * NODE_WORDS : node * NODE_WORDS + CHILDREN].reshape(6, 8)
+    return words[0::2, place], words[1::2, place], int(tree.links[node * NODE_WORDS + CHILDREN + place])
+
+
+def _leaf_faults(
+    tree: Tree,
+    mesh: Mesh,
+    code: int,
+    box: tuple[NDArray[np.float32], NDArray[np.float32]],
+    blocks_reached: NDArray[np.int64],
+    where: str,
+) -> list[str]:
+    first, count = code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1
+    if first + count > len(blocks_reached):
+        return [f"{where}: leaf of blocks {first} to {first + count - 1} of {len(blocks_reached)}"]
+    blocks_reached[first : first + count] += 1
+    faces = tree.faces[first * LANES : (first + count) * LANES]
+    faces = faces[(faces >= 0) & (faces < len(mesh.faces))]
+    corners = mesh.vertices[mesh.faces[faces]].reshape(-1, 3)
+    outside = (corners < box[0]).any() or (corners > box[1]).any()
+    return [f"{where}: a face reaches outside the leaf's box"] if outside else []
+
+
+def _block_faults(tree: Tree, mesh: Mesh) -> list[str]:
+    """Faults in the blocks by themselves: each face exactly once, with its vertices."""
+    found = []
+    used = tree.faces >= 0
+    counts = np.bincount(tree.faces[used], minlength=len(mesh.faces))
+    found += [f"face {f}: expected in 1 place, is in {counts[f]}" for f in np.flatnonzero(counts != 1)]
+    rows = tree.blocks.reshape(-1, BLOCK_WORDS // LANES, LANES).transpose(0, 2, 1).reshape(-1, 3, 3)
+    known = used & (tree.faces < len(mesh.faces))
+    wrong = (rows[known] != mesh.vertices[mesh.faces[tree.faces[known]]]).any(axis=(1, 2))
+    found += [f"face {f}: its vertices in the block differ from the mesh's" for f in tree.faces[known][wrong]]
+    idle = rows[~used]
+    flat = (idle == idle[:, :1]).all(axis=(1, 2))
+    found += [f"place {p}: unused but not a single point" for p in np.flatnonzero(~used)[~flat]]
+    return found

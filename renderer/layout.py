@@ -1,0 +1,37 @@
+"""The records in memory: what a node and a block of triangles look like. Kernels and builder both read this page."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# A node is NODE_WORDS 32-bit words. Words 0-47 are six rows of eight float32, one value an octant: lower x,
+# upper x, lower y, upper y, lower z, upper z. Words CHILDREN to CHILDREN + 7 are its children as int32 (the same
+# memory seen through ``links``). An empty octant has lower = +inf and upper = -inf, which no ray enters.
+NODE_WORDS = 56
+CHILDREN = 48
+
+# A child >= 0 is a node. A child < 0 is a leaf: ~child holds its first block and, in the low three bits, its number
+# of blocks less one.
+LEAF_BITS = 3
+MAX_LEAF_BLOCKS = 1 << LEAF_BITS
+
+# A block is nine rows of four values, one a triangle: p0 x, p0 y, p0 z, p1 x, ... p2 z. An unused place repeats
+# one vertex three times, which nothing hits, and has face -1.
+LANES = 4
+BLOCK_WORDS = 36
+
+
+class Tree(NamedTuple):
+    """The arrays that a traversal reads.
+
+    nodes   (N * NODE_WORDS,) float32, rounded outwards from the float64 vertices
+    links   the same memory as int32
+    blocks  (B * BLOCK_WORDS,) float32 when every vertex is exactly a float32, else float64
+    faces   (B * LANES,) int32, the face in each place of each block, -1 where unused
+    """
+
+    nodes: NDArray[np.float32]
+    links: NDArray[np.int32]
+    blocks: NDArray[np.float32] | NDArray[np.float64]
+    faces: NDArray[np.int32]

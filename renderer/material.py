@@ -1,0 +1,73 @@
+"""Materials, and the rows of the array in which the kernels read them."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from renderer.light import Color
+
+# One row a material, float64. Colours take three columns from the one named.
+KIND, AMBIENT, DIFFUSE, SPECULAR, REFLECTANCE, TRANSMITTANCE = 0, 1, 4, 7, 10, 13
+SHININESS, IOR = 16, 17
+MATERIAL_COLUMNS = 18
+PHONG, MIRROR, DIELECTRIC = 0, 1, 2
+
+_Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+_BLACK = (0.0, 0.0, 0.0)
+_WHITE = (1.0, 1.0, 1.0)
+
+
+class _Material(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Phong(_Material):
+    """Ambient, diffuse and specular light with a constant reflected and transmitted part.
+
+    ``ambient`` (k_a) is ``diffuse`` unless given. Under total internal reflection there is no transmitted part.
+    """
+
+    type: Literal["phong"] = "phong"
+    diffuse: Color = (0.8, 0.8, 0.8)
+    ambient: Color | None = None
+    specular: Color = _BLACK
+    shininess: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 32.0
+    reflectance: Color = _BLACK
+    transmittance: Color = _BLACK
+    ior: _Ior = 1.5
+
+    def row(self) -> NDArray[np.float64]:
+        """(MATERIAL_COLUMNS,) float64."""
+        ambient = self.diffuse if self.ambient is None else self.ambient
+        colors = (*ambient, *self.diffuse, *self.specular, *self.reflectance, *self.transmittance)
+        return np.array([PHONG, *colors, self.shininess, self.ior])
+
+
+class Mirror(_Material):
+    """A perfect mirror: ``reflectance`` times the reflected light, nothing else."""
+
+    type: Literal["mirror"]
+    reflectance: Color = _WHITE
+
+    def row(self) -> NDArray[np.float64]:
+        """(MATERIAL_COLUMNS,) float64."""
+        return np.array([MIRROR, *_BLACK, *_BLACK, *_BLACK, *self.reflectance, *_BLACK, 0.0, 1.0])
+
+
+class Dielectric(_Material):
+    """Clear glass of index ``ior``: Fresnel's share reflected, the rest refracted, tinted by the two colours."""
+
+    type: Literal["dielectric"]
+    ior: _Ior = 1.5
+    reflectance: Color = _WHITE
+    transmittance: Color = _WHITE
+
+    def row(self) -> NDArray[np.float64]:
+        """(MATERIAL_COLUMNS,) float64."""
+        colors = (*_BLACK, *_BLACK, *_BLACK, *self.reflectance, *self.transmittance)
+        return np.array([DIELECTRIC, *colors, 0.0, self.ior])
+
+
+Material = Phong | Mirror | Dielectric

@@ -1,0 +1,253 @@
+"""An immutable, checked triangle mesh: the one form in which geometry enters the renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import MeshError
+
+Float64Array = NDArray[np.float64]
+Int32Array = NDArray[np.int32]
+T = TypeVar("T", bound=np.generic)
+
+# A face's corners are int32, so no vertex beyond this one can be named.
+MAX_VERTICES = 2**31 - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles over shared vertices.
+
+    The constructor accepts anything that numpy reads as an array (lists, float32, any integer type), copies
+    it, checks it and makes it read-only; code that holds a ``Mesh`` need not check again. Meshes compare and
+    hash by identity.
+
+    vertices : (V, 3) float64, finite, scene units.
+    faces : (F, 3) int32, each in [0, V); counter-clockwise seen from outside. F may be 0.
+    normals : (V, 3) float64 shading normals, finite, or None. They need not be of unit length.
+    colors : (V, 3) float32 RGB in [0, 1], or None.
+    texcoords : (V, 2) float64, origin at the lower left of the texture, or None.
+    name : used to begin error messages.
+
+    Raises ``MeshError`` that names the array, what was expected, what stood there and in which row.
+
+    >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+    >>> mesh.face_normals().tolist()
+    [[0.0, 0.0, 1.0]]
+    >>> mesh.extent.tolist()
+    [1.0, 2.0, 0.0]
+    """
+
+    vertices: Float64Array
+    faces: Int32Array
+    normals: Float64Array | None = None
+    colors: NDArray[np.float32] | None = None
+    texcoords: Float64Array | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        vertices = self._floats("vertices", 3, np.float64)
+        faces = self._checked_faces(len(vertices))
+        object.__setattr__(self, "vertices", _read_only(vertices))
+        object.__setattr__(self, "faces", _read_only(faces))
+        for attribute, width, dtype in _VERTEX_ATTRIBUTES:
+            if getattr(self, attribute) is None:
+                continue
+            array = self._floats(attribute, width, dtype)
+            if len(array) != len(vertices):
+                raise self._error(f"{attribute}: expected a row a vertex, {len(vertices)}, got {len(array)}")
+            object.__setattr__(self, attribute, _read_only(array))
+        if self.colors is not None:
+            outside = (self.colors < 0) | (self.colors > 1)
+            self._reject_rows("colors", self.colors, outside, "values in [0, 1]")
+
+    def _error(self, message: str) -> MeshError:
+        return MeshError(f"{self.name}: {message}" if self.name else message)
+
+    def _reject_rows(self, argument: str, array: NDArray[Any], bad: NDArray[np.bool_], expected: str) -> None:
+        if bad.any():
+            row = int(bad.any(axis=1).argmax())
+            raise self._error(f"{argument}: expected {expected}, got {array[row].tolist()} in row {row}")
+
+    def _array(self, argument: str, width: int) -> NDArray[Any]:
+        try:
+            array = np.asarray(getattr(self, argument))
+        except ValueError as error:  # a ragged list
+            raise self._error(f"{argument}: expected an array of shape (n, {width}), got {error}") from error
+        if array.shape == (0,):
+            array = array.reshape(0, width)
+        if array.ndim != 2 or array.shape[1] != width:
+            raise self._error(f"{argument}: expected shape (n, {width}), got {array.shape}")
+        return array
+
+    def _floats(self, argument: str, width: int, dtype: type[np.floating]) -> NDArray[Any]:
+        array = self._array(argument, width)
+        if array.size and array.dtype.kind not in "fiu":
+            raise self._error(f"{argument}: expected real numbers, got dtype {array.dtype}")
+        with np.errstate(over="ignore"):  # what overflows to inf is rejected just below
+            floats = np.array(array, dtype=dtype, order="C")
+        finite = np.isfinite(floats)
+        if not finite.all():
+            self._reject_rows(argument, floats, ~finite, "finite values")
+        return floats
+
+    def _checked_faces(self, vertex_count: int) -> Int32Array:
+        faces = self._array("faces", 3)
+        if faces.size == 0:
+            return np.empty((0, 3), np.int32)
+        if faces.dtype.kind not in "iu":
+            raise self._error(f"faces: expected integers, got dtype {faces.dtype}")
+        if vertex_count > MAX_VERTICES:
+            raise self._error(f"vertices: expected at most {MAX_VERTICES} rows, got {vertex_count}")
+        if faces.min() < 0 or faces.max() >= vertex_count:
+            row, corner = np.argwhere((faces < 0) | (faces >= vertex_count))[0]
+            raise self._error(
+                f"faces: expected indices of {vertex_count} vertices, got {faces[row, corner]} in row {row}"
+            )
+        return np.array(faces, dtype=np.int32, order="C")
+
+    @cached_property
+    def bounds(self) -> tuple[Float64Array, Float64Array]:
+        """Least and greatest corner, each (3,) float64; (inf, -inf) when there are no vertices."""
+        if len(self.vertices) == 0:
+            return _read_only(np.full(3, np.inf)), _read_only(np.full(3, -np.inf))
+        return _read_only(self.vertices.min(axis=0)), _read_only(self.vertices.max(axis=0))
+
+    @property
+    def extent(self) -> Float64Array:
+        """Size along each axis, (3,) float64; 0 when there are no vertices."""
+        lower, upper = self.bounds
+        return np.maximum(upper - lower, 0.0)
+
+    @property
+    def triangles(self) -> Float64Array:
+        """Corner positions, (F, 3 corners, 3) float64, a new array."""
+        return self.vertices[self.faces]
+
+    @cached_property
+    def is_float32(self) -> bool:
+        """Whether float32 holds every vertex exactly."""
+        with np.errstate(over="ignore", under="ignore"):
+            return bool((self.vertices.astype(np.float32) == self.vertices).all())
+
+    def face_normals(self) -> Float64Array:
+        """Unit geometric normals, (F, 3) float64; zero for a face without area."""
+        corners = self.triangles
+        first, second = _scaled_edges(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return _unit(np.cross(first, second))
+
+    def vertex_normals(self) -> Float64Array:
+        """Unit normals, (V, 3) float64: face normals weighted by the face's angle at the vertex.
+
+        Unlike area weights, angles do not depend on how a flat region is cut into triangles (Thürmer and
+        Wüthrich 1998). A vertex that no face with area uses gets zero.
+        """
+        corners = self.triangles
+        weighted = np.empty_like(corners)
+        face_normals = self.face_normals()
+        for corner in range(3):
+            to_next = _unit(corners[:, (corner + 1) % 3] - corners[:, corner])
+            to_last = _unit(corners[:, (corner + 2) % 3] - corners[:, corner])
+            # 2 atan2(|a - b|, |a + b|) is accurate for every angle, as acos(a . b) is not (Kahan 2006).
+            apart, along = to_next - to_last, to_next + to_last
+            angle = 2 * np.arctan2(_lengths(apart), _lengths(along))
+            weighted[:, corner] = face_normals * angle[:, None]
+        flat, count = self.faces.ravel(), len(self.vertices)
+        sums = [np.bincount(flat, weighted[:, :, axis].ravel(), minlength=count) for axis in range(3)]
+        return _unit(np.stack(sums, axis=1))
+
+    def is_closed(self) -> bool:
+        """Whether the faces bound a volume: each edge is used exactly twice, once in either direction.
+
+        False for a mesh without faces and where a face names a vertex twice. Vertices are told apart by
+        index, not by position.
+        """
+        start, end = self.faces.ravel().astype(np.int64), np.roll(self.faces, -1, axis=1).ravel()
+        if len(start) == 0 or (start == end).any():
+            return False
+        count = len(self.vertices)
+        forward = np.sort(start * count + end)
+        backward = np.sort(end * np.int64(count) + start)
+        return bool((forward[1:] != forward[:-1]).all() and (forward == backward).all())
+
+    def transformed(self, matrix: object) -> Mesh:
+        """A copy moved by an affine map.
+
+        matrix : (4, 4), applied to column vectors; its last row must be 0 0 0 1.
+
+        Normals go by the inverse transpose and come back with unit length. A map that mirrors also turns
+        each face round, so that outside stays outside.
+        """
+        expected = "matrix: expected a finite affine (4, 4) with last row 0 0 0 1"
+        try:
+            affine = np.asarray(matrix, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise self._error(f"{expected}, got {error}") from error
+        if affine.shape != (4, 4) or not np.isfinite(affine).all() or affine[3].tolist() != [0, 0, 0, 1]:
+            raise self._error(f"{expected}, got {affine.tolist()}")
+        linear = affine[:3, :3]
+        mirrors = np.linalg.det(linear) < 0
+        normals = None
+        if self.normals is not None:
+            # The cofactors are det times the inverse transpose, and exist for a singular map too.
+            columns = linear.T
+            cofactors = np.stack([np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)])
+            normals = _unit(self.normals @ cofactors) * (-1.0 if mirrors else 1.0)
+        faces = self.faces[:, [0, 2, 1]] if mirrors else self.faces
+        return replace(self, vertices=self.vertices @ linear.T + affine[:3, 3], faces=faces, normals=normals)
+
+    @classmethod
+    def concatenate(cls, meshes: Iterable[Mesh], name: str = "") -> Mesh:
+        """One mesh of all vertices and faces, in order.
+
+        Normals, colours and texture coordinates stay only where all the meshes have them.
+        """
+        parts = list(meshes)
+        if not parts:
+            return cls(np.empty((0, 3)), np.empty((0, 3), np.int32), name=name)
+        starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+        attributes: dict[str, Any] = {}
+        for attribute, _, _ in _VERTEX_ATTRIBUTES:
+            arrays = [getattr(part, attribute) for part in parts]
+            if all(array is not None for array in arrays):
+                attributes[attribute] = np.concatenate(arrays)
+        faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)])
+        return cls(np.concatenate([part.vertices for part in parts]), faces, name=name, **attributes)
+
+
+_VERTEX_ATTRIBUTES: tuple[tuple[str, int, type[np.floating]], ...] = (
+    ("normals", 3, np.float64),
+    ("colors", 3, np.float32),
+    ("texcoords", 2, np.float64),
+)
+
+
+def _read_only(array: NDArray[T]) -> NDArray[T]:
+    array.flags.writeable = False
+    return array
+
+
+def _scaled_edges(*edges: Float64Array) -> list[Float64Array]:
+    """Edges over a power of two near each row's largest component: products neither overflow nor vanish."""
+    # Column by column: NumPy reduces along a short last axis five times slower.
+    largest = np.maximum.reduce([np.abs(edge[:, axis]) for edge in edges for axis in range(3)])
+    exponent = -np.frexp(largest)[1]
+    return [np.ldexp(edge, exponent[:, None]) for edge in edges]
+
+
+def _lengths(vectors: Float64Array) -> Float64Array:
+    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+
+
+def _unit(vectors: Float64Array) -> Float64Array:
+    """(n, 3) vectors at unit length; zero stays zero."""
+    (scaled,) = _scaled_edges(vectors)
+    lengths = _lengths(scaled)[:, None]
+    unit: Float64Array = np.divide(scaled, lengths, out=np.zeros_like(scaled), where=lengths > 0)
+    return unit

@@ -1,0 +1,135 @@
+"""Mesh files: PLY, OBJ, STL and GLB in, PLY out."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from renderer.errors import MeshError
+from renderer.mesh import Mesh
+from renderer.obj import parse_obj
+from renderer.ply import format_ply, parse_ply
+
+
+def load_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
+    """Read a triangle mesh from a .ply, .obj, .stl or .glb file.
+
+    name : the mesh's name; by default the file's, without its suffix.
+
+    Polygons are cut into fans, right for convex ones. Normals, colours and texture coordinates of vertices
+    are kept. Positions are float64 whatever the file holds. An STL file shares no vertices between its faces.
+
+    Raises ``MeshError`` that names the file and the fault: not there, not a file, unknown suffix, malformed
+    or truncated, no faces, a face index out of range, a face of fewer than three vertices, values that are
+    not finite.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _PARSERS:
+        raise MeshError(f"{path}: expected a suffix of {', '.join(_PARSERS)}, got {path.suffix!r}")
+    try:
+        content = path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a null byte in the path
+        raise MeshError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    try:
+        mesh = parse_mesh(content, path.suffix.lower())
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from error
+    return replace(mesh, name=path.stem if name is None else name)
+
+
+def parse_mesh(content: bytes, suffix: str) -> Mesh:
+    """The mesh in a file's content; ``suffix`` is one of '.ply', '.obj', '.stl', '.glb'.
+
+    Raises ``MeshError`` as ``load_mesh`` does, without the file's name.
+    """
+    mesh = _PARSERS[suffix](content)
+    if len(mesh.faces) == 0:
+        raise MeshError("holds no faces")
+    return mesh
+
+
+def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
+    """Write ``mesh`` as binary little-endian PLY, with float32 positions where those are exact, else double.
+
+    The file appears whole or not at all. Raises ``OSError`` where it cannot be written.
+    """
+    path = Path(path)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        unfinished.write_bytes(format_ply(mesh))
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _parse_stl(content: bytes) -> Mesh:
+    """Binary STL is known by its length; text must close every facet and solid that it opens."""
+    face_count = int.from_bytes(content[80:84], "little")
+    if len(content) < 84 or len(content) != 84 + 50 * face_count:
+        if not content.lstrip().lower().startswith(b"solid"):
+            raise MeshError(
+                f"expected text that starts with 'solid', or binary of {84 + 50 * face_count} bytes for its"
+                f" {face_count} faces, got {len(content)} bytes"
+            )
+        opened, closed = (
+            [len(re.findall(rb"(?mi)^[ \t]*" + word + rb"\b", content)) for word in words]
+            for words in ((b"facet", b"solid"), (b"endfacet", b"endsolid"))
+        )
+        if opened != closed:
+            raise MeshError(f"truncated: (facets, solids) that begin {opened}, that end {closed}")
+        face_count = opened[0]
+        # trimesh guesses the encoding of what is not ASCII, and only names can be that.
+        content = content.decode("ascii", "replace").encode("ascii", "replace")
+    mesh = _through_trimesh(content, "stl")
+    if len(mesh.faces) != face_count:
+        raise MeshError(f"expected {face_count} faces, read {len(mesh.faces)}")
+    return mesh
+
+
+def _parse_glb(content: bytes) -> Mesh:
+    return _through_trimesh(content, "glb")
+
+
+def _through_trimesh(content: bytes, file_type: str) -> Mesh:
+    """All triangle meshes, each placed by the scene's transforms; points and lines have no surface."""
+    import trimesh  # half a second, which scenes of PLY files need not spend
+
+    try:
+        scene = trimesh.load_scene(BytesIO(content), file_type=file_type, process=False)
+        meshes = []
+        for node in scene.graph.nodes_geometry:
+            transform, geometry_name = scene.graph[node]
+            geometry = scene.geometry[geometry_name]
+            if isinstance(geometry, trimesh.Trimesh):
+                meshes.append(_from_trimesh(geometry).transformed(transform))
+        return Mesh.concatenate(meshes)
+    except MeshError:
+        raise
+    except Exception as error:  # a library on malformed input raises anything: KeyError, struct.error, ...
+        fault = " ".join(str(error).split())[:120]
+        raise MeshError(f"malformed {file_type.upper()}: {type(error).__name__}: {fault}") from error
+
+
+def _from_trimesh(geometry: Any) -> Mesh:
+    # trimesh computes normals when asked; only those that stood in the file are in its cache.
+    normals = geometry.vertex_normals if "vertex_normals" in geometry._cache else None
+    colors = None
+    if geometry.visual.kind == "vertex":
+        colors = (np.asarray(geometry.visual.vertex_colors)[:, :3] / 255).astype(np.float32)
+    texcoords = getattr(geometry.visual, "uv", None)
+    return Mesh(geometry.vertices, geometry.faces, normals=normals, colors=colors, texcoords=texcoords)
+
+
+_PARSERS: dict[str, Callable[[bytes], Mesh]] = {
+    ".ply": parse_ply,
+    ".obj": parse_obj,
+    ".stl": _parse_stl,
+    ".glb": _parse_glb,
+}

@@ -1,0 +1,157 @@
+"""The public accelerators: ``Octree``, and ``BruteForce`` as its baseline with the same interface and triangle test."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.build import SPLITS, Rule, build_blocks, build_tree
+from renderer.errors import MeshError, expect
+from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.mesh import Mesh
+from renderer.parallel import checked_threads
+from renderer.query import Hits, any_hits, check_rays, closest_hits
+
+MAX_LEAF_SIZE = LANES * MAX_LEAF_BLOCKS
+MAX_DEPTH = 64
+# Boxes are float32. Twice a coordinate (a doubled centre) must stay below float32's 2^128.
+_LARGEST_COORDINATE = 2.0**126
+
+
+@dataclass(frozen=True)
+class Stats:
+    """What was built. ``references`` counts the faces in all leaves; each face is in exactly one."""
+
+    faces: int
+    nodes: int
+    leaves: int
+    depth: int
+    blocks: int
+    references: int
+    bytes: int
+
+    @property
+    def fill(self) -> float:
+        """Share of the blocks' places that hold a face; 1 for none at all."""
+        return self.references / (self.blocks * LANES) if self.blocks else 1.0
+
+
+class _Accelerator:
+    """Ray queries on one mesh; safe to call from many threads at once."""
+
+    def __init__(self, mesh: Mesh, tree: Tree, depth: int, threads: int | None) -> None:
+        self.mesh = mesh
+        self.tree = tree
+        self.depth = depth
+        self.threads = checked_threads(threads)
+
+    def closest_hit(
+        self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
+    ) -> Hits:
+        """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
+
+        ``origins`` and ``directions`` are (n, 3), finite, directions non-zero and of any length; ``t_min`` and ``t_max``
+        are >= 0, one number or (n,), in units of |direction|. No face is culled; a ray in a face's plane misses it.
+        Results are the same bits for any number of threads. Raises ``ValueError`` naming argument and row.
+        """
+        return closest_hits(self.tree, self.depth, check_rays(origins, directions, t_min, t_max), self.mesh, self.threads)
+
+    def any_hit(
+        self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
+    ) -> NDArray[np.bool_]:
+        """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above."""
+        return any_hits(self.tree, self.depth, check_rays(origins, directions, t_min, t_max), self.threads)
+
+    @property
+    def stats(self) -> Stats:
+        """Counts and bytes of the built arrays, those of the mesh left out."""
+        tree = self.tree
+        children = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN:]
+        return Stats(
+            faces=len(self.mesh.faces),
+            nodes=len(children),
+            leaves=int((children < 0).sum()),
+            depth=self.depth,
+            blocks=len(tree.faces) // LANES,
+            references=int((tree.faces >= 0).sum()),
+            bytes=tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes,
+        )
+
+
+class Octree(_Accelerator):
+    """An octree over triangles with fitted boxes, eight octants tested at once and blocks of four triangles.
+
+    split      "midpoint": octants at the middle of the faces' centres, small ones merged; "sah": binary splits by
+               the surface area heuristic, slower to build and a little faster to trace
+    leaf_size  the most faces of a leaf, 1 to 32
+    max_depth  the deepest level that the split rule may cut, 1 to 64; below it faces are shared out evenly
+    threads    for queries; None takes all processors
+
+    >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> octree.closest_hit([[0.25, 0.25, 2.0]], [[0, 0, -1]]).t
+    array([2.])
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        split: Literal["midpoint", "sah"] = "midpoint",
+        leaf_size: int = 4,
+        max_depth: int = 32,
+        threads: int | None = None,
+    ) -> None:
+        mesh = Mesh(vertices, faces)  # type: ignore[arg-type]  # Mesh checks and converts
+        self._build(mesh, split, leaf_size, max_depth, threads)
+
+    @classmethod
+    def from_mesh(
+        cls,
+        mesh: Mesh,
+        *,
+        split: Literal["midpoint", "sah"] = "midpoint",
+        leaf_size: int = 4,
+        max_depth: int = 32,
+        threads: int | None = None,
+    ) -> "Octree":
+        """Build over a mesh that is already checked; options as in the class."""
+        octree = cls.__new__(cls)
+        octree._build(mesh, split, leaf_size, max_depth, threads)
+        return octree
+
+    def _build(self, mesh: Mesh, split: str, leaf_size: int, max_depth: int, threads: int | None) -> None:
+        expect(split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
+        _expect_range("leaf_size", leaf_size, MAX_LEAF_SIZE)
+        _expect_range("max_depth", max_depth, MAX_DEPTH)
+        _expect_magnitude(mesh)
+        tree, depth = build_tree(mesh.vertices, mesh.faces, Rule(SPLITS[split], leaf_size, max_depth))
+        super().__init__(mesh, tree, depth, threads)
+
+
+class BruteForce(_Accelerator):
+    """Every ray against every face, through the octree's own triangle test: its honest baseline."""
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, threads: int | None = None) -> None:
+        mesh = Mesh(vertices, faces)  # type: ignore[arg-type]  # Mesh checks and converts
+        super().__init__(mesh, build_blocks(mesh.vertices, mesh.faces), 0, threads)
+
+    @classmethod
+    def from_mesh(cls, mesh: Mesh, *, threads: int | None = None) -> "BruteForce":
+        """The same over a mesh that is already checked."""
+        brute = cls.__new__(cls)
+        _Accelerator.__init__(brute, mesh, build_blocks(mesh.vertices, mesh.faces), 0, threads)
+        return brute
+
+
+def _expect_range(argument: str, value: object, largest: int) -> None:
+    good = isinstance(value, int | np.integer) and not isinstance(value, bool) and 1 <= value <= largest
+    expect(bool(good), argument, f"an integer from 1 to {largest}", repr(value))
+
+
+def _expect_magnitude(mesh: Mesh) -> None:
+    far = np.abs(mesh.vertices) > _LARGEST_COORDINATE
+    if far.any():
+        row = int(far.any(axis=1).argmax())
+        raise MeshError(f"vertices: expected coordinates within +-2^126, got {mesh.vertices[row].tolist()} in row {row}")

@@ -1,0 +1,76 @@
+"""Chunks of independent work on a pool of threads, for kernels that release the GIL.
+
+Safe for concurrent callers, which Numba's ``prange`` on its default layer is not. Ctrl-C stops between chunks.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from threading import Event, Lock
+
+from renderer.errors import expect
+
+
+def available_threads() -> int:
+    """Processors that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def checked_threads(threads: int | None) -> int:
+    """``threads``, or all available processors for None."""
+    if threads is None:
+        return available_threads()
+    expect(isinstance(threads, int) and threads >= 1, "threads", "an integer >= 1 or None", threads)
+    return threads
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="renderer")
+
+
+def for_chunks(
+    work: Callable[[int, int], None],
+    count: int,
+    size: int,
+    threads: int,
+    finished: Callable[[int], None] | None = None,
+) -> None:
+    """Call ``work(begin, end)`` for every chunk of ``range(count)``, on up to ``threads`` threads.
+
+    Chunks must write to places of their own; then the result does not depend on who ran what. ``finished(items)``
+    is called after each chunk, by one thread at a time. On an exception, Ctrl-C included, no further chunk starts,
+    the running ones end, and it is raised here.
+    """
+    begins = iter(range(0, count, size))
+    taking, stop = Lock(), Event()
+
+    def take_chunks() -> None:
+        while not stop.is_set():
+            with taking:
+                begin = next(begins, None)
+            if begin is None:
+                return
+            end = min(begin + size, count)
+            try:
+                work(begin, end)
+            except BaseException:
+                stop.set()
+                raise
+            if finished is not None:
+                with taking:
+                    finished(end - begin)
+
+    workers = min(threads, -(-count // size))
+    if workers <= 1:
+        take_chunks()
+        return
+    running = [_pool(workers).submit(take_chunks) for _ in range(workers)]
+    try:
+        for future in running:
+            future.result()
+    finally:
+        stop.set()
+        for future in running:
+            future.cancel() or future.exception()

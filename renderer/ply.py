@@ -1,0 +1,356 @@
+"""Reading and writing PLY: ASCII and both binary byte orders, polygons and triangle strips.
+
+Own code, because the readers at hand do not serve: plyfile reads mixed polygons and ASCII row by row in
+Python, and trimesh drops ``tristrips``. The format: Greg Turk, "The PLY Polygon File Format", 1994.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import MeshError
+from renderer.mesh import Float64Array, Mesh
+
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "float": "f4", "double": "f8", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_ByteOrder = Literal["<", ">", "="]
+_ASCII: _ByteOrder = "="  # its numbers are turned into native doubles
+_BYTE_ORDERS: dict[str, _ByteOrder] = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": _ASCII}
+_INDEX_NAMES = ("vertex_indices", "vertex_index")
+_TEXCOORD_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+
+# Real headers are a few hundred bytes; beyond this a missing end_header is certain enough to stop looking.
+_MAX_HEADER_BYTES = 1 << 20
+
+
+@dataclass(frozen=True)
+class _Property:
+    name: str
+    type: np.dtype[Any]  # as the header declares it
+    count_type: np.dtype[Any] | None  # of a list's length; None for a single value
+    stored: np.dtype[Any]  # as its values stand in the body
+    count_stored: np.dtype[Any] | None
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    count: int
+    properties: tuple[_Property, ...]
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One property of every row: ``values`` end to end; row r holds values[starts[r] : starts[r + 1]]."""
+
+    property: _Property
+    starts: NDArray[np.int64]
+    values: NDArray[Any]
+
+
+_Columns = dict[str, _Column]
+
+
+def parse_ply(content: bytes) -> Mesh:
+    """The mesh in a PLY file's content.
+
+    Faces come from the elements ``face`` (polygons are cut into fans from their first corner, right for
+    convex ones) and ``tristrips`` (-1 restarts a strip; every second triangle is turned; stitching triangles
+    without area stay), in the file's order. Vertex normals, colours (red, green, blue; unsigned integers are
+    divided by their type's maximum) and texture coordinates (s t, u v or texture_u texture_v) are kept; other
+    properties and elements are ignored.
+
+    Raises ``MeshError``, which does not know the file's name.
+    """
+    byte_order, elements, body_start = _parse_header(content)
+    if byte_order == _ASCII:
+        content, elements = _ascii_as_doubles(content[body_start:]), [_in_doubles(e) for e in elements]
+        body_start = 0
+    columns = _read_elements(content, body_start, elements, byte_order)
+    if "vertex" not in columns:
+        raise MeshError(f"expected an element 'vertex', got {', '.join(columns) or 'no element'}")
+    vertex = columns["vertex"]
+    positions = _vertex_columns(vertex, ("x", "y", "z"))
+    if positions is None:
+        raise MeshError(f"element vertex: expected properties x, y and z, got {', '.join(vertex) or 'none'}")
+    readers = {"face": _fans, "tristrips": _strips}
+    faces = [readers[e.name](_corners(e.name, columns[e.name])) for e in elements if e.name in readers]
+    texcoords = (_vertex_columns(vertex, names) for names in _TEXCOORD_NAMES)
+    return Mesh(
+        positions,
+        np.concatenate([np.empty((0, 3), np.int64), *faces]),
+        normals=_vertex_columns(vertex, ("nx", "ny", "nz")),
+        colors=_colors(vertex),
+        texcoords=next((pair for pair in texcoords if pair is not None), None),
+    )
+
+
+def format_ply(mesh: Mesh) -> bytes:
+    """Binary little-endian PLY of ``mesh``: float32 positions where those are exact, else double.
+
+    Normals and texture coordinates are doubles; colours are floats.
+    """
+    position = "f4" if mesh.is_float32 else "f8"
+    fields: list[tuple[str, str, NDArray[Any]]] = [
+        (axis, position, mesh.vertices[:, k]) for k, axis in enumerate("xyz")
+    ]
+    for names, type_, array in (
+        (("nx", "ny", "nz"), "f8", mesh.normals),
+        (("red", "green", "blue"), "f4", mesh.colors),
+        (("s", "t"), "f8", mesh.texcoords),
+    ):
+        if array is not None:
+            fields += [(field, type_, array[:, k]) for k, field in enumerate(names)]
+    vertices = np.empty(len(mesh.vertices), [(field, "<" + type_) for field, type_, _ in fields])
+    for field, _, column in fields:
+        vertices[field] = column
+    faces = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, mesh.faces
+    keywords = {"f4": "float", "f8": "double"}
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
+    header += [f"property {keywords[type_]} {field}" for field, type_, _ in fields]
+    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    return "\n".join(header).encode("ascii") + vertices.tobytes() + faces.tobytes()
+
+
+# --- header -------------------------------------------------------------------------------------------------
+
+
+def _parse_header(content: bytes) -> tuple[_ByteOrder, list[_Element], int]:
+    """Byte order, elements, and where the body starts."""
+    if re.match(rb"ply[ \t]*(\r\n|\r|\n)", content) is None:
+        raise MeshError(f"expected a first line 'ply', got {content[:16]!r}")
+    end = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n|\Z)").search(content, 0, _MAX_HEADER_BYTES)
+    if end is None:
+        raise MeshError("header: expected a line 'end_header', found none")
+    lines = content[: end.start()].decode("latin-1").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    byte_order: _ByteOrder | None = None
+    elements: list[tuple[str, int, list[_Property]]] = []
+    for number, line in enumerate(lines[1:], start=2):
+        match line.split():
+            case [] | ["comment" | "obj_info", *_]:
+                pass
+            case ["format", word, "1.0"] if word in _BYTE_ORDERS and byte_order is None:
+                byte_order = _BYTE_ORDERS[word]
+            case ["element", name, count] if re.fullmatch("[0-9]{1,18}", count):
+                if name in [other[0] for other in elements]:
+                    raise MeshError(f"header line {number}: element {name!r} stands twice")
+                elements.append((name, int(count), []))
+            case ["property", *words] if elements and (property_ := _parse_property(words)) is not None:
+                if property_.name in [other.name for other in elements[-1][2]]:
+                    raise MeshError(f"header line {number}: property {property_.name!r} stands twice")
+                elements[-1][2].append(property_)
+            case _:
+                raise MeshError(f"header line {number}: expected a PLY header line, got {line[:80]!r}")
+    if byte_order is None:
+        raise MeshError("header: expected a line 'format', found none")
+    return byte_order, [_Element(name, count, tuple(rows)) for name, count, rows in elements], end.end()
+
+
+def _parse_property(words: list[str]) -> _Property | None:
+    match words:
+        case ["list", count, value, name] if count in _TYPES and value in _TYPES and _TYPES[count][0] != "f":
+            type_, count_type = np.dtype(_TYPES[value]), np.dtype(_TYPES[count])
+            return _Property(name, type_, count_type, type_, count_type)
+        case [value, name] if value in _TYPES:
+            return _Property(name, np.dtype(_TYPES[value]), None, np.dtype(_TYPES[value]), None)
+    return None
+
+
+# --- body ---------------------------------------------------------------------------------------------------
+
+
+def _ascii_as_doubles(body: bytes) -> bytes:
+    """The numbers of an ASCII body as native doubles, which hold every PLY type: one reader serves both."""
+    tokens = body.split()
+    if b"_" in body:  # float() would take 1_000 for a number
+        raise MeshError("malformed number: '_' in the body")
+    try:
+        return np.fromiter(map(float, tokens), np.float64, len(tokens)).tobytes()
+    except ValueError as error:
+        raise MeshError(f"malformed number: {str(error)[:80]}") from error
+
+
+def _in_doubles(element: _Element) -> _Element:
+    double = np.dtype("f8")
+    swapped = [replace(p, stored=double, count_stored=p.count_type and double) for p in element.properties]
+    return replace(element, properties=tuple(swapped))
+
+
+def _read_elements(
+    content: bytes, position: int, elements: list[_Element], byte_order: _ByteOrder
+) -> dict[str, _Columns]:
+    columns: dict[str, _Columns] = {}
+    for element in elements:
+        # Refuse, before anything is allocated, a count that the rest of the file cannot hold.
+        least = sum((p.count_stored or p.stored).itemsize for p in element.properties)
+        if element.count * least > len(content) - position:
+            raise MeshError(f"truncated: too short for the {element.count} rows of element {element.name}")
+        columns[element.name], position = _read_rows(content, position, element, byte_order)
+    # Some writers pad; anything else after the last row means that the header is wrong.
+    if content[position:].strip(b"\0 \t\r\n"):
+        raise MeshError("expected the end of the file after the last element, got more")
+    return columns
+
+
+def _read_rows(
+    content: bytes, position: int, element: _Element, byte_order: _ByteOrder
+) -> tuple[_Columns, int]:
+    """The element's columns and where it ends.
+
+    Rows that all look like the first (triangles only, say) are strided views of ``content``. Otherwise
+    Python walks from list length to list length, about half a second for a million faces.
+    """
+    if not element.properties:
+        return {}, position
+    rows = element.count
+    starts, lengths, end = _walk(content, position, element, byte_order, min(rows, 1))
+    stride = end - position
+    uniform = rows > 0 and rows * stride <= len(content) - position
+    columns: _Columns = {}
+    for k, p in enumerate(element.properties if uniform else ()):
+        if p.count_stored is not None:
+            at = int(starts[0, k]) - p.count_stored.itemsize
+            count_type = p.count_stored.newbyteorder(byte_order)
+            counts: NDArray[Any] = np.ndarray((rows,), count_type, content, at, (stride,))
+            uniform = uniform and bool((counts == lengths[0, k]).all())
+        shape, strides = (rows, int(lengths[0, k])), (stride, p.stored.itemsize)
+        values: NDArray[Any] = np.ndarray(
+            shape, p.stored.newbyteorder(byte_order), content, int(starts[0, k]), strides
+        )
+        columns[p.name] = _Column(p, np.arange(rows + 1) * lengths[0, k], values.reshape(-1))
+    if uniform:
+        return columns, position + rows * stride
+    starts, lengths, end = _walk(content, position, element, byte_order, rows)
+    return {
+        p.name: _gathered(content, p, starts[:, k], lengths[:, k], byte_order)
+        for k, p in enumerate(element.properties)
+    }, end
+
+
+def _walk(
+    content: bytes, position: int, element: _Element, byte_order: _ByteOrder, rows: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+    """Where each property's values start and how many there are, (rows, properties), and where the rows end."""
+    steps = [
+        (p.count_stored and struct.Struct(byte_order + p.count_stored.char), p.stored.itemsize)
+        for p in element.properties
+    ]
+    starts: list[int] = []
+    lengths: list[int] = []
+    size = len(content)
+    for row in range(rows):
+        for count_format, item_size in steps:
+            length = 1
+            if count_format is not None:
+                if position + count_format.size > size:
+                    raise MeshError(f"truncated: the file ends in row {row} of element {element.name}")
+                (length,) = count_format.unpack_from(content, position)
+                position += count_format.size
+                if not 0 <= length < 2**32 or length % 1:
+                    raise MeshError(f"element {element.name}: list length {length} in row {row}")
+            starts.append(position)
+            lengths.append(length)
+            position += int(length) * item_size
+            if position > size:
+                raise MeshError(f"truncated: the file ends in row {row} of element {element.name}")
+    shape = (rows, len(steps))
+    return np.array(starts, np.int64).reshape(shape), np.array(lengths, np.int64).reshape(shape), position
+
+
+def _gathered(
+    content: bytes,
+    property_: _Property,
+    starts: NDArray[np.int64],
+    lengths: NDArray[np.int64],
+    byte_order: _ByteOrder,
+) -> _Column:
+    """A column whose values lie at uneven places of ``content``."""
+    firsts = np.concatenate([[0], np.cumsum(lengths)])
+    size = property_.stored.itemsize
+    places = np.repeat(starts - firsts[:-1] * size, lengths) + np.arange(firsts[-1]) * size
+    scattered = np.frombuffer(content, np.uint8)[places[:, None] + np.arange(size)]
+    return _Column(property_, firsts, scattered.reshape(-1).view(property_.stored.newbyteorder(byte_order)))
+
+
+# --- columns to arrays --------------------------------------------------------------------------------------
+
+
+def _vertex_columns(vertex: _Columns, names: tuple[str, ...]) -> Float64Array | None:
+    """(V, len(names)) float64, or None where one is missing."""
+    columns = [vertex[name] for name in names if name in vertex and vertex[name].property.count_type is None]
+    if len(columns) < len(names):
+        return None
+    return np.stack([column.values for column in columns], axis=1).astype(np.float64)
+
+
+def _colors(vertex: _Columns) -> NDArray[np.float32] | None:
+    names = ("red", "green", "blue")
+    colors = _vertex_columns(vertex, names)
+    if colors is None:
+        return None
+    types = [vertex[name].property.type for name in names]
+    if any(type_.kind == "i" for type_ in types):
+        raise MeshError(f"element vertex: expected colours of an unsigned or floating type, got {types[0]}")
+    scale = [1 if type_.kind == "f" else np.iinfo(type_).max for type_ in types]
+    return (colors / scale).astype(np.float32)
+
+
+def _corners(element: str, columns: _Columns) -> _Column:
+    """The element's list of vertex indices, as int64."""
+    named = [columns[name] for name in _INDEX_NAMES if name in columns]
+    lists = [column for column in named if column.property.count_type is not None]
+    if not lists:
+        names = ", ".join(columns) or "none"
+        raise MeshError(f"element {element}: expected a list {' or '.join(_INDEX_NAMES)}, got {names}")
+    values = lists[0].values
+    if values.dtype.kind == "f":
+        whole = np.abs(values) < 2**53  # false for NaN and inf too
+        whole &= np.floor(values, where=whole, out=np.zeros_like(values)) == values
+        if not whole.all():
+            raise MeshError(f"element {element}: expected whole vertex indices, got {values[~whole][0]}")
+    return replace(lists[0], values=values.astype(np.int64))
+
+
+def _fans(polygons: _Column) -> NDArray[np.int64]:
+    """(F, 3) triangles; polygon a b c d ... becomes abc, acd, ..."""
+    lengths = np.diff(polygons.starts)
+    if (lengths < 3).any():
+        row = int((lengths < 3).argmax())
+        raise MeshError(f"element face: expected at least 3 vertices, got {lengths[row]} in row {row}")
+    cuts = lengths - 2
+    firsts = np.repeat(polygons.starts[:-1], cuts)
+    steps = np.arange(cuts.sum()) - np.repeat(np.cumsum(cuts) - cuts, cuts) + 1
+    triangles: NDArray[np.int64] = polygons.values[
+        np.stack([firsts, firsts + steps, firsts + steps + 1], axis=1)
+    ]
+    return triangles
+
+
+def _strips(strips: _Column) -> NDArray[np.int64]:
+    """(F, 3) triangles; strip a b c d ... becomes abc, cbd, ..."""
+    values = strips.values
+    restarts = values == -1
+    places = np.arange(len(values))
+    begins = restarts.copy()
+    begins[strips.starts[:-1][strips.starts[:-1] < len(values)]] = True
+    # Each place's strip is named by where it begins: a row's first place, or a restart's own.
+    strip = np.maximum.accumulate(np.where(begins, places, 0))
+    sizes = np.bincount(strip[~restarts])
+    if ((sizes == 1) | (sizes == 2)).any():
+        raise MeshError("element tristrips: expected at least 3 vertices in each strip, got 1 or 2")
+    whole = (strip[2:] == strip[:-2]) & ~restarts[:-2]
+    first = places[:-2][whole]
+    turned = (first - strip[:-2][whole] - restarts[strip[:-2][whole]]) % 2 == 1
+    triangles: NDArray[np.int64] = values[np.stack([first, first + 1, first + 2], axis=1)]
+    triangles[turned] = triangles[turned][:, [1, 0, 2]]
+    return triangles

@@ -1,0 +1,125 @@
+"""Batches of rays against a tree: checks at the boundary, chunks on threads, and the results."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.batch import any_chunk, closest_chunk, first_bad_ray
+from renderer.errors import expect
+from renderer.layout import Tree
+from renderer.mesh import Mesh
+from renderer.parallel import for_chunks
+
+# Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
+# taking a chunk costs nothing beside its 1 to 10 ms of tracing.
+CHUNK = 8192
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Closest hits, one row a ray.
+
+    t     (n,) float64, in units of |direction|; inf on a miss
+    face  (n,) int64; -1 on a miss
+    u, v  (n,) float64, P = (1 - u - v) p0 + u p1 + v p2; nan on a miss
+    """
+
+    t: NDArray[np.float64]
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    _mesh: Mesh = field(repr=False)
+
+    @property
+    def hit(self) -> NDArray[np.bool_]:
+        """(n,) bool."""
+        return self.face >= 0
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """Hit points from the barycentrics, (n, 3) float64; nan on a miss."""
+        points = np.full((len(self.t), 3), np.nan)
+        hit = self.hit
+        corners = self._mesh.vertices[self._mesh.faces[self.face[hit]]]
+        u, v = self.u[hit, None], self.v[hit, None]
+        points[hit] = (1.0 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
+        return points
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit geometric normals by the faces' winding, (n, 3) float64; nan on a miss."""
+        normals = np.full((len(self.t), 3), np.nan)
+        hit = self.hit
+        corners = self._mesh.vertices[self._mesh.faces[self.face[hit]]]
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals[hit] = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+        return normals
+
+
+def _vectors(argument: str, values: ArrayLike) -> NDArray[np.float64]:
+    array = np.asarray(values)
+    expect(array.dtype.kind in "fiu", argument, "real numbers", f"dtype {array.dtype}")
+    expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
+    return np.ascontiguousarray(array, np.float64)
+
+
+def _bound(argument: str, value: ArrayLike, count: int) -> NDArray[np.float64]:
+    """One bound for all rays or one each, as a (1,) or (n,) array."""
+    array = np.asarray(value)
+    expect(array.dtype.kind in "fiu", argument, "real numbers", f"dtype {array.dtype}")
+    expect(array.ndim == 0 or array.shape == (count,), argument, f"a number or shape ({count},)", f"shape {array.shape}")
+    array = np.ascontiguousarray(np.atleast_1d(array), np.float64)
+    bad = np.isnan(array) | (array < 0.0)
+    if bad.any():
+        row = int(bad.argmax())
+        expect(False, argument, "numbers >= 0", f"{array[row]} in row {row}")
+    return array
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Rays that passed the checks; build them with ``check_rays``."""
+
+    origins: NDArray[np.float64]
+    directions: NDArray[np.float64]
+    t_min: NDArray[np.float64]
+    t_max: NDArray[np.float64]
+
+
+def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike) -> Rays:
+    """Check a batch once. Raises ``ValueError`` naming the argument and, for a bad ray, its row."""
+    origins, directions = _vectors("origins", origins), _vectors("directions", directions)
+    expect(len(origins) == len(directions), "directions", f"{len(origins)} rows as in origins", len(directions))
+    low, high = _bound("t_min", t_min, len(origins)), _bound("t_max", t_max, len(origins))
+    expect(bool(np.isfinite(low).all()), "t_min", "finite numbers", "inf")
+    row = first_bad_ray(origins, directions)
+    if row >= 0:
+        bad_origin = not np.isfinite(origins[row]).all()
+        name, values = ("origins", origins) if bad_origin else ("directions", directions)
+        expected = "finite numbers" if bad_origin else "finite, non-zero vectors"
+        expect(False, name, expected, f"{values[row].tolist()} in row {row}")
+    return Rays(origins, directions, low, high)
+
+
+def closest_hits(tree: Tree, depth: int, rays: Rays, mesh: Mesh, threads: int) -> Hits:
+    """Closest hits of a batch; ``depth`` 0 means that there are no nodes and every block is tested."""
+    count = len(rays.origins)
+    out = (np.empty(count), np.empty(count, np.int64), np.empty(count), np.empty(count))
+    _run(closest_chunk, tree, depth, rays, out, threads)
+    return Hits(*out, mesh)
+
+
+def any_hits(tree: Tree, depth: int, rays: Rays, threads: int) -> NDArray[np.bool_]:
+    """Whether each ray of a batch hits anything; ``depth`` as in ``closest_hits``."""
+    out = np.empty(len(rays.origins), np.bool_)
+    _run(any_chunk, tree, depth, rays, out, threads)
+    return out
+
+
+def _run(chunk: Any, tree: Tree, depth: int, rays: Rays, out: Any, threads: int) -> None:
+    arrays = (rays.origins, rays.directions, rays.t_min, rays.t_max)
+    for_chunks(
+        lambda begin, end: chunk(tree, depth, depth == 0, arrays, out, begin, end), len(rays.origins), CHUNK, threads
+    )

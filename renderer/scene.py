@@ -1,0 +1,235 @@
+"""Scenes: what a TOML file may say, and the world-space triangles that it means.
+
+Units are scene units and degrees, y is up. Paths are relative to the scene file. An unknown key, a missing
+file or a bad value is one ``SceneError`` that names the file, the key's path, what was expected and what stood there.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from renderer.camera import FiniteVector, OrthographicCamera, PerspectiveCamera, sample_offsets
+from renderer.errors import MeshError, SceneError
+from renderer.light import Color, DirectionalLight, PointLight
+from renderer.material import Dielectric, Material, Mirror, Phong
+from renderer.mesh import Mesh
+from renderer.mesh_io import load_mesh
+
+
+def _typed(default: str) -> BeforeValidator:
+    """Fill in ``type`` where a table leaves it out, so that the union's error names the right kind."""
+
+    def fill(value: Any) -> Any:
+        return {"type": default, **value} if isinstance(value, dict) else value
+
+    return BeforeValidator(fill)
+
+
+AnyCamera = Annotated[
+    Annotated[PerspectiveCamera | OrthographicCamera, Field(discriminator="type")], _typed("perspective")
+]
+AnyMaterial = Annotated[Annotated[Phong | Mirror | Dielectric, Field(discriminator="type")], _typed("phong")]
+AnyLight = Annotated[DirectionalLight | PointLight, Field(discriminator="type")]
+_Pixels = Annotated[int, Field(ge=1, le=16384)]
+
+
+def _uniform(value: Any) -> Any:
+    return (value, value, value) if isinstance(value, int | float) else value
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+
+class RenderSettings(_Table):
+    """Defaults of ``render``; each can be given there instead.
+
+    ``max_depth`` is the number of bounces: 0 shows what the eye sees directly. ``min_weight`` ends a ray whose
+    largest weight is below it; it bounds no error when rays branch, because the cut ones may be many.
+    """
+
+    resolution: tuple[_Pixels, _Pixels] = (512, 512)
+    samples: int = 1
+    max_depth: Annotated[int, Field(ge=0, le=64)] = 6
+    min_weight: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _square_samples(self) -> "RenderSettings":
+        sample_offsets(self.samples)
+        return self
+
+
+class SceneObject(_Table):
+    """A mesh in the world: scaled, then turned about x, y and z (degrees, in this order), then moved."""
+
+    mesh: Path | Mesh
+    material: str
+    normals: Literal["flat", "smooth"] = "flat"
+    scale: Annotated[FiniteVector, BeforeValidator(_uniform)] = (1.0, 1.0, 1.0)
+    rotate: FiniteVector = (0.0, 0.0, 0.0)
+    translate: FiniteVector = (0.0, 0.0, 0.0)
+
+    def matrix(self) -> NDArray[np.float64]:
+        """Object to world, (4, 4) float64."""
+        result = np.eye(4)
+        linear = np.diag(self.scale)
+        for axis, degrees in enumerate(self.rotate):
+            linear = _rotation(axis, degrees) @ linear
+        result[:3, :3] = linear
+        result[:3, 3] = self.translate
+        return result
+
+
+class Floor(_Table):
+    """The plane y = 0 cut to the rectangle from ``min`` to ``max`` (x, z), tiled with its materials in turn."""
+
+    min: tuple[float, float]
+    max: tuple[float, float]
+    materials: Annotated[tuple[str, ...], Field(min_length=1, max_length=2)]
+    squares: tuple[Annotated[int, Field(ge=1, le=1000)], Annotated[int, Field(ge=1, le=1000)]] = (1, 1)
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> "Floor":
+        if not (np.isfinite([*self.min, *self.max]).all() and self.min[0] < self.max[0] and self.min[1] < self.max[1]):
+            raise ValueError("expected finite min < max in x and z")
+        return self
+
+
+@dataclass(frozen=True)
+class Instance:
+    """One mesh in world space with its material's name; ``smooth`` asks for interpolated normals."""
+
+    mesh: Mesh
+    material: str
+    smooth: bool
+
+
+class Scene(_Table):
+    """Everything that a picture needs. Read one with ``load_scene`` or build it from keyword arguments."""
+
+    camera: AnyCamera
+    materials: dict[str, AnyMaterial]
+    lights: tuple[AnyLight, ...] = ()
+    objects: tuple[SceneObject, ...] = ()
+    floor: Floor | None = None
+    ambient: Color = (0.0, 0.0, 0.0)
+    background: Color = (0.0, 0.0, 0.0)
+    render: RenderSettings = RenderSettings()
+
+    @model_validator(mode="after")
+    def _materials_exist(self) -> "Scene":
+        used = [(f"objects.{i}.material", o.material) for i, o in enumerate(self.objects)]
+        used += [("floor.materials", name) for name in (self.floor.materials if self.floor else ())]
+        for where, name in used:
+            if name not in self.materials:
+                raise ValueError(f"{where}: expected one of {sorted(self.materials)}, got {name!r}")
+        return self
+
+    @cached_property
+    def instances(self) -> tuple[Instance, ...]:
+        """The world-space meshes: the objects in their order, then the floor's (one for each material)."""
+        placed = [
+            Instance(_place(_loaded(o.mesh), o.matrix()), o.material, o.normals == "smooth") for o in self.objects
+        ]
+        if self.floor is not None:
+            placed += [Instance(m, name, False) for m, name in _floor_meshes(self.floor)]
+        return tuple(placed)
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read and check a scene file, and load its meshes. Raises ``SceneError`` or ``MeshError``."""
+    path = Path(path)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise SceneError(f"{path}: expected TOML, got a syntax error: {error}") from None
+    for entry in table.get("objects") or [] if isinstance(table.get("objects"), list) else []:
+        if isinstance(entry, dict) and isinstance(entry.get("mesh"), str):
+            entry["mesh"] = path.parent / entry["mesh"]
+    try:
+        scene = Scene.model_validate(table)
+    except ValidationError as error:
+        raise SceneError(f"{path}: {_first_fault(error)}") from None
+    try:
+        _ = scene.instances
+    except MeshError as error:
+        raise SceneError(f"{path}: objects: {error}") from None
+    return scene
+
+
+def _first_fault(error: ValidationError) -> str:
+    """One line for the first thing that is wrong, with the number of others."""
+    faults = error.errors()
+    first = faults[0]
+    # The names of the union's members are ours, not keys of the file.
+    inner = {"perspective", "orthographic", "phong", "mirror", "dielectric", "directional", "point", "function-before"}
+    keys = [str(k) for k in first["loc"] if not (str(k) in inner or "is-instance" in str(k))]
+    where = ".".join(keys) + ": " if keys else ""
+    message = first["msg"].removeprefix("Value error, ")
+    got = "" if "got" in message or isinstance(first["input"], dict) else f", got {first['input']!r}"
+    if first["type"] == "extra_forbidden":
+        message, got = "unknown key", f" (its value is {first['input']!r})"
+    others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return f"{where}{message}{got}{others}"
+
+
+def _loaded(mesh: Path | Mesh) -> Mesh:
+    return mesh if isinstance(mesh, Mesh) else load_mesh(mesh)
+
+
+def _place(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
+    """Move ``mesh`` to the world, in float32 where that costs no more than the file's own rounding did.
+
+    A float32 file knows its vertices to 2^-24 of its extent. While the world position is within four extents of
+    the origin, rounding the result to float32 again adds at most 2^-22 of the extent: the same order, and every
+    reference then gets the identical triangles. Farther out the float64 positions are kept.
+    """
+    if np.array_equal(matrix, np.eye(4)):
+        return mesh
+    world = mesh.transformed(matrix)
+    if not mesh.is_float32 or not len(world.vertices):
+        return world
+    rounded = world.vertices.astype(np.float32).astype(np.float64)
+    if np.abs(rounded - world.vertices).max() > 2.0**-22 * np.max(world.extent):
+        return world
+    return Mesh(rounded, world.faces, world.normals, world.colors, world.texcoords, world.name)
+
+
+def _rotation(axis: int, degrees: float) -> NDArray[np.float64]:
+    """Rotation matrix about a coordinate axis, counter-clockwise seen against it, (3, 3) float64."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    result = np.eye(3)
+    result[i, i], result[i, j], result[j, i], result[j, j] = c, -s, s, c
+    return result
+
+
+def _floor_meshes(floor: Floor) -> list[tuple[Mesh, str]]:
+    """The floor's squares as one mesh a material, facing up, with the squares' edges shared exactly."""
+    nx, nz = floor.squares
+    x = np.linspace(floor.min[0], floor.max[0], nx + 1).astype(np.float32).astype(np.float64)
+    z = np.linspace(floor.min[1], floor.max[1], nz + 1).astype(np.float32).astype(np.float64)
+    grid_z, grid_x = np.meshgrid(z, x, indexing="ij")
+    vertices = np.stack([grid_x, np.zeros_like(grid_x), grid_z], axis=-1).reshape(-1, 3)
+    row, column = (a.ravel() for a in np.meshgrid(np.arange(nz), np.arange(nx), indexing="ij"))
+    a = row * (nx + 1) + column
+    b, c, d = a + nx + 1, a + nx + 2, a + 1
+    faces = np.stack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)], 1)
+    color = (row + column) % len(floor.materials)
+    meshes = []
+    for index, name in enumerate(floor.materials):
+        chosen = faces[color == index].reshape(-1, 3)
+        if len(chosen):
+            meshes.append((Mesh(vertices, chosen.astype(np.int32), name="floor"), name))
+    return meshes
+
+
+__all__ = ["Floor", "Instance", "Material", "RenderSettings", "Scene", "SceneObject", "load_scene"]

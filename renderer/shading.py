@@ -1,0 +1,112 @@
+"""Phong, Fresnel, reflection, refraction, and the offset of spawned rays, for kernels.
+
+Vectors are tuples of float64. ``n`` is the unit normal on the side of the incoming ray, so d . n <= 0.
+"""
+
+import math
+
+import numpy as np
+
+from renderer.jit import kernel
+from renderer.vec3 import add, dot, scale, sub
+
+_ROUNDOFF = 2.0**-53
+# gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).
+_GAMMA7 = 7.0 * _ROUNDOFF / (1.0 - 7.0 * _ROUNDOFF)
+# The next test of the same plane errs too: per vertex 3 roundings of the shear, 2 more and a cancellation in each
+# edge function, 3 in the weighted sum of the distances: 16 u of the largest distance to a vertex covers them.
+_GAMMA16 = 16.0 * _ROUNDOFF / (1.0 - 16.0 * _ROUNDOFF)
+# Mitsuba 3's RayEpsilon: 1500 times the unit roundoff of float32.
+MITSUBA_EPSILON = 1500.0 * 2.0**-24
+# ``offset`` below 0 asks for the error-bounded rule.
+BOUNDED = -1.0
+
+
+@kernel
+def reflect(d, n):
+    """The mirror image of the unit direction d."""
+    return sub(d, scale(n, 2.0 * dot(d, n)))
+
+
+@kernel
+def refract(d, n, n1, n2):
+    """Snell's n1 sin i = n2 sin t: (cos t, unit direction), with cos t < 0 for total internal reflection.
+
+    Stable on both sides of the critical angle: 1 - eta^2 s^2 is never formed as a difference of near-equal
+    numbers. With c = |d . n|, q = d - (d . n) n, s = |q| it is (1 - eta s)(1 + eta s) for s^2 < 1/2, and
+    (eta c)^2 + (1 - eta)(1 + eta) with 1 - eta = (n2 - n1) / n2 otherwise.
+    """
+    eta = n1 / n2
+    dn = dot(d, n)
+    q = sub(d, scale(n, dn))
+    s2 = dot(q, q)
+    if s2 < 0.5:
+        s = math.sqrt(s2)
+        cos2 = (1.0 - eta * s) * (1.0 + eta * s)
+    else:
+        cos2 = (eta * dn) * (eta * dn) + ((n2 - n1) / n2) * (1.0 + eta)
+    if cos2 < 0.0:
+        return -1.0, d
+    cos_t = math.sqrt(cos2)
+    return cos_t, sub(scale(q, eta), scale(n, cos_t))
+
+
+@kernel
+def fresnel(cos_i, cos_t, n1, n2):
+    """Unpolarised reflectance of a dielectric boundary."""
+    s = (n1 * cos_i - n2 * cos_t) / (n1 * cos_i + n2 * cos_t)
+    p = (n1 * cos_t - n2 * cos_i) / (n1 * cos_t + n2 * cos_i)
+    return 0.5 * (s * s + p * p)
+
+
+@kernel
+def specular(d, n, light, shininess):
+    """(R . V)^shininess with R = 2 N (N . L) - L and V = -d, 0 where R . V <= 0.
+
+    exp(n log1p(-|R - V|^2 / 2)) keeps its accuracy where R . V is close to 1 and the exponent large.
+    """
+    r = sub(scale(n, 2.0 * dot(n, light)), light)
+    if -dot(r, d) <= 0.0:
+        return 0.0
+    difference = add(r, d)
+    return math.exp(shininess * math.log1p(max(-0.5 * dot(difference, difference), -1.0)))
+
+
+@kernel
+def offset_distance(p, p0, p1, p2, u, v, n_g):
+    """How far p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
+
+    The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
+    matters where the first vanishes: on a plane through the origin.
+    """
+    w, distance, reach = 1.0 - u - v, 0.0, 0.0
+    for k in range(3):
+        distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
+        reach = max(reach, max(abs(p0[k] - p[k]), max(abs(p1[k] - p[k]), abs(p2[k] - p[k]))))
+    return _GAMMA7 * distance + _GAMMA16 * reach
+
+
+@kernel
+def _away(x, step):
+    """x + step, rounded at least one float64 further in the direction of ``step``."""
+    y = x + step
+    if step > 0.0:
+        return np.nextafter(y, np.inf)
+    if step < 0.0:
+        return np.nextafter(y, -np.inf)
+    return y
+
+
+@kernel
+def spawn_origin(p, error, n_g, w, offset):
+    """Where a ray from the surface point p in direction w starts, so that it does not meet that surface again.
+
+    ``offset`` < 0: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away.
+    Otherwise Mitsuba's rule, (1 + max|p|) ``offset`` along n_g.
+    """
+    side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
+    if offset >= 0.0:
+        distance = (1.0 + max(abs(p[0]), max(abs(p[1]), abs(p[2])))) * offset
+        return add(p, scale(n_g, side * distance))
+    step = scale(n_g, side * error)
+    return (_away(p[0], step[0]), _away(p[1], step[1]), _away(p[2], step[2]))

@@ -1,0 +1,228 @@
+"""Short vectors as values in Numba kernels: 8 x float32, 4 x float64 and their masks.
+
+This is the one file that touches llvmlite. A vector lives in a register; it is made by ``load*`` or ``splat*`` and
+leaves through ``store``, ``lane`` or ``movemask``. ``+ - *`` and the comparisons work lane by lane and give a mask;
+masks know ``&`` and ``|``. No operation carries fast-math flags, so nothing is contracted to a fused multiply-add:
+the signs of the edge functions in ``intersect`` depend on that.
+"""
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+
+class Vector(types.Type):
+    """``lanes`` values of ``scalar`` side by side; ``mask`` is a vector of truth values."""
+
+    def __init__(self, scalar: str, lanes: int) -> None:
+        self.scalar = scalar
+        self.lanes = lanes
+        super().__init__(name=f"{scalar}x{lanes}")
+
+
+F32X8 = Vector("f32", 8)
+F64X4 = Vector("f64", 4)
+MASK8 = Vector("mask", 8)
+MASK4 = Vector("mask", 4)
+
+_ELEMENT = {"f32": ir.FloatType(), "f64": ir.DoubleType(), "mask": ir.IntType(1)}
+_MASK_OF = {8: MASK8, 4: MASK4}
+
+
+def _llvm(vector: Vector) -> ir.VectorType:
+    return ir.VectorType(_ELEMENT[vector.scalar], vector.lanes)
+
+
+@register_model(Vector)
+class _VectorModel(models.PrimitiveModel):
+    def __init__(self, dmm: Any, fe_type: Vector) -> None:
+        super().__init__(dmm, fe_type, _llvm(fe_type))
+
+
+def _binary(op: Any, emit: Any) -> None:
+    """Give ``op`` a meaning for two equal float vectors."""
+
+    @infer_global(op)
+    class _Typing(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if len(args) == 2 and isinstance(args[0], Vector) and args[0] == args[1] and args[0].scalar != "mask":
+                return signature(args[0], *args)
+            return None
+
+    @lower_builtin(op, Vector, Vector)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return emit(builder, args[0], args[1])
+
+
+def _comparison(op: Any, predicate: str) -> None:
+    @infer_global(op)
+    class _Typing(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if len(args) == 2 and isinstance(args[0], Vector) and args[0] == args[1] and args[0].scalar != "mask":
+                return signature(_MASK_OF[args[0].lanes], *args)
+            return None
+
+    @lower_builtin(op, Vector, Vector)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.fcmp_ordered(predicate, args[0], args[1])
+
+
+def _logic(op: Any, emit: Any) -> None:
+    @infer_global(op)
+    class _Typing(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if len(args) == 2 and isinstance(args[0], Vector) and args[0] == args[1] and args[0].scalar == "mask":
+                return signature(args[0], *args)
+            return None
+
+    @lower_builtin(op, Vector, Vector)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return emit(builder, args[0], args[1])
+
+
+_binary(operator.add, lambda b, x, y: b.fadd(x, y))
+_binary(operator.sub, lambda b, x, y: b.fsub(x, y))
+_binary(operator.mul, lambda b, x, y: b.fmul(x, y))
+_binary(operator.truediv, lambda b, x, y: b.fdiv(x, y))
+_comparison(operator.lt, "<")
+_comparison(operator.le, "<=")
+_comparison(operator.gt, ">")
+_comparison(operator.ge, ">=")
+_comparison(operator.ne, "!=")
+_logic(operator.and_, lambda b, x, y: b.and_(x, y))
+_logic(operator.or_, lambda b, x, y: b.or_(x, y))
+
+
+def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any, vector: ir.VectorType) -> Any:
+    """Address of element ``index`` of a one-dimensional array, as a pointer to a vector."""
+    data = cgutils.create_struct_proxy(array_type)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
+
+
+def _load(builder: Any, pointer: Any, array_type: Any) -> Any:
+    loaded = builder.load(pointer)
+    loaded.align = array_type.dtype.bitwidth // 8
+    return loaded
+
+
+@intrinsic
+def load8(typingctx, array, index):
+    """Eight float32 from a one-dimensional float32 array, starting at ``index``."""
+
+    def codegen(context, builder, sig, args):
+        return _load(builder, _pointer(context, builder, sig.args[0], *args, _llvm(F32X8)), sig.args[0])
+
+    return F32X8(array, types.intp), codegen
+
+
+@intrinsic
+def load4(typingctx, array, index):
+    """Four values from a float32 or float64 array as float64; float32 widens exactly."""
+
+    def codegen(context, builder, sig, args):
+        element = _ELEMENT["f32"] if sig.args[0].dtype == types.float32 else _ELEMENT["f64"]
+        pointer = _pointer(context, builder, sig.args[0], *args, ir.VectorType(element, 4))
+        loaded = _load(builder, pointer, sig.args[0])
+        return builder.fpext(loaded, _llvm(F64X4)) if element == _ELEMENT["f32"] else loaded
+
+    return F64X4(array, types.intp), codegen
+
+
+@intrinsic
+def store(typingctx, array, index, vector):
+    """Write a vector's lanes to ``array[index:index + lanes]``; the element types must agree."""
+
+    def codegen(context, builder, sig, args):
+        pointer = _pointer(context, builder, sig.args[0], args[0], args[1], _llvm(sig.args[2]))
+        builder.store(args[2], pointer, align=sig.args[0].dtype.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, vector), codegen
+
+
+def _splat(vector: Vector) -> Any:
+    def codegen(context, builder, sig, args):
+        one = builder.insert_element(ir.Constant(_llvm(vector), ir.Undefined), args[0], ir.IntType(32)(0))
+        order = ir.Constant(ir.VectorType(ir.IntType(32), vector.lanes), [0] * vector.lanes)
+        return builder.shuffle_vector(one, one, order)
+
+    return codegen
+
+
+@intrinsic
+def splat8(typingctx, value):
+    """One float32 in all eight lanes."""
+    return F32X8(types.float32), _splat(F32X8)
+
+
+@intrinsic
+def splat4(typingctx, value):
+    """One float64 in all four lanes."""
+    return F64X4(types.float64), _splat(F64X4)
+
+
+@intrinsic
+def select(typingctx, mask, chosen, other):
+    """Lane by lane: ``chosen`` where the mask is set, else ``other``."""
+
+    def codegen(context, builder, sig, args):
+        return builder.select(args[0], args[1], args[2])
+
+    return chosen(mask, chosen, other), codegen
+
+
+@intrinsic
+def lane(typingctx, vector, index):
+    """The value in one lane; the index may vary at run time."""
+    result = types.float32 if vector.scalar == "f32" else types.float64
+
+    def codegen(context, builder, sig, args):
+        return builder.extract_element(args[0], builder.trunc(args[1], ir.IntType(32)))
+
+    return result(vector, types.intp), codegen
+
+
+@intrinsic
+def movemask(typingctx, mask):
+    """The mask as an integer, lane i in bit i."""
+
+    def codegen(context, builder, sig, args):
+        bits = builder.bitcast(args[0], ir.IntType(sig.args[0].lanes))
+        return builder.zext(bits, ir.IntType(64))
+
+    return types.int64(mask), codegen
+
+
+@intrinsic
+def lowest_bit(typingctx, bits):
+    """Index of the lowest set bit of a non-zero int64."""
+
+    def codegen(context, builder, sig, args):
+        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
+
+    return types.int64(types.int64), codegen
+
+
+@intrinsic
+def float_bits(typingctx, value):
+    """The bits of a float32 as a non-negative int64; for values >= 0 they sort as the values do."""
+
+    def codegen(context, builder, sig, args):
+        return builder.zext(builder.bitcast(args[0], ir.IntType(32)), ir.IntType(64))
+
+    return types.int64(types.float32), codegen
+
+
+@intrinsic
+def bits_float(typingctx, bits):
+    """The float32 whose bits are the low half of an int64."""
+
+    def codegen(context, builder, sig, args):
+        return builder.bitcast(builder.trunc(args[0], ir.IntType(32)), ir.FloatType())
+
+    return types.float32(types.int64), codegen

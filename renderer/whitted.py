@@ -1,0 +1,278 @@
+"""The radiance of one camera ray: Whitted's recursion as a loop over an explicit stack of weighted rays.
+
+I(x) = k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light + k_r I(reflected) + k_t I(refracted)
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.jit import kernel
+from renderer.layout import Tree
+from renderer.light import DIRECTIONAL
+from renderer.material import (
+    AMBIENT,
+    DIELECTRIC,
+    DIFFUSE,
+    IOR,
+    KIND,
+    PHONG,
+    REFLECTANCE,
+    SHININESS,
+    SPECULAR,
+    TRANSMITTANCE,
+)
+from renderer.shading import fresnel, offset_distance, reflect, refract, spawn_origin, specular
+from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute
+from renderer.vec3 import (
+    add,
+    barycentric,
+    columns3,
+    cross,
+    dot,
+    normalized,
+    row3,
+    scale,
+    sub,
+    times,
+)
+
+# One waiting ray: origin, direction, weight, depth.
+_RAY_WORDS = 10
+
+
+class World(NamedTuple):
+    """What the kernel reads of a scene; rows of materials and lights as in ``material`` and ``light``.
+
+    vertices (V, 3), normals (V, 3) or (0, 3), faces (F, 3) int32, material (F,) int32, smooth (F,) bool,
+    materials (M, MATERIAL_COLUMNS), lights (L, LIGHT_COLUMNS), colors (2, 3): ambient and background.
+    """
+
+    vertices: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    material: NDArray[np.int32]
+    smooth: NDArray[np.bool_]
+    materials: NDArray[np.float64]
+    lights: NDArray[np.float64]
+    colors: NDArray[np.float64]
+
+
+class Accelerator(NamedTuple):
+    """The tree with its depth; depth 0 means that every block is tested."""
+
+    tree: Tree
+    depth: int
+
+
+class Settings(NamedTuple):
+    """Bounces, the weight below which a ray ends, and the offset rule of ``shading.spawn_origin``."""
+
+    max_depth: int
+    min_weight: float
+    offset: float
+
+
+class Scratch(NamedTuple):
+    """Memory of one thread: nodes that wait in a traversal, rays that wait in a recursion."""
+
+    nodes: NDArray[np.int64]
+    rays: NDArray[np.float64]
+
+
+class Surface(NamedTuple):
+    """Where a ray met the scene: point, its distance bound, geometric and shading normal, material's row."""
+
+    p: tuple
+    error: float
+    n_g: tuple
+    n_s: tuple
+    material: int
+
+
+@kernel
+def make_scratch(depth, max_depth):
+    """Scratch for a tree and a number of bounces: each ray leaves at most two, so one waits a level and one more."""
+    return Scratch(np.empty(7 * depth + 8, np.int64), np.empty((max_depth + 2, _RAY_WORDS), np.float64))
+
+
+@kernel
+def _closest(accelerator, o, d, stack):
+    if accelerator.depth == 0:
+        return closest_hit_brute(accelerator.tree, o[0], o[1], o[2], d[0], d[1], d[2], 0.0, np.inf, stack)
+    return closest_hit(accelerator.tree, o[0], o[1], o[2], d[0], d[1], d[2], 0.0, np.inf, stack)
+
+
+@kernel
+def _occluded(accelerator, o, d, t_max, stack):
+    if accelerator.depth == 0:
+        return any_hit_brute(accelerator.tree, o[0], o[1], o[2], d[0], d[1], d[2], 0.0, t_max, stack)
+    return any_hit(accelerator.tree, o[0], o[1], o[2], d[0], d[1], d[2], 0.0, t_max, stack)
+
+
+@kernel
+def _surface(world, face, u, v):
+    a, b, c = world.faces[face, 0], world.faces[face, 1], world.faces[face, 2]
+    p0, p1, p2 = row3(world.vertices, a), row3(world.vertices, b), row3(world.vertices, c)
+    n_g = normalized(cross(sub(p1, p0), sub(p2, p0)))
+    p = barycentric(p0, p1, p2, u, v)
+    n_s = n_g
+    if world.smooth[face]:
+        n_s = normalized(barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v))
+    return Surface(p, offset_distance(p, p0, p1, p2, u, v, n_g), n_g, n_s, world.material[face])
+
+
+@kernel
+def _visible_light(accelerator, world, surface, n, light, offset, stack):
+    """Unit direction to a light, the light that arrives (irradiance facing it), and whether any does.
+
+    A shadow ray to a point light ends at the light: t counts in units of the distance, and a surface at the light
+    itself does not hide it.
+    """
+    towards = columns3(world.lights, light, 1)
+    arriving = columns3(world.lights, light, 4)
+    nothing = (0.0, 0.0, 0.0)
+    if world.lights[light, 0] == DIRECTIONAL:
+        if dot(n, towards) <= 0.0:
+            return towards, nothing, False
+        o = spawn_origin(surface.p, surface.error, surface.n_g, towards, offset)
+        return towards, arriving, not _occluded(accelerator, o, towards, np.inf, stack)
+    to_light = sub(towards, surface.p)
+    squared = dot(to_light, to_light)
+    if squared == 0.0 or dot(n, to_light) <= 0.0:
+        return to_light, nothing, False
+    o = spawn_origin(surface.p, surface.error, surface.n_g, to_light, offset)
+    shadow = sub(towards, o)
+    # Open at the light: the largest float64 below 1. Mitsuba's rule stops ten of its epsilons short.
+    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-53
+    seen = not _occluded(accelerator, o, shadow, t_max, stack)
+    return normalized(to_light), scale(arriving, 1.0 / squared), seen
+
+
+@kernel
+def _local(accelerator, world, surface, d, n, offset, stack):
+    """Ambient, diffuse and specular light of a Phong surface, and the shadow rays that it took."""
+    m, materials = surface.material, world.materials
+    total = times(columns3(materials, m, AMBIENT), row3(world.colors, 0))
+    diffuse, glossy = columns3(materials, m, DIFFUSE), columns3(materials, m, SPECULAR)
+    shines = max(glossy[0], max(glossy[1], glossy[2])) > 0.0
+    rays = 0
+    for light in range(len(world.lights)):
+        towards, arriving, seen = _visible_light(accelerator, world, surface, n, light, offset, stack)
+        rays += 1
+        if not seen:
+            continue
+        factor = scale(diffuse, dot(n, towards))
+        if shines:
+            factor = add(factor, scale(glossy, specular(d, n, towards, materials[m, SHININESS])))
+        total = add(total, times(factor, arriving))
+    return total, rays
+
+
+@kernel
+def _push(rays, top, o, d, weight, depth, min_weight):
+    """Let a ray wait, unless its weight is nothing or below ``min_weight``. Returns the new top."""
+    largest = max(weight[0], max(weight[1], weight[2]))
+    if largest <= 0.0 or largest < min_weight:
+        return top
+    for k in range(3):
+        rays[top, k], rays[top, 3 + k], rays[top, 6 + k] = o[k], d[k], weight[k]
+    rays[top, 9] = depth
+    return top + 1
+
+
+@kernel
+def _spawn(world, surface, ray, settings, rays, top):
+    """Push the reflected and the refracted ray of a hit. Returns the new top of the stack."""
+    d, n, inside, weight, depth = ray
+    m, materials = surface.material, world.materials
+    k_r, k_t = columns3(materials, m, REFLECTANCE), columns3(materials, m, TRANSMITTANCE)
+    passes = max(k_t[0], max(k_t[1], k_t[2])) > 0.0
+    if passes or materials[m, KIND] == DIELECTRIC:
+        n1, n2 = (materials[m, IOR], 1.0) if inside else (1.0, materials[m, IOR])
+        cos_t, through = refract(d, n, n1, n2)
+        if materials[m, KIND] == DIELECTRIC:
+            f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
+            k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
+        if cos_t >= 0.0:
+            through = normalized(through)
+            o = spawn_origin(surface.p, surface.error, surface.n_g, through, settings.offset)
+            top = _push(rays, top, o, through, times(weight, k_t), depth, settings.min_weight)
+    if max(k_r[0], max(k_r[1], k_r[2])) > 0.0:
+        mirrored = normalized(reflect(d, n))
+        o = spawn_origin(surface.p, surface.error, surface.n_g, mirrored, settings.offset)
+        top = _push(rays, top, o, mirrored, times(weight, k_r), depth, settings.min_weight)
+    return top
+
+
+@kernel
+def radiance(accelerator, world, settings, o, d, scratch):
+    """Linear radiance (r, g, b) along one unit ray, what its first hit was, and the rays traced.
+
+    Returns (color, t, face, n_s, rays) with t = inf and face = NO_FACE where the ray leaves the scene. The stack
+    never holds more than ``max_depth + 2`` rays: each one popped leaves at most two of the next depth.
+    """
+    color, first_t, first_face, first_n, traced = (0.0, 0.0, 0.0), np.inf, NO_FACE, (0.0, 0.0, 0.0), 0
+    rays = scratch.rays
+    top = _push(rays, 0, o, d, (1.0, 1.0, 1.0), 0, 0.0)
+    while top > 0:
+        top -= 1
+        o, d, weight = columns3(rays, top, 0), columns3(rays, top, 3), columns3(rays, top, 6)
+        depth = int(rays[top, 9])
+        t, face, u, v = _closest(accelerator, o, d, scratch.nodes)
+        traced += 1
+        if face == NO_FACE:
+            color = add(color, times(weight, row3(world.colors, 1)))
+            continue
+        surface = _surface(world, face, u, v)
+        if traced == 1:
+            first_t, first_face, first_n = t, face, surface.n_s
+        # The shading normal faces the eye; a surface without light from behind has two sides.
+        inside = dot(d, surface.n_s) > 0.0
+        n = scale(surface.n_s, -1.0) if inside else surface.n_s
+        if world.materials[surface.material, KIND] == PHONG:
+            local, shadow_rays = _local(accelerator, world, surface, d, n, settings.offset, scratch.nodes)
+            color = add(color, times(weight, local))
+            traced += shadow_rays
+        if depth < settings.max_depth:
+            top = _spawn(world, surface, (d, n, inside, weight, depth + 1), settings, rays, top)
+    return color, first_t, first_face, first_n, traced
+
+
+class Film(NamedTuple):
+    """What a tile writes: radiance and normal (h, w, 3), depth (h, w), face and rays (h, w)."""
+
+    radiance: NDArray[np.float32]
+    depth: NDArray[np.float64]
+    normal: NDArray[np.float32]
+    face: NDArray[np.int32]
+    rays: NDArray[np.int32]
+
+
+@kernel
+def render_tile(accelerator, world, settings, camera, samples, film, tile):
+    """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
+
+    Depth, face and normal come from the middle sample (the pixel's centre for one sample), radiance from the mean.
+    """
+    x0, y0, x1, y1 = tile
+    scratch = make_scratch(accelerator.depth, settings.max_depth)
+    middle = len(samples) // 2 if len(samples) % 2 == 1 else (len(samples) + int(np.sqrt(len(samples)))) // 2
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            total, rays = (0.0, 0.0, 0.0), 0
+            for s in range(len(samples)):
+                px, py = x + samples[s, 0], y + samples[s, 1]
+                o = add(row3(camera, 0), add(scale(row3(camera, 1), px), scale(row3(camera, 2), py)))
+                d = add(row3(camera, 3), add(scale(row3(camera, 4), px), scale(row3(camera, 5), py)))
+                color, t, face, n, traced = radiance(accelerator, world, settings, o, normalized(d), scratch)
+                total = add(total, color)
+                rays += traced
+                if s == middle:
+                    film.depth[y, x], film.face[y, x] = t, -1 if face == NO_FACE else face
+                    for k in range(3):
+                        film.normal[y, x, k] = n[k]
+            for k in range(3):
+                film.radiance[y, x, k] = total[k] / len(samples)
+            film.rays[y, x] = rays

@@ -1,0 +1,600 @@
+"""Mesh files: every format and fault, each from a fixture that the test writes itself."""
+
+import itertools
+import re
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plyfile
+import pytest
+import trimesh
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from renderer import mesh_io
+from renderer.errors import MeshError
+from renderer.mesh import Mesh
+from renderer.mesh_io import load_mesh, save_ply
+from renderer.ply import format_ply, parse_ply
+from renderer.shapes import box, torus
+
+SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+FORMATS = ["ascii", "binary_little_endian", "binary_big_endian"]
+CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
+
+Rows = list[list[Any]]
+
+
+def ply(form: str, *elements: tuple[str, list[str], Rows], trailing: bytes = b"") -> bytes:
+    """A PLY file of (name, properties like 'float x' or 'list uchar int i', rows) elements; a list's row entry is a list."""
+    header = ["ply", f"format {form} 1.0", "comment made for a test"]
+    body = b""
+    for name, properties, rows in elements:
+        header += [f"element {name} {len(rows)}", *(f"property {p}" for p in properties)]
+        for row in rows:
+            words: list[str] = []
+            for text, value in zip(properties, row, strict=True):
+                types = text.split()
+                values = [len(value), *value] if types[0] == "list" else [value]
+                codes = [types[1], *[types[2]] * len(value)] if types[0] == "list" else [types[0]]
+                words += map(str, values)
+                if form != "ascii":
+                    order = "<" if form == "binary_little_endian" else ">"
+                    body += b"".join(struct.pack(order + CODES[c], v) for c, v in zip(codes, values, strict=True))
+            if form == "ascii":
+                body += " ".join(words).encode() + b"\n"
+    return "\n".join([*header, "end_header", ""]).encode() + body + trailing
+
+
+XYZ = ["float x", "float y", "float z"]
+INDICES = ["list uchar int vertex_indices"]
+
+
+def load_bytes(folder: Path, content: bytes, name: str = "model.ply") -> Mesh:
+    path = folder / name
+    path.write_bytes(content)
+    return load_mesh(path)
+
+
+def fault(folder: Path, content: bytes, name: str = "model.ply") -> str:
+    """The one line that loading this content fails with, checked to name the file."""
+    with pytest.raises(MeshError) as caught:
+        load_bytes(folder, content, name)
+    message = str(caught.value)
+    assert message.startswith(f"{folder / name}: ") and "\n" not in message and len(message) < 400
+    return message.removeprefix(f"{folder / name}: ")
+
+
+# --- PLY that is right ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_ply_triangles(tmp_path: Path, form: str) -> None:
+    mesh = load_bytes(tmp_path, ply(form, ("vertex", XYZ, SQUARE), ("face", INDICES, [[[0, 1, 2]], [[0, 2, 3]]])))
+    assert mesh.vertices.tolist() == SQUARE and mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert mesh.name == "model" and mesh.normals is mesh.colors is mesh.texcoords is None
+    assert load_mesh(tmp_path / "model.ply", name="pot").name == "pot"
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize(
+    "index", ["list uchar int vertex_index", "list int uint vertex_indices", "list ushort uchar vertex_index"]
+)
+def test_ply_polygons_become_fans(tmp_path: Path, form: str, index: str) -> None:
+    vertices = [[np.cos(a), np.sin(a), 0.5] for a in np.arange(6)]
+    for polygons, expected in [
+        ([[[0, 1, 2, 3]], [[2, 3, 4, 5]]], [[0, 1, 2], [0, 2, 3], [2, 3, 4], [2, 4, 5]]),
+        ([[[0, 1, 2]], [[1, 2, 3, 4, 5]], [[5, 0, 1]], [[3, 2, 1, 0]]],
+         [[0, 1, 2], [1, 2, 3], [1, 3, 4], [1, 4, 5], [5, 0, 1], [3, 2, 1], [3, 1, 0]]),
+    ]:  # fmt: skip
+        mesh = load_bytes(
+            tmp_path, ply(form, ("vertex", ["double x", "double y", "double z"], vertices), ("face", [index], polygons))
+        )
+        assert mesh.faces.tolist() == expected
+        if form != "ascii":
+            assert mesh.vertices.tolist() == vertices
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_ply_tristrips(tmp_path: Path, form: str) -> None:
+    """Strips of both parities, restarts first, last and doubled, two rows, a restart that shifts the parity."""
+    vertices = [[k // 2, k % 2, 0] for k in range(9)]
+    rows = [[[0, 1, 2, 3, -1, 2, 3, 4, 5, 6, -1, -1]], [[-1, 4, 5, 6]]]
+    mesh = load_bytes(
+        tmp_path, ply(form, ("vertex", XYZ, vertices), ("tristrips", ["list int int vertex_indices"], rows))
+    )
+    assert mesh.faces.tolist() == [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5], [4, 5, 6], [4, 5, 6]]
+    # 0 1 2 3 ... zigzags, so a right alternation faces every triangle the same way.
+    assert len({tuple(normal) for normal in mesh.face_normals().tolist()}) == 1
+
+
+def test_ply_strips_and_faces_keep_the_files_order(tmp_path: Path) -> None:
+    face = ("face", INDICES, [[[0, 1, 2]]])
+    strip = ("tristrips", ["list int int vertex_indices"], [[[3, 2, 1]]])
+    vertex = ("vertex", XYZ, SQUARE)
+    assert load_bytes(tmp_path, ply("ascii", vertex, face, strip)).faces.tolist() == [[0, 1, 2], [3, 2, 1]]
+    assert load_bytes(tmp_path, ply("ascii", strip, vertex, face)).faces.tolist() == [[3, 2, 1], [0, 1, 2]]
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_ply_stitching_triangles_keep_the_parity(tmp_path: Path, form: str) -> None:
+    rows: Rows = [[[0, 1, 2, 2, 1, 3]]]
+    mesh = load_bytes(
+        tmp_path, ply(form, ("vertex", XYZ, SQUARE), ("tristrips", ["list int int vertex_indices"], rows))
+    )
+    assert mesh.faces.tolist() == [[0, 1, 2], [2, 1, 2], [2, 2, 1], [1, 2, 3]]
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_ply_ignores_what_it_need_not_know(tmp_path: Path, form: str) -> None:
+    vertex = ["uchar flag", "float x", "list uchar short rings", "double y", "float z", "float quality"]
+    rows: Rows = [[7, *p[:1], [1] * k, *p[1:], 0.5] for k, p in enumerate(SQUARE)]
+    face = ["int group", "list uchar float texcoord", "list uchar int vertex_indices", "uchar red"]
+    mesh = load_bytes(
+        tmp_path,
+        ply(
+            form,
+            ("material", ["float shine", "list uchar char note"], [[1.0, [1, 2]], [2.0, []]]),
+            ("vertex", vertex, rows),
+            ("nothing", ["int a", "list uchar int b"], []),
+            ("face", face, [[1, [0.5] * 6, [0, 1, 2], 9], [2, [], [0, 1, 2, 3], 8]]),
+            ("edge", ["int vertex1", "int vertex2"], [[0, 1]]),
+        ),
+    )
+    assert mesh.vertices.tolist() == SQUARE and mesh.faces.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
+    assert mesh.colors is None and mesh.texcoords is None
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("names", [("s", "t"), ("u", "v"), ("texture_u", "texture_v")])
+@pytest.mark.parametrize(("type_", "full"), [("uchar", 255), ("ushort", 65535), ("float", 1.0)])
+def test_ply_keeps_normals_colors_texcoords(tmp_path: Path, form: str, names: Any, type_: str, full: float) -> None:
+    properties = [
+        *XYZ,
+        "float nx",
+        "float ny",
+        "float nz",
+        *(f"{type_} {c}" for c in ("red", "green", "blue", "alpha")),
+    ]
+    properties += [f"float {name}" for name in names]
+    zero = type(full)(0)
+    rows: Rows = [[*p, 0, 0, 1, full, zero, full, zero, 0.25, k] for k, p in enumerate(SQUARE)]
+    mesh = load_bytes(tmp_path, ply(form, ("vertex", properties, rows), ("face", INDICES, [[[0, 1, 2]]])))
+    assert mesh.normals is not None and mesh.normals.tolist() == [[0, 0, 1]] * 4
+    assert mesh.colors is not None and mesh.colors.tolist() == [[1, 0, 1]] * 4
+    assert mesh.texcoords is not None and mesh.texcoords.tolist() == [[0.25, k] for k in range(4)]
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_ply_line_ends_and_blanks(tmp_path: Path, newline: str) -> None:
+    content = ply("ascii", ("vertex", XYZ, SQUARE), ("face", INDICES, [[[0, 1, 2]]])).decode()
+    content = content.replace("ply\n", "ply \n").replace("element vertex", "obj_info x y\n\nelement  vertex") + "\n \n"
+    assert load_bytes(tmp_path, content.replace("\n", newline).encode()).faces.tolist() == [[0, 1, 2]]
+
+
+def test_ply_binary_body_may_begin_with_a_newline_byte(tmp_path: Path) -> None:
+    """After 'end_header\\r\\n' the body starts; after 'end_header\\n' a body byte 10 or 13 is data."""
+    content = ply(
+        "binary_little_endian",
+        ("tag", ["uchar a"], [[10], [13]]),
+        ("vertex", XYZ, SQUARE),
+        ("face", INDICES, [[[0, 1, 2]]]),
+    )
+    assert load_bytes(tmp_path, content).vertices.tolist() == SQUARE
+
+
+def test_ply_binary_may_be_padded(tmp_path: Path) -> None:
+    elements = (("vertex", XYZ, SQUARE), ("face", INDICES, [[[0, 1, 2]]]))
+    assert load_bytes(tmp_path, ply("binary_little_endian", *elements, trailing=b"\n\0\0\0")).faces.tolist() == [
+        [0, 1, 2]
+    ]
+    assert "after the last element" in fault(tmp_path, ply("binary_little_endian", *elements, trailing=b"\0\0\0\1"))
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_save_ply_and_back(tmp_path: Path, exact: bool) -> None:
+    vertices = np.random.default_rng(1).normal(size=(50, 3))
+    if exact:
+        vertices = vertices.astype(np.float32).astype(np.float64)
+    rng = np.random.default_rng(2)
+    mesh = Mesh(vertices, rng.integers(0, 50, (80, 3), dtype=np.int32), normals=rng.normal(size=(50, 3)),
+                colors=rng.random((50, 3), dtype=np.float32), texcoords=rng.random((50, 2)), name="pot")  # fmt: skip
+    path = tmp_path / "pot.ply"
+    path.write_bytes(b"old")
+    save_ply(mesh, path)
+    loaded = load_mesh(path)
+    for field in ("vertices", "faces", "normals", "colors", "texcoords", "name"):
+        assert np.array_equal(getattr(loaded, field), getattr(mesh, field)), field
+    assert [p.name for p in tmp_path.iterdir()] == ["pot.ply"]
+    # Readers that nobody here wrote see the same mesh.
+    foreign = plyfile.PlyData.read(path)
+    assert foreign["vertex"]["x"].dtype == ("<f4" if exact else "<f8")
+    assert np.array_equal(np.stack([foreign["vertex"][axis] for axis in "xyz"], axis=1), mesh.vertices)
+    assert np.array_equal(np.stack(foreign["face"]["vertex_indices"]), mesh.faces)
+    assert np.array_equal(trimesh.load_mesh(path, process=False).triangles, mesh.triangles)
+
+
+def test_save_ply_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "pot.ply"
+    save_ply(box(), path)
+    before = path.read_bytes()
+
+    def disk_full(self: Path, content: bytes) -> int:
+        with self.open("wb") as file:
+            file.write(content[:100])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", disk_full)
+    with pytest.raises(OSError, match="No space"):
+        save_ply(torus(), path)
+    assert [p.name for p in tmp_path.iterdir()] == ["pot.ply"] and path.read_bytes() == before
+
+
+@pytest.mark.parametrize("text", [True, False])
+def test_ply_against_plyfile(tmp_path: Path, text: bool) -> None:
+    """A random file of mixed polygons, written and read by plyfile."""
+    rng = np.random.default_rng(5)
+    vertices = np.array([tuple(row) for row in rng.normal(size=(40, 3))], dtype=[("x", "f8"), ("y", "f4"), ("z", "f8")])
+    polygons = np.empty(60, dtype=[("flag", "u1"), ("vertex_indices", object)])
+    polygons["flag"] = 1
+    for k in range(60):
+        polygons["vertex_indices"][k] = rng.integers(0, 40, rng.integers(3, 8)).astype("i4")
+    elements = [plyfile.PlyElement.describe(vertices, "vertex"), plyfile.PlyElement.describe(polygons, "face")]
+    plyfile.PlyData(elements, text=text, byte_order=">").write(str(tmp_path / "a.ply"))
+    mesh = load_mesh(tmp_path / "a.ply")
+    # plyfile writes text with 18 digits, enough for every double.
+    assert np.array_equal(mesh.vertices, np.stack([vertices[axis].astype(np.float64) for axis in "xyz"], axis=1))
+    expected = [[p[0], p[k], p[k + 1]] for p in polygons["vertex_indices"] for k in range(1, len(p) - 1)]
+    assert mesh.faces.tolist() == expected
+
+
+def test_a_million_faces_load_in_two_seconds(tmp_path: Path) -> None:
+    """Quiet, it takes 0.15 s; the rest is room for a loaded machine."""
+    path = tmp_path / "large.ply"
+    save_ply(torus(around=1000, across=500), path)
+    start = time.perf_counter()
+    mesh = load_mesh(path)
+    assert time.perf_counter() - start < 2.0
+    assert len(mesh.faces) == 1_000_000
+
+
+# --- PLY that is wrong ----------------------------------------------------------------------------------------
+
+VERTEX = ("vertex", XYZ, SQUARE)
+FACE = ("face", INDICES, [[[0, 1, 2]]])
+STRIPS = ["list int int vertex_indices"]
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize(
+    ("elements", "message"),
+    [
+        ([VERTEX], "holds no faces"),
+        ([VERTEX, ("face", INDICES, [])], "holds no faces"),
+        ([VERTEX, ("tristrips", STRIPS, [[[]], [[-1, -1]]])], "holds no faces"),
+        ([], "expected an element 'vertex', got no element"),
+        ([FACE], "expected an element 'vertex', got face"),
+        ([("vertex", [], []), FACE], "expected properties x, y and z, got none"),
+        ([("vertex", ["float x", "float z"], [[0, 0]]), FACE], "expected properties x, y and z, got x, z"),
+        ([("vertex", ["float x", "float y", "list uchar float z"], [[0, 0, [1]]]), FACE], "expected properties x, y and z"),
+        ([VERTEX, ("face", ["int vertex_indices"], [[0]])], "expected a list vertex_indices or vertex_index"),
+        ([VERTEX, ("face", ["list uchar int corners"], [[[0, 1, 2]]])], "vertex_index, got corners"),
+        ([VERTEX, ("face", [], [])], "expected a list vertex_indices or vertex_index, got none"),
+        ([VERTEX, ("face", INDICES, [[[0, 1, 4]]])], "faces: expected indices of 4 vertices, got 4 in row 0"),
+        ([VERTEX, ("face", INDICES, [[[0, 1, 2]], [[0, -1, 2]]])], "faces: expected indices of 4 vertices, got -1 in row 1"),
+        ([VERTEX, ("face", INDICES, [[[0, 1, 2]], [[0, 1]]])], "expected at least 3 vertices, got 2 in row 1"),
+        ([VERTEX, ("face", INDICES, [[[]]])], "expected at least 3 vertices, got 0 in row 0"),
+        ([VERTEX, ("face", ["list uchar float vertex_indices"], [[[0, 1.5, 2]]])], "expected whole vertex indices, got 1.5"),
+        ([VERTEX, ("face", ["list uchar float vertex_indices"], [[[0, float("nan"), 2]]])], "whole vertex indices, got nan"),
+        ([VERTEX, ("face", ["list uchar double vertex_indices"], [[[0, 1e300, 2]]])], "whole vertex indices, got 1e+300"),
+        ([VERTEX, ("tristrips", STRIPS, [[[0, 1, 2, -2]]])], "faces: expected indices of 4 vertices, got -2"),
+        ([VERTEX, ("tristrips", STRIPS, [[[0, 1, 2, -1, 3]]])], "expected at least 3 vertices in each strip"),
+        ([VERTEX, ("tristrips", STRIPS, [[[0, 1]], [[2, 3, 0]]])], "expected at least 3 vertices in each strip"),
+        ([("vertex", XYZ, [*SQUARE[:3], [0, float("nan"), 0]]), FACE], "vertices: expected finite values, got [0.0, nan, 0.0] in row 3"),
+        ([("vertex", XYZ, [*SQUARE[:3], [float("-inf"), 0, 0]]), FACE], "vertices: expected finite values"),
+        ([("vertex", [*XYZ, *(f"char {c}" for c in ("red", "green", "blue"))], [[*p, 1, 1, 1] for p in SQUARE]), FACE], "colours of an unsigned"),
+        ([("vertex", [*XYZ, *(f"float {c}" for c in ("red", "green", "blue"))], [[*p, 1, 9, 1] for p in SQUARE]), FACE], "colors: expected values in [0, 1]"),
+    ],
+)  # fmt: skip
+def test_ply_content_faults(tmp_path: Path, form: str, elements: Any, message: str) -> None:
+    assert message in fault(tmp_path, ply(form, *elements))
+
+
+GOOD = ply("ascii", VERTEX, FACE).decode()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("ply\n", "plx\n", "expected a first line 'ply', got b'plx"),
+        ("ply\n", "", "expected a first line 'ply'"),
+        ("format ascii 1.0\n", "", "expected a line 'format', found none"),
+        ("format ascii 1.0\n", "format ascii 1.0\nformat ascii 1.0\n", "header line 3"),
+        ("format ascii 1.0", "format ascii 2.0", "header line 2: expected a PLY header line, got 'format ascii 2.0'"),
+        ("format ascii", "format binary_middle_endian", "header line 2"),
+        ("end_header\n", "", "expected a line 'end_header', found none"),
+        ("end_header", "xend_header", "expected a line 'end_header', found none"),
+        ("element vertex 4", "element vertex -4", "header line 4: expected a PLY header line, got 'element vertex -4'"),
+        ("element vertex 4", "element vertex four", "header line 4"),
+        ("element vertex 4", "element vertex", "header line 4"),
+        ("element vertex 4", "element vertex 4 4", "header line 4"),
+        ("element vertex 4", "element vertex 999999999999999999", "truncated: too short for the 999999999999999999 rows"),
+        ("element vertex 4", "element vertex " + "9" * 5000, "header line 4"),
+        ("element face 1", "element face 3000000000", "truncated: too short for the 3000000000 rows of element face"),
+        ("element vertex 4", "element vertex 5", "truncated"),
+        ("element vertex 4", "element vertex 3", "expected the end of the file"),
+        ("element face 1", "element vertex 1", "element 'vertex' stands twice"),
+        ("float y", "float x", "property 'x' stands twice"),
+        ("float y", "floot y", "header line 6"),
+        ("list uchar int", "list float int", "header line 9"),
+        ("element vertex 4\n", "", "header line 4: expected a PLY header line, got 'property float x'"),
+        ("1 0 0", "1 0 O", "malformed number"),
+        ("1 0 0", "1_0 0 0", "malformed number"),
+        ("1 0 0", "1e999 0 0", "vertices: expected finite values, got [inf, 0.0, 0.0] in row 1"),
+        ("3 0 1 2", "3 0 1 2 9", "expected the end of the file"),
+        ("3 0 1 2", "3 0 1", "truncated"),
+        ("3 0 1 2", "2.5 0 1 2", "element face: list length 2.5 in row 0"),
+        ("3 0 1 2", "-3 0 1 2", "element face: list length -3.0 in row 0"),
+        ("3 0 1 2", "nan 0 1 2", "element face: list length nan in row 0"),
+        ("3 0 1 2", "inf 0 1 2", "element face: list length inf in row 0"),
+        ("3 0 1 2", "3 0 1.5 2", "expected whole vertex indices, got 1.5"),
+    ],
+)  # fmt: skip
+def test_ply_text_faults(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in GOOD
+    start = time.perf_counter()
+    assert message in fault(tmp_path, GOOD.replace(old, new, 1).encode())
+    assert time.perf_counter() - start < 1.0
+
+
+@pytest.mark.parametrize("count", [-1, 2**31 - 1])
+def test_ply_binary_list_length_faults(tmp_path: Path, count: int) -> None:
+    content = ply(
+        "binary_little_endian", VERTEX, ("face", ["list int int vertex_indices"], [[[0, 1, 2]], [[0, 2, 3, 1]]])
+    )
+    for length in (3, 4):
+        broken = content.replace(struct.pack("<i", length) + struct.pack("<i", 0), struct.pack("<ii", count, 0))
+        assert broken != content
+        assert ("list length -1" if count < 0 else "truncated") in fault(tmp_path, broken)
+
+
+def test_ply_of_garbage(tmp_path: Path) -> None:
+    for content in (b"", b"p", b"ply", b"\0" * 1000, b"ply\n" + b"\xff" * 3_000_000, bytes(range(256)) * 10):
+        fault(tmp_path, content)
+
+
+RICH = [
+    ("vertex", [*XYZ, *(f"uchar {c}" for c in ("red", "green", "blue"))], [[*p, 1, 2, 3] for p in SQUARE]),
+    ("face", INDICES, [[[0, 1, 2]], [[0, 1, 2, 3]]]),
+    ("tristrips", STRIPS, [[[0, 1, 2, -1, 3, 2, 1]]]),
+]
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_ply_truncated_at_every_byte(tmp_path: Path, form: str) -> None:
+    content = ply(form, *RICH).rstrip(b"\n")
+    assert len(load_bytes(tmp_path, content).faces) == 5
+    for length in range(len(content)):
+        fault(tmp_path, content[:length])
+
+
+# --- other formats --------------------------------------------------------------------------------------------
+
+V = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "faces"),
+    [
+        (V + "f 1 2 3\nf 1 3 4\n", [[0, 1, 2], [0, 2, 3]]),
+        (V + "f 1 2 3 4", [[0, 1, 2], [0, 2, 3]]),
+        (V + "f 1 2 \\\n3 \\\n4\n", [[0, 1, 2], [0, 2, 3]]),
+        (V + "f -4 -3 -2\n", [[0, 1, 2]]),
+        ("v 9 9 9\n" + V + "# note\no a\ng b\nusemtl red\ns 1\nmtllib none.mtl\nl 1 2\np 1\nf 2 3 4\r\n", [[1, 2, 3]]),
+        (V + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl a\nf 2 3 4\n", [[0, 1, 2], [0, 2, 3], [1, 2, 3]]),
+    ],
+)
+def test_obj_faces(tmp_path: Path, text: str, faces: Any) -> None:
+    mesh = load_bytes(tmp_path, text.encode(), "a.obj")
+    assert mesh.faces.tolist() == faces and mesh.name == "a"
+    assert mesh.vertices.tolist()[-4:] == SQUARE
+
+
+def test_obj_splits_vertices_where_texcoords_differ(tmp_path: Path) -> None:
+    text = V + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.5\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\nf 1/4/1 3/3/1 4/-1/-1\n"
+    mesh = load_bytes(tmp_path, text.encode(), "a.obj")
+    assert mesh.triangles.tolist() == [[SQUARE[k] for k in (0, 1, 2)], [SQUARE[k] for k in (0, 2, 3)]]
+    assert mesh.texcoords is not None and mesh.normals is not None
+    assert mesh.texcoords[mesh.faces].tolist() == [[[0, 0], [1, 0], [1, 1]], [[0.5, 0.5], [1, 1], [0.5, 0.5]]]
+    assert len(mesh.vertices) == 5 and mesh.normals.tolist() == [[0, 0, 1]] * 5
+
+
+def test_obj_where_only_some_faces_have_texcoords_and_normals(tmp_path: Path) -> None:
+    mesh = load_bytes(tmp_path, (V + "vt 0.5 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1 3 4\n").encode(), "a.obj")
+    assert mesh.texcoords is not None and mesh.normals is None
+    assert mesh.texcoords[mesh.faces].tolist() == [[[0.5, 1]] * 3, [[0, 0]] * 3]
+
+
+def test_obj_vertex_colors(tmp_path: Path) -> None:
+    mesh = load_bytes(tmp_path, b"v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\nf 1 2 3\n", "a.obj")
+    assert mesh.colors is not None and mesh.colors.tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 0.5]]
+    mixed = load_bytes(tmp_path, b"v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj")
+    assert mixed.colors is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "holds no faces"),
+        (V, "holds no faces"),
+        (V + "f 1 2 5\n", "line 5: face index out of range: expected 1 to 4 or -4 to -1, got 'f 1 2 5'"),
+        (V + "f 0 1 2\n", "line 5: face index out of range"),
+        (V + "f -5 1 2\n", "line 5: face index out of range"),
+        (V + "f 1/1 2/1 3/1\n", "line 5: face index out of range"),
+        (V + "f 1 2 3\nf 1 2\n", "line 6: expected a face of at least 3 vertices, got 'f 1 2'"),
+        (V + "f 1 2 x\n", "line 5: "),
+        (V + "f 1 2 3.5\n", "line 5: "),
+        (V + "f 1/1/1/1 2 3\n", "line 5: expected a corner like"),
+        ("v 0 0\n" + V + "f 1 2 3\n", "line 1: expected at least 3 numbers, got 'v 0 0'"),
+        ("v 0 0 nan\n" + V + "f 2 3 4\n", "vertices: expected finite values, got [0.0, 0.0, nan] in row 0"),
+        ("v 0 0 x\n" + V, "line 1: could not convert"),
+        (V + "f 1 2 3\nsurf 0 1 0 1 1 2 3 4\n", "line 6: expected a statement of a polygon mesh"),
+        ("\xff\xfe\0garbage", "line 1: "),
+    ],
+)
+def test_obj_faults(tmp_path: Path, text: str, message: str) -> None:
+    assert message in fault(tmp_path, text.encode("latin-1"), "a.obj")
+
+
+def foreign_box() -> trimesh.Trimesh:
+    return trimesh.creation.box(extents=(1, 2, 4))
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii"])
+def test_stl(tmp_path: Path, kind: str) -> None:
+    source = foreign_box()
+    content = source.export(file_type=kind)
+    mesh = load_bytes(tmp_path, content if isinstance(content, bytes) else content.encode(), "a.STL")
+    assert np.array_equal(mesh.triangles, source.triangles) and mesh.normals is None
+
+
+def test_stl_text_of_two_solids_with_foreign_names(tmp_path: Path) -> None:
+    one = "solid caf\xe9 {}\nfacet normal 0 0 1\nouter loop\nvertex 0 0 {}\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"
+    content = (one.format(1, 1) + one.format(2, 2)).encode("latin-1")
+    assert load_bytes(tmp_path, content, "a.stl").vertices[:, 2].tolist() == [1, 0, 0, 2, 0, 0]
+    assert "truncated" in fault(tmp_path, content[:-20], "a.stl")
+
+
+def test_stl_faults(tmp_path: Path) -> None:
+    binary, text = foreign_box().export(file_type="stl"), foreign_box().export(file_type="stl_ascii").encode()
+    assert "expected text that starts with 'solid', or binary of 684 bytes" in fault(tmp_path, binary[:-1], "a.stl")
+    assert "684 bytes for its 12 faces, got 686" in fault(tmp_path, binary + b"zz", "a.stl")
+    assert "holds no faces" in fault(tmp_path, b"\0" * 84, "a.stl")
+    assert "holds no faces" in fault(tmp_path, b"solid x\nendsolid x\n", "a.stl")
+    nan = binary[:96] + struct.pack("<f", np.nan) + binary[100:]
+    assert "vertices: expected finite values, got [nan" in fault(tmp_path, nan, "a.stl")
+    for length in itertools.chain(range(0, len(binary), 7), range(0, 90)):
+        fault(tmp_path, binary[:length], "a.stl")
+    for length in range(0, len(text.rstrip()), 7):
+        fault(tmp_path, text[:length], "a.stl")
+
+
+def test_glb_places_each_instance(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    scene.add_geometry(foreign_box(), transform=trimesh.transformations.translation_matrix([5, 0, 0]))
+    scene.add_geometry(foreign_box(), transform=np.diag([-1.0, 1, 1, 1]))
+    mesh = load_bytes(tmp_path, scene.export(file_type="glb"), "a.glb")
+    assert [corner.tolist() for corner in mesh.bounds] == [[-0.5, -1, -2], [5.5, 1, 2]]
+    assert len(mesh.faces) == 24 and mesh.is_closed()
+    a, b, c = np.moveaxis(mesh.triangles, 1, 0)
+    # Mirrored, the second box would count as -8 were its faces not turned.
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(16, rel=1e-12)
+
+
+def test_glb_keeps_normals_colors_texcoords(tmp_path: Path) -> None:
+    normals = np.array([[0, 0, 1.0]] * 3)
+    source = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], vertex_normals=normals, process=False)
+    source.visual = trimesh.visual.ColorVisuals(
+        source, vertex_colors=[[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 51, 255]]
+    )
+    mesh = load_bytes(tmp_path, trimesh.Scene(source).export(file_type="glb", include_normals=True), "a.glb")
+    assert mesh.normals is not None and mesh.normals.tolist() == normals.tolist()
+    assert mesh.colors is not None and mesh.colors.tolist() == np.float32([[1, 0, 0], [0, 1, 0], [0, 0, 0.2]]).tolist()
+    uv = np.array([[0, 0], [1, 0], [0, 0.75]])
+    source = trimesh.Trimesh(source.vertices, source.faces, process=False)
+    source.visual = trimesh.visual.TextureVisuals(uv=uv, material=trimesh.visual.material.PBRMaterial())
+    mesh = load_bytes(tmp_path, trimesh.Scene(source).export(file_type="glb"), "a.glb")
+    assert mesh.texcoords is not None and mesh.texcoords.tolist() == uv.tolist() and mesh.normals is None
+
+
+def test_glb_faults(tmp_path: Path) -> None:
+    content = trimesh.Scene(foreign_box()).export(file_type="glb")
+    assert "holds no faces" in fault(
+        tmp_path, trimesh.Scene(trimesh.PointCloud(np.eye(3))).export(file_type="glb"), "a.glb"
+    )
+    for length in range(0, len(content) - 4, 13):
+        fault(tmp_path, content[:length], "a.glb")
+
+
+# --- any file -------------------------------------------------------------------------------------------------
+
+
+def test_path_faults(tmp_path: Path) -> None:
+    (tmp_path / "folder.ply").mkdir()
+    for name, message in [
+        ("missing.ply", "cannot be read: No such file or directory"),
+        ("folder.ply", "cannot be read: Is a directory"),
+        ("model.fbx", "expected a suffix of .ply, .obj, .stl, .glb, got '.fbx'"),
+        ("model", "got ''"),
+        ("null\0.ply", "cannot be read: "),
+    ]:
+        with pytest.raises(MeshError, match=re.escape(f"{tmp_path / name}: ") + ".*" + re.escape(message)):
+            load_mesh(tmp_path / name)
+
+
+def examples() -> dict[str, bytes]:
+    rich = [ply(form, *RICH) for form in FORMATS]
+    return {
+        "ascii.ply": rich[0],
+        "little.ply": rich[1],
+        "big.ply": rich[2],
+        "saved.ply": format_ply(box()),
+        "a.obj": (V + "vt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1 3 4\n").encode(),
+        "binary.stl": foreign_box().export(file_type="stl"),
+        "text.stl": foreign_box().export(file_type="stl_ascii").encode(),
+        "a.glb": trimesh.Scene(foreign_box()).export(file_type="glb"),
+    }
+
+
+EXAMPLES = examples()
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 3), st.integers(0, 255)), min_size=1, max_size=8))
+def test_mutated_files_load_or_fail_clearly(name: str, mutations: list[tuple[int, int, int]]) -> None:
+    """Bytes changed, removed, added, cut off: a valid mesh or one MeshError, and no other exception or warning."""
+    content = bytearray(EXAMPLES[name])
+    for place, kind, value in mutations:
+        at = place % max(len(content), 1)
+        match kind:
+            case 0:
+                content[at : at + 1] = bytes([value])
+            case 1:
+                del content[at : at + 1]
+            case 2:
+                content[at:at] = bytes([value])
+            case 3 if value < 32:
+                del content[at:]
+    try:
+        mesh = mesh_io.parse_mesh(bytes(content), Path(name).suffix)
+    except MeshError as error:
+        assert "\n" not in str(error)
+    else:
+        assert len(mesh.faces) > 0 and mesh.faces.max() < len(mesh.vertices) and np.isfinite(mesh.vertices).all()
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.binary(max_size=200))
+@example(b"1 " * 50)
+def test_ply_body_of_any_bytes(body: bytes) -> None:
+    for form in FORMATS:
+        header = ply(form, *RICH).split(b"end_header\n")[0]
+        try:
+            assert np.isfinite(parse_ply(header + b"end_header\n" + body).vertices).all()
+        except MeshError:
+            continue
+
+
+def test_the_mutation_test_would_see_a_reader_that_lets_an_exception_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    def careless(content: bytes) -> Mesh:
+        raise KeyError("x")
+
+    monkeypatch.setitem(mesh_io._PARSERS, ".ply", careless)
+    run: Callable[..., None] = test_mutated_files_load_or_fail_clearly.hypothesis.inner_test  # type: ignore[attr-defined]
+    with pytest.raises(KeyError):
+        run("saved.ply", [(0, 0, 0)])

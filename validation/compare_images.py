@@ -1,0 +1,142 @@
+"""One picture of ours against a reference: the numbers that it is gated on, and which pixels may not count.
+
+SSIM sees structure: an edge out of place, a wrong normal, a missing bounce. It is nearly blind to brightness
+(a gain of 1.10 leaves .998), so it never stands alone: the share of pixels that differ visibly, the mean
+error and the largest error go with it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.metrics import structural_similarity
+
+Picture = NDArray[np.floating[Any]]
+
+# The smallest difference that an 8-bit picture shows.
+VISIBLE = 1.0 / 255.0
+
+# A pixel is fragile when one of these small changes moves it by half of what is visible. The offsets are
+# those by which renderers lift spawned rays off a surface: 1e-7 of the scene is as small as double precision
+# cares for, 3e-4 is more than Mitsuba's in scenes of extent 1 to 3. 0.002 pixel is how far a silhouette moves
+# when float32 rounds rays and vertices.
+BASE_OFFSET = 1e-7
+OFFSETS = (1e-5, 1e-4, 3e-4)
+SHIFT = 0.002
+FRAGILE = 0.5 * VISIBLE
+
+# Wang et al. 2004: a Gaussian window with sigma 1.5 and population covariances. skimage cuts it at 3.5 sigma,
+# 11 pixels wide.
+_SIGMA = 1.5
+_WINDOW = 11
+
+
+@dataclass(frozen=True)
+class ImageComparison:
+    """How far ``ours`` is from the reference.
+
+    ssim : mean structural similarity of the sRGB pictures, 1 when they are the same.
+    ssim_foreground : its mean over the foreground's pixels, which a wide background cannot raise; None
+        without a mask.
+    pixel_share : share of pixels of which a channel is off by more than 1/255 in sRGB.
+    mean_error : mean absolute difference of linear radiance, not clipped.
+    max_error : largest difference in sRGB outside the fragile pixels, over all channels.
+    fragile_share : share of the pixels that ``max_error`` left out; bound it too: at 1 nothing was judged.
+    difference : (h, w) float64, largest difference in sRGB over the channels of each pixel.
+    """
+
+    ssim: float
+    ssim_foreground: float | None
+    pixel_share: float
+    mean_error: float
+    max_error: float
+    fragile_share: float
+    difference: NDArray[np.float64]
+
+
+def srgb(linear: Picture) -> NDArray[np.float64]:
+    """Linear radiance clipped to [0, 1] and encoded as IEC 61966-2-1 does, the same shape, float64."""
+    clipped = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
+    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1.0 / 2.4) - 0.055)
+
+
+def compare(
+    ours: Picture,
+    reference: Picture,
+    fragile: NDArray[np.bool_] | None = None,
+    foreground: NDArray[np.bool_] | None = None,
+) -> ImageComparison:
+    """Compare two pictures of linear radiance, both (h, w, 3) with h, w >= 11.
+
+    fragile, foreground : (h, w) masks; none is fragile without the first.
+
+    Raises ``ValueError`` for shapes that differ or are too small, for an empty foreground and for a radiance
+    that is not finite.
+    """
+    _check(ours, reference, fragile, foreground)
+    encoded, expected = srgb(ours), srgb(reference)
+    ssim, similarity = structural_similarity(
+        encoded,
+        expected,
+        data_range=1.0,
+        channel_axis=2,
+        gaussian_weights=True,
+        sigma=_SIGMA,
+        use_sample_covariance=False,
+        full=True,
+    )
+    difference = np.abs(encoded - expected).max(axis=2)
+    excused = np.zeros(difference.shape, dtype=bool) if fragile is None else fragile
+    return ImageComparison(
+        ssim=float(ssim),
+        ssim_foreground=None if foreground is None else float(similarity[foreground].mean()),
+        pixel_share=float((difference > VISIBLE).mean()),
+        mean_error=float(np.abs(np.subtract(ours, reference, dtype=np.float64)).mean()),
+        max_error=float(difference[~excused].max(initial=0.0)),
+        fragile_share=float(excused.mean()),
+        difference=difference,
+    )
+
+
+def fragile_pixels(render: Callable[[float, tuple[float, float]], Picture]) -> NDArray[np.bool_]:
+    """Mask (h, w) of the pixels that a rounding error may decide.
+
+    render(offset, shift) : our picture, linear (h, w, 3), with spawned rays lifted off the surface by
+        ``offset`` and primary rays moved by ``shift`` pixels in x and y.
+
+    Where a ray passes an edge by less than two renderers' roundings, or a spawned ray starts so near another
+    surface that the offset decides what it meets, both of their pictures are right. Only our own picture is
+    asked, so an error of ours cannot excuse itself by differing from the reference: a pixel that is wrong but
+    steady is not fragile.
+    """
+    base = srgb(render(BASE_OFFSET, (0.0, 0.0)))
+    changes = [(offset, (0.0, 0.0)) for offset in OFFSETS]
+    changes += [(BASE_OFFSET, shift) for shift in ((SHIFT, 0.0), (-SHIFT, 0.0), (0.0, SHIFT), (0.0, -SHIFT))]
+    result = np.zeros(base.shape[:2], dtype=bool)
+    for offset, shift in changes:
+        result |= np.abs(srgb(render(offset, shift)) - base).max(axis=2) > FRAGILE
+    return result
+
+
+def _check(ours: Picture, reference: Picture, *masks: NDArray[np.bool_] | None) -> None:
+    shape = np.shape(ours)
+    if len(shape) != 3 or shape[2] != 3 or min(shape[:2]) < _WINDOW:
+        raise ValueError(f"ours: expected shape (h, w, 3) with h, w >= {_WINDOW}, got {shape}")
+    if np.shape(reference) != shape:
+        raise ValueError(f"reference: expected shape {shape} as ours, got {np.shape(reference)}")
+    for name, picture in (("ours", ours), ("reference", reference)):
+        bad = np.argwhere(~np.isfinite(picture))
+        if len(bad):
+            row, column, _ = bad[0].tolist()
+            raise ValueError(
+                f"{name}: expected finite radiance, got {picture[row, column]} in row {row}, column {column}"
+            )
+    for name, mask in zip(("fragile", "foreground"), masks, strict=True):
+        if mask is not None and (mask.shape != shape[:2] or mask.dtype != np.bool_):
+            raise ValueError(
+                f"{name}: expected a bool mask of shape {shape[:2]}, got {mask.dtype} {mask.shape}"
+            )
+    if masks[1] is not None and not masks[1].any():
+        raise ValueError("foreground: expected at least one pixel, got none")

@@ -1,0 +1,154 @@
+"""A scene of ours as Mitsuba 3 objects: rays, BSDFs, meshes, emitters, and the scene that holds them.
+
+Mitsuba runs in the variant ``scalar_rgb``, which every wheel carries; importing this module selects it for
+the whole process. It computes in float32 and finds its hits with Embree, so it judges pictures, not
+distances.
+
+A diffuse BSDF is k_d / pi in Mitsuba and k_d for us, so every light is multiplied by pi.
+"""
+
+from collections.abc import Sequence
+from math import pi
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import primary_rays, sample_offsets
+from renderer.light import DirectionalLight, Light
+from renderer.scene import Instance, Scene
+
+mi.set_variant("scalar_rgb")
+
+Rays = tuple[NDArray[np.float64], NDArray[np.float64]]
+Rgb = Sequence[float]
+
+# Rounding a vertex to float32 moves it by 2^-24 of its coordinate. Up to 2^-22 of the mesh's size, i.e.
+# within four sizes of the origin, that is the order of what every float32 reader does to a model; beyond,
+# shapes would change.
+VERTEX_ROUNDING = 2.0**-22
+
+
+def camera_rays(scene: Scene, width: int, height: int, samples: int) -> list[Rays]:
+    """Our primary rays for each sample of a pixel: origins, unit directions, (height * width, 3) float64."""
+    return [primary_rays(scene.camera, width, height, (x, y)) for x, y in sample_offsets(samples).tolist()]
+
+
+def mitsuba_rays(rays: Rays) -> list[mi.Ray3f]:
+    """The same rays for Mitsuba, rounded to float32."""
+    origins, directions = rays
+    pairs = zip(origins.tolist(), directions.tolist(), strict=True)
+    return [mi.Ray3f(mi.Point3f(*origin), mi.Vector3f(*direction)) for origin, direction in pairs]
+
+
+def diffuse(albedo: Rgb) -> mi.BSDF:
+    """Lambert's law on both sides of the surface."""
+    return _two_sided({"type": "diffuse", "reflectance": _reflectance(albedo)})
+
+
+def mirror(reflectance: Rgb) -> mi.BSDF:
+    """A perfect mirror on both sides of the surface."""
+    return _two_sided(
+        {"type": "conductor", "material": "none", "specular_reflectance": _reflectance(reflectance)}
+    )
+
+
+def dielectric(ior: float, reflectance: Rgb, transmittance: Rgb) -> mi.BSDF:
+    """Clear glass in air. Component 0 is reflection, 1 refraction."""
+    return mi.load_dict(
+        {
+            "type": "dielectric",
+            "int_ior": ior,
+            "ext_ior": 1.0,
+            "specular_reflectance": _reflectance(reflectance),
+            "specular_transmittance": _reflectance(transmittance),
+        }
+    )
+
+
+def emitter(light: Light, scale: float = 1.0) -> mi.Emitter:
+    """A point or directional emitter ``scale`` times as bright as ``light`` (times pi, see the module)."""
+    if isinstance(light, DirectionalLight):
+        power = _radiance(light.irradiance, scale * pi)
+        return mi.load_dict({"type": "directional", "direction": list(light.direction), "irradiance": power})
+    return mi.load_dict(
+        {
+            "type": "point",
+            "position": list(light.position),
+            "intensity": _radiance(light.intensity, scale * pi),
+        }
+    )
+
+
+def background(color: Rgb) -> mi.Emitter:
+    """An emitter for the constant radiance that a ray sees when it leaves the scene."""
+    return mi.load_dict({"type": "constant", "radiance": _radiance(color, 1.0)})
+
+
+def meshes(scene: Scene, bsdfs: Sequence[mi.BSDF]) -> dict[mi.Mesh, int]:
+    """One Mitsuba mesh for each instance that has faces, with the instance's index.
+
+    bsdfs : one for each of ``scene.instances``.
+
+    Raises ``ValueError`` for a mesh whose shape does not survive float32, see ``VERTEX_ROUNDING``.
+    """
+    placed = zip(scene.instances, bsdfs, strict=True)
+    return {
+        _mesh(i, instance, bsdf): i for i, (instance, bsdf) in enumerate(placed) if len(instance.mesh.faces)
+    }
+
+
+def assemble(shapes: dict[mi.Mesh, int], emitters: Sequence[mi.Emitter]) -> mi.Scene:
+    """The Mitsuba scene of these shapes and emitters.
+
+    A hit's ``si.shape`` is the very object in ``shapes``, so ``shapes[si.shape]`` is the instance's index.
+    Mitsuba may merge shapes when it loads a scene; that is turned off, and ``RuntimeError`` is raised should
+    it happen all the same.
+    """
+    content: dict[str, Any] = {"type": "scene", "embree_use_robust_intersections": True}
+    content |= {f"instance{i}": shape for shape, i in shapes.items()}
+    content |= {f"emitter{i}": light for i, light in enumerate(emitters)}
+    scene = mi.load_dict(content, optimize=False)
+    loaded = scene.shapes()
+    if len(loaded) != len(shapes) or any(shape not in shapes for shape in loaded):
+        raise RuntimeError(
+            f"mitsuba: expected the {len(shapes)} shapes handed in, got {len(loaded)}, merged or copied"
+        )
+    return scene
+
+
+def _two_sided(bsdf: dict[str, Any]) -> mi.BSDF:
+    return mi.load_dict({"type": "twosided", "bsdf": bsdf})
+
+
+def _reflectance(color: Rgb) -> dict[str, Any]:
+    """A spectrum of ``color`` that, unlike the usual "rgb", may exceed 1: our materials may."""
+    return {"type": "srgb", "color": list(color), "unbounded": True}
+
+
+def _radiance(color: Rgb, scale: float) -> dict[str, Any]:
+    return {"type": "rgb", "value": [scale * channel for channel in color]}
+
+
+def _mesh(index: int, instance: Instance, bsdf: mi.BSDF) -> mi.Mesh:
+    mesh = instance.mesh
+    vertices = mesh.vertices.astype(np.float32)
+    moved = np.abs(vertices - mesh.vertices).max()
+    if not moved <= VERTEX_ROUNDING * mesh.extent.max():
+        raise ValueError(
+            f"instance {index} ({mesh.name}): expected vertices that float32 holds to {VERTEX_ROUNDING:.1g} "
+            f"of the mesh's size {mesh.extent.max():.3g}, got one that moves by {moved:.3g}"
+        )
+    properties = mi.Properties()
+    properties["bsdf"] = bsdf
+    name, counts = f"instance{index}", (len(vertices), len(mesh.faces))
+    result = mi.Mesh(name, *counts, has_vertex_normals=instance.smooth, props=properties)
+    arrays = mi.traverse(result)
+    arrays["vertex_positions"] = vertices.ravel()
+    arrays["faces"] = mesh.faces.astype(np.uint32).ravel()
+    if instance.smooth:
+        normals = mesh.vertex_normals() if mesh.normals is None else mesh.normals
+        arrays["vertex_normals"] = normals.astype(np.float32).ravel()
+    arrays.update()
+    return result

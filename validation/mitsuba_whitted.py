@@ -1,0 +1,226 @@
+"""Reference B: the Whitted recursion over Mitsuba's scene, BSDFs and emitters.
+
+Only the recursion is written here. Hits, shading frames, spawned rays, mirror and refraction directions,
+Fresnel's shares, light falloff and shadows are Mitsuba's; the Phong highlight, for which Mitsuba has no
+plugin, is computed from Mitsuba's frame and its ``reflect``. Each lobe of a BSDF is sampled on its own, so
+nothing is random and a second run gives the same bits.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.material import Dielectric, Material, Mirror, Phong
+from renderer.scene import Scene
+from validation import mitsuba_scene as source
+
+# Delta lobes and delta emitters do not depend on the random numbers that they are sampled with.
+_ANY_NUMBER, _ANY_POINT = 0.5, mi.Point2f(0.5, 0.5)
+
+
+def _context(component: int | None = None) -> mi.BSDFContext:
+    """A context that samples one component of a BSDF, or all of them.
+
+    Importance transport leaves out the factor 1 / eta^2 by which radiance is compressed in glass: Whitted's
+    model, and ours, has none.
+    """
+    context = mi.BSDFContext(mi.TransportMode.Importance)
+    if component is not None:
+        context.component = component
+    return context
+
+
+_ALL, _REFLECTION, _REFRACTION = _context(), _context(0), _context(1)
+
+
+@dataclass(frozen=True)
+class _Lobe:
+    """A direction in which light is followed; ``weight`` replaces the BSDF's own where it is given."""
+
+    bsdf: mi.BSDF
+    context: mi.BSDFContext
+    weight: mi.Color3f | None = None
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """What one material does: its ambient light k_a I_a, what it scatters of the lights, its lobes."""
+
+    ambient: mi.Color3f
+    diffuse: mi.BSDF | None
+    specular: mi.Color3f | None
+    shininess: float
+    lobes: tuple[_Lobe, ...]
+
+
+@dataclass(frozen=True)
+class _Whitted:
+    scene: mi.Scene
+    surfaces: dict[mi.Mesh, _Surface]
+    lights: tuple[mi.Emitter, ...]
+    background: mi.Color3f
+    max_depth: int
+
+    def radiance(self, ray: mi.Ray3f, depth: int) -> mi.Color3f:
+        si = self.scene.ray_intersect(ray)
+        if not si.is_valid():
+            return self.background
+        surface = self.surfaces[si.shape]
+        result = surface.ambient
+        if surface.diffuse is not None or surface.specular is not None:
+            result = result + self._direct(si, surface)
+        if depth < self.max_depth:
+            for lobe in surface.lobes:
+                result = result + self._follow(si, lobe, depth)
+        return result
+
+    def _direct(self, si: mi.SurfaceInteraction3f, surface: _Surface) -> mi.Color3f:
+        result = mi.Color3f(0.0)
+        for light in self.lights:
+            sample, irradiance = light.sample_direction(si, _ANY_POINT)
+            wo = si.to_local(sample.d)
+            same_side = wo.z * si.wi.z > 0.0
+            if same_side and not self.scene.ray_test(si.spawn_ray_to(sample.p)):
+                result = result + irradiance * _scattered(si, surface, wo)
+        return result
+
+    def _follow(self, si: mi.SurfaceInteraction3f, lobe: _Lobe, depth: int) -> mi.Color3f:
+        sample, weight = lobe.bsdf.sample(lobe.context, si, _ANY_NUMBER, _ANY_POINT)
+        if max(weight) == 0.0:  # total internal reflection, or a black lobe
+            return mi.Color3f(0.0)
+        spawned = si.spawn_ray(si.to_world(sample.wo))
+        return (weight if lobe.weight is None else lobe.weight) * self.radiance(spawned, depth + 1)
+
+
+def _scattered(si: mi.SurfaceInteraction3f, surface: _Surface, wo: mi.Vector3f) -> mi.Color3f:
+    """k_d N.L + k_s (R.V)^n, over pi because the lights are multiplied by it.
+
+    R.V is a float32 number: above a shininess of about 1e4 its rounding (6e-8, times n) begins to show.
+    """
+    result = mi.Color3f(0.0)
+    if surface.diffuse is not None:
+        result = result + surface.diffuse.eval(_ALL, si, wo)
+    if surface.specular is not None:
+        cosine = float(sum(mi.reflect(wo) * si.wi))
+        if cosine > 0.0:
+            result = result + surface.specular * (cosine**surface.shininess / pi)
+    return result
+
+
+def _surface(material: Material, ambient_light: source.Rgb) -> _Surface:
+    black = mi.Color3f(0.0)
+    if isinstance(material, Mirror):
+        return _Surface(black, None, None, 0.0, (_Lobe(source.mirror(material.reflectance), _ALL),))
+    if isinstance(material, Dielectric):
+        glass = source.dielectric(material.ior, material.reflectance, material.transmittance)
+        return _Surface(black, None, None, 0.0, (_Lobe(glass, _REFLECTION), _Lobe(glass, _REFRACTION)))
+    ambient = material.diffuse if material.ambient is None else material.ambient
+    return _Surface(
+        mi.Color3f(*ambient) * mi.Color3f(*ambient_light),
+        source.diffuse(material.diffuse) if any(material.diffuse) else None,
+        mi.Color3f(*material.specular) if any(material.specular) else None,
+        material.shininess,
+        _phong_lobes(material),
+    )
+
+
+def _phong_lobes(material: Phong) -> tuple[_Lobe, ...]:
+    """The constant shares; clear glass gives the refracted direction, and weight 0 under total internal
+    reflection.
+    """
+    lobes = []
+    if any(material.reflectance):
+        lobes.append(_Lobe(source.mirror(material.reflectance), _ALL))
+    if any(material.transmittance):
+        glass = source.dielectric(material.ior, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+        lobes.append(_Lobe(glass, _REFRACTION, mi.Color3f(*material.transmittance)))
+    return tuple(lobes)
+
+
+def _whitted(scene: Scene, max_depth: int) -> _Whitted:
+    surfaces = [_surface(scene.materials[i.material], scene.ambient) for i in scene.instances]
+    # A shape must carry some BSDF; each surface's own are asked instead, so what it is does not matter.
+    shapes = source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
+    lights = tuple(source.emitter(light) for light in scene.lights)
+    return _Whitted(
+        source.assemble(shapes, lights),
+        {shape: surfaces[index] for shape, index in shapes.items()},
+        lights,
+        mi.Color3f(*scene.background),
+        max_depth,
+    )
+
+
+def whitted(
+    scene: Scene,
+    width: int,
+    height: int,
+    *,
+    max_depth: int,
+    samples: int = 1,
+    rays: source.Rays | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> NDArray[np.float64]:
+    """The picture of ``scene`` by reference B, linear radiance (height, width, 3) float64.
+
+    max_depth : bounces followed, as in ``RenderSettings``; there is no ``min_weight``.
+    samples : a square number of rays a pixel, on our regular grid.
+    rays : origins and unit directions, (height * width, 3) each, instead of the camera's; ``samples`` is then
+        not used.
+    progress : called with the rows done and the rows in all.
+    """
+    tracer = _whitted(scene, max_depth)
+    bundles = source.camera_rays(scene, width, height, samples) if rays is None else [rays]
+    result = np.zeros((height, width, 3))
+    for number, bundle in enumerate(bundles):
+        traced = source.mitsuba_rays(bundle)
+        for row in range(height):
+            line = [tracer.radiance(ray, 0) for ray in traced[row * width : (row + 1) * width]]
+            result[row] += np.array(line, dtype=np.float64).reshape(width, 3)
+            if progress is not None:
+                progress(number * height + row + 1, len(bundles) * height)
+    return result / len(bundles)
+
+
+@dataclass(frozen=True)
+class Aovs:
+    """What the primary rays meet; every array begins with (height, width).
+
+    depth : float64, distance along the unit ray, inf on a miss.
+    position, geometric_normal, shading_normal : (..., 3) float64, NaN on a miss. Normals point to the side
+        from which the face is counter-clockwise (the vertex normals' side), not to the eye.
+    instance : int64 index into ``scene.instances``, -1 on a miss.
+    """
+
+    depth: NDArray[np.float64]
+    position: NDArray[np.float64]
+    geometric_normal: NDArray[np.float64]
+    shading_normal: NDArray[np.float64]
+    instance: NDArray[np.int64]
+
+
+def aovs(scene: Scene, width: int, height: int, *, rays: source.Rays | None = None) -> Aovs:
+    """Mitsuba's hits, in float32, of our primary rays through the pixels' centres, or of ``rays``."""
+    shapes = source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
+    unlit = source.assemble(shapes, [])
+    table = np.full((height * width, 10), np.nan)
+    table[:, 0] = np.inf
+    instance = np.full(height * width, -1, dtype=np.int64)
+    bundle = source.camera_rays(scene, width, height, 1)[0] if rays is None else rays
+    for row, ray in enumerate(source.mitsuba_rays(bundle)):
+        si = unlit.ray_intersect(ray)
+        if si.is_valid():
+            table[row] = si.t, *si.p, *si.n, *si.sh_frame.n
+            instance[row] = shapes[si.shape]
+    vectors = table[:, 1:].reshape(height, width, 3, 3)
+    return Aovs(
+        table[:, 0].reshape(height, width),
+        vectors[:, :, 0],
+        vectors[:, :, 1],
+        vectors[:, :, 2],
+        instance.reshape(height, width),
+    )

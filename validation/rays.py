@@ -1,0 +1,198 @@
+"""Seeded families of rays around a mesh.
+
+Every number is exact in float32, though stored as float64, so a float32 reference sees the very same rays.
+The mesh should be too: see ``float32_exact``. Directions are not unit length unless stated.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class RayBatch:
+    """Rays of one family: ``origins`` and ``directions`` are float64 (n, 3), float32-exact, no direction is
+    zero.
+    """
+
+    name: str
+    origins: Floats
+    directions: Floats
+
+    def __len__(self) -> int:
+        return len(self.origins)
+
+    def select(self, rows: ArrayLike) -> "RayBatch":
+        """The rays at ``rows`` (indices or a mask), under the same name."""
+        index = np.asarray(rows)
+        return RayBatch(self.name, self.origins[index], self.directions[index])
+
+
+def float32_exact(values: ArrayLike) -> Floats:
+    """``values`` rounded to float32 and stored as float64."""
+    return np.asarray(values).astype(np.float32).astype(np.float64)
+
+
+def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayBatch, ...]:
+    """All seven families, ``count`` rays each. Equal arguments give equal rays; each family has a seed of its
+    own.
+    """
+    makers: tuple[Callable[[Floats, int, Generator], RayBatch], ...] = (
+        random_rays,
+        axis_parallel_rays,
+        edge_rays,
+        vertex_rays,
+        grazing_rays,
+        from_inside_rays,
+    )
+    if not len(faces):
+        raise ValueError("faces: expected at least one face to aim rays at, got none")
+    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
+    seeds = np.random.SeedSequence(seed).spawn(len(makers))
+    seeded = (make(corners, count, np.random.default_rng(s)) for make, s in zip(makers, seeds, strict=True))
+    return (camera_rays(corners.reshape(-1, 3), count), *seeded)
+
+
+def camera_rays(vertices: Floats, count: int) -> RayBatch:
+    """Pinhole camera that just sees all of ``vertices`` (V, 3), scanline by scanline; unit directions."""
+    centre, radius = _sphere(vertices)
+    forward = _unit(np.array([[-0.6, -0.45, -0.66]]))[0]
+    right = _unit(np.cross(forward, [0.0, 1.0, 0.0])[None])[0]
+    up = np.cross(right, forward)
+
+    # The bounding sphere, 3 radii away, subtends a half angle of asin(1/3): the picture holds it.
+    side = int(np.ceil(np.sqrt(count)))
+    row, column = np.divmod(np.arange(count), max(side, 1))
+    half_width = np.tan(np.arcsin(1 / 3))
+    x = half_width * ((2 * column + 1) / max(side, 1) - 1)
+    y = half_width * (1 - (2 * row + 1) / max(side, 1))
+    directions = _unit(forward + x[:, None] * right + y[:, None] * up)
+    return _batch("camera", np.broadcast_to(centre - 3 * radius * forward, (count, 3)), directions)
+
+
+def random_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    """Half between two points on a sphere around the mesh's ``corners`` (F, 3, 3), half between points in its
+    box.
+    """
+    centre, radius = _sphere(corners.reshape(-1, 3))
+    from_sphere = centre + 1.1 * radius * _sphere_points(count, rng)
+    to_sphere = centre + 1.1 * radius * _sphere_points(count, rng)
+    lower, upper = _bounds(corners)
+    from_box, to_box = rng.uniform(lower, upper, (2, count, 3))
+    inside = (np.arange(count) % 2 == 1)[:, None]
+    start, end = np.where(inside, from_box, from_sphere), np.where(inside, to_box, to_sphere)
+    return _batch("random", start, end - start)
+
+
+def axis_parallel_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    """Along +-x, +-y, +-z with exact zeros of both signs; half the rays share two or three coordinates with a
+    vertex.
+    """
+    lower, upper = _bounds(corners)
+    margin = 0.25 * (upper - lower)
+    axis = np.arange(count) % 3
+    sign = np.where(np.arange(count) // 3 % 2, -1.0, 1.0)
+    ray = np.arange(count)
+
+    origins = rng.uniform(lower - margin, upper + margin, (count, 3))
+    on_vertex = rng.random(count) < 0.5
+    origins[on_vertex] = _pick(corners.reshape(-1, 3), count, rng)[on_vertex]
+    outside = np.where(sign > 0, (lower - margin)[axis], (upper + margin)[axis])
+    moved = on_vertex & (rng.random(count) < 0.75)
+    origins[ray[moved], axis[moved]] = outside[moved]
+
+    directions = np.where(rng.random((count, 3)) < 0.5, -0.0, 0.0)
+    directions[ray, axis] = sign
+    return _batch("axis_parallel", origins, directions)
+
+
+def edge_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    """Aimed at random points of random edges, alternately from outside and from near the mesh's centre; t is
+    about 1.
+    """
+    triangle = _pick(corners, count, rng)
+    first = rng.integers(0, 3, count)
+    ray = np.arange(count)
+    along = rng.random((count, 1))
+    target = (1 - along) * triangle[ray, first] + along * triangle[ray, (first + 1) % 3]
+    return _aimed("edge", corners, target, rng)
+
+
+def vertex_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    """Aimed at random vertices, alternately from outside and from near the mesh's centre; t is about 1."""
+    return _aimed("vertex", corners, _pick(corners.reshape(-1, 3), count, rng), rng)
+
+
+def grazing_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    """Aimed from outside at random points of random faces, 1e-4 to 1e-1 radians (log-uniform) above their
+    planes.
+    """
+    triangle = _pick(corners, count, rng)
+    weights = rng.dirichlet((1.0, 1.0, 1.0), count)
+    target = np.einsum("nk,nkj->nj", weights, triangle)
+    normal = _unit(np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]))
+    tangent = _unit(np.cross(normal, _sphere_points(count, rng)))
+    angle = 10.0 ** rng.uniform(-4, -1, (count, 1))
+    directions = np.cos(angle) * tangent - np.sin(angle) * normal
+    return _batch("grazing", target - 2 * _sphere(corners.reshape(-1, 3))[1] * directions, directions)
+
+
+def from_inside_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    """From near the middle of the mesh's box into every direction: no ray leaves a closed, star-shaped mesh
+    unhit.
+    """
+    return _batch("from_inside", _near_centre(corners, count, rng), _sphere_points(count, rng))
+
+
+def _aimed(name: str, corners: Floats, targets: Floats, rng: Generator) -> RayBatch:
+    count = len(targets)
+    centre, radius = _sphere(corners.reshape(-1, 3))
+    outside = centre + 2 * radius * _sphere_points(count, rng)
+    inside = _near_centre(corners, count, rng)
+    # Round first: the direction must start at the origin that the ray will have.
+    origins = float32_exact(np.where((np.arange(count) % 2 == 0)[:, None], outside, inside))
+    return _batch(name, origins, targets - origins)
+
+
+def _batch(name: str, origins: Floats, directions: Floats) -> RayBatch:
+    """Round to float32; a direction that is or rounds to zero (a target at its origin) becomes +z."""
+    exact = float32_exact(directions)
+    exact[~exact.any(axis=1)] = (0.0, 0.0, 1.0)
+    return RayBatch(name, float32_exact(origins), exact)
+
+
+def _near_centre(corners: Floats, count: int, rng: Generator) -> Floats:
+    lower, upper = _bounds(corners)
+    return rng.uniform(0.55 * lower + 0.45 * upper, 0.45 * lower + 0.55 * upper, (count, 3))
+
+
+def _pick(rows: Floats, count: int, rng: Generator) -> Floats:
+    return rows[rng.integers(0, len(rows), count)]
+
+
+def _sphere_points(count: int, rng: Generator) -> Floats:
+    return _unit(rng.standard_normal((count, 3)))
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Unit vectors; zero stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    unit: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return unit
+
+
+def _bounds(corners: Floats) -> tuple[Floats, Floats]:
+    points = corners.reshape(-1, 3)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _sphere(points: Floats) -> tuple[Floats, float]:
+    """Centre of the bounds of ``points`` and the largest distance from it; the radius of one point is 1."""
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    return centre, float(np.linalg.norm(points - centre, axis=1).max()) or 1.0
