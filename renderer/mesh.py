@@ -90,7 +90,8 @@ class Mesh:
         array = self._array(argument, width)
         if array.size and array.dtype.kind not in "fiu":
             raise self._error(f"{argument}: expected real numbers, got dtype {array.dtype}")
-        with np.errstate(over="ignore"):  # what overflows to inf is rejected just below
+        # What overflows to inf is rejected just below, and so is a signalling NaN, whose cast would warn.
+        with np.errstate(over="ignore", invalid="ignore"):
             floats = np.array(array, dtype=dtype, order="C")
         finite = np.isfinite(floats)
         if not finite.all():

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 import os
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
@@ -16,6 +16,7 @@ from renderer.errors import MeshError
 from renderer.mesh import Mesh
 from renderer.obj import parse_obj
 from renderer.ply import format_ply, parse_ply
+from renderer.stl import parse_stl
 
 
 def load_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
@@ -69,40 +70,13 @@ def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
         unfinished.unlink(missing_ok=True)
 
 
-def _parse_stl(content: bytes) -> Mesh:
-    """Binary STL is known by its length; text must close every facet and solid that it opens."""
-    face_count = int.from_bytes(content[80:84], "little")
-    if len(content) < 84 or len(content) != 84 + 50 * face_count:
-        if not content.lstrip().lower().startswith(b"solid"):
-            raise MeshError(
-                f"expected text that starts with 'solid', or binary of {84 + 50 * face_count} bytes for its"
-                f" {face_count} faces, got {len(content)} bytes"
-            )
-        opened, closed = (
-            [len(re.findall(rb"(?mi)^[ \t]*" + word + rb"\b", content)) for word in words]
-            for words in ((b"facet", b"solid"), (b"endfacet", b"endsolid"))
-        )
-        if opened != closed:
-            raise MeshError(f"truncated: (facets, solids) that begin {opened}, that end {closed}")
-        face_count = opened[0]
-        # trimesh guesses the encoding of what is not ASCII, and only names can be that.
-        content = content.decode("ascii", "replace").encode("ascii", "replace")
-    mesh = _through_trimesh(content, "stl")
-    if len(mesh.faces) != face_count:
-        raise MeshError(f"expected {face_count} faces, read {len(mesh.faces)}")
-    return mesh
-
-
 def _parse_glb(content: bytes) -> Mesh:
-    return _through_trimesh(content, "glb")
-
-
-def _through_trimesh(content: bytes, file_type: str) -> Mesh:
     """All triangle meshes, each placed by the scene's transforms; points and lines have no surface."""
     import trimesh  # half a second, which scenes of PLY files need not spend
 
+    _check_glb_frame(content)
     try:
-        scene = trimesh.load_scene(BytesIO(content), file_type=file_type, process=False)
+        scene = trimesh.load_scene(BytesIO(content), file_type="glb", process=False)
         meshes = []
         for node in scene.graph.nodes_geometry:
             transform, geometry_name = scene.graph[node]
@@ -114,7 +88,20 @@ def _through_trimesh(content: bytes, file_type: str) -> Mesh:
         raise
     except Exception as error:  # a library on malformed input raises anything: KeyError, struct.error, ...
         fault = " ".join(str(error).split())[:120]
-        raise MeshError(f"malformed {file_type.upper()}: {type(error).__name__}: {fault}") from error
+        raise MeshError(f"malformed GLB: {type(error).__name__}: {fault}") from error
+
+
+def _check_glb_frame(content: bytes) -> None:
+    """The 12-byte header and the JSON chunk (glTF 2.0, section 4.4): trimesh checks neither length nor encoding."""
+    if content[:4] != b"glTF":
+        raise MeshError(f"expected a first word 'glTF', got {content[:4]!r}")
+    length, json_length = (int.from_bytes(content[at : at + 4], "little") for at in (8, 12))
+    if len(content) < max(length, 20 + json_length):
+        raise MeshError(f"truncated: expected {max(length, 20 + json_length)} bytes, got {len(content)}")
+    try:
+        json.loads(content[20 : 20 + json_length].decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise MeshError(f"malformed GLB: its JSON chunk: {str(error)[:120]}") from error
 
 
 def _from_trimesh(geometry: Any) -> Mesh:
@@ -130,6 +117,6 @@ def _from_trimesh(geometry: Any) -> Mesh:
 _PARSERS: dict[str, Callable[[bytes], Mesh]] = {
     ".ply": parse_ply,
     ".obj": parse_obj,
-    ".stl": _parse_stl,
+    ".stl": parse_stl,
     ".glb": _parse_glb,
 }

@@ -49,6 +49,8 @@ def parse_obj(content: bytes) -> Mesh:
         if not words or words[0].startswith("#"):
             continue
         try:
+            if "_" in line and words[0] in ("v", "vt", "vn", "f"):  # Python takes 1_000 for a number
+                raise ValueError(f"malformed number {next(word for word in words if '_' in word)!r}")
             _read_statement(words[0], words[1:], statements)
         except ValueError as error:
             raise MeshError(f"line {number}: {str(error)[:100]}, got {line.strip()[:80]!r}") from error

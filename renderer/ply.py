@@ -202,9 +202,7 @@ def _read_elements(
     return columns
 
 
-def _read_rows(
-    content: bytes, position: int, element: _Element, byte_order: _ByteOrder
-) -> tuple[_Columns, int]:
+def _read_rows(content: bytes, position: int, element: _Element, byte_order: _ByteOrder) -> tuple[_Columns, int]:
     """The element's columns and where it ends.
 
     Rows that all look like the first (triangles only, say) are strided views of ``content``. Otherwise
@@ -224,16 +222,13 @@ def _read_rows(
             counts: NDArray[Any] = np.ndarray((rows,), count_type, content, at, (stride,))
             uniform = uniform and bool((counts == lengths[0, k]).all())
         shape, strides = (rows, int(lengths[0, k])), (stride, p.stored.itemsize)
-        values: NDArray[Any] = np.ndarray(
-            shape, p.stored.newbyteorder(byte_order), content, int(starts[0, k]), strides
-        )
+        values: NDArray[Any] = np.ndarray(shape, p.stored.newbyteorder(byte_order), content, int(starts[0, k]), strides)
         columns[p.name] = _Column(p, np.arange(rows + 1) * lengths[0, k], values.reshape(-1))
     if uniform:
         return columns, position + rows * stride
     starts, lengths, end = _walk(content, position, element, byte_order, rows)
     return {
-        p.name: _gathered(content, p, starts[:, k], lengths[:, k], byte_order)
-        for k, p in enumerate(element.properties)
+        p.name: _gathered(content, p, starts[:, k], lengths[:, k], byte_order) for k, p in enumerate(element.properties)
     }, end
 
 
@@ -290,7 +285,8 @@ def _vertex_columns(vertex: _Columns, names: tuple[str, ...]) -> Float64Array | 
     columns = [vertex[name] for name in names if name in vertex and vertex[name].property.count_type is None]
     if len(columns) < len(names):
         return None
-    return np.stack([column.values for column in columns], axis=1).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a signalling NaN: Mesh rejects it with its row
+        return np.stack([column.values.astype(np.float64) for column in columns], axis=1)
 
 
 def _colors(vertex: _Columns) -> NDArray[np.float32] | None:
@@ -314,8 +310,8 @@ def _corners(element: str, columns: _Columns) -> _Column:
         raise MeshError(f"element {element}: expected a list {' or '.join(_INDEX_NAMES)}, got {names}")
     values = lists[0].values
     if values.dtype.kind == "f":
-        whole = np.abs(values) < 2**53  # false for NaN and inf too
-        whole &= np.floor(values, where=whole, out=np.zeros_like(values)) == values
+        with np.errstate(invalid="ignore"):  # NaN and inf, which are not whole either
+            whole = (np.abs(values) < 2**53) & (np.floor(values) == values)
         if not whole.all():
             raise MeshError(f"element {element}: expected whole vertex indices, got {values[~whole][0]}")
     return replace(lists[0], values=values.astype(np.int64))
@@ -330,9 +326,7 @@ def _fans(polygons: _Column) -> NDArray[np.int64]:
     cuts = lengths - 2
     firsts = np.repeat(polygons.starts[:-1], cuts)
     steps = np.arange(cuts.sum()) - np.repeat(np.cumsum(cuts) - cuts, cuts) + 1
-    triangles: NDArray[np.int64] = polygons.values[
-        np.stack([firsts, firsts + steps, firsts + steps + 1], axis=1)
-    ]
+    triangles: NDArray[np.int64] = polygons.values[np.stack([firsts, firsts + steps, firsts + steps + 1], axis=1)]
     return triangles
 
 

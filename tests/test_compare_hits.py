@@ -179,11 +179,23 @@ def test_a_silhouette_is_counted_apart_and_listed():
     comparison = judged(missed, answer(1.0, hits[0].face), batch)
     assert comparison.verdicts[NEAR_EDGE] == 1 and comparison.ours_wrong == 0
     errors = exact_errors(missed, hits, VERTICES, FACES, batch)
-    assert (errors.wrong, errors.near_edge, len(errors.listed)) == (0, 1, 1)
+    assert (errors.wrong, errors.near_edge, errors.near_edge_flipped, len(errors.listed)) == (0, 1, 1, 1)
+
+
+def test_the_neighbour_at_an_edge_is_counted_apart_but_is_no_flip():
+    """Aim a hair beside an edge: the neighbour is missed by less than float64 resolves, at the same t."""
+    square = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    batch = one_ray([np.nextafter(0.7, 1), 0.7, 1], [0, 0, -1])
+    hits = exact.closest_hits(square, faces, batch.origins, batch.directions)
+    assert hits[0].faces_at_t == (0,)
+    errors = exact_errors(answer(1.0, 1), hits, square, faces, batch)
+    assert (errors.wrong, errors.near_edge, errors.near_edge_flipped) == (0, 1, 0)
 
 
 def test_faces_are_not_compared_where_t_agrees():
     theirs = replace(THEIRS, face=np.where(THEIRS.hit, (THEIRS.face + 1) % len(FACES), -1))
+    assert np.count_nonzero(theirs.face != THEIRS.face) > 200
     first, second = compare(OURS, THEIRS, VERTICES, FACES, RAYS), compare(OURS, theirs, VERTICES, FACES, RAYS)
     assert [d.ray for d in first.disagreements] == [d.ray for d in second.disagreements]
 

@@ -197,6 +197,10 @@ def test_overflow_and_denormals_lose_nothing():
         assert hits[0] is not None and hits[0].t == Fraction(scale)
     hits = exact.closest_hits(TRIANGLE * 4e307, ONE, [[4e307, 4e307, -1.7e308]], [[0, 0, 1.0]])
     assert hits[0] is not None and hits[0].t == Fraction(1.7e308)
+    # Here even the difference of box and origin overflows.
+    far = np.array([[0.0, 0.0, 1e308], [4.0, 0.0, 1e308], [0.0, 4.0, 1e308]])
+    hits = exact.closest_hits(far, ONE, [[1, 1, -1.7e308]], [[0, 0, 1e300]], t_max=1e9)
+    assert hits[0] is not None and hits[0].t == (Fraction(1e308) + Fraction(1.7e308)) / Fraction(1e300)
 
 
 @pytest.mark.parametrize(

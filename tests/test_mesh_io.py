@@ -30,7 +30,7 @@ Rows = list[list[Any]]
 
 
 def ply(form: str, *elements: tuple[str, list[str], Rows], trailing: bytes = b"") -> bytes:
-    """A PLY file of (name, properties like 'float x' or 'list uchar int i', rows) elements; a list's row entry is a list."""
+    """A PLY file of elements (name, properties like 'float x' or 'list uchar int i', rows of numbers and lists)."""
     header = ["ply", f"format {form} 1.0", "comment made for a test"]
     body = b""
     for name, properties, rows in elements:
@@ -267,6 +267,12 @@ def test_a_million_faces_load_in_two_seconds(tmp_path: Path) -> None:
 VERTEX = ("vertex", XYZ, SQUARE)
 FACE = ("face", INDICES, [[[0, 1, 2]]])
 STRIPS = ["list int int vertex_indices"]
+FLOAT_INDICES = ["list uchar float vertex_indices"]
+NAN = float("nan")
+
+
+def colored(type_: str, value: float) -> tuple[str, list[str], Rows]:
+    return "vertex", [*XYZ, f"{type_} red", f"{type_} green", f"{type_} blue"], [[*p, *[value] * 3] for p in SQUARE]
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -280,24 +286,24 @@ STRIPS = ["list int int vertex_indices"]
         ([FACE], "expected an element 'vertex', got face"),
         ([("vertex", [], []), FACE], "expected properties x, y and z, got none"),
         ([("vertex", ["float x", "float z"], [[0, 0]]), FACE], "expected properties x, y and z, got x, z"),
-        ([("vertex", ["float x", "float y", "list uchar float z"], [[0, 0, [1]]]), FACE], "expected properties x, y and z"),
+        ([("vertex", ["float x", "float y", "list uchar float z"], [[0, 0, [1]]]), FACE], "expected properties x, y"),
         ([VERTEX, ("face", ["int vertex_indices"], [[0]])], "expected a list vertex_indices or vertex_index"),
         ([VERTEX, ("face", ["list uchar int corners"], [[[0, 1, 2]]])], "vertex_index, got corners"),
         ([VERTEX, ("face", [], [])], "expected a list vertex_indices or vertex_index, got none"),
         ([VERTEX, ("face", INDICES, [[[0, 1, 4]]])], "faces: expected indices of 4 vertices, got 4 in row 0"),
-        ([VERTEX, ("face", INDICES, [[[0, 1, 2]], [[0, -1, 2]]])], "faces: expected indices of 4 vertices, got -1 in row 1"),
+        ([VERTEX, ("face", INDICES, [[[0, 1, 2]], [[0, -1, 2]]])], "indices of 4 vertices, got -1 in row 1"),
         ([VERTEX, ("face", INDICES, [[[0, 1, 2]], [[0, 1]]])], "expected at least 3 vertices, got 2 in row 1"),
         ([VERTEX, ("face", INDICES, [[[]]])], "expected at least 3 vertices, got 0 in row 0"),
-        ([VERTEX, ("face", ["list uchar float vertex_indices"], [[[0, 1.5, 2]]])], "expected whole vertex indices, got 1.5"),
-        ([VERTEX, ("face", ["list uchar float vertex_indices"], [[[0, float("nan"), 2]]])], "whole vertex indices, got nan"),
-        ([VERTEX, ("face", ["list uchar double vertex_indices"], [[[0, 1e300, 2]]])], "whole vertex indices, got 1e+300"),
+        ([VERTEX, ("face", FLOAT_INDICES, [[[0, 1.5, 2]]])], "expected whole vertex indices, got 1.5"),
+        ([VERTEX, ("face", FLOAT_INDICES, [[[0, NAN, 2]]])], "expected whole vertex indices, got nan"),
+        ([VERTEX, ("face", FLOAT_INDICES, [[[0, 2.0**60, 2]]])], "expected whole vertex indices, got 1.15"),
         ([VERTEX, ("tristrips", STRIPS, [[[0, 1, 2, -2]]])], "faces: expected indices of 4 vertices, got -2"),
         ([VERTEX, ("tristrips", STRIPS, [[[0, 1, 2, -1, 3]]])], "expected at least 3 vertices in each strip"),
         ([VERTEX, ("tristrips", STRIPS, [[[0, 1]], [[2, 3, 0]]])], "expected at least 3 vertices in each strip"),
-        ([("vertex", XYZ, [*SQUARE[:3], [0, float("nan"), 0]]), FACE], "vertices: expected finite values, got [0.0, nan, 0.0] in row 3"),
-        ([("vertex", XYZ, [*SQUARE[:3], [float("-inf"), 0, 0]]), FACE], "vertices: expected finite values"),
-        ([("vertex", [*XYZ, *(f"char {c}" for c in ("red", "green", "blue"))], [[*p, 1, 1, 1] for p in SQUARE]), FACE], "colours of an unsigned"),
-        ([("vertex", [*XYZ, *(f"float {c}" for c in ("red", "green", "blue"))], [[*p, 1, 9, 1] for p in SQUARE]), FACE], "colors: expected values in [0, 1]"),
+        ([("vertex", XYZ, [*SQUARE[:3], [0, NAN, 0]]), FACE], "expected finite values, got [0.0, nan, 0.0] in row 3"),
+        ([("vertex", XYZ, [*SQUARE[:3], [-np.inf, 0, 0]]), FACE], "vertices: expected finite values"),
+        ([colored("char", 1), FACE], "expected colours of an unsigned or floating type, got int8"),
+        ([colored("float", 9), FACE], "colors: expected values in [0, 1], got [9.0, 9.0, 9.0] in row 0"),
     ],
 )  # fmt: skip
 def test_ply_content_faults(tmp_path: Path, form: str, elements: Any, message: str) -> None:
@@ -322,7 +328,7 @@ GOOD = ply("ascii", VERTEX, FACE).decode()
         ("element vertex 4", "element vertex four", "header line 4"),
         ("element vertex 4", "element vertex", "header line 4"),
         ("element vertex 4", "element vertex 4 4", "header line 4"),
-        ("element vertex 4", "element vertex 999999999999999999", "truncated: too short for the 999999999999999999 rows"),
+        ("element vertex 4", "element vertex 999999999999999999", "too short for the 999999999999999999 rows"),
         ("element vertex 4", "element vertex " + "9" * 5000, "header line 4"),
         ("element face 1", "element face 3000000000", "truncated: too short for the 3000000000 rows of element face"),
         ("element vertex 4", "element vertex 5", "truncated"),
@@ -380,6 +386,28 @@ def test_ply_truncated_at_every_byte(tmp_path: Path, form: str) -> None:
     assert len(load_bytes(tmp_path, content).faces) == 5
     for length in range(len(content)):
         fault(tmp_path, content[:length])
+
+
+SIGNALLING_NAN = b"\x00\x00\xa0\x7f"
+
+
+@pytest.mark.parametrize("place", ["vertex", "index", "stl"])
+def test_signalling_nan_fails_like_any_other(tmp_path: Path, place: str) -> None:
+    """Regression: casting one to float64 raised NumPy's warning before the check that names the row."""
+    if place == "stl":
+        content = foreign_box().export(file_type="stl")
+        message = fault(tmp_path, content[:96] + SIGNALLING_NAN + content[100:], "a.stl")
+        assert "vertices: expected finite values, got [nan" in message
+        return
+    face = ("face", ["list uchar float vertex_indices"], [[[0, 1, 2]]])
+    content = ply("binary_little_endian", VERTEX, face)
+    if place == "vertex":
+        start = content.index(b"end_header\n") + len(b"end_header\n")
+        assert "got [nan, 0.0, 0.0] in row 0" in fault(
+            tmp_path, content[:start] + SIGNALLING_NAN + content[start + 4 :]
+        )
+    else:
+        assert "whole vertex indices, got nan" in fault(tmp_path, content[:-4] + SIGNALLING_NAN)
 
 
 # --- other formats --------------------------------------------------------------------------------------------
@@ -442,6 +470,8 @@ def test_obj_vertex_colors(tmp_path: Path) -> None:
         ("v 0 0\n" + V + "f 1 2 3\n", "line 1: expected at least 3 numbers, got 'v 0 0'"),
         ("v 0 0 nan\n" + V + "f 2 3 4\n", "vertices: expected finite values, got [0.0, 0.0, nan] in row 0"),
         ("v 0 0 x\n" + V, "line 1: could not convert"),
+        ("v 0 0 1_0\n" + V, "line 1: malformed number '1_0'"),
+        (V + "f 1 2 0_3\n", "line 5: malformed number '0_3'"),
         (V + "f 1 2 3\nsurf 0 1 0 1 1 2 3 4\n", "line 6: expected a statement of a polygon mesh"),
         ("\xff\xfe\0garbage", "line 1: "),
     ],
@@ -463,7 +493,8 @@ def test_stl(tmp_path: Path, kind: str) -> None:
 
 
 def test_stl_text_of_two_solids_with_foreign_names(tmp_path: Path) -> None:
-    one = "solid caf\xe9 {}\nfacet normal 0 0 1\nouter loop\nvertex 0 0 {}\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"
+    one = "solid caf\xe9 {}\nfacet normal 0 0 1\nouter loop\nvertex 0 0 {}\nvertex 1 0 0\nvertex 0 1 0\n"
+    one += "endloop\nendfacet\nendsolid\n"
     content = (one.format(1, 1) + one.format(2, 2)).encode("latin-1")
     assert load_bytes(tmp_path, content, "a.stl").vertices[:, 2].tolist() == [1, 0, 0, 2, 0, 0]
     assert "truncated" in fault(tmp_path, content[:-20], "a.stl")
@@ -475,6 +506,16 @@ def test_stl_faults(tmp_path: Path) -> None:
     assert "684 bytes for its 12 faces, got 686" in fault(tmp_path, binary + b"zz", "a.stl")
     assert "holds no faces" in fault(tmp_path, b"\0" * 84, "a.stl")
     assert "holds no faces" in fault(tmp_path, b"solid x\nendsolid x\n", "a.stl")
+    for old, new, message in [
+        (b"outer loop", b"outer lop", "expected 'loop', got 'lop' in facet 0"),
+        (b"vertex -0.5", b"vertex -0.O", "malformed number"),
+        (b"vertex -0.5", b"vertex -0_5", "malformed number"),
+        (b"vertex -0.5", b"vertex nan", "vertices: expected finite values"),
+        (b"endsolid", b"facet normal\nendsolid", "expected 21 words, got 2 in facet 12"),
+        (b"solid", b"solid\nsolid", "truncated: 2 solids begin, 1 end"),
+    ]:
+        assert old in text
+        assert message in fault(tmp_path, text.replace(old, new, 1), "a.stl")
     nan = binary[:96] + struct.pack("<f", np.nan) + binary[100:]
     assert "vertices: expected finite values, got [nan" in fault(tmp_path, nan, "a.stl")
     for length in itertools.chain(range(0, len(binary), 7), range(0, 90)):
@@ -513,6 +554,11 @@ def test_glb_keeps_normals_colors_texcoords(tmp_path: Path) -> None:
 
 def test_glb_faults(tmp_path: Path) -> None:
     content = trimesh.Scene(foreign_box()).export(file_type="glb")
+    assert "expected a first word 'glTF', got b'glTX'" in fault(tmp_path, b"glTX" + content[4:], "a.glb")
+    assert f"truncated: expected {len(content)} bytes, got {len(content) - 1}" in fault(tmp_path, content[:-1], "a.glb")
+    assert "malformed GLB: its JSON chunk: " in fault(tmp_path, content[:25] + b"\xff" + content[26:], "a.glb")
+    assert "malformed GLB: its JSON chunk: " in fault(tmp_path, content[:20] + b"[" + content[21:], "a.glb")
+    assert "malformed GLB: KeyError" in fault(tmp_path, content.replace(b'"accessors"', b'"accessorz"'), "a.glb")
     assert "holds no faces" in fault(
         tmp_path, trimesh.Scene(trimesh.PointCloud(np.eye(3))).export(file_type="glb"), "a.glb"
     )

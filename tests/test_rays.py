@@ -130,3 +130,17 @@ def test_tiny_meshes_give_usable_rays(vertices):
 def test_a_mesh_without_faces_is_refused():
     with pytest.raises(ValueError, match="faces: expected at least one face"):
         rays.families(VERTICES, np.empty((0, 3), int), 10, seed=1)
+
+
+def test_leak_rays_meet_edges_and_vertices_as_well_as_float64_can():
+    """Float32 directions would pass them at 1e-8 or more, where no float64 kernel ever leaks."""
+    edge, vertex = rays.leak_rays(VERTICES, FACES, COUNT, seed=2)
+    assert (edge.name, vertex.name) == ("edge_leak", "vertex_leak")
+    # A few roundings at lengths below 16.
+    assert line_distance(VERTICES[:, None, :], vertex).min(axis=0).max() < 16 * 8 * 2.0**-53
+    start, stop = CORNERS.reshape(-1, 3), np.roll(CORNERS, -1, axis=1).reshape(-1, 3)
+    normal = np.cross(start[:, None] - edge.origins, stop[:, None] - edge.origins)
+    beside = np.abs((normal * edge.directions).sum(axis=2)) / np.linalg.norm(normal, axis=2)
+    assert beside.min(axis=0).max() < 16 * 8 * 2.0**-53
+    hits = exact.closest_hits(VERTICES, FACES, edge.origins, edge.directions)
+    assert None not in hits

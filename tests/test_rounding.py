@@ -95,11 +95,10 @@ def view(origin, direction):
     return RayView(VERTICES, FACES, tuple(map(float, origin)), tuple(map(float, direction)), FLOAT64_ROUNDOFF)
 
 
-@pytest.mark.parametrize("family", [rays.edge_rays, rays.vertex_rays])
+@pytest.mark.parametrize("family", [0, 1])
 def test_leaks_are_not_permitted_but_the_watertight_kernel_is(family):
     corners = VERTICES[FACES]
-    batch = family(corners, 1000, np.random.default_rng(3))
-    inside = batch.select(np.linalg.norm(batch.origins, axis=1) < 0.5)
+    inside = rays.leak_rays(VERTICES, FACES, 500, seed=3)[family]
     t, face = closest(woop, corners, inside)
     _, leaky_face = closest(moller_trumbore, corners, inside)
     leaks = np.flatnonzero(leaky_face < 0)
@@ -152,3 +151,10 @@ def test_an_open_edge_may_go_either_way():
     assert on_rim.is_permitted(None, None)
     assert not on_diagonal.is_permitted(None, None)
     assert on_diagonal.is_permitted(1.0, 0) and on_diagonal.is_permitted(1.0, 1)
+
+
+def test_a_face_behind_the_origin_is_not_permitted():
+    square = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+    behind = RayView(square, np.array([[0, 1, 2]]), (0.75, 0.25, 1.0), (0.0, 0.0, 1.0), FLOAT64_ROUNDOFF)
+    assert behind.closest is None and behind.is_right(None, None)
+    assert not behind.is_permitted(-1.0, 0)

@@ -1,5 +1,4 @@
-"""Compare closest hits of our kernel with a float32 reference, ray by ray, and judge every disagreement
-exactly.
+"""Compare our closest hits with a float32 reference, ray by ray, and judge each disagreement exactly.
 
 Faces are never compared where t agrees: at a tie any of them is right. A verdict needs no trust in either
 side: an answer is *right* when exact arithmetic gives the same hit or miss and t lies within the derived
@@ -126,6 +125,7 @@ class ExactErrors:
     hits: int
     wrong: int
     near_edge: int
+    near_edge_flipped: int  # of these, hit where exact arithmetic misses or the reverse; the others are neighbours
     ulp_p50: float
     ulp_p99: float
     ulp_max: float
@@ -215,6 +215,7 @@ def exact_errors(
         hits=sum(hit is not None for hit in exact_hits),
         wrong=len(listed) - near_edge,
         near_edge=near_edge,
+        near_edge_flipped=sum(d.verdict == NEAR_EDGE and (d.ours_t is None) != (d.exact_t is None) for d in listed),
         ulp_p50=ulp_p50,
         ulp_p99=ulp_p99,
         ulp_max=ulp_max,

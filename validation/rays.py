@@ -1,7 +1,7 @@
 """Seeded families of rays around a mesh.
 
-Every number is exact in float32, though stored as float64, so a float32 reference sees the very same rays.
-The mesh should be too: see ``float32_exact``. Directions are not unit length unless stated.
+Every number of ``families`` is exact in float32, though stored as float64, so a float32 reference sees the
+very same rays. The mesh should be too: see ``float32_exact``. Directions are not unit length unless stated.
 """
 
 from collections.abc import Callable
@@ -17,9 +17,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class RayBatch:
-    """Rays of one family: ``origins`` and ``directions`` are float64 (n, 3), float32-exact, no direction is
-    zero.
-    """
+    """Rays of one family: ``origins`` and ``directions`` are float64 (n, 3); no direction is zero."""
 
     name: str
     origins: Floats
@@ -113,20 +111,34 @@ def axis_parallel_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
 
 
 def edge_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    """Aimed at random points of random edges, alternately from outside and from near the mesh's centre; t is
-    about 1.
+    """At random points of random edges, alternately from outside and from near the mesh's centre; t is about
+    1.
     """
-    triangle = _pick(corners, count, rng)
-    first = rng.integers(0, 3, count)
-    ray = np.arange(count)
-    along = rng.random((count, 1))
-    target = (1 - along) * triangle[ray, first] + along * triangle[ray, (first + 1) % 3]
-    return _aimed("edge", corners, target, rng)
+    return _aimed("edge", corners, _edge_points(corners, count, rng), rng)
 
 
 def vertex_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    """Aimed at random vertices, alternately from outside and from near the mesh's centre; t is about 1."""
+    """At random vertices, alternately from outside and from near the mesh's centre; t is about 1."""
     return _aimed("vertex", corners, _pick(corners.reshape(-1, 3), count, rng), rng)
+
+
+def leak_rays(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayBatch, RayBatch]:
+    """From near the centre at points of edges and at vertices, ``count`` rays each, aimed in full float64.
+
+    Not float32-exact, and not for a float32 reference: a direction rounded to float32 passes its edge at a
+    distance that float64 resolves easily, so only these rays put a float64 kernel's watertightness to the
+    test.
+    """
+    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
+    rng = np.random.default_rng(seed)
+    batches = []
+    for name, targets in (
+        ("edge_leak", _edge_points(corners, count, rng)),
+        ("vertex_leak", _pick(corners.reshape(-1, 3), count, rng)),
+    ):
+        origins = _near_centre(corners, count, rng)
+        batches.append(RayBatch(name, origins, targets - origins))
+    return batches[0], batches[1]
 
 
 def grazing_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
@@ -148,6 +160,27 @@ def from_inside_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
     unhit.
     """
     return _batch("from_inside", _near_centre(corners, count, rng), _sphere_points(count, rng))
+
+
+def _edge_points(corners: Floats, count: int, rng: Generator) -> Floats:
+    triangle = _pick(corners, count, rng)
+    ray, first = np.arange(count), rng.integers(0, 3, count)
+    along = rng.random((count, 1))
+    points: Floats = (1 - along) * triangle[ray, first] + along * triangle[ray, (first + 1) % 3]
+    return points
+
+
+def face_rays(vertices: Floats, faces: Ints) -> RayBatch:
+    """One ray at the centre of every face, so that not one can be missing: from its own size above or below
+    it.
+    """
+    corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
+    centre = corners.mean(axis=1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.sqrt(np.linalg.norm(normal, axis=1, keepdims=True))
+    side = np.where(np.arange(len(faces)) % 2 == 0, 1.0, -1.0)[:, None]
+    origins = float32_exact(centre + side * size * _unit(normal))
+    return _batch("face", origins, centre - origins)
 
 
 def _aimed(name: str, corners: Floats, targets: Floats, rng: Generator) -> RayBatch:

@@ -1,0 +1,27 @@
+"""The scenes that are checked, and where they lie."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+SCENES = Path(__file__).resolve().parent.parent / "scenes"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene file and what it is there to show."""
+
+    name: str
+    shows: str
+
+    @property
+    def path(self) -> Path:
+        """The scene file."""
+        return SCENES / f"{self.name}.toml"
+
+
+CASES = (
+    Case("three_models", "three PLY models on a bounded floor: Phong, shadows, reflections"),
+    Case("mirrors", "diffuse objects between mirrors: what a path integrator can judge without any recursion of ours"),
+    Case("glass", "dielectrics: refraction, total internal reflection, tinted glass, highlights"),
+    Case("stairs", "flat faces under an orthographic camera, hits known by hand"),
+)
