@@ -245,10 +245,7 @@ def _open(rule, deep, faces, begin, end, ends):
     """Open one group by the split rule, or evenly where the rule cannot or the tree is as deep as allowed."""
     opened = 1
     if not deep:
-        if rule.split == SAH:
-            opened = _open_sah(faces, begin, end, ends)
-        else:
-            opened = _open_octants(faces, begin, end, ends)
+        opened = _open_sah(faces, begin, end, ends) if rule.split == SAH else _open_octants(faces, begin, end, ends)
     if opened == 1:
         opened = _open_evenly(begin, end, min(2 if rule.split == SAH else 8, end - begin), ends)
     return opened

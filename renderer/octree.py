@@ -51,11 +51,12 @@ class _Accelerator:
     ) -> Hits:
         """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
 
-        ``origins`` and ``directions`` are (n, 3), finite, directions non-zero and of any length; ``t_min`` and ``t_max``
-        are >= 0, one number or (n,), in units of |direction|. No face is culled; a ray in a face's plane misses it.
-        Results are the same bits for any number of threads. Raises ``ValueError`` naming argument and row.
+        ``origins`` and ``directions`` are (n, 3), finite, directions non-zero and of any length; ``t_min`` and
+        ``t_max`` are >= 0, one number or (n,), in units of |direction|. No face is culled; a ray in a face's plane
+        misses it. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.
         """
-        return closest_hits(self.tree, self.depth, check_rays(origins, directions, t_min, t_max), self.mesh, self.threads)
+        rays = check_rays(origins, directions, t_min, t_max)
+        return closest_hits(self.tree, self.depth, rays, self.mesh, self.threads)
 
     def any_hit(
         self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
@@ -154,4 +155,5 @@ def _expect_magnitude(mesh: Mesh) -> None:
     far = np.abs(mesh.vertices) > _LARGEST_COORDINATE
     if far.any():
         row = int(far.any(axis=1).argmax())
-        raise MeshError(f"vertices: expected coordinates within +-2^126, got {mesh.vertices[row].tolist()} in row {row}")
+        got = mesh.vertices[row].tolist()
+        raise MeshError(f"vertices: expected coordinates within +-2^126, got {got} in row {row}")

@@ -69,7 +69,8 @@ def _bound(argument: str, value: ArrayLike, count: int) -> NDArray[np.float64]:
     """One bound for all rays or one each, as a (1,) or (n,) array."""
     array = np.asarray(value)
     expect(array.dtype.kind in "fiu", argument, "real numbers", f"dtype {array.dtype}")
-    expect(array.ndim == 0 or array.shape == (count,), argument, f"a number or shape ({count},)", f"shape {array.shape}")
+    fits = array.ndim == 0 or array.shape == (count,)
+    expect(fits, argument, f"a number or shape ({count},)", f"shape {array.shape}")
     array = np.ascontiguousarray(np.atleast_1d(array), np.float64)
     bad = np.isnan(array) | (array < 0.0)
     if bad.any():

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from renderer.light import LIGHT_COLUMNS
+from renderer.material import MATERIAL_COLUMNS
 from renderer.mesh import Mesh
 from renderer.scene import Scene
 from renderer.whitted import World
@@ -25,8 +27,8 @@ def pack(scene: Scene) -> tuple[Mesh, World]:
         faces=mesh.faces,
         material=np.repeat(np.array([rows[i.material] for i in instances], np.int32), counts),
         smooth=np.repeat(np.array([i.smooth for i in instances], np.bool_), counts),
-        materials=np.array([m.row() for m in scene.materials.values()]),
-        lights=np.array([light.row() for light in scene.lights]).reshape(len(scene.lights), -1),
+        materials=np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS),
+        lights=np.array([light.row() for light in scene.lights]).reshape(-1, LIGHT_COLUMNS),
         colors=np.array([scene.ambient, scene.background]),
     )
     return mesh, world

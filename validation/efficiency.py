@@ -3,7 +3,8 @@
 import statistics
 import time
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,6 +21,11 @@ RUNS = 5
 # The origin timed each of its configurations three times.
 ORIGIN_RUNS = 3
 # What the C++ program that this grew out of printed, on another machine and other models: 100 x 100, depth 3.
+_ORIGIN_ROWS: tuple[tuple[Literal["octree", "brute"], int, int], ...] = (
+    ("brute", 100, 3),
+    ("octree", 100, 3),
+    ("octree", 500, 6),
+)
 ORIGIN = {"brute_seconds": 205.4, "octree_seconds": 0.411}
 
 
@@ -38,9 +44,9 @@ def _hits(count: int, step: Callable[[str], None]) -> dict[str, object]:
     for rays in (camera_rays(mesh.vertices, count), random_rays(corners, count, np.random.default_rng(1))):
         step(f"efficiency: {rays.name} rays")
         contenders: dict[str, Callable[[], Any]] = {
-            "ours": lambda r=rays: octree.closest_hit(r.origins, r.directions),
-            "ours_one_thread": lambda r=rays: single.closest_hit(r.origins, r.directions),
-            "embree": lambda r=rays: embree.closest_hit(r.origins, r.directions),
+            "ours": partial(octree.closest_hit, rays.origins, rays.directions),
+            "ours_one_thread": partial(single.closest_hit, rays.origins, rays.directions),
+            "embree": partial(embree.closest_hit, rays.origins, rays.directions),
         }
         seconds = _interleaved(contenders)
         ratios = [e / o for e, o in zip(seconds["embree"], seconds["ours"], strict=True)]
@@ -71,10 +77,10 @@ def _origin(step: Callable[[str], None]) -> dict[str, object]:
     """The origin's table on our main scene: build and render, every run a new tree."""
     scene = load_scene(SCENES / "three_models.toml")
     # Compile both kernels before any clock starts.
-    for accelerator in ("octree", "brute"):
+    for accelerator, _, _ in _ORIGIN_ROWS:
         render(scene, resolution=(4, 4), max_depth=1, accelerator=accelerator)
-    rows = []
-    for accelerator, size, depth in (("brute", 100, 3), ("octree", 100, 3), ("octree", 500, 6)):
+    rows: list[dict[str, Any]] = []
+    for accelerator, size, depth in _ORIGIN_ROWS:
         step(f"efficiency: origin, {accelerator} {size} x {size}")
         images = [
             render(scene, resolution=(size, size), max_depth=depth, accelerator=accelerator)

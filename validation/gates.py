@@ -62,6 +62,8 @@ REASONS = {
     "mean_error": "brightness, which SSIM does not see; linear radiance",
     "max_error": "one wrong pixel outside the fragile ones; sRGB",
 }
+# Mitsuba's sensors round film positions to float32, 1e-4 pixel at 1024; a shift of 0.1 pixel is a defect to catch.
+CAMERA_PIXELS = 2e-3
 # AOVs: a float32 hit errs by 3e-7 + 2e-7 / |n.d| of its distance; below an angle of 0.02 rad that passes 1e-5.
 AOV_DEPTH = 1e-5
 # An interpolated float32 normal errs by a few 1e-7; 1e-4 rad would show on no picture.

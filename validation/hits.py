@@ -41,10 +41,10 @@ def meshes() -> dict[str, Mesh]:
     """What is shot at: our models, a mesh far from the origin, and triangles in no order, all float32-exact."""
     models = {name: load_mesh(SCENES / "models" / f"{name}.ply") for name in ("teapot", "torus_knot", "stairs")}
     ball = icosphere(5)
-    far = Mesh(float32_exact(ball.vertices + [1000.0, -2000.0, 500.0]), ball.faces)
+    far = Mesh(float32_exact(ball.vertices + np.array([1000.0, -2000.0, 500.0])), ball.faces)
     rng = np.random.default_rng(SEED)
     corners = float32_exact(rng.normal(size=(2000, 1, 3)) + 0.1 * rng.normal(size=(2000, 3, 3)))
-    soup = Mesh(corners.reshape(-1, 3), np.arange(6000).reshape(-1, 3))
+    soup = Mesh(corners.reshape(-1, 3), np.arange(6000, dtype=np.int32).reshape(-1, 3))
     return {**models, "sphere_far_away": far, "triangle_soup": soup}
 
 

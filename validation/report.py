@@ -27,7 +27,7 @@ def number(value: float | int | None) -> str:
         return f"{int(value):,}"
     if 1e-3 <= abs(value) < 1e4:
         # Values just below 1 (an SSIM) keep the digits that tell them from 1.
-        return f"{value:.7f}".rstrip("0") if 0.99 < value < 1.0 else f"{value:.4g}"
+        return f"{value:.7f}" if 0.99 < value < 1.0 else f"{value:.4g}"
     return f"{value:.2e}"
 
 

@@ -1,0 +1,216 @@
+"""The command line: what it writes, and one line and an exit code for everything that can go wrong."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from renderer.cli import main
+from renderer.render import render
+from renderer.scene import load_scene
+
+ROOT = Path(__file__).parents[1]
+STAIRS = ROOT / "scenes" / "stairs.toml"
+
+
+def run(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "renderer.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=120, check=False, **options)
+
+
+def fails(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line on standard error, after checking that it is one, that the code is 2 and that nothing else came."""
+    assert main([str(a) for a in arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.endswith("\n") and len(err.splitlines()) == 1
+    assert err.startswith("octree-render: ") and "Traceback" not in err
+    return err.removeprefix("octree-render: ")
+
+
+def test_render_writes_what_the_library_renders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.npy"
+    options = ["--resolution", "24x16", "--max-depth", "2", "--samples", "4", "--min-weight", "0.01", "--threads", "1"]
+    assert main(["render", str(STAIRS), "-o", str(path), *options]) == 0
+    expected = render(load_scene(STAIRS), resolution=(24, 16), max_depth=2, samples=4, min_weight=0.01, threads=1)
+    assert np.load(path).tobytes() == expected.radiance.tobytes()
+    out, err = capsys.readouterr()
+    assert re.match(rf"{re.escape(str(path))}: 24 x 16, {expected.rays.sum()} rays in ", out)
+    assert len(out.splitlines()) == 1
+    assert err == ""
+
+
+def test_accelerator_split_and_threads_change_no_byte(tmp_path: Path) -> None:
+    pictures = []
+    for i, more in enumerate(([], ["--accelerator", "brute"], ["--split", "sah"], ["--threads", "3"])):
+        path = tmp_path / f"{i}.png"
+        assert main(["render", str(STAIRS), "--output", str(path), "--resolution", "40X30", "--quiet", *more]) == 0
+        pictures.append(path.read_bytes())
+    assert pictures[0].startswith(b"\x89PNG") and pictures.count(pictures[0]) == 4
+
+
+def test_quiet_says_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["render", str(STAIRS), "-o", str(tmp_path / "a.png"), "--resolution", "4x4", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("split", ["midpoint", "sah"])
+def test_info(capsys: pytest.CaptureFixture[str], split: str) -> None:
+    assert main(["info", str(STAIRS), "--split", split]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    lines = out.splitlines()
+    lights = len(load_scene(STAIRS).lights)
+    assert f"2 meshes, {lights} lights, orthographic camera" in lines[0]
+    assert re.match(r"  stairs +44 faces +flat +stone \(phong\)", lines[1]) and re.match(r"  floor +2 faces", lines[2])
+    assert lines[3].startswith(f"octree ({split}): ") and "46 references" in lines[3]
+
+
+def test_as_a_module(tmp_path: Path) -> None:
+    done = run("render", STAIRS, "-o", tmp_path / "a.png", "--resolution", "8x8")
+    assert (done.returncode, done.stderr) == (0, "") and (tmp_path / "a.png").exists()
+    done = run("render", STAIRS, "-o", tmp_path / "none" / "a.png")
+    assert done.returncode == 2 and done.stdout == "" and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["render", "--help"], ["info", "--help"]])
+def test_help_and_version(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    out, err = capsys.readouterr()
+    assert caught.value.code == 0 and err == ""
+    assert re.match(r"\d+\.\d+\.\d+\n$" if arguments == ["--version"] else "usage: octree-render", out)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["none.toml"], ["none.toml", "No such file"]),
+        ([ROOT], ["Is a directory"]),
+        ([STAIRS, "-o", "none/a.png"], ["output", "existing folder"]),
+        ([STAIRS, "-o", "a.jpg"], ["output", ".png or .npy", "a.jpg"]),
+        ([STAIRS, "-o", "renderer"], ["output", ".png or .npy"]),
+        ([STAIRS, "--resolution", "0x4"], ["resolution", "0"]),
+        ([STAIRS, "--resolution", "4x99999"], ["resolution", "99999"]),
+        ([STAIRS, "--samples", "3"], ["samples", "square number", "3"]),
+        ([STAIRS, "--samples", "-1"], ["samples", "-1"]),
+        ([STAIRS, "--max-depth", "65"], ["max_depth", "65"]),
+        ([STAIRS, "--max-depth", "-1"], ["max_depth", "-1"]),
+        ([STAIRS, "--min-weight", "nan"], ["min_weight", "nan"]),
+        ([STAIRS, "--min-weight", "2"], ["min_weight", "2"]),
+        ([STAIRS, "--threads", "0"], ["threads", "0"]),
+    ],
+)
+def test_bad_input_is_one_line(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[Any],
+    says: list[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    message = fails(capsys, "render", *arguments)
+    for words in says:
+        assert words in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bad_scenes_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = tmp_path / "bad.toml"
+    for text, says in (
+        ("x = ", "TOML"),
+        ("[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nspeed = 3\n[materials]\n", "camera.speed: unknown key"),
+        ('[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n[materials."a\\nb"]\nspeed = 3\n', "speed: unknown key"),
+        ('[camera]\neye=[0,0,1]\ntarget=[0,0,0]\n[materials.a]\n[[objects]]\nmesh="a.ply"\nmaterial="a"\n', "a.ply"),
+        (f"x = {'9' * 5000}", "4300"),
+    ):
+        bad.write_text(text)
+        for command in ("render", "info"):
+            message = fails(capsys, command, bad)
+            assert str(bad) in message and says in message
+
+
+def test_info_of_an_empty_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "empty.toml").write_text("[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n[materials]\n")
+    assert "at least one object or a floor" in fails(capsys, "info", tmp_path / "empty.toml")
+
+
+def test_a_scene_without_objects_or_lights_renders(tmp_path: Path) -> None:
+    text = "background = 0.5\n[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n[materials]\n"
+    (tmp_path / "empty.toml").write_text(text)
+    out = tmp_path / "a.npy"
+    assert main(["render", str(tmp_path / "empty.toml"), "-o", str(out), "--resolution", "2x2", "--quiet"]) == 0
+    assert (np.load(out) == 0.5).all()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["paint"],
+        ["render"],
+        ["info"],
+        ["render", STAIRS, "--resolution", "512"],
+        ["render", STAIRS, "--resolution", "axb"],
+        ["render", STAIRS, "--resolution", "-1x5"],
+        ["render", STAIRS, "--samples", "x"],
+        ["render", STAIRS, "--accelerator", "bvh"],
+        ["render", STAIRS, "--speed", "3"],
+        ["info", STAIRS, "--split", "kd"],
+    ],
+)
+def test_arguments_that_make_no_sense_are_usage_errors(
+    capsys: pytest.CaptureFixture[str], arguments: list[Any]
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([str(a) for a in arguments])
+    out, err = capsys.readouterr()
+    assert caught.value.code == 2 and out == "" and "error: " in err.splitlines()[-1] and "Traceback" not in err
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere") if hasattr(os, "geteuid") else lambda f: f
+def test_a_folder_that_may_not_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tmp_path.chmod(0o500)
+    assert "ermission" in fails(capsys, "render", STAIRS, "-o", tmp_path / "a.png", "--resolution", "2x2", "--quiet")
+
+
+def test_a_disk_that_fills_up_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    message = fails(capsys, "render", STAIRS, "-o", tmp_path / "a.png", "--resolution", "2x2", "--quiet")
+    assert "No space left" in message and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+@pytest.mark.parametrize("threads", [1, 2])
+def test_control_c_stops_within_seconds_and_writes_nothing(tmp_path: Path, threads: int) -> None:
+    """Brute force over 81,000 faces at 1024 x 1024 would take minutes."""
+    scene, out = str(ROOT / "scenes" / "glass.toml"), str(tmp_path / "a.png")
+    # Compile here, so that the signal meets the tracing and not the compiler.
+    render(load_scene(scene), resolution=(1, 1), accelerator="brute", threads=1)
+    options = ["--accelerator", "brute", "--resolution", "1024x1024", "--threads", str(threads)]
+    command = [sys.executable, "-m", "renderer.cli", "render", scene, "-o", out, *options]
+    running = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        time.sleep(4.0)
+        assert running.poll() is None, running.communicate()
+        sent = time.perf_counter()
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate(timeout=60)
+        waited = time.perf_counter() - sent
+    finally:
+        running.kill()
+    assert running.returncode == 130 and out == "" and err == "octree-render: interrupted, nothing written\n"
+    assert list(tmp_path.iterdir()) == []
+    # A tile of 1,024 pixels by brute force takes about a second here; twice that, for machines with other work.
+    assert waited < 5.0

@@ -1,0 +1,164 @@
+"""Images: the sRGB curve, files that are whole or not there, and what a notebook shows."""
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import PIL.Image
+import pytest
+
+from renderer.image import Image, check_picture_path, srgb, write_atomically
+
+
+def image(radiance: Any = None) -> Image:
+    radiance = np.random.default_rng(1).uniform(-0.2, 1.3, (5, 7, 3)) if radiance is None else radiance
+    radiance = np.asarray(radiance, np.float32)
+    shape = radiance.shape[:2]
+    return Image(
+        radiance=radiance,
+        depth=np.ones(shape),
+        normal=np.zeros((*shape, 3), np.float32),
+        face=np.zeros(shape, np.int32),
+        rays=np.ones(shape, np.int32),
+        build_seconds=0.0,
+        render_seconds=0.0,
+    )
+
+
+def decoded(code: np.ndarray) -> np.ndarray:
+    """IEC 61966-2-1's inverse: 8-bit sRGB to linear."""
+    c = code / 255.0
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def test_every_code_comes_back() -> None:
+    codes = np.arange(256)
+    assert (srgb(decoded(codes)) == codes).all()
+
+
+def test_codes_change_half_way_between_neighbours() -> None:
+    codes = np.arange(255)
+    for side, expected in ((-1e-6, codes), (1e-6, codes + 1)):
+        assert (srgb(decoded(codes + 0.5 + side)) == expected).all()
+
+
+def test_values_out_of_range_are_clipped() -> None:
+    assert srgb([-np.inf, -1.0, -0.0, 0.0, 1.0, 1.0000001, 1e30, np.inf]).tolist() == [0, 0, 0, 0, 255, 255, 255, 255]
+    assert srgb(0.5) == 188 and srgb(0.18) == 118 and srgb([[0.5, 0.5]]).shape == (1, 2)
+
+
+def test_png_holds_the_srgb_codes_with_row_zero_at_the_top(tmp_path: Path) -> None:
+    picture = image()
+    picture.save(tmp_path / "a.png")
+    with PIL.Image.open(tmp_path / "a.png") as file:
+        assert (file.format, file.mode, file.size) == ("PNG", "RGB", (7, 5))
+        assert (np.asarray(file) == srgb(picture.radiance)).all()
+    assert picture._repr_png_() == (tmp_path / "a.png").read_bytes()
+    assert PIL.Image.open(io.BytesIO(picture._repr_png_())).size == (7, 5)
+
+
+def test_npy_holds_the_radiance(tmp_path: Path) -> None:
+    picture = image()
+    picture.save(str(tmp_path / "a.NPY"))
+    loaded = np.load(tmp_path / "a.NPY")
+    assert loaded.dtype == np.float32 and loaded.tobytes() == picture.radiance.tobytes()
+
+
+def test_an_existing_file_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(b"old")
+    image().save(tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG") and len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("error", [OSError("disk full"), KeyboardInterrupt()])
+@pytest.mark.parametrize("existed", [False, True])
+def test_a_failure_midway_leaves_what_was_there(tmp_path: Path, error: BaseException, existed: bool) -> None:
+    path = tmp_path / "a.npy"
+    if existed:
+        path.write_bytes(b"old")
+
+    def half(file: Any) -> None:
+        file.write(b"half")
+        file.flush()
+        raise error
+
+    with pytest.raises(type(error)):
+        write_atomically(path, half)
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == ([("a.npy", b"old")] if existed else [])
+
+
+def test_nobody_ever_sees_half_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    path.write_bytes(b"old")
+
+    def look(file: Any) -> None:
+        file.write(b"half")
+        file.flush()
+        assert path.read_bytes() == b"old"
+
+    write_atomically(path, look)
+    assert path.read_bytes() == b"half"
+
+
+def test_a_failed_rename_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError("no")
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(PermissionError):
+        image().save(tmp_path / "a.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permission bits are POSIX's")
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
+def test_permissions_are_those_of_any_new_file(tmp_path: Path, mask: int) -> None:
+    before = os.umask(mask)
+    try:
+        image().save(tmp_path / "a.png")
+        (tmp_path / "plain").write_bytes(b"")
+        assert os.umask(mask) == mask
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a.png").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_names_as_long_as_the_file_system_allows(tmp_path: Path) -> None:
+    """The temporary file's name must not be longer than the one asked for may be."""
+    path = tmp_path / ("a" * 251 + ".png")
+    path.write_bytes(b"")  # this name is allowed
+    image().save(path)
+    assert path.stat().st_size > 0
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a", "a.png.txt", ".png", "png"])
+def test_unknown_suffixes(tmp_path: Path, name: str) -> None:
+    for call in (check_picture_path, image().save):
+        with pytest.raises(ValueError, match=r"output: expected a \.png or \.npy file, got .*" + name):
+            call(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_folders_and_folders_in_the_place_of_files(tmp_path: Path) -> None:
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "file").write_bytes(b"")
+    for call in (check_picture_path, image().save):
+        with pytest.raises(ValueError, match=r"output: .*existing folder.*none"):
+            call(tmp_path / "none" / "a.png")
+        with pytest.raises(ValueError, match=r"output: .*existing folder"):
+            call(tmp_path / "file" / "a.png")
+        with pytest.raises(ValueError, match=r"output: expected a file, got the folder.*folder\.png"):
+            call(tmp_path / "folder.png")
+
+
+def test_relative_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    image().save("a.png")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
+
+
+def test_the_smallest_picture() -> None:
+    shown = PIL.Image.open(io.BytesIO(image([[[1.0, 0.0, 0.5]]])._repr_png_()))
+    assert np.asarray(shown).tolist() == [[[255, 0, 188]]]

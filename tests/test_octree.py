@@ -1,0 +1,288 @@
+"""Octree and BruteForce as objects: options, statistics, extreme meshes, ties, and the analytic hits they must give."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from meshes import assert_same_hits, make_mesh, rays_at
+
+from renderer.invariants import faults
+from renderer.layout import LANES
+from renderer.mesh import Mesh
+from renderer.octree import MAX_DEPTH, MAX_LEAF_SIZE, BruteForce, Octree
+from renderer.shapes import grid, icosphere
+
+ROOT = Path(__file__).parents[1]
+SPLIT = pytest.mark.parametrize("split", ["midpoint", "sah"])
+
+
+def cast(accelerator, origin, direction):
+    hits = accelerator.closest_hit([origin], [direction])
+    return hits.t[0], hits.face[0]
+
+
+def test_empty_mesh_and_empty_batch():
+    for vertices in (np.empty((0, 3)), np.zeros((2, 3))):
+        for accelerator in (Octree(vertices, np.empty((0, 3), int)), BruteForce(vertices, np.empty((0, 3), int))):
+            hits = accelerator.closest_hit([[0, 0, 1], [1, 2, 3]], [[0, 0, -1], [1e-300, 0, 0]])
+            assert hits.t.tolist() == [np.inf, np.inf] and hits.face.tolist() == [-1, -1]
+            assert np.isnan(hits.points).all() and hits.points.shape == (2, 3)
+            assert accelerator.any_hit([[0, 0, 1]], [[0, 0, -1]]).tolist() == [False]
+            assert accelerator.stats.references == 0 and accelerator.stats.fill == 1
+    full = Octree.from_mesh(icosphere(1))
+    none = full.closest_hit(np.empty((0, 3)), np.empty((0, 3)), np.empty(0), np.empty(0))
+    assert (len(none.t), len(none.face), none.points.shape, none.normals.shape) == (0, 0, (0, 3), (0, 3))
+    assert full.any_hit(np.empty((0, 3)), np.empty((0, 3))).shape == (0,)
+
+
+@SPLIT
+def test_one_triangle_with_flat_bounds(split):
+    for axis in range(3):
+        vertices = np.roll([[0, 0, 7], [1, 0, 7], [0, 1, 7]], axis, axis=1)
+        origin, direction = np.roll([0.25, 0.5, 9], axis), np.roll([0, 0, -2], axis)
+        octree = Octree(vertices, [[0, 1, 2]], split=split)
+        hits = octree.closest_hit([origin], [direction])
+        assert (hits.t[0], hits.face[0], hits.u[0], hits.v[0]) == (1, 0, 0.25, 0.5)
+        np.testing.assert_array_equal(hits.points[0], np.roll([0.25, 0.5, 7], axis))
+        np.testing.assert_array_equal(hits.normals[0], np.roll([0, 0, 1], axis))
+        assert octree.stats.references == octree.stats.leaves == octree.stats.blocks == octree.stats.nodes == 1
+
+
+@SPLIT
+@pytest.mark.parametrize("leaf_size", [1, 4, MAX_LEAF_SIZE])
+def test_big_faces_without_a_vertex_in_the_cell_are_hit(split, leaf_size):
+    layers = [[[0.25, 0.25, z], [3.75, 0.25, z], [0.25, 3.75, z]] for z in 2.5 + 0.01 * np.arange(-7, 1)]
+    pins = [[[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]], [[4, 4, 4], [3.99, 4, 4], [4, 3.99, 4]]]
+    vertices = np.array(layers + pins).reshape(-1, 3)
+    octree = Octree(vertices, np.arange(30).reshape(-1, 3), split=split, leaf_size=leaf_size)
+    assert cast(octree, [1.5, 1.5, 0], [0, 0, 1]) == (pytest.approx(2.43, abs=1e-15), 0)
+    assert cast(octree, [1.5, 1.5, 5], [0, 0, -1]) == (2.5, 7)
+
+
+@SPLIT
+@pytest.mark.parametrize("leaf_size", [1, 4, MAX_LEAF_SIZE])
+def test_a_hit_beyond_the_cell_does_not_end_the_search(split, leaf_size):
+    vertices = [
+        [0.5, 0.5, 0.95], [1.95, 0.1, 0.3], [1.95, 0.9, 0.3],
+        [1.25, 0.3, 0.3], [1.25, 0.7, 0.3], [1.25, 0.5, 0.8],
+        [0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [2, 2, 2], [1.99, 2, 2], [2, 1.99, 2],
+    ]  # fmt: skip
+    octree = Octree(vertices, np.arange(12).reshape(-1, 3), split=split, leaf_size=leaf_size)
+    assert cast(octree, [-1, 0.5, 0.5], [1, 0, 0]) == (2.25, 1)
+
+
+@SPLIT
+@pytest.mark.parametrize("leaf_size", [1, 3, 8, MAX_LEAF_SIZE])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_lowest_of_equal_faces_wins(split, leaf_size, seed):
+    rng = np.random.default_rng(seed)
+    vertices, faces = make_mesh("soup", seed, 40)
+    copies = np.repeat(faces, 10, axis=0)
+    order = rng.permutation(len(copies))
+    octree = Octree(vertices, copies[order], split=split, leaf_size=leaf_size)
+    lowest = np.array([np.flatnonzero(order // 10 == face)[0] for face in range(len(faces))])
+    origins, directions = rays_at(vertices, faces, seed)
+    plain = Octree(vertices, faces).closest_hit(origins, directions)
+    hits = octree.closest_hit(origins, directions)
+    np.testing.assert_array_equal(hits.t, plain.t)
+    np.testing.assert_array_equal(hits.face, np.where(plain.hit, lowest[plain.face], -1))
+
+
+def test_rays_at_the_shared_vertices_of_a_grid_get_the_lowest_face_there():
+    plane = grid(16, 16, (16.0, 16.0))
+    order = np.random.default_rng(3).permutation(len(plane.faces))
+    faces = plane.faces[order]
+    lowest = [np.flatnonzero((faces == vertex).any(axis=1))[0] for vertex in range(len(plane.vertices))]
+    origins = plane.vertices + [0, 3, 0]
+    for options in ({}, {"split": "sah"}, {"leaf_size": 1}, {"leaf_size": 32}, {"max_depth": 1}):
+        hits = Octree(plane.vertices, faces, **options).closest_hit(origins, np.tile([0, -1, 0], (len(origins), 1)))
+        assert (hits.t == 3).all()
+        np.testing.assert_array_equal(hits.face, lowest)
+
+
+@SPLIT
+def test_coincident_triangles_build_a_small_tree(split):
+    count = 20_000
+    vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    octree = Octree(vertices, np.tile([0, 1, 2], (count, 1)), split=split)
+    assert octree.stats.references == count and octree.stats.nodes < count and octree.stats.depth <= MAX_DEPTH
+    assert cast(octree, [0.25, 0.25, 2], [0, 0, -1]) == (2, 0)
+
+
+@SPLIT
+def test_a_fan_about_one_vertex_keeps_one_reference_a_face(split):
+    count = 20_000
+    angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    rim = np.stack([np.cos(angle), np.sin(angle), 0.3 + 0 * angle], axis=1)
+    spoke = np.arange(count)
+    faces = np.stack([0 * spoke, 1 + spoke, 1 + (spoke + 1) % count], axis=1)
+    octree = Octree(np.concatenate([[[0, 0, 0]], rim]), faces, split=split)
+    assert octree.stats.references == count and octree.stats.nodes < count
+    middle = 0.3 * (rim + np.roll(rim, -1, axis=0))
+    hits = octree.closest_hit(middle + [0, 0, 1], np.tile([0, 0, -1.0], (count, 1)))
+    np.testing.assert_array_equal(hits.face, spoke)
+
+
+@SPLIT
+def test_bounds_of_two_ulp_far_from_the_origin(split):
+    rng = np.random.default_rng(4)
+    vertices = 1e6 + rng.integers(0, 3, (300, 3)) * np.spacing(1e6)
+    octree = Octree(vertices, np.arange(300).reshape(-1, 3), split=split, leaf_size=1)
+    assert octree.stats.references == 100 and faults(octree.tree, octree.depth, octree.mesh) == []
+    origins, directions = rays_at(vertices, octree.mesh.faces, 5)
+    brute = BruteForce(vertices, octree.mesh.faces)
+    assert_same_hits(octree.closest_hit(origins, directions), brute.closest_hit(origins, directions))
+
+
+@SPLIT
+def test_a_small_model_in_a_wide_stadium(split):
+    small = icosphere(3)
+    stadium = grid(1, 1, (1e5, 1e5))
+    mesh = Mesh.concatenate([Mesh(small.vertices + [0, 2, 0], small.faces), stadium])
+    rng = np.random.default_rng(6)
+    targets = small.vertices[rng.integers(0, len(small.vertices), 2000)] + [0, 2, 0]
+    origins = rng.uniform(-2e4, 2e4, (2000, 3))
+    directions = targets - origins
+    hits = Octree.from_mesh(mesh, split=split).closest_hit(origins, directions)
+    assert_same_hits(hits, BruteForce.from_mesh(mesh).closest_hit(origins, directions))
+    assert hits.hit.mean() > 0.5
+
+
+@SPLIT
+def test_an_edge_with_five_faces_and_an_open_mesh(split):
+    angle = np.arange(5) * 2 * np.pi / 5
+    rim = np.stack([np.cos(angle), np.sin(angle), 0.5 + 0 * angle], axis=1)
+    vertices = np.concatenate([[[0, 0, 0], [0, 0, 1]], rim])
+    faces = np.array([[0, 1, k] for k in range(2, 7)])
+    rng = np.random.default_rng(7)
+    targets = np.stack([np.zeros(500), np.zeros(500), rng.random(500)], axis=1)
+    origins = rng.normal(size=(500, 3)) * 4
+    hits = Octree(vertices, faces, split=split, leaf_size=1).closest_hit(origins, targets - origins)
+    assert_same_hits(hits, BruteForce(vertices, faces).closest_hit(origins, targets - origins))
+
+
+def test_extreme_coordinates_build_and_trace():
+    sphere = icosphere(2)
+    rng = np.random.default_rng(8)
+    origins = rng.uniform(-0.5, 0.5, (500, 3))
+    directions = rng.normal(size=(500, 3))
+    expected = Octree.from_mesh(sphere).closest_hit(origins, directions)
+    for exponent in (-149, -126, 125):
+        for split in ("midpoint", "sah"):
+            mesh = Mesh(np.ldexp(sphere.vertices, exponent), sphere.faces)
+            octree = Octree.from_mesh(mesh, split=split)
+            assert faults(octree.tree, octree.depth, mesh) == []
+            hits = octree.closest_hit(np.ldexp(origins, exponent), directions)
+            np.testing.assert_array_equal(hits.face, expected.face)
+            np.testing.assert_array_equal(hits.t, np.ldexp(expected.t, exponent))
+
+
+def test_large_scales_do_not_spoil_the_tree():
+    # Areas of 2^150 do not fit a float32; the tree must not fall apart into arbitrary groups for that.
+    sphere = icosphere(4)
+    for split in ("midpoint", "sah"):
+        plain = Octree.from_mesh(sphere, split=split)
+        for exponent in (-75, 75):
+            mesh = Mesh(np.ldexp(sphere.vertices, exponent), sphere.faces)
+            assert Octree.from_mesh(mesh, split=split).stats == plain.stats
+
+
+def run(script):
+    """Run Python in a process of its own, because what it does has ended or hung the interpreter before."""
+    subprocess.run([sys.executable, "-W", "ignore", "-c", script], cwd=ROOT, check=True, timeout=20)
+
+
+def test_origins_beyond_float32_do_not_crash():
+    run("""
+from renderer.octree import Octree
+octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], threads=1)
+for far in (1e39, -1e39, 1e300):
+    for query in (octree.closest_hit, octree.any_hit):
+        try:
+            query([[far, far, far]], [[-1 if far > 0 else 1] * 3])
+        except ValueError:
+            pass
+""")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_forked_process_can_trace():
+    # multiprocessing forks by default on Linux; threads do not survive that, so their pool must be made anew.
+    run("""
+import os
+import numpy as np
+from renderer.octree import Octree
+octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], threads=2)
+octree.any_hit(np.zeros((20_000, 3)), np.ones((20_000, 3)))
+pid = os.fork()
+if pid == 0:
+    import signal
+    signal.alarm(10)
+    octree.any_hit(np.zeros((20_000, 3)), np.ones((20_000, 3)))
+    os._exit(0)
+assert os.waitpid(pid, 0)[1] == 0, "the child hangs"
+""")
+
+
+def test_stats_count_what_is_there():
+    mesh = icosphere(3)
+    octree = Octree.from_mesh(mesh, leaf_size=8)
+    stats, tree = octree.stats, octree.tree
+    assert stats.faces == stats.references == 1280
+    assert stats.bytes == tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes
+    assert stats.fill == 1280 / (LANES * stats.blocks)
+    assert stats.nodes * 56 * 4 == tree.nodes.nbytes and stats.blocks * LANES == len(tree.faces)
+    # Each leaf and each node but the root hangs in one place of a node.
+    used = int((tree.nodes.reshape(stats.nodes, -1)[:, :8] < np.inf).sum())
+    assert used == stats.leaves + stats.nodes - 1
+    assert np.log(stats.leaves) / np.log(8) <= stats.depth <= 12
+    brute = BruteForce.from_mesh(mesh).stats
+    assert (brute.nodes, brute.leaves, brute.depth, brute.blocks, brute.references) == (0, 0, 0, 320, 1280)
+
+
+@SPLIT
+def test_options_shape_the_tree(split):
+    mesh = icosphere(4)
+    nodes = [Octree.from_mesh(mesh, split=split, leaf_size=size).stats.nodes for size in (1, 4, 32)]
+    assert nodes == sorted(nodes, reverse=True) and nodes[0] > nodes[2]
+    deep, shallow = (Octree.from_mesh(mesh, split=split, max_depth=depth).stats for depth in (32, 1))
+    assert deep != shallow
+    for size in (1, 3, 4, 7, 32):
+        octree = Octree.from_mesh(mesh, split=split, leaf_size=size)
+        links = octree.tree.links.reshape(-1, 56)[:, 48:]
+        for code in ~links[links < 0]:
+            first, count = code >> 3, (code & 7) + 1
+            assert (octree.tree.faces[first * LANES : (first + count) * LANES] >= 0).sum() <= size
+
+
+def test_float32_vertices_take_half_the_memory_and_give_the_same_hits():
+    vertices, faces = make_mesh("soup_float32", 9, 500)
+    narrow, wide = Octree(vertices, faces), Octree(np.concatenate([vertices, [[0.1, 0, 0]]]), faces)
+    assert narrow.tree.blocks.dtype == np.float32 and wide.tree.blocks.dtype == np.float64
+    rays = rays_at(vertices, faces, 10)
+    assert_same_hits(narrow.closest_hit(*rays), wide.closest_hit(*rays))
+
+
+def test_the_tree_is_the_same_every_time_and_for_every_entrance():
+    mesh = icosphere(3)
+    first, second = Octree.from_mesh(mesh), Octree(mesh.vertices.tolist(), mesh.faces.tolist())
+    for a, b in zip(first.tree, second.tree, strict=True):
+        assert a.tobytes() == b.tobytes()
+    assert first.mesh is mesh
+
+
+def test_the_caller_may_change_its_arrays_afterwards():
+    vertices, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+    octree = Octree(vertices, faces)
+    vertices[:], faces[:] = 9, 0
+    assert cast(octree, [0.25, 0.25, 1], [0, 0, -1]) == (1, 0)
+
+
+@pytest.mark.parametrize("exponent", [-140, -110, 0, 110])
+def test_normals_are_unit_at_every_scale(exponent):
+    vertices = np.ldexp([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], exponent)
+    hits = Octree(vertices, [[0, 1, 2]]).closest_hit(np.ldexp([[0.25, 0.25, 1]], exponent), [[0, 0, -1]])
+    np.testing.assert_array_equal(hits.normals, [[0, 0, 1]])

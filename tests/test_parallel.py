@@ -1,0 +1,165 @@
+"""Chunks on threads: all of them once, exceptions out, no more work after one, and safe for several callers."""
+
+import os
+import signal
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from renderer.parallel import available_threads, checked_threads, for_chunks
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("count, size", [(0, 4), (1, 4), (4, 4), (5, 4), (1000, 7), (3, 100)])
+def test_every_item_is_worked_on_once(count, size, threads):
+    times = np.zeros(count, int)
+    ends = []
+
+    def work(begin, end):
+        assert 0 <= begin < end <= count and end - begin <= size
+        times[begin:end] += 1
+
+    for_chunks(work, count, size, threads, ends.append)
+    assert (times == 1).all() and sum(ends) == count and len(ends) == -(-count // size)
+
+
+def test_chunks_run_side_by_side():
+    together = threading.Barrier(3)
+    for_chunks(lambda begin, end: together.wait(timeout=10), 3, 1, 3)
+
+
+def test_one_thread_works_in_the_caller_and_in_order():
+    begins, names = [], set()
+
+    def work(begin, end):
+        begins.append(begin)
+        names.add(threading.current_thread())
+
+    for_chunks(work, 50, 3, 1)
+    assert begins == list(range(0, 50, 3)) and names == {threading.current_thread()}
+
+
+def test_finished_is_called_by_one_thread_at_a_time():
+    inside = [0]
+
+    def finished(items):
+        inside[0] += 1
+        time.sleep(0.0005)
+        assert inside[0] == 1
+        inside[0] -= 1
+
+    for_chunks(lambda begin, end: None, 40, 1, 5, finished)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt, SystemExit])
+def test_an_exception_comes_out_and_stops_the_rest(error, threads):
+    done = []
+
+    def work(begin, end):
+        if begin == 10:
+            raise error("chunk 10")
+        time.sleep(0.001)
+        done.append(begin)
+
+    with pytest.raises(error, match="chunk 10"):
+        for_chunks(work, 1000, 1, threads)
+    # Those before it in order, and one running on each other thread.
+    assert len(done) <= 10 + 2 * threads
+    after = len(done)
+    time.sleep(0.02)
+    assert len(done) == after
+    # The pool lives on.
+    for_chunks(lambda begin, end: done.append(begin), 20, 1, threads)
+    assert len(done) == after + 20
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_an_exception_in_finished_stops_the_rest(threads):
+    done = []
+
+    def work(begin, end):
+        time.sleep(0.001)
+        done.append(begin)
+
+    def finished(items):
+        if len(done) >= 10:
+            raise ZeroDivisionError("finished")
+
+    with pytest.raises(ZeroDivisionError, match="finished"):
+        for_chunks(work, 500, 1, threads, finished)
+    assert len(done) <= 10 + 2 * threads
+
+
+def test_an_exception_in_finished_of_one_thread_stops_the_others():
+    # The thread that runs on is the one whose result is waited for first.
+    done, failed = [], threading.Event()
+
+    def work(begin, end):
+        time.sleep(0.001)
+        done.append(begin)
+
+    def finished(items):
+        if not failed.is_set() and threading.current_thread() is not first[0]:
+            failed.set()
+            raise ZeroDivisionError("finished")
+
+    first = [None]
+
+    def note_first(begin, end):
+        if first[0] is None:
+            first[0] = threading.current_thread()
+        work(begin, end)
+
+    with pytest.raises(ZeroDivisionError):
+        for_chunks(note_first, 500, 1, 2, finished)
+    assert len(done) < 100
+
+
+def test_ctrl_c_in_the_caller_stops_within_a_chunk():
+    done = []
+
+    def work(begin, end):
+        if begin == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.005)
+        done.append(begin)
+
+    with pytest.raises(KeyboardInterrupt):
+        for_chunks(work, 400, 1, 2)
+    # The main thread sees the signal when it next wakes.
+    assert len(done) < 100
+    after = len(done)
+    time.sleep(0.03)
+    assert len(done) == after
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_concurrent_callers_do_not_disturb_one_another(threads):
+    def call(number):
+        out = np.zeros(500, int)
+
+        def work(begin, end):
+            out[begin:end] = number
+            if number % 5 == 4 and begin == 40:
+                raise ValueError(f"caller {number}")
+
+        try:
+            for_chunks(work, 500, 10, threads)
+        except ValueError as error:
+            return str(error) == f"caller {number}"
+        return number % 5 != 4 and (out == number).all()
+
+    with ThreadPoolExecutor(8) as callers:
+        assert all(callers.map(call, range(60)))
+
+
+def test_threads():
+    assert available_threads() >= 1
+    assert checked_threads(None) == available_threads() and checked_threads(3) == 3
+    for bad in (0, -1, 1.5, "2"):
+        with pytest.raises(ValueError, match="threads: expected an integer >= 1 or None, got"):
+            checked_threads(bad)

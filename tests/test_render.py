@@ -1,0 +1,196 @@
+"""``render``: what it accepts, what it says of the rest, its progress bar and how it stops."""
+
+import dataclasses
+import importlib
+import io
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from renderer.camera import PerspectiveCamera
+from renderer.light import DirectionalLight
+from renderer.material import Phong
+from renderer.render import TILE, render
+from renderer.scene import RenderSettings, Scene, SceneObject, load_scene
+from renderer.shapes import icosphere
+
+# ``renderer.render`` itself is the function of that name.
+MODULE = importlib.import_module("renderer.render")
+SCENES = Path(__file__).parents[1] / "scenes"
+
+
+def ball(**settings: Any) -> Scene:
+    return Scene(
+        camera=PerspectiveCamera(eye=(0, 0, 4), target=(0, 0, 0)),
+        materials={"m": Phong(reflectance=0.5)},
+        objects=(SceneObject(mesh=icosphere(2), material="m"),),
+        lights=(DirectionalLight(direction=(-1, -1, -1)),),
+        background=0.25,
+        render=RenderSettings(**{"resolution": (6, 4), **settings}),
+    )
+
+
+def test_shapes_and_dtypes() -> None:
+    image = render(ball(), threads=1)
+    expected = {"radiance": (4, 6, 3), "depth": (4, 6), "normal": (4, 6, 3), "face": (4, 6), "rays": (4, 6)}
+    dtypes = {"radiance": "f4", "depth": "f8", "normal": "f4", "face": "i4", "rays": "i4"}
+    for name, shape in expected.items():
+        array = getattr(image, name)
+        assert array.shape == shape and array.dtype == dtypes[name], name
+    assert image.build_seconds > 0 and image.render_seconds > 0
+    assert {f.name for f in dataclasses.fields(image)} == {*expected, "build_seconds", "render_seconds"}
+
+
+def test_the_scenes_settings_hold_unless_others_are_given() -> None:
+    scene = ball(resolution=(3, 2), max_depth=0, samples=4)
+    assert render(scene, threads=1).depth.shape == (2, 3)
+    given = render(scene, threads=1, resolution=(6, 4), max_depth=6, samples=1)
+    np.testing.assert_array_equal(given.radiance, render(ball(), threads=1).radiance)
+    # None stands for the scene's own, as for an option that a command line was not given.
+    same = render(scene, threads=1, resolution=None, max_depth=None, samples=None, min_weight=None)
+    np.testing.assert_array_equal(same.radiance, render(scene, threads=1).radiance)
+    assert scene.render.resolution == (3, 2)
+
+
+@pytest.mark.parametrize(
+    "resolution", [(1, 1), (TILE, TILE), (TILE + 1, TILE - 1), (3 * TILE + 5, 2), (1, 2 * TILE + 1)]
+)
+def test_every_pixel_is_written_once(resolution: tuple[int, int]) -> None:
+    image = render(ball(), resolution=resolution, threads=2, max_depth=0)
+    assert image.depth.shape == resolution[::-1]
+    # One primary ray each, and a shadow ray where the ball is hit; nothing is left at its initial zero.
+    assert (image.rays >= 1).all() and (image.rays <= 2).all()
+    np.testing.assert_array_equal(image.radiance[image.face < 0], 0.25)
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "got"),
+    [
+        ("accelerator", "bvh", "bvh"),
+        ("accelerator", None, "None"),
+        ("split", "kd", "kd"),
+        ("offset", "none", "none"),
+        ("offset", -1.0, "-1"),
+        ("offset", 0.5, "0.5"),
+        ("offset", float("nan"), "nan"),
+        ("offset", None, "None"),
+        ("offset", [1], "1"),
+        ("threads", 0, "0"),
+        ("threads", -1, "-1"),
+        ("threads", 1.5, "1.5"),
+        ("threads", True, "True"),
+        ("resolution", (0, 4), "0"),
+        ("resolution", (4, 4, 4), "4"),
+        ("resolution", 4, "4"),
+        ("resolution", (4, 1e9), "1000000000|16384"),
+        ("samples", 3, "3"),
+        ("samples", -1, "-1"),
+        ("samples", True, "True"),
+        ("samples", "4", "4"),
+        ("max_depth", -1, "-1"),
+        ("max_depth", 65, "65"),
+        ("max_depth", 1.5, "1.5"),
+        ("max_depth", float("nan"), "nan"),
+        ("min_weight", -0.1, "-0.1"),
+        ("min_weight", 1.0, "1"),
+        ("min_weight", float("nan"), "nan"),
+        ("speed", 3, "speed"),
+        ("camera", None, "camera"),
+    ],
+)
+def test_errors_name_the_argument_and_what_came(argument: str, value: Any, got: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        render(ball(), **{argument: value})
+    assert argument in str(caught.value)
+    assert any(g in str(caught.value) for g in got.split("|"))
+
+
+def test_brute_force_is_as_strict_about_arguments_that_it_does_not_use() -> None:
+    with pytest.raises(ValueError, match="split"):
+        render(ball(), accelerator="brute", split="kd")  # type: ignore[arg-type]
+
+
+def test_arguments_are_checked_before_anything_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
+    def built(*_: object) -> None:
+        raise AssertionError("built a tree for arguments that are no good")
+
+    monkeypatch.setattr(MODULE, "pack", built)
+    for bad in ({"threads": 0}, {"samples": 3}, {"accelerator": "x"}, {"offset": "x"}, {"split": "x"}):
+        with pytest.raises(ValueError):
+            render(ball(), **bad)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_the_bar_shows_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    for stream, progress, shows in ((Terminal(), True, True), (Terminal(), False, False), (io.StringIO(), True, False)):
+        monkeypatch.setattr(sys, "stderr", stream)
+        render(ball(), resolution=(3 * TILE, TILE), threads=2, progress=progress)
+        assert ("tile" in stream.getvalue()) == shows, (stream, progress)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_an_exception_in_a_tile_stops_the_rest(monkeypatch: pytest.MonkeyPatch, threads: int, error: type) -> None:
+    tiles, lock = [], threading.Lock()
+
+    def interrupted(*arguments: Any) -> None:
+        with lock:
+            tiles.append(arguments[-1])
+            count = len(tiles)
+        if count == 5:
+            raise error
+
+    monkeypatch.setattr(MODULE, "render_tile", interrupted)
+    with pytest.raises(error):
+        render(ball(), resolution=(20 * TILE, 20 * TILE), threads=threads)
+    # Each other thread may have had one tile under way and have taken one more before it saw the stop.
+    assert 5 <= len(tiles) <= 5 + 2 * threads
+    monkeypatch.undo()
+    assert render(ball(), resolution=(2 * TILE, TILE), threads=threads).rays.min() >= 1
+
+
+def test_each_tile_is_rendered_once_and_they_cover_the_film(monkeypatch: pytest.MonkeyPatch) -> None:
+    covered = np.zeros((2 * TILE + 7, 3 * TILE + 1), int)
+
+    def count(*arguments: Any) -> None:
+        x0, y0, x1, y1 = arguments[-1]
+        covered[y0:y1, x0:x1] += 1
+
+    monkeypatch.setattr(MODULE, "render_tile", count)
+    render(ball(), resolution=covered.shape[::-1], threads=1)
+    assert (covered == 1).all()
+
+
+def test_concurrent_callers_get_the_same_picture() -> None:
+    expected = render(ball(), resolution=(70, 40), threads=1)
+    images: list[Any] = [None] * 6
+
+    def call(i: int) -> None:
+        images[i] = render(ball(), resolution=(70, 40), threads=2)
+
+    callers = [threading.Thread(target=call, args=(i,)) for i in range(len(images))]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join()
+    for image in images:
+        assert image.radiance.tobytes() == expected.radiance.tobytes()
+        assert image.face.tobytes() == expected.face.tobytes()
+
+
+def test_offset_may_be_a_number() -> None:
+    by_name = render(load_scene(SCENES / "glass.toml"), resolution=(16, 16), offset="mitsuba", threads=1)
+    by_number = render(load_scene(SCENES / "glass.toml"), resolution=(16, 16), offset=1500 * 2.0**-24, threads=1)
+    np.testing.assert_array_equal(by_name.radiance, by_number.radiance)
+    bounded = render(load_scene(SCENES / "glass.toml"), resolution=(16, 16), threads=1)
+    assert (bounded.radiance != by_name.radiance).any()
+    # The rules differ by 1e-4 of the scene; only rays that pass an edge may see something else.
+    assert np.median(np.abs(bounded.radiance - by_name.radiance)) < 1e-3

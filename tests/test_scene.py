@@ -1,0 +1,613 @@
+"""Scenes: what a file may say, the one line that says what is wrong with it, and the triangles that it means."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from renderer.camera import OrthographicCamera, PerspectiveCamera
+from renderer.errors import MeshError, SceneError
+from renderer.light import DirectionalLight, PointLight
+from renderer.material import Dielectric, Mirror, Phong
+from renderer.mesh import Mesh
+from renderer.mesh_io import save_ply
+from renderer.scene import Floor, Scene, SceneObject, load_scene
+from renderer.shapes import box, icosphere
+from renderer.world import pack
+
+CAMERA = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n"
+MATERIAL = "[materials.clay]\ndiffuse = 0.5\n"
+FULL = """\
+ambient = 0.1
+background = [0.1, 0.2, 0.3]
+
+[render]
+resolution = [8, 6]
+samples = 4
+max_depth = 3
+min_weight = 0.001
+
+[camera]
+type = "perspective"
+eye = [0, 1, 5]
+target = [0, 0, 0]
+up = [0, 1, 0]
+fov = 40
+
+[materials.clay]
+diffuse = [0.7, 0.35, 0.22]
+ambient = 0.5
+specular = 0.2
+shininess = 20
+reflectance = 0.1
+transmittance = 0.2
+ior = 1.3
+
+[materials.glass]
+type = "dielectric"
+ior = 1.5
+
+[materials.mirror]
+type = "mirror"
+reflectance = 0.9
+
+[[lights]]
+type = "directional"
+direction = [0, -1, 0]
+irradiance = 0.5
+
+[[lights]]
+type = "point"
+position = [1, 2, 3]
+intensity = [6, 5, 4]
+
+[[objects]]
+mesh = "models/box.ply"
+material = "glass"
+normals = "smooth"
+scale = 0.5
+rotate = [0, 30, 0]
+translate = [1, 0, 0]
+
+[[objects]]
+mesh = "models/box.ply"
+material = "mirror"
+scale = [1, 2, 3]
+
+[floor]
+min = [-4, -4]
+max = [4.0, 4.0]
+squares = [2, 3]
+materials = ["clay", "glass"]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: Any) -> Path:
+    where = tmp_path_factory.mktemp("scenes")
+    (where / "models").mkdir()
+    save_ply(box(), where / "models" / "box.ply")
+    (where / "models" / "broken.ply").write_bytes(b"ply\nnonsense")
+    return where
+
+
+def load(folder: Path, text: str) -> Scene:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_scene(path)
+
+
+def error_of(folder: Path, text: str) -> str:
+    """The SceneError's message without the file that it must name, after checking that it is one line."""
+    with pytest.raises(SceneError) as caught:
+        load(folder, text)
+    message = str(caught.value)
+    assert message.startswith(f"{folder / 'scene.toml'}: ")
+    assert len(message.splitlines()) == 1
+    return message.removeprefix(f"{folder / 'scene.toml'}: ")
+
+
+def test_a_file_that_uses_every_key(folder: Path) -> None:
+    scene = load(folder, FULL)
+    assert scene.ambient == (0.1, 0.1, 0.1) and scene.background == (0.1, 0.2, 0.3)
+    assert scene.render.model_dump() == {"resolution": (8, 6), "samples": 4, "max_depth": 3, "min_weight": 0.001}
+    assert scene.camera == PerspectiveCamera(eye=(0, 1, 5), target=(0, 0, 0), fov=40)
+    assert list(scene.materials) == ["clay", "glass", "mirror"]
+    assert scene.materials["clay"] == Phong(
+        diffuse=(0.7, 0.35, 0.22), ambient=0.5, specular=0.2, shininess=20, reflectance=0.1, transmittance=0.2, ior=1.3
+    )
+    assert scene.materials["mirror"] == Mirror(type="mirror", reflectance=0.9)
+    assert scene.materials["glass"] == Dielectric(type="dielectric", ior=1.5)
+    assert scene.lights == (
+        DirectionalLight(direction=(0, -1, 0), irradiance=0.5),
+        PointLight(position=(1, 2, 3), intensity=(6, 5, 4)),
+    )
+    assert [(i.material, i.smooth) for i in scene.instances] == [
+        ("glass", True), ("mirror", False), ("clay", False), ("glass", False)]  # fmt: skip
+
+
+def test_what_a_file_leaves_out(folder: Path) -> None:
+    scene = load(folder, CAMERA + MATERIAL)
+    assert (scene.lights, scene.objects, scene.floor, scene.instances) == ((), (), None, ())
+    assert scene.ambient == scene.background == (0, 0, 0)
+    assert scene.render.resolution == (512, 512) and scene.render.samples == 1 and scene.render.max_depth == 6
+    assert isinstance(scene.camera, PerspectiveCamera) and scene.camera.fov == 45 and scene.camera.up == (0, 1, 0)
+
+
+def test_orthographic_camera(folder: Path) -> None:
+    scene = load(folder, CAMERA + 'type = "orthographic"\nheight = 3\n[materials]\n')
+    assert scene.camera == OrthographicCamera(type="orthographic", eye=(0, 0, 5), target=(0, 0, 0), height=3)
+
+
+def with_key(table: str, line: str) -> str:
+    """FULL with a line added to the top of a table (or of the file), in place of the key's line if it has one."""
+    key = line.split("=")[0].strip()
+    head, found, tail = FULL.partition(f"{table}\n") if table else ("", "", FULL)
+    own, gap, rest = tail.partition("\n\n")
+    own = re.sub(rf"(?m)^{re.escape(key)} = .*\n?", "", own)
+    return f"{head}{found}{line}\n{own}{gap}{rest}"
+
+
+FAULTS = [
+    # table, line, the key's path, what the message must say besides
+    ("", "speed = 3", "speed", ["unknown key", "3"]),
+    ("[render]", "speed = 3", "render.speed", ["unknown key", "3"]),
+    ("[camera]", "speed = 3", "camera.speed", ["unknown key", "3"]),
+    ("[camera]", "height = 3", "camera.height", ["unknown key", "3"]),
+    ("[materials.clay]", "speed = 3", "materials.clay.speed", ["unknown key", "3"]),
+    ("[materials.glass]", "diffuse = 3", "materials.glass.diffuse", ["unknown key", "3"]),
+    ("[materials.mirror]", "speed = 3", "materials.mirror.speed", ["unknown key", "3"]),
+    ("[[lights]]", "speed = 3", "lights.0.speed", ["unknown key", "3"]),
+    ("[[objects]]", "speed = 3", "objects.0.speed", ["unknown key", "3"]),
+    ("[floor]", "speed = 3", "floor.speed", ["unknown key", "3"]),
+    ("", "ambient = -0.5", "ambient", ["greater than or equal to 0", "-0.5"]),
+    ("", "ambient = [1, 2]", "ambient", ["[1, 2]"]),
+    ("", "ambient = nan", "ambient", ["finite", "nan"]),
+    ("", "ambient = inf", "ambient", ["finite", "inf"]),
+    ("", 'ambient = "bright"', "ambient", ["bright"]),
+    ("", "background = {}", "background", []),
+    ("[render]", "resolution = [0, 6]", "render.resolution.0", ["1", "0"]),
+    ("[render]", "resolution = [8, 1000000]", "render.resolution.1", ["16384", "1000000"]),
+    ("[render]", "resolution = 8", "render.resolution", ["8"]),
+    ("[render]", "resolution = [8, 6, 4]", "render.resolution", ["[8, 6, 4]"]),
+    ("[render]", "resolution = [8.5, 6]", "render.resolution.0", ["8.5"]),
+    ("[render]", "samples = 3", "render", ["samples", "square number", "got 3"]),
+    ("[render]", "samples = 0", "render", ["samples", "got 0"]),
+    ("[render]", "samples = -4", "render", ["samples", "got -4"]),
+    ("[render]", "max_depth = -1", "render.max_depth", ["-1"]),
+    ("[render]", "max_depth = 65", "render.max_depth", ["64", "65"]),
+    ("[render]", "min_weight = 1.0", "render.min_weight", ["1.0"]),
+    ("[render]", "min_weight = nan", "render.min_weight", ["nan"]),
+    ("[camera]", 'type = "fisheye"', "camera", ["fisheye", "perspective", "orthographic"]),
+    ("[camera]", "type = 3", "camera", ["3"]),
+    ("[camera]", "type = [3]", "camera", ["3"]),
+    ("[camera]", "eye = [0, 0]", "camera.eye", ["[0, 0]"]),
+    ("[camera]", "eye = [0, 0, inf]", "camera.eye.2", ["inf"]),
+    ("[camera]", "target = [0, 1, 5]", "camera", ["target != eye"]),
+    ("[camera]", "up = [0, 1, 5]", "camera", ["up not parallel"]),
+    ("[camera]", "up = [0, 0, 0]", "camera", ["up not parallel"]),
+    ("[camera]", "fov = 180", "camera.fov", ["180"]),
+    ("[camera]", "fov = 0", "camera.fov", ["0"]),
+    ("[camera]", "fov = nan", "camera.fov", ["nan"]),
+    ("[camera]", "fov = 1979-05-27", "camera.fov", ["1979"]),
+    ("[materials.clay]", 'type = "gold"', "materials.clay", ["gold", "phong", "mirror", "dielectric"]),
+    ("[materials.clay]", "diffuse = [0.1, 0.2, -0.3]", "materials.clay.diffuse.2", ["-0.3"]),
+    ("[materials.clay]", "shininess = -1", "materials.clay.shininess", ["-1"]),
+    ("[materials.clay]", "ior = 0", "materials.clay.ior", ["0"]),
+    ("[materials.glass]", "ior = inf", "materials.glass.ior", ["inf"]),
+    ("[materials.mirror]", "reflectance = nan", "materials.mirror.reflectance", ["nan"]),
+    ("[[lights]]", 'type = "spot"', "lights.0", ["spot", "directional", "point"]),
+    ("[[lights]]", "direction = [0, 0, 0]", "lights.0.direction", ["non-zero"]),
+    ("[[lights]]", "direction = [0, nan, 0]", "lights.0.direction.1", ["nan"]),
+    ("[[lights]]", "irradiance = -1", "lights.0.irradiance", ["-1"]),
+    ("[[objects]]", "mesh = 3", "objects.0.mesh", ["3"]),
+    ("[[objects]]", 'mesh = "models/none.ply"', "objects", ["none.ply", "No such file"]),
+    ("[[objects]]", 'mesh = "models"', "objects", ["models", "suffix"]),
+    ("[[objects]]", 'mesh = "models/broken.ply"', "objects", ["broken.ply"]),
+    ("[[objects]]", 'mesh = "models/box.abc"', "objects", ["box.abc", "suffix"]),
+    ("[[objects]]", 'mesh = "models/bo\\u0000x.ply"', "objects", ["null byte"]),
+    ("[[objects]]", 'material = "gold"', "objects.0.material", ["clay", "glass", "mirror", "'gold'"]),
+    ("[[objects]]", "material = 3", "objects.0.material", ["3"]),
+    ("[[objects]]", 'normals = "soft"', "objects.0.normals", ["flat", "smooth", "soft"]),
+    ("[[objects]]", "scale = [1, 2]", "objects.0.scale", ["[1, 2]"]),
+    ("[[objects]]", "scale = nan", "objects.0.scale", ["nan"]),
+    ("[[objects]]", "rotate = 30", "objects.0.rotate", ["30"]),
+    ("[[objects]]", "translate = [0, inf, 0]", "objects.0.translate.1", ["inf"]),
+    ("[floor]", "min = [4, -4]", "floor", ["min < max"]),
+    ("[floor]", "max = [nan, 4]", "floor", ["finite"]),
+    ("[floor]", "squares = [0, 1]", "floor.squares.0", ["0"]),
+    ("[floor]", "squares = [1, 1001]", "floor.squares.1", ["1000", "1001"]),
+    ("[floor]", "materials = []", "floor.materials", ["at least 1"]),
+    ("[floor]", 'materials = ["clay", "glass", "clay"]', "floor.materials", ["at most 2"]),
+    ("[floor]", 'materials = ["gold"]', "floor.materials", ["clay", "'gold'"]),
+]
+
+
+@pytest.mark.parametrize(("table", "line", "where", "says"), FAULTS, ids=[f"{t} {line}" for t, line, _, _ in FAULTS])
+def test_each_fault_is_one_line_with_its_place(
+    folder: Path, table: str, line: str, where: str, says: list[str]
+) -> None:
+    message = error_of(folder, with_key(table, line))
+    assert re.match(re.escape(where) + r"(\.\d)?: ", message), message
+    for words in says:
+        assert words in message, message
+
+
+# TOML has types; a bool is no number there and neither is a string.
+WRONG_TYPES = [
+    ("", "ambient = true", "ambient"),
+    ("", 'background = ["1", "2", "3"]', "background"),
+    ("[render]", "samples = true", "render.samples"),
+    ("[render]", 'max_depth = "3"', "render.max_depth"),
+    ("[render]", "max_depth = true", "render.max_depth"),
+    ("[camera]", 'fov = "45"', "camera.fov"),
+    ("[camera]", 'eye = ["0", "1", "5"]', "camera.eye"),
+    ("[camera]", "fov = true", "camera.fov"),
+    ("[materials.clay]", "reflectance = true", "materials.clay.reflectance"),
+    ("[materials.clay]", "shininess = true", "materials.clay.shininess"),
+    ("[materials.glass]", 'ior = "1.5"', "materials.glass.ior"),
+    ("[[objects]]", "scale = true", "objects.0.scale"),
+    ("[[objects]]", 'rotate = ["0", "0", "0"]', "objects.0.rotate"),
+    ("[floor]", 'min = ["-4", "-4"]', "floor.min"),
+    ("[floor]", "squares = [true, true]", "floor.squares"),
+]
+
+
+@pytest.mark.parametrize(("table", "line", "where"), WRONG_TYPES, ids=[f"{t} {line}" for t, line, _ in WRONG_TYPES])
+def test_a_value_of_another_type_is_not_taken_for_a_number(folder: Path, table: str, line: str, where: str) -> None:
+    assert error_of(folder, with_key(table, line)).startswith(where)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", ["camera: ", "required"]),
+        (CAMERA, ["materials: ", "required"]),
+        (MATERIAL, ["camera: ", "required"]),
+        ("[materials]\n[camera]\n", ["camera.eye: ", "required"]),
+        ("camera = 3\n[materials]\n", ["camera: ", "3"]),
+        ("materials = 3\n" + CAMERA, ["materials: ", "3"]),
+        ("lights = 3\n" + CAMERA + MATERIAL, ["lights: ", "3"]),
+        ("objects = 3\n" + CAMERA + MATERIAL, ["objects: ", "3"]),
+        ("objects = [3]\n" + CAMERA + MATERIAL, ["objects.0: ", "3"]),
+        ("lights = [3]\n" + CAMERA + MATERIAL, ["lights.0: ", "3"]),
+        (CAMERA + MATERIAL + "[lights]\n", ["lights: "]),
+        (CAMERA + MATERIAL + "[objects]\n", ["objects: "]),
+        (CAMERA + MATERIAL + "[[lights]]\n", ["lights.0: ", "type"]),
+        (CAMERA + MATERIAL + "[[objects]]\n", ["objects.0.mesh: ", "required", "1 more"]),
+        (CAMERA + MATERIAL + "[floor]\n", ["floor.min: ", "required", "2 more"]),
+        (CAMERA + "materials = {clay = 3}", ["camera.materials: ", "unknown key"]),
+        (CAMERA + "[materials]\nclay = 3", ["materials.clay: ", "3"]),
+        (CAMERA + MATERIAL + 'type = "mirror"', ["materials.clay.diffuse: ", "unknown key", "0.5"]),
+        ("x = [", ["TOML", "syntax"]),
+        ("x = 1\nx = 2", ["TOML", "overwrite"]),
+        ("\ufeff" + CAMERA, ["TOML"]),
+        ("x = " + "[" * 5000, ["TOML"]),
+    ],
+)
+def test_faults_of_whole_tables(folder: Path, text: str, says: list[str]) -> None:
+    message = error_of(folder, text)
+    for words in says:
+        assert words in message, message
+
+
+@pytest.mark.parametrize(
+    "name", ["perspective", "phong", "mirror", "dielectric", "point", "function-before", "is-instance"]
+)
+def test_a_material_may_bear_the_name_of_a_type(folder: Path, name: str) -> None:
+    """The key's path names the user's own keys, whatever they are called."""
+    message = error_of(folder, CAMERA + f"[materials.{name}]\nspeed = 3\n")
+    assert message.startswith(f"materials.{name}.speed: unknown key")
+
+
+@pytest.mark.parametrize("digits", [400, 4000, 4400, 6000])
+def test_huge_integers(folder: Path, digits: int) -> None:
+    """Python reads no decimal number of more than 4300 digits, and writes none."""
+    for number in ("1" * digits, "0x" + "f" * digits):
+        error_of(folder, CAMERA + f"fov = {number}\n" + MATERIAL)
+        error_of(folder, CAMERA + f"speed = {number}\n" + MATERIAL)
+        error_of(folder, CAMERA.replace("[0, 0, 5]", f"[0, 0, {number}]") + MATERIAL)
+
+
+@pytest.mark.parametrize("text", ['"a\\nb" = 3\n', '[materials."a\\nb"]\nspeed = 3\n'])
+def test_keys_with_line_breaks_stay_on_one_line(folder: Path, text: str) -> None:
+    error_of(folder, text + CAMERA if text.startswith('"') else CAMERA + text)
+
+
+def test_file_names_with_line_breaks_stay_on_one_line(folder: Path) -> None:
+    error_of(folder, with_key("[[objects]]", 'mesh = "models/a\\nb.ply"'))
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    for path, says in ((tmp_path / "none.toml", "No such file"), (tmp_path, "Is a directory")):
+        with pytest.raises(SceneError, match=re.escape(f"{path}: cannot be read: {says}")):
+            load_scene(path)
+    latin = tmp_path / "latin.toml"
+    latin.write_bytes(b'x = "\xe9"')
+    with pytest.raises(SceneError, match=re.escape(f"{latin}: expected TOML")):
+        load_scene(str(latin))
+    with pytest.raises(SceneError, match="null byte"):
+        load_scene("a\0b.toml")
+
+
+def test_mesh_paths_are_relative_to_the_scene_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    load(folder, FULL)
+    monkeypatch.chdir(folder.parent)
+    assert len(load_scene(Path(folder.name) / "scene.toml").instances[0].mesh.faces) == 12
+    monkeypatch.chdir(folder / "models")
+    assert len(load_scene("../scene.toml").instances) == 4
+    absolute = FULL.replace("models/box.ply", str(folder / "models" / "box.ply"))
+    (folder.parent / "other.toml").write_text(absolute)
+    assert len(load_scene(folder.parent / "other.toml").instances) == 4
+
+
+# Values that a number, vector, string or table of the file may be replaced with.
+STRANGE: list[str] = [
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "1e160",
+    "1e-200",
+    "0",
+    "-0.0",
+    "-1",
+    "1",
+    "2.5",
+    "nan",
+    "inf",
+    "-inf",
+    "true",
+    '""',
+    '"\\u0000"',
+    '"a\\nb"',
+    "{}",
+    "[[]]",
+    "{a=1}",
+    "1979-05-27",
+    "07:32:00",
+    "99999999999999999999",
+    "[1e308,1e308,1e308]",
+    "[1e-200,0,0]",
+    "[0,0,0]",
+    "[1,2]",
+    "[true,1,1]",
+    '["clay"]',
+    '"clay"',
+    '"models/box.ply"',
+    '"models"',
+    '"mirror"',
+    '"dielectric"',
+    '"point"',
+    "[]",
+]
+STRANGE += ["9" * 4400, "0x" + "f" * 4400]
+LINES = FULL.splitlines()
+
+
+@st.composite
+def mutated(draw: Any) -> str:
+    lines = list(LINES)
+    for _ in range(draw(st.integers(1, 3))):
+        at = draw(st.integers(0, len(lines) - 1))
+        kind = draw(st.sampled_from(["value", "value", "value", "drop", "twice", "swap", "text", "key"]))
+        key, equals, value = lines[at].partition(" = ")
+        if kind == "value" and equals:
+            lines[at] = f"{key} = {draw(st.sampled_from(STRANGE))}"
+        elif kind == "key" and equals:
+            name = draw(st.sampled_from(["x", "type", "mesh", "fov", "height", '"a b"']))
+            lines[at] = f"{name} = {value}"
+        elif kind == "drop":
+            lines[at] = ""
+        elif kind == "twice":
+            lines.insert(at, lines[at])
+        elif kind == "swap":
+            other = draw(st.integers(0, len(lines) - 1))
+            lines[at], lines[other] = lines[other], lines[at]
+        else:
+            cut = draw(st.integers(0, len(lines[at])))
+            lines[at] = lines[at][:cut] + draw(st.text(max_size=4)) + lines[at][cut:]
+    return "\n".join(lines)
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(text=mutated())
+@example(FULL.replace("translate = [1, 0, 0]", "translate = [1e308, 0, 0]").replace("scale = 0.5", "scale = 1e308"))
+@example(FULL.replace("translate = [1, 0, 0]", "translate = [1e300, 0, 0]"))
+@example(FULL.replace("max = [4.0, 4.0]", "max = [1e300, 4.0]"))
+@example(
+    FULL.replace("eye = [0, 1, 5]", "eye = [1e308, 1, 5]").replace("target = [0, 0, 0]", "target = [-1e308, 0, 0]")
+)
+@example(FULL.replace("max_depth = 3", "max_depth = " + "9" * 4400))
+def test_any_file_is_a_scene_or_one_line(folder: Path, text: str) -> None:
+    """No other exception and no warning; a scene that comes out is one that can be packed for the kernels."""
+    path = folder / "fuzz.toml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    try:
+        scene = load_scene(path)
+    except (SceneError, MeshError) as error:
+        assert str(error).startswith(f"{path}: ") and len(str(error).splitlines()) == 1
+        return
+    _, world = pack(scene)
+    for array in (world.vertices, world.normals, world.materials, world.lights, world.colors):
+        assert np.isfinite(array).all()
+    for rows in (scene.camera.rows(3, 2), np.array(scene.camera.frame())):
+        assert np.isfinite(rows).all()
+    towards = world.lights[world.lights[:, 0] == 0, 1:4] if len(scene.lights) else np.zeros((0, 3))
+    np.testing.assert_allclose(np.linalg.norm(towards, axis=1), 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-200, 1e-160, 1.0, 1e160, 1e300])
+def test_directional_lights_of_any_length_shine_alike(size: float) -> None:
+    row = DirectionalLight(direction=(0, -size, 0), irradiance=2.0).row()
+    assert row.tolist() == [0, 0, 1, 0, 2, 2, 2]
+
+
+class TestFromPython:
+    def test_meshes_in_memory(self) -> None:
+        mesh = icosphere(1)
+        scene = Scene(
+            camera=PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0)),
+            materials={"a": Phong(), "b": Mirror(type="mirror")},
+            objects=(SceneObject(mesh=mesh, material="b"), SceneObject(mesh=box(), material="a", translate=(1, 2, 3))),
+        )
+        first, second = scene.instances
+        assert first.mesh is mesh and first.material == "b"
+        assert second.mesh.bounds[0].tolist() == [1, 2, 3] and second.material == "a"
+        assert scene.instances is scene.instances
+
+    def test_plain_tables(self, folder: Path) -> None:
+        scene = Scene(
+            camera={"eye": (0, 0, 5), "target": (0, 0, 0)},
+            materials={"a": {"type": "mirror"}},
+            lights=[{"type": "point", "position": (0, 1, 0)}],
+            objects=[{"mesh": folder / "models" / "box.ply", "material": "a"}],
+        )
+        assert isinstance(scene.camera, PerspectiveCamera) and isinstance(scene.materials["a"], Mirror)
+        assert isinstance(scene.lights[0], PointLight) and len(scene.instances[0].mesh.faces) == 12
+
+    def test_faults_are_value_errors_that_name_the_key(self) -> None:
+        camera = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+        with pytest.raises(ValueError, match="speed"):
+            Scene(camera=camera, materials={}, speed=3)
+        with pytest.raises(ValueError, match=r"objects\.0\.material.*'a'"):
+            Scene(camera=camera, materials={}, objects=(SceneObject(mesh=box(), material="a"),))
+
+    def test_scenes_are_frozen(self) -> None:
+        scene = Scene(camera=PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0)), materials={})
+        with pytest.raises(ValueError, match="frozen"):
+            scene.ambient = (1, 1, 1)
+
+
+def turned(degrees: Any, points: np.ndarray) -> np.ndarray:
+    """Points rotated about x, then y, then z, counter-clockwise seen from the axis' tip; by complex numbers."""
+    points = points.astype(np.float64).copy()
+    for axis, angle in enumerate(degrees):
+        i, j = [(1, 2), (2, 0), (0, 1)][axis]
+        z = (points[:, i] + 1j * points[:, j]) * np.exp(1j * np.radians(angle))
+        points[:, i], points[:, j] = z.real, z.imag
+    return points
+
+
+class TestPlacing:
+    def test_scaled_then_turned_about_x_y_z_then_moved(self) -> None:
+        placed = SceneObject(mesh=box(), material="a", scale=(1, 2, 3), rotate=(30, 50, -110), translate=(7, 8, 9))
+        matrix = placed.matrix()
+        expected = turned((30, 50, -110), box().vertices * [1, 2, 3]) + np.array([7, 8, 9])
+        # A dozen roundings of values of at most 16.
+        np.testing.assert_allclose(box().vertices @ matrix[:3, :3].T + matrix[:3, 3], expected, atol=12 * 16 * 2.0**-53)
+        assert matrix[3].tolist() == [0, 0, 0, 1]
+
+    @pytest.mark.parametrize(
+        ("rotate", "image"),
+        [((90, 0, 0), [(1, 0, 0), (0, 0, 1), (0, -1, 0)]), ((0, 90, 0), [(0, 0, -1), (0, 1, 0), (1, 0, 0)]),
+         ((0, 0, 90), [(0, 1, 0), (-1, 0, 0), (0, 0, 1)]), ((90, 90, 0), [(0, 0, -1), (1, 0, 0), (0, -1, 0)])],
+    )  # fmt: skip
+    def test_quarter_turns(self, rotate: Any, image: Any) -> None:
+        """Where the x, y and z axes go; the last case tells x-then-y from y-then-x."""
+        matrix = SceneObject(mesh=box(), material="a", rotate=rotate).matrix()
+        np.testing.assert_allclose(matrix[:3, :3].T, image, atol=2.0**-52)
+
+    def place(self, mesh: Mesh, **how: Any) -> Mesh:
+        camera = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+        objects = (SceneObject(mesh=mesh, material="a", **how),)
+        return Scene(camera=camera, materials={"a": Phong()}, objects=objects).instances[0].mesh
+
+    def test_float32_meshes_stay_float32_near_the_origin(self) -> None:
+        mesh = Mesh(icosphere(2).vertices.astype(np.float32), icosphere(2).faces)
+        how = {"scale": 0.3, "rotate": (10, 20, 30), "translate": (0.1, 0.7, -0.2)}
+        near = self.place(mesh, **how)
+        exact = turned((10, 20, 30), mesh.vertices * 0.3) + np.array([0.1, 0.7, -0.2])
+        assert near.is_float32
+        # Nearest float32 of the exact position, itself computed with a few roundings.
+        np.testing.assert_allclose(near.vertices, exact.astype(np.float32), atol=2.0**-24)
+        assert np.abs(near.vertices - exact).max() <= 2.0**-22 * np.ptp(exact, axis=0).max()
+
+    def test_far_out_they_become_float64(self) -> None:
+        mesh = Mesh(icosphere(2).vertices.astype(np.float32), icosphere(2).faces)
+        far = self.place(mesh, scale=0.3, rotate=(10, 20, 30), translate=(1000.1, 0, 0))
+        exact = turned((10, 20, 30), mesh.vertices * 0.3) + np.array([1000.1, 0, 0])
+        assert not far.is_float32
+        np.testing.assert_allclose(far.vertices, exact, atol=4 * 1024 * 2.0**-53)
+
+    def test_float64_meshes_are_never_rounded(self) -> None:
+        mesh = icosphere(2)
+        assert not mesh.is_float32
+        placed = self.place(mesh, rotate=(0, 0, 90))
+        np.testing.assert_allclose(placed.vertices, turned((0, 0, 90), mesh.vertices), atol=2.0**-52)
+        assert not placed.is_float32
+
+    def test_a_mirroring_scale_keeps_outside_outside(self) -> None:
+        placed = self.place(box((-1, -1, -1), (1, 1, 1)), scale=(-1, 1, 1))
+        assert (np.einsum("ij,ij->i", placed.face_normals(), placed.triangles.mean(axis=1)) > 0).all()
+
+    def test_normals_go_with_the_surface(self) -> None:
+        ball = Mesh(icosphere(3).vertices, icosphere(3).faces, normals=icosphere(3).vertices)
+        placed = self.place(ball, scale=(1, 2, 4), rotate=(0, 30, 0))
+        assert placed.normals is not None
+        # The normal of an ellipsoid at (x, y, z) goes like (x, y/4, z/16) of its placed position.
+        expected = turned((0, 30, 0), ball.vertices / [1, 2, 4])
+        expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+        np.testing.assert_allclose(placed.normals, expected, atol=16 * 2.0**-53)
+
+    def test_world_positions_that_overflow_are_one_error_without_warnings(self, folder: Path) -> None:
+        error_of(folder, with_key("[[objects]]", "scale = 1e308").replace("[1, 0, 0]", "[1e308, 1e308, 1e308]"))
+
+
+class TestFloor:
+    def parts(self, **how: Any) -> dict[str, Mesh]:
+        floor = Floor(**{"min": (-1, -2), "max": (3, 4), "materials": ("a", "b"), **how})
+        scene = Scene(
+            camera=PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0)),
+            materials={"a": Phong(), "b": Phong()},
+            floor=floor,
+        )
+        return {i.material: i.mesh for i in scene.instances}
+
+    def test_one_material_fills_the_rectangle(self) -> None:
+        (mesh,) = self.parts(materials=("a",), squares=(3, 2)).values()
+        assert [b.tolist() for b in mesh.bounds] == [[-1, 0, -2], [3, 0, 4]]
+        assert len(mesh.faces) == 12 and (mesh.face_normals() == [0, 1, 0]).all()
+        a, b, c = np.moveaxis(mesh.triangles, 1, 0)
+        assert np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2 == pytest.approx(24, rel=1e-7)
+
+    def test_two_materials_alternate_from_the_corner(self) -> None:
+        parts = self.parts(squares=(4, 3))
+        for index, name in enumerate("ab"):
+            centres = parts[name].triangles.mean(axis=1)
+            column, row = np.floor(centres[:, 0] + 1).astype(int), np.floor((centres[:, 2] + 2) / 2).astype(int)
+            assert ((column + row) % 2 == index).all()
+            assert sorted(zip(column, row, strict=True)) == sorted(
+                2 * [(i, j) for i in range(4) for j in range(3) if (i + j) % 2 == index])  # fmt: skip
+
+    def test_squares_share_their_edges(self) -> None:
+        parts = self.parts(min=(-0.1, -0.7), max=(0.3, 0.9), squares=(7, 5))
+        assert set(map(tuple, parts["a"].vertices)) == set(map(tuple, parts["b"].vertices))
+        assert parts["a"].is_float32
+
+    def test_one_square_of_two_materials_uses_the_first(self) -> None:
+        assert list(self.parts()) == ["a"]
+
+
+def test_packed_rows_follow_the_instances(folder: Path) -> None:
+    scene = load(folder, FULL)
+    mesh, world = pack(scene)
+    names = list(scene.materials)
+    assert [names[i] for i in world.material] == ["glass"] * 12 + ["mirror"] * 12 + ["clay"] * 6 + ["glass"] * 6
+    assert world.smooth.tolist() == [True] * 12 + [False] * 24
+    start = 0
+    for instance in scene.instances:
+        count = len(instance.mesh.faces)
+        assert (mesh.triangles[start : start + count] == instance.mesh.triangles).all()
+        start += count
+    assert len(mesh.faces) == len(world.faces) == start
+    assert world.colors.tolist() == [[0.1] * 3, [0.1, 0.2, 0.3]]
+
+
+def test_one_mesh_may_stand_in_many_places(folder: Path) -> None:
+    entry = '[[objects]]\nmesh = "models/box.ply"\nmaterial = "clay"\n'
+    scene = load(folder, CAMERA + MATERIAL + entry * 20)
+    assert len(scene.instances) == 20 and len(pack(scene)[0].faces) == 240
