@@ -6,50 +6,64 @@ from renderer.jit import kernel
 from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute
 
 
+# What keeps every product of the triangle test finite and every reciprocal exact to rounding: a determinant is a
+# product of three lengths, so 2^300 leaves room below 2^1024.
+FARTHEST = 2.0**300
+SHORTEST, LONGEST = 2.0**-1000, 2.0**1000
+
+
 @kernel
-def first_bad_ray(origins, directions):
-    """Row of the first ray that is not finite or has a zero direction, or -1."""
+def first_bad_ray(origins, directions, scale):
+    """Row of the first ray out of range, or -1. NaN fails every comparison, so it is out of range too.
+
+    In range: components of ``scale`` times the origin up to FARTHEST, the largest component of the direction from
+    SHORTEST to LONGEST.
+    """
     for i in range(len(origins)):
-        total = 0.0
+        far = max(abs(origins[i, 0]), max(abs(origins[i, 1]), abs(origins[i, 2]))) * scale
+        largest = max(abs(directions[i, 0]), max(abs(directions[i, 1]), abs(directions[i, 2])))
+        # max drops a NaN in some places; x - x is NaN for NaN and inf and 0 otherwise.
+        odd = 0.0
         for k in range(3):
-            # x - x is 0 for a finite x and NaN for NaN and inf.
-            total += (origins[i, k] - origins[i, k]) + (directions[i, k] - directions[i, k])
-        zero = directions[i, 0] == 0.0 and directions[i, 1] == 0.0 and directions[i, 2] == 0.0
-        if zero or total != 0.0:
+            odd += (origins[i, k] - origins[i, k]) + (directions[i, k] - directions[i, k])
+        if not (odd == 0.0 and far <= FARTHEST and SHORTEST <= largest <= LONGEST):
             return i
     return -1
 
 
 @kernel
-def closest_chunk(tree, depth, brute, rays, out, begin, end):
-    """Closest hits of rays[begin:end] into the four arrays of ``out``."""
+def closest_chunk(tree, depth, scale, rays, out, begin, end):
+    """Closest hits of rays[begin:end] into the four arrays of ``out``; depth 0 tests every block.
+
+    ``scale``, a power of two, is what the tree's vertices were multiplied by; it goes in and out of t exactly.
+    """
     origins, directions, t_min, t_max = rays
     t_out, face_out, u_out, v_out = out
     stack = np.empty(7 * depth + 8, np.int64)
     for i in range(begin, end):
-        ox, oy, oz = origins[i, 0], origins[i, 1], origins[i, 2]
+        ox, oy, oz = scale * origins[i, 0], scale * origins[i, 1], scale * origins[i, 2]
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        low, high = t_min[i if len(t_min) > 1 else 0], t_max[i if len(t_max) > 1 else 0]
-        if brute:
+        low, high = scale * t_min[i if len(t_min) > 1 else 0], scale * t_max[i if len(t_max) > 1 else 0]
+        if depth == 0:
             t, face, u, v = closest_hit_brute(tree, ox, oy, oz, dx, dy, dz, low, high, stack)
         else:
             t, face, u, v = closest_hit(tree, ox, oy, oz, dx, dy, dz, low, high, stack)
         if face == NO_FACE:
             t_out[i], face_out[i], u_out[i], v_out[i] = np.inf, -1, np.nan, np.nan
         else:
-            t_out[i], face_out[i], u_out[i], v_out[i] = t, face, u, v
+            t_out[i], face_out[i], u_out[i], v_out[i] = t / scale, face, u, v
 
 
 @kernel
-def any_chunk(tree, depth, brute, rays, out, begin, end):
-    """Whether anything is hit by each of rays[begin:end], into ``out``."""
+def any_chunk(tree, depth, scale, rays, out, begin, end):
+    """Whether anything is hit by each of rays[begin:end], into ``out``; arguments as for ``closest_chunk``."""
     origins, directions, t_min, t_max = rays
     stack = np.empty(7 * depth + 8, np.int64)
     for i in range(begin, end):
-        ox, oy, oz = origins[i, 0], origins[i, 1], origins[i, 2]
+        ox, oy, oz = scale * origins[i, 0], scale * origins[i, 1], scale * origins[i, 2]
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        low, high = t_min[i if len(t_min) > 1 else 0], t_max[i if len(t_max) > 1 else 0]
-        if brute:
+        low, high = scale * t_min[i if len(t_min) > 1 else 0], scale * t_max[i if len(t_max) > 1 else 0]
+        if depth == 0:
             out[i] = any_hit_brute(tree, ox, oy, oz, dx, dy, dz, low, high, stack)
         else:
             out[i] = any_hit(tree, ox, oy, oz, dx, dy, dz, low, high, stack)

@@ -38,6 +38,11 @@ class Phong(_Material):
     transmittance: Color = _BLACK
     ior: _Ior = 1.5
 
+    @property
+    def passes_light(self) -> bool:
+        """Whether rays go through the surface into the object."""
+        return any(self.transmittance)
+
     def row(self) -> NDArray[np.float64]:
         """(MATERIAL_COLUMNS,) float64."""
         ambient = self.diffuse if self.ambient is None else self.ambient
@@ -51,6 +56,11 @@ class Mirror(_Material):
     type: Literal["mirror"]
     reflectance: Color = _WHITE
 
+    @property
+    def passes_light(self) -> bool:
+        """Never: the object behind a mirror is not seen."""
+        return False
+
     def row(self) -> NDArray[np.float64]:
         """(MATERIAL_COLUMNS,) float64."""
         return np.array([MIRROR, *_BLACK, *_BLACK, *_BLACK, *self.reflectance, *_BLACK, 0.0, 1.0])
@@ -63,6 +73,11 @@ class Dielectric(_Material):
     ior: _Ior = 1.5
     reflectance: Color = _WHITE
     transmittance: Color = _WHITE
+
+    @property
+    def passes_light(self) -> bool:
+        """Whether rays go through the surface into the object."""
+        return any(self.transmittance)
 
     def row(self) -> NDArray[np.float64]:
         """(MATERIAL_COLUMNS,) float64."""

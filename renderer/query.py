@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.batch import any_chunk, closest_chunk, first_bad_ray
+from renderer.batch import FARTHEST, LONGEST, SHORTEST, any_chunk, closest_chunk, first_bad_ray
 from renderer.errors import expect
 from renderer.layout import Tree
 from renderer.mesh import Mesh
@@ -89,38 +89,58 @@ class Rays:
     t_max: NDArray[np.float64]
 
 
-def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike) -> Rays:
-    """Check a batch once. Raises ``ValueError`` naming the argument and, for a bad ray, its row."""
+def check_rays(
+    origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike, scale: float = 1.0
+) -> Rays:
+    """Check a batch once, for a tree scaled by ``scale``.
+
+    Raises ``ValueError`` naming the argument and, for a bad ray, its row.
+    """
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     expect(len(origins) == len(directions), "directions", f"{len(origins)} rows as in origins", len(directions))
     low, high = _bound("t_min", t_min, len(origins)), _bound("t_max", t_max, len(origins))
     expect(bool(np.isfinite(low).all()), "t_min", "finite numbers", "inf")
-    row = first_bad_ray(origins, directions)
+    row = first_bad_ray(origins, directions, scale)
     if row >= 0:
-        bad_origin = not np.isfinite(origins[row]).all()
+        bad_origin = not (np.abs(origins[row]) * scale <= FARTHEST).all()
         name, values = ("origins", origins) if bad_origin else ("directions", directions)
-        expected = "finite numbers" if bad_origin else "finite, non-zero vectors"
+        near = f"finite numbers within {FARTHEST / scale:.3g}"
+        expected = near if bad_origin else f"finite, non-zero vectors, components up to {SHORTEST:.3g} to {LONGEST:.3g}"
         expect(False, name, expected, f"{values[row].tolist()} in row {row}")
     return Rays(origins, directions, low, high)
 
 
-def closest_hits(tree: Tree, depth: int, rays: Rays, mesh: Mesh, threads: int) -> Hits:
-    """Closest hits of a batch; ``depth`` 0 means that there are no nodes and every block is tested."""
+@dataclass(frozen=True)
+class Target:
+    """What rays are shot at: a tree, its depth (0: no nodes, every block is tested) and the power of two by which its
+    vertices were scaled.
+    """
+
+    tree: Tree
+    depth: int
+    scale: float
+
+
+def closest_hits(target: Target, rays: Rays, mesh: Mesh, threads: int) -> Hits:
+    """Closest hits of a batch."""
     count = len(rays.origins)
     out = (np.empty(count), np.empty(count, np.int64), np.empty(count), np.empty(count))
-    _run(closest_chunk, tree, depth, rays, out, threads)
+    _run(closest_chunk, target, rays, out, threads)
     return Hits(*out, mesh)
 
 
-def any_hits(tree: Tree, depth: int, rays: Rays, threads: int) -> NDArray[np.bool_]:
-    """Whether each ray of a batch hits anything; ``depth`` as in ``closest_hits``."""
+def any_hits(target: Target, rays: Rays, threads: int) -> NDArray[np.bool_]:
+    """Whether each ray of a batch hits anything."""
     out = np.empty(len(rays.origins), np.bool_)
-    _run(any_chunk, tree, depth, rays, out, threads)
+    _run(any_chunk, target, rays, out, threads)
     return out
 
 
-def _run(chunk: Any, tree: Tree, depth: int, rays: Rays, out: Any, threads: int) -> None:
+def _run(chunk: Any, target: Target, rays: Rays, out: Any, threads: int) -> None:
     arrays = (rays.origins, rays.directions, rays.t_min, rays.t_max)
     for_chunks(
-        lambda begin, end: chunk(tree, depth, depth == 0, arrays, out, begin, end), len(rays.origins), CHUNK, threads
+        lambda begin, end: chunk(target.tree, target.depth, target.scale, arrays, out, begin, end),
+        len(rays.origins),
+        CHUNK,
+        threads,
     )

@@ -13,9 +13,11 @@ from renderer.vec3 import add, dot, scale, sub
 _ROUNDOFF = 2.0**-53
 # gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).
 _GAMMA7 = 7.0 * _ROUNDOFF / (1.0 - 7.0 * _ROUNDOFF)
-# The next test of the same plane errs too: per vertex 3 roundings of the shear, 2 more and a cancellation in each
-# edge function, 3 in the weighted sum of the distances: 16 u of the largest distance to a vertex covers them.
-_GAMMA16 = 16.0 * _ROUNDOFF / (1.0 - 16.0 * _ROUNDOFF)
+# The next ray's test of the same triangle errs too. With L the largest component of a vertex relative to the origin and
+# every shear at most 1: a sheared coordinate is at most 2 L and errs by 5 u L; an edge function is at most 8 L^2 and
+# errs by 56 u L^2; the sum of the three e z errs by 3 (56 + 8 + 24) u L^3. Divided by the determinant, which is
+# |cross(p1 - p0, p2 - p0) . d| / |d_z|, and projected onto the normal, the direction drops out: 264 u L^3 / |cross|.
+_GAMMA264 = 264.0 * _ROUNDOFF / (1.0 - 264.0 * _ROUNDOFF)
 # Mitsuba 3's RayEpsilon: 1500 times the unit roundoff of float32.
 MITSUBA_EPSILON = 1500.0 * 2.0**-24
 # ``offset`` below 0 asks for the error-bounded rule.
@@ -73,17 +75,19 @@ def specular(d, n, light, shininess):
 
 
 @kernel
-def offset_distance(p, p0, p1, p2, u, v, n_g):
+def offset_distance(p, p0, p1, p2, u, v, n_g, double_area):
     """How far p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
 
     The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
-    matters where the first vanishes: on a plane through the origin.
+    matters where the first vanishes (on a plane through the origin) and for slivers. ``double_area`` is
+    |cross(p1 - p0, p2 - p0)|.
     """
     w, distance, reach = 1.0 - u - v, 0.0, 0.0
     for k in range(3):
         distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
         reach = max(reach, max(abs(p0[k] - p[k]), max(abs(p1[k] - p[k]), abs(p2[k] - p[k]))))
-    return _GAMMA7 * distance + _GAMMA16 * reach
+    # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
+    return _GAMMA7 * distance + _GAMMA264 * reach * (reach / double_area * reach)
 
 
 @kernel

@@ -52,6 +52,16 @@ def normalized(a):
 
 
 @kernel
+def length(a):
+    """|a|, scaled first so that no square overflows or vanishes."""
+    largest = max(abs(a[0]), max(abs(a[1]), abs(a[2])))
+    if largest == 0.0:
+        return 0.0
+    b = scale(a, 1.0 / largest)
+    return largest * math.sqrt(dot(b, b))
+
+
+@kernel
 def row3(array, i):
     """Row i of an (n, 3) array."""
     return (array[i, 0], array[i, 1], array[i, 2])

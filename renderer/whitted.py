@@ -31,6 +31,7 @@ from renderer.vec3 import (
     columns3,
     cross,
     dot,
+    length,
     normalized,
     row3,
     scale,
@@ -38,15 +39,20 @@ from renderer.vec3 import (
     times,
 )
 
-# One waiting ray: origin, direction, weight, depth.
-_RAY_WORDS = 10
+# One waiting ray: origin, direction, weight, depth, and the media it is in: how many, then their materials' rows,
+# outermost first. A ninth medium is not remembered; leaving it then leads back into the eighth.
+MAX_MEDIA = 8
+_BRIGHTEST = np.finfo(np.float32).max
+_DEPTH, _MEDIA = 9, 10
+_RAY_WORDS = _MEDIA + 1 + MAX_MEDIA
 
 
 class World(NamedTuple):
     """What the kernel reads of a scene; rows of materials and lights as in ``material`` and ``light``.
 
     vertices (V, 3), normals (V, 3) or (0, 3), faces (F, 3) int32, material (F,) int32, smooth (F,) bool,
-    materials (M, MATERIAL_COLUMNS), lights (L, LIGHT_COLUMNS), colors (2, 3): ambient and background.
+    materials (M, MATERIAL_COLUMNS), lights (L, LIGHT_COLUMNS), colors (2, 3): ambient and background,
+    media (m,) int64, m <= MAX_MEDIA: the materials that the eye is in, outermost first.
     """
 
     vertices: NDArray[np.float64]
@@ -57,6 +63,7 @@ class World(NamedTuple):
     materials: NDArray[np.float64]
     lights: NDArray[np.float64]
     colors: NDArray[np.float64]
+    media: NDArray[np.int64]
 
 
 class Accelerator(NamedTuple):
@@ -75,10 +82,12 @@ class Settings(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory of one thread: nodes that wait in a traversal, rays that wait in a recursion."""
+    """Memory of one thread: nodes that wait in a traversal, rays that wait in a recursion, media on both sides."""
 
     nodes: NDArray[np.int64]
     rays: NDArray[np.float64]
+    media: NDArray[np.int64]
+    beyond: NDArray[np.int64]
 
 
 class Surface(NamedTuple):
@@ -94,7 +103,12 @@ class Surface(NamedTuple):
 @kernel
 def make_scratch(depth, max_depth):
     """Scratch for a tree and a number of bounces: each ray leaves at most two, so one waits a level and one more."""
-    return Scratch(np.empty(7 * depth + 8, np.int64), np.empty((max_depth + 2, _RAY_WORDS), np.float64))
+    return Scratch(
+        np.empty(7 * depth + 8, np.int64),
+        np.empty((max_depth + 2, _RAY_WORDS), np.float64),
+        np.empty(MAX_MEDIA, np.int64),
+        np.empty(MAX_MEDIA, np.int64),
+    )
 
 
 @kernel
@@ -115,12 +129,14 @@ def _occluded(accelerator, o, d, t_max, stack):
 def _surface(world, face, u, v):
     a, b, c = world.faces[face, 0], world.faces[face, 1], world.faces[face, 2]
     p0, p1, p2 = row3(world.vertices, a), row3(world.vertices, b), row3(world.vertices, c)
-    n_g = normalized(cross(sub(p1, p0), sub(p2, p0)))
+    area = cross(sub(p1, p0), sub(p2, p0))
+    n_g = normalized(area)
     p = barycentric(p0, p1, p2, u, v)
     n_s = n_g
     if world.smooth[face]:
         n_s = normalized(barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v))
-    return Surface(p, offset_distance(p, p0, p1, p2, u, v, n_g), n_g, n_s, world.material[face])
+    error = offset_distance(p, p0, p1, p2, u, v, n_g, length(area))
+    return Surface(p, error, n_g, n_s, world.material[face])
 
 
 @kernel
@@ -140,7 +156,8 @@ def _visible_light(accelerator, world, surface, n, light, offset, stack):
         return towards, arriving, not _occluded(accelerator, o, towards, np.inf, stack)
     to_light = sub(towards, surface.p)
     squared = dot(to_light, to_light)
-    if squared == 0.0 or dot(n, to_light) <= 0.0:
+    # A light within rounding of the surface lies on it and does not light it; this also bounds 1 / r^2.
+    if dot(n, to_light) <= surface.error:
         return to_light, nothing, False
     o = spawn_origin(surface.p, surface.error, surface.n_g, to_light, offset)
     shadow = sub(towards, o)
@@ -171,38 +188,78 @@ def _local(accelerator, world, surface, d, n, offset, stack):
 
 
 @kernel
-def _push(rays, top, o, d, weight, depth, min_weight):
-    """Let a ray wait, unless its weight is nothing or below ``min_weight``. Returns the new top."""
-    largest = max(weight[0], max(weight[1], weight[2]))
-    if largest <= 0.0 or largest < min_weight:
-        return top
+def _push(rays, top, o, d, weight, depth, media):
+    """Let a ray wait above ``top`` in the given media. Returns the new top."""
     for k in range(3):
         rays[top, k], rays[top, 3 + k], rays[top, 6 + k] = o[k], d[k], weight[k]
-    rays[top, 9] = depth
+    rays[top, _DEPTH] = depth
+    rays[top, _MEDIA] = len(media)
+    for k in range(len(media)):
+        rays[top, _MEDIA + 1 + k] = media[k]
     return top + 1
 
 
 @kernel
-def _spawn(world, surface, ray, settings, rays, top):
-    """Push the reflected and the refracted ray of a hit. Returns the new top of the stack."""
-    d, n, inside, weight, depth = ray
-    m, materials = surface.material, world.materials
+def _goes_on(weight, min_weight):
+    largest = max(weight[0], max(weight[1], weight[2]))
+    return largest > 0.0 and largest >= min_weight
+
+
+@kernel
+def _enter_or_leave(media, count, material, inside):
+    """Cross the surface of ``material``: change ``media`` in place, return how many there are then.
+
+    Leaving takes out the innermost entry of that material, wherever it stands, so overlapping objects are left one
+    by one.
+    """
+    if not inside:
+        if count < MAX_MEDIA:
+            media[count] = material
+            count += 1
+        return count
+    for k in range(count - 1, -1, -1):
+        if media[k] == material:
+            for j in range(k, count - 1):
+                media[j] = media[j + 1]
+            return count - 1
+    return count
+
+
+@kernel
+def _innermost_ior(world, media, count):
+    return world.materials[media[count - 1], IOR] if count > 0 else 1.0
+
+
+@kernel
+def _spawn(world, surface, ray, settings, scratch, top):
+    """Push the reflected and the refracted ray of a hit. Returns the new top of the stack.
+
+    ``scratch.media[:count]`` are the media that the ray came through.
+    """
+    d, n, inside, weight, depth, count = ray
+    m, materials, media = surface.material, world.materials, scratch.media
     k_r, k_t = columns3(materials, m, REFLECTANCE), columns3(materials, m, TRANSMITTANCE)
-    passes = max(k_t[0], max(k_t[1], k_t[2])) > 0.0
-    if passes or materials[m, KIND] == DIELECTRIC:
-        n1, n2 = (materials[m, IOR], 1.0) if inside else (1.0, materials[m, IOR])
+    if max(k_t[0], max(k_t[1], k_t[2])) > 0.0 or materials[m, KIND] == DIELECTRIC:
+        beyond = scratch.beyond
+        beyond[:count] = media[:count]
+        left = _enter_or_leave(beyond, count, m, inside)
+        # From inside, n1 is this material even where no entry was seen: an open mesh.
+        n1 = materials[m, IOR] if inside else _innermost_ior(world, media, count)
+        n2 = _innermost_ior(world, beyond, left) if inside else materials[m, IOR]
         cos_t, through = refract(d, n, n1, n2)
         if materials[m, KIND] == DIELECTRIC:
             f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
             k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
-        if cos_t >= 0.0:
+        passed = times(weight, k_t)
+        if cos_t >= 0.0 and _goes_on(passed, settings.min_weight):
             through = normalized(through)
             o = spawn_origin(surface.p, surface.error, surface.n_g, through, settings.offset)
-            top = _push(rays, top, o, through, times(weight, k_t), depth, settings.min_weight)
-    if max(k_r[0], max(k_r[1], k_r[2])) > 0.0:
+            top = _push(scratch.rays, top, o, through, passed, depth, beyond[:left])
+    returned = times(weight, k_r)
+    if _goes_on(returned, settings.min_weight):
         mirrored = normalized(reflect(d, n))
         o = spawn_origin(surface.p, surface.error, surface.n_g, mirrored, settings.offset)
-        top = _push(rays, top, o, mirrored, times(weight, k_r), depth, settings.min_weight)
+        top = _push(scratch.rays, top, o, mirrored, returned, depth, media[:count])
     return top
 
 
@@ -214,12 +271,12 @@ def radiance(accelerator, world, settings, o, d, scratch):
     never holds more than ``max_depth + 2`` rays: each one popped leaves at most two of the next depth.
     """
     color, first_t, first_face, first_n, traced = (0.0, 0.0, 0.0), np.inf, NO_FACE, (0.0, 0.0, 0.0), 0
-    rays = scratch.rays
-    top = _push(rays, 0, o, d, (1.0, 1.0, 1.0), 0, 0.0)
+    rays, media = scratch.rays, scratch.media
+    top = _push(rays, 0, o, d, (1.0, 1.0, 1.0), 0, world.media)
     while top > 0:
         top -= 1
         o, d, weight = columns3(rays, top, 0), columns3(rays, top, 3), columns3(rays, top, 6)
-        depth = int(rays[top, 9])
+        depth, count = int(rays[top, _DEPTH]), int(rays[top, _MEDIA])
         t, face, u, v = _closest(accelerator, o, d, scratch.nodes)
         traced += 1
         if face == NO_FACE:
@@ -236,7 +293,10 @@ def radiance(accelerator, world, settings, o, d, scratch):
             color = add(color, times(weight, local))
             traced += shadow_rays
         if depth < settings.max_depth:
-            top = _spawn(world, surface, (d, n, inside, weight, depth + 1), settings, rays, top)
+            # The children may take this ray's place on the stack, so its media move out first.
+            for k in range(count):
+                media[k] = int(rays[top, _MEDIA + 1 + k])
+            top = _spawn(world, surface, (d, n, inside, weight, depth + 1, count), settings, scratch, top)
     return color, first_t, first_face, first_n, traced
 
 
@@ -273,6 +333,7 @@ def render_tile(accelerator, world, settings, camera, samples, film, tile):
                     film.depth[y, x], film.face[y, x] = t, -1 if face == NO_FACE else face
                     for k in range(3):
                         film.normal[y, x, k] = n[k]
+            # The brightest float32 stands for anything brighter: a light within 1e-15 of a surface.
             for k in range(3):
-                film.radiance[y, x, k] = total[k] / len(samples)
+                film.radiance[y, x, k] = min(total[k] / len(samples), _BRIGHTEST)
             film.rays[y, x] = rays

@@ -6,7 +6,7 @@ from renderer.light import LIGHT_COLUMNS
 from renderer.material import MATERIAL_COLUMNS
 from renderer.mesh import Mesh
 from renderer.scene import Scene
-from renderer.whitted import World
+from renderer.whitted import MAX_MEDIA, World
 
 
 def pack(scene: Scene) -> tuple[Mesh, World]:
@@ -30,8 +30,36 @@ def pack(scene: Scene) -> tuple[Mesh, World]:
         materials=np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS),
         lights=np.array([light.row() for light in scene.lights]).reshape(-1, LIGHT_COLUMNS),
         colors=np.array([scene.ambient, scene.background]),
+        media=_media(scene, rows),
     )
     return mesh, world
+
+
+def _media(scene: Scene, rows: dict[str, int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """Materials of the closed, light-passing meshes around the eye, outermost (by volume) first."""
+    around = []
+    for instance in scene.instances:
+        if scene.materials[instance.material].passes_light and _winding(instance.mesh, scene.camera.eye) > 0.5:
+            p0, p1, p2 = instance.mesh.triangles.transpose(1, 0, 2)
+            volume = abs(np.einsum("nk,nk->", p0, np.cross(p1, p2)))
+            around.append((volume, rows[instance.material]))
+    return np.array([row for _, row in sorted(around, reverse=True)][:MAX_MEDIA], np.int64)
+
+
+def _winding(mesh: Mesh, point: tuple[float, float, float]) -> float:
+    """How often ``mesh`` winds around ``point``: the solid angle of its faces over 4 pi, 1 inside a closed mesh.
+
+    van Oosterom and Strackee, The Solid Angle of a Plane Triangle, IEEE Trans. Biomed. Eng. 30:2, 1983.
+    """
+    lower, upper = mesh.bounds
+    if (np.less(point, lower) | np.greater(point, upper)).any():
+        return 0.0
+    a, b, c = (mesh.triangles - np.asarray(point)).transpose(1, 0, 2)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    dots = [np.einsum("nk,nk->n", v, w) for v, w in ((a, b), (b, c), (c, a))]
+    denominator = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
+    volume = np.einsum("nk,nk->n", a, np.cross(b, c))
+    return float(2.0 * np.arctan2(volume, denominator).sum() / (4.0 * np.pi))
 
 
 def _normals(scene: Scene, count: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
