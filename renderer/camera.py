@@ -11,15 +11,21 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Vector = tuple[float, float, float]
 FiniteVector = tuple[
-    Annotated[float, Field(allow_inf_nan=False)],
-    Annotated[float, Field(allow_inf_nan=False)],
-    Annotated[float, Field(allow_inf_nan=False)],
+    Annotated[float, Field(allow_inf_nan=False, strict=True)],
+    Annotated[float, Field(allow_inf_nan=False, strict=True)],
+    Annotated[float, Field(allow_inf_nan=False, strict=True)],
 ]
+
+
+def unit(vector: ArrayLike) -> NDArray[np.float64]:
+    """At unit length, scaled first so that no square overflows or vanishes; zero gives nan."""
+    scaled = np.asarray(vector, np.float64) / np.abs(vector).max()
+    return scaled / np.linalg.norm(scaled)
 
 
 class _Camera(BaseModel):
@@ -31,17 +37,16 @@ class _Camera(BaseModel):
 
     @model_validator(mode="after")
     def _has_a_view_direction(self) -> "_Camera":
-        forward = np.subtract(self.target, self.eye)
-        if not np.linalg.norm(np.cross(forward, self.up)) > 0.0:
+        with np.errstate(all="ignore"):
+            right = np.cross(unit(np.subtract(self.target, self.eye)), unit(self.up))
+        if not np.linalg.norm(right) > 0.0:
             raise ValueError("expected target != eye and up not parallel to the view direction")
         return self
 
     def frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Unit vectors (right, up, forward) in world space, each (3,) float64."""
-        forward = np.subtract(self.target, self.eye)
-        forward = forward / np.linalg.norm(forward)
-        right = np.cross(forward, self.up)
-        right = right / np.linalg.norm(right)
+        forward = unit(np.subtract(self.target, self.eye))
+        right = unit(np.cross(forward, unit(self.up)))
         return right, np.cross(right, forward), forward
 
 
@@ -49,7 +54,7 @@ class PerspectiveCamera(_Camera):
     """A pinhole camera; ``fov`` is the vertical field of view in degrees."""
 
     type: Literal["perspective"] = "perspective"
-    fov: Annotated[float, Field(gt=0.0, lt=180.0)] = 45.0
+    fov: Annotated[float, Field(gt=0.0, lt=180.0, strict=True)] = 45.0
 
     def rows(self, width: int, height: int) -> NDArray[np.float64]:
         """The affine map of the module's docstring, (6, 3) float64."""
@@ -64,7 +69,7 @@ class OrthographicCamera(_Camera):
     """Parallel rays; ``height`` is the height of the film in scene units."""
 
     type: Literal["orthographic"]
-    height: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    height: Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 
     def rows(self, width: int, height: int) -> NDArray[np.float64]:
         """The affine map of the module's docstring, (6, 3) float64."""
@@ -80,7 +85,7 @@ Camera = PerspectiveCamera | OrthographicCamera
 
 def sample_offsets(samples: int) -> NDArray[np.float64]:
     """Positions of a regular k x k grid in the unit pixel, (samples, 2) float64; the centre for one sample."""
-    k = math.isqrt(samples)
+    k = math.isqrt(max(samples, 0))
     if k < 1 or k * k != samples:
         raise ValueError(f"samples: expected a square number (1, 4, 9, ...), got {samples}")
     centres = (np.arange(k) + 0.5) / k

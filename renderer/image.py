@@ -24,7 +24,7 @@ def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
 def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
     """Let ``write`` fill a temporary file beside ``path``, then rename it: never a half-written file."""
     path = Path(path)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=".picture.", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             write(file)

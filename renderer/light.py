@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
 
-from renderer.camera import FiniteVector
+from renderer.camera import FiniteVector, unit
 
 # One row a light, float64: kind, x, y, z, red, green, blue. A directional light stores the unit vector
 # towards the light, a point light its position.
@@ -16,10 +16,10 @@ DIRECTIONAL, POINT = 0, 1
 
 def _grey(value: object) -> object:
     """Let one number stand for an equal red, green and blue."""
-    return (value, value, value) if isinstance(value, int | float) else value
+    return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
-_Channel = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_Channel = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=True)]
 Color = Annotated[tuple[_Channel, _Channel, _Channel], BeforeValidator(_grey)]
 
 
@@ -43,7 +43,7 @@ class DirectionalLight(_Light):
 
     def row(self) -> NDArray[np.float64]:
         """(LIGHT_COLUMNS,) float64."""
-        towards = -np.asarray(self.direction) / np.linalg.norm(self.direction)
+        towards = -unit(self.direction)
         return np.array([DIRECTIONAL, *towards, *self.irradiance])
 
 

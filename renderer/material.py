@@ -14,7 +14,7 @@ SHININESS, IOR = 16, 17
 MATERIAL_COLUMNS = 18
 PHONG, MIRROR, DIELECTRIC = 0, 1, 2
 
-_Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+_Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 _BLACK = (0.0, 0.0, 0.0)
 _WHITE = (1.0, 1.0, 1.0)
 
@@ -33,7 +33,7 @@ class Phong(_Material):
     diffuse: Color = (0.8, 0.8, 0.8)
     ambient: Color | None = None
     specular: Color = _BLACK
-    shininess: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 32.0
+    shininess: Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=True)] = 32.0
     reflectance: Color = _BLACK
     transmittance: Color = _BLACK
     ior: _Ior = 1.5

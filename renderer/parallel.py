@@ -21,7 +21,8 @@ def checked_threads(threads: int | None) -> int:
     """``threads``, or all available processors for None."""
     if threads is None:
         return available_threads()
-    expect(isinstance(threads, int) and threads >= 1, "threads", "an integer >= 1 or None", threads)
+    good = isinstance(threads, int) and not isinstance(threads, bool) and threads >= 1
+    expect(good, "threads", "an integer >= 1 or None", repr(threads))
     return threads
 
 

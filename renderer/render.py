@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from renderer.build import SPLITS
 from renderer.camera import sample_offsets
 from renderer.errors import expect
 from renderer.image import Image
@@ -42,12 +43,13 @@ def render(
     chosen = _settings(scene, settings)
     width, height = chosen.resolution
     expect(accelerator in ("octree", "brute"), "accelerator", "'octree' or 'brute'", repr(accelerator))
+    expect(split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
     threads = checked_threads(threads)
+    kernel_settings = Settings(chosen.max_depth, chosen.min_weight, _offset(offset))
     began = time.perf_counter()
     mesh, world = pack(scene)
     built = Octree.from_mesh(mesh, split=split) if accelerator == "octree" else BruteForce.from_mesh(mesh)
     target = Accelerator(built.tree, built.depth)
-    kernel_settings = Settings(chosen.max_depth, chosen.min_weight, _offset(offset))
     camera, samples = scene.camera.rows(width, height), sample_offsets(chosen.samples)
     film = _film(width, height)
     ready = time.perf_counter()
@@ -77,7 +79,7 @@ def _offset(offset: str | float) -> float:
     if isinstance(offset, str):
         expect(offset in ("bounded", "mitsuba"), "offset", "'bounded', 'mitsuba' or a number", repr(offset))
         return BOUNDED if offset == "bounded" else MITSUBA_EPSILON
-    expect(0.0 <= offset < 0.1, "offset", "a number from 0 to below 0.1", offset)
+    expect(isinstance(offset, int | float) and 0.0 <= offset < 0.1, "offset", "a number from 0 to below 0.1", offset)
     return float(offset)
 
 

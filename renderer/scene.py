@@ -36,11 +36,13 @@ AnyCamera = Annotated[
 ]
 AnyMaterial = Annotated[Annotated[Phong | Mirror | Dielectric, Field(discriminator="type")], _typed("phong")]
 AnyLight = Annotated[DirectionalLight | PointLight, Field(discriminator="type")]
-_Pixels = Annotated[int, Field(ge=1, le=16384)]
+_Pixels = Annotated[int, Field(ge=1, le=16384, strict=True)]
+_Squares = Annotated[int, Field(ge=1, le=1000, strict=True)]
+_Finite = Annotated[float, Field(strict=True)]
 
 
 def _uniform(value: Any) -> Any:
-    return (value, value, value) if isinstance(value, int | float) else value
+    return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
 class _Table(BaseModel):
@@ -55,9 +57,9 @@ class RenderSettings(_Table):
     """
 
     resolution: tuple[_Pixels, _Pixels] = (512, 512)
-    samples: int = 1
-    max_depth: Annotated[int, Field(ge=0, le=64)] = 6
-    min_weight: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    samples: Annotated[int, Field(strict=True)] = 1
+    max_depth: Annotated[int, Field(ge=0, le=64, strict=True)] = 6
+    min_weight: Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] = 0.0
 
     @model_validator(mode="after")
     def _square_samples(self) -> "RenderSettings":
@@ -89,10 +91,10 @@ class SceneObject(_Table):
 class Floor(_Table):
     """The plane y = 0 cut to the rectangle from ``min`` to ``max`` (x, z), tiled with its materials in turn."""
 
-    min: tuple[float, float]
-    max: tuple[float, float]
+    min: tuple[_Finite, _Finite]
+    max: tuple[_Finite, _Finite]
     materials: Annotated[tuple[str, ...], Field(min_length=1, max_length=2)]
-    squares: tuple[Annotated[int, Field(ge=1, le=1000)], Annotated[int, Field(ge=1, le=1000)]] = (1, 1)
+    squares: tuple[_Squares, _Squares] = (1, 1)
 
     @model_validator(mode="after")
     def _not_empty(self) -> "Floor":
@@ -149,7 +151,7 @@ def load_scene(path: str | Path) -> Scene:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, a null byte, too many digits
         raise SceneError(f"{path}: expected TOML, got a syntax error: {error}") from None
     for entry in table.get("objects") or [] if isinstance(table.get("objects"), list) else []:
         if isinstance(entry, dict) and isinstance(entry.get("mesh"), str):
@@ -159,9 +161,10 @@ def load_scene(path: str | Path) -> Scene:
     except ValidationError as error:
         raise SceneError(f"{path}: {_first_fault(error)}") from None
     try:
-        _ = scene.instances
+        with np.errstate(all="ignore"):
+            _ = scene.instances
     except MeshError as error:
-        raise SceneError(f"{path}: objects: {error}") from None
+        raise SceneError(f"{path}: objects: {' '.join(str(error).split())}") from None
     return scene
 
 
@@ -170,15 +173,28 @@ def _first_fault(error: ValidationError) -> str:
     faults = error.errors()
     first = faults[0]
     # The names of the union's members are ours, not keys of the file.
-    inner = {"perspective", "orthographic", "phong", "mirror", "dielectric", "directional", "point", "function-before"}
-    keys = [str(k) for k in first["loc"] if not (str(k) in inner or "is-instance" in str(k))]
+    tag = {"camera": 1, "materials": 2, "lights": 2}.get(str(first["loc"][0]) if first["loc"] else "")
+    if first["loc"][:1] == ("objects",) and len(first["loc"]) > 3 and first["loc"][2] == "mesh":
+        tag = 3
+    keys = [_shown(k) for i, k in enumerate(first["loc"]) if i != tag]
     where = ".".join(keys) + ": " if keys else ""
     message = first["msg"].removeprefix("Value error, ")
-    got = "" if "got" in message or isinstance(first["input"], dict) else f", got {first['input']!r}"
+    says_it = (first["type"] == "value_error" and ", got" in message) or isinstance(first["input"], dict)
+    got = "" if says_it else f", got {_shown(first['input'])}"
     if first["type"] == "extra_forbidden":
-        message, got = "unknown key", f" (its value is {first['input']!r})"
+        message, got = "unknown key", f" (its value is {_shown(first['input'])})"
     others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return f"{where}{message}{got}{others}"
+
+
+def _shown(value: object) -> str:
+    """A value or key on one line; Python writes no integer of more than 4300 digits."""
+    if isinstance(value, str) and value.isprintable() and value:
+        return value if value.replace("-", "").replace("_", "").isalnum() else repr(value)
+    try:
+        return repr(value)
+    except ValueError:
+        return "an integer of more than 4300 digits"
 
 
 def _loaded(mesh: Path | Mesh) -> Mesh:

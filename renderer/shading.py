@@ -56,6 +56,8 @@ def refract(d, n, n1, n2):
 @kernel
 def fresnel(cos_i, cos_t, n1, n2):
     """Unpolarised reflectance of a dielectric boundary."""
+    if n1 == n2:
+        return 0.0  # also where both cosines are 0
     s = (n1 * cos_i - n2 * cos_t) / (n1 * cos_i + n2 * cos_t)
     p = (n1 * cos_t - n2 * cos_i) / (n1 * cos_t + n2 * cos_i)
     return 0.5 * (s * s + p * p)
@@ -71,7 +73,8 @@ def specular(d, n, light, shininess):
     if -dot(r, d) <= 0.0:
         return 0.0
     difference = add(r, d)
-    return math.exp(shininess * math.log1p(max(-0.5 * dot(difference, difference), -1.0)))
+    short = 0.5 * dot(difference, difference)
+    return math.exp(shininess * math.log1p(-short)) if short < 1.0 else 0.0
 
 
 @kernel

@@ -151,20 +151,21 @@ def _visible_light(accelerator, world, surface, n, light, offset, stack):
     nothing = (0.0, 0.0, 0.0)
     if world.lights[light, 0] == DIRECTIONAL:
         if dot(n, towards) <= 0.0:
-            return towards, nothing, False
+            return towards, nothing, False, 0
         o = spawn_origin(surface.p, surface.error, surface.n_g, towards, offset)
-        return towards, arriving, not _occluded(accelerator, o, towards, np.inf, stack)
+        return towards, arriving, not _occluded(accelerator, o, towards, np.inf, stack), 1
     to_light = sub(towards, surface.p)
     squared = dot(to_light, to_light)
     # A light within rounding of the surface lies on it and does not light it; this also bounds 1 / r^2.
     if dot(n, to_light) <= surface.error:
-        return to_light, nothing, False
+        return to_light, nothing, False, 0
     o = spawn_origin(surface.p, surface.error, surface.n_g, to_light, offset)
     shadow = sub(towards, o)
-    # Open at the light: the largest float64 below 1. Mitsuba's rule stops ten of its epsilons short.
-    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-53
+    # A surface at the light must not hide it, and its t errs by a few u times the aspect ratio: 2^-40 is 8192 u, so what
+    # lies within 1e-12 of the distance before the light is taken to be at it. Mitsuba stops ten of its epsilons short.
+    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-40
     seen = not _occluded(accelerator, o, shadow, t_max, stack)
-    return normalized(to_light), scale(arriving, 1.0 / squared), seen
+    return normalized(to_light), scale(arriving, 1.0 / squared), seen, 1
 
 
 @kernel
@@ -176,8 +177,8 @@ def _local(accelerator, world, surface, d, n, offset, stack):
     shines = max(glossy[0], max(glossy[1], glossy[2])) > 0.0
     rays = 0
     for light in range(len(world.lights)):
-        towards, arriving, seen = _visible_light(accelerator, world, surface, n, light, offset, stack)
-        rays += 1
+        towards, arriving, seen, traced = _visible_light(accelerator, world, surface, n, light, offset, stack)
+        rays += traced
         if not seen:
             continue
         factor = scale(diffuse, dot(n, towards))

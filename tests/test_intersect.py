@@ -96,7 +96,7 @@ def test_targets_on_an_integer_box_are_hit_at_exactly_one(accelerator, shift):
 @BOTH
 def test_vertical_rays_at_every_vertex_of_a_grid_hit(accelerator):
     plane = grid(32, 32, (32.0, 32.0))
-    origins = plane.vertices + [0, 5, 0]
+    origins = plane.vertices + np.array([0, 5, 0])
     for tiny in (0.0, -0.0, 1e-42, -1e-42, 1e-300):
         hits = accelerator.from_mesh(plane).closest_hit(origins, np.tile([tiny, -1.0, 0.0], (len(origins), 1)))
         # A tilt of 1e-42 leaves the mesh only beside its outline, where the exact answer is a miss.
@@ -155,6 +155,14 @@ def test_directions_of_any_length_hit(accelerator, exponent):
 def test_a_far_origin_on_one_axis(accelerator, distance, t_min):
     found = cast(accelerator(TRIANGLE, ONE), [1, 1, distance], [0, 0, -1], t_min * distance)
     assert found == (distance, 0, 0.25, 0.25)
+
+
+@BOTH
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_hardly_tilted_ray_reaches_what_lies_hardly_beside_it(accelerator, sign):
+    # 1 / 1e-42 is infinite in float32, and so would be the distance to a plane 5e-30 away that lies at 5e12.
+    vertices = np.array([[sign * 5e-30, -1, 1e13], [sign * 5e-30, 1, 1e13], [sign * 1e-28, 0, 1e13]])
+    assert cast(accelerator(vertices, ONE), [0, 0, 0], [sign * 1e-42, 0, 1])[0] == 1e13
 
 
 def woop(corners, origin, direction):

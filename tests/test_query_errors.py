@@ -72,7 +72,8 @@ class TestRays:
     @pytest.mark.parametrize(
         "bad",
         [
-            np.ones(3), np.ones((4, 2)), np.ones((3, 4)), np.ones((4, 3, 1)), 1.0, [], None, "abc", [["a", "b", "c"]] * 4,
+            np.ones(3), np.ones((4, 2)), np.ones((3, 4)), np.ones((4, 3, 1)), 1.0, [], None, "abc",
+            [["a", "b", "c"]] * 4,
             np.ones((4, 3), bool), np.ones((4, 3), complex), np.ones((4, 3), object), [[1, 2, 3], [1, 2]], {"x": 1},
             np.zeros((4, 3), "datetime64[s]"), [[10**400, 0, 0]] * 4,
         ],

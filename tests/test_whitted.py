@@ -353,6 +353,15 @@ class TestGlass:
                 value = pixel(scene(camera, (water, GLASS), (bright, GLOWS), ambient=1.0))
                 assert value == pytest.approx(expected, rel=2 * REL)
 
+    def test_total_internal_reflection_loses_nothing(self) -> None:
+        """From below the surface at 60 degrees all of the bright floor is seen, and nothing of the dark above."""
+        angle = math.radians(60)
+        water = (quad((2.0, 0, 0.3), (0, 0, 50), (50, 0, 0)), GLASS)
+        bottom = (quad((0, -20, 0), (500, 0, 0), (0, 0, 500)), GLOWS)
+        camera = towards((math.sin(angle), -math.cos(angle), 0))
+        image = one(scene(camera, water, bottom, ambient=1.0))
+        assert image.radiance[0, 0].tolist() == [1, 1, 1] and image.rays[0, 0] == 2
+
     def test_its_colours_tint_the_two_parts(self) -> None:
         glass = Dielectric(type="dielectric", ior=1.5, reflectance=(1, 0.5, 0), transmittance=(0, 0.5, 1))
         value = pixel(scene(towards((0, 1, 0), up=(1, 0, 0)), (floor(), glass), background=1.0))
