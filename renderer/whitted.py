@@ -161,7 +161,7 @@ def _visible_light(accelerator, world, surface, n, light, offset, stack):
         return to_light, nothing, False, 0
     o = spawn_origin(surface.p, surface.error, surface.n_g, to_light, offset)
     shadow = sub(towards, o)
-    # A surface at the light must not hide it, and its t errs by a few u times the aspect ratio: 2^-40 is 8192 u, so what
+    # A surface at the light must not hide it, and its t errs by some u times the aspect ratio: 2^-40 is 8192 u; what
     # lies within 1e-12 of the distance before the light is taken to be at it. Mitsuba stops ten of its epsilons short.
     t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-40
     seen = not _occluded(accelerator, o, shadow, t_max, stack)
