@@ -5,7 +5,6 @@ import numpy as np
 from renderer.jit import kernel
 from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute
 
-
 # What keeps every product of the triangle test finite and every reciprocal exact to rounding: a determinant is a
 # product of three lengths, so 2^300 leaves room below 2^1024.
 FARTHEST = 2.0**300

@@ -8,15 +8,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.build import SPLITS, Rule, build_blocks, build_tree
 from renderer.errors import MeshError, expect
-from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.mesh import Mesh
 from renderer.parallel import checked_threads
-from renderer.query import Hits, any_hits, check_rays, closest_hits
+from renderer.query import Hits, Target, any_hits, check_rays, closest_hits
 
 MAX_LEAF_SIZE = LANES * MAX_LEAF_BLOCKS
 MAX_DEPTH = 64
-# Boxes are float32. Twice a coordinate (a doubled centre) must stay below float32's 2^128.
-_LARGEST_COORDINATE = 2.0**126
+# Boxes are float32, whose products of two extents must neither overflow nor vanish. Meshes beyond these sizes are
+# scaled by a power of two, which is exact.
+_SMALLEST, _LARGEST = 2.0**-60, 2.0**60
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,9 @@ class Stats:
 class _Accelerator:
     """Ray queries on one mesh; safe to call from many threads at once."""
 
-    def __init__(self, mesh: Mesh, tree: Tree, depth: int, threads: int | None) -> None:
+    def __init__(self, mesh: Mesh, target: Target, threads: int | None) -> None:
         self.mesh = mesh
-        self.tree = tree
-        self.depth = depth
+        self.target = target
         self.threads = checked_threads(threads)
 
     def closest_hit(
@@ -55,25 +55,25 @@ class _Accelerator:
         ``t_max`` are >= 0, one number or (n,), in units of |direction|. No face is culled; a ray in a face's plane
         misses it. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.
         """
-        rays = check_rays(origins, directions, t_min, t_max)
-        return closest_hits(self.tree, self.depth, rays, self.mesh, self.threads)
+        rays = check_rays(origins, directions, t_min, t_max, self.target.scale)
+        return closest_hits(self.target, rays, self.mesh, self.threads)
 
     def any_hit(
         self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
     ) -> NDArray[np.bool_]:
         """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above."""
-        return any_hits(self.tree, self.depth, check_rays(origins, directions, t_min, t_max), self.threads)
+        return any_hits(self.target, check_rays(origins, directions, t_min, t_max, self.target.scale), self.threads)
 
     @property
     def stats(self) -> Stats:
         """Counts and bytes of the built arrays, those of the mesh left out."""
-        tree = self.tree
+        tree = self.target.tree
         children = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN:]
         return Stats(
             faces=len(self.mesh.faces),
             nodes=len(children),
             leaves=int((children < 0).sum()),
-            depth=self.depth,
+            depth=self.target.depth,
             blocks=len(tree.faces) // LANES,
             references=int((tree.faces >= 0).sum()),
             bytes=tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes,
@@ -126,9 +126,9 @@ class Octree(_Accelerator):
         expect(split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
         _expect_range("leaf_size", leaf_size, MAX_LEAF_SIZE)
         _expect_range("max_depth", max_depth, MAX_DEPTH)
-        _expect_magnitude(mesh)
-        tree, depth = build_tree(mesh.vertices, mesh.faces, Rule(SPLITS[split], leaf_size, max_depth))
-        super().__init__(mesh, tree, depth, threads)
+        vertices, scale = _scaled(mesh)
+        tree, depth = build_tree(vertices, mesh.faces, Rule(SPLITS[split], leaf_size, max_depth))
+        super().__init__(mesh, Target(tree, depth, scale), threads)
 
 
 class BruteForce(_Accelerator):
@@ -136,13 +136,13 @@ class BruteForce(_Accelerator):
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, threads: int | None = None) -> None:
         mesh = Mesh(vertices, faces)  # type: ignore[arg-type]  # Mesh checks and converts
-        super().__init__(mesh, build_blocks(mesh.vertices, mesh.faces), 0, threads)
+        super().__init__(mesh, _all_blocks(mesh), threads)
 
     @classmethod
     def from_mesh(cls, mesh: Mesh, *, threads: int | None = None) -> "BruteForce":
         """The same over a mesh that is already checked."""
         brute = cls.__new__(cls)
-        _Accelerator.__init__(brute, mesh, build_blocks(mesh.vertices, mesh.faces), 0, threads)
+        _Accelerator.__init__(brute, mesh, _all_blocks(mesh), threads)
         return brute
 
 
@@ -151,9 +151,32 @@ def _expect_range(argument: str, value: object, largest: int) -> None:
     expect(bool(good), argument, f"an integer from 1 to {largest}", repr(value))
 
 
-def _expect_magnitude(mesh: Mesh) -> None:
-    far = np.abs(mesh.vertices) > _LARGEST_COORDINATE
-    if far.any():
-        row = int(far.any(axis=1).argmax())
+def _all_blocks(mesh: Mesh) -> Target:
+    vertices, scale = _scaled(mesh)
+    return Target(build_blocks(vertices, mesh.faces), 0, scale)
+
+
+def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
+    """The vertices times a power of two that brings the largest coordinate near 1, and that power.
+
+    It is 1 for all but extreme meshes. Raises ``MeshError`` where float64 cannot hold the scaled vertices exactly.
+    """
+    largest = float(np.abs(mesh.vertices[mesh.faces]).max(initial=0.0)) if _is_extreme(mesh) else 1.0
+    if largest == 0.0 or _SMALLEST <= largest <= _LARGEST:
+        return mesh.vertices, 1.0
+    # Limited to what a float64 can be, for meshes of denormals.
+    exponent = min(-int(np.frexp(largest)[1]), 1000)
+    scaled = np.ldexp(mesh.vertices, exponent)
+    exact = (np.ldexp(scaled, -exponent) == mesh.vertices).all(axis=1)
+    if not exact.all():
+        row = int((~exact).argmax())
         got = mesh.vertices[row].tolist()
-        raise MeshError(f"vertices: expected coordinates within +-2^126, got {got} in row {row}")
+        raise MeshError(f"vertices: expected coordinates within 2^900 of each other, got {got} in row {row}")
+    return scaled, 2.0**exponent
+
+
+def _is_extreme(mesh: Mesh) -> bool:
+    """Whether any vertex, used or not, lies outside the comfortable sizes."""
+    lower, upper = mesh.bounds
+    largest = float(max(np.abs(lower).max(), np.abs(upper).max())) if len(mesh.vertices) else 1.0
+    return not _SMALLEST <= largest <= _LARGEST
