@@ -5,10 +5,10 @@ import numpy as np
 from renderer.jit import kernel
 from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute
 
-# What keeps every product of the triangle test finite and every reciprocal exact to rounding: a determinant is a
-# product of three lengths, so 2^300 leaves room below 2^1024.
-FARTHEST = 2.0**300
-SHORTEST, LONGEST = 2.0**-1000, 2.0**1000
+# Origins as far as float32 boxes can tell from infinity, and directions whose reciprocals and distances to such an
+# origin stay normal float64 numbers.
+FARTHEST = 2.0**126
+SHORTEST, LONGEST = 2.0**-800, 2.0**800
 
 
 @kernel

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.jit import kernel
+from renderer.jit import inlined, kernel
 from renderer.layout import NODE_WORDS
-from renderer.simd import load4, load8, movemask, select, splat4, splat8
+from renderer.simd import load4, load8, magnitude, movemask, select, splat4, splat8
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).
@@ -17,24 +17,46 @@ FAR_PADDING = np.float32(1.0 + 8.0 * 2.0**-23)
 _LARGEST = np.float32(np.finfo(np.float32).max)
 _STEP = np.float32(2.0**-23)
 _TINY = np.float32(2.0**-149)
+# A sheared coordinate errs by 5 u of the distance to its vertex, so the determinant by some 20 u of ``across`` times
+# that distance. Above 2^-30 of it the barycentrics err by 2^-18 at most, of a face that is then no larger than its
+# distance: within what FAR_PADDING allows for, unless a ray starts that close to the rim of a very large face.
+_DOUBT = 2.0**-30
 
 
-@kernel
+@inlined
 def round_up(x):
-    """A float32 >= x, within two ulp."""
-    y = np.float32(x)
+    """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN."""
+    y = max(np.float32(x), -_LARGEST)
     if np.float64(y) < x:
         y = np.float32(y + np.float32(abs(y) * _STEP + _TINY))
     return y
 
 
-@kernel
+@inlined
 def round_down(x):
-    """A float32 <= x, within two ulp."""
-    y = np.float32(x)
+    """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN."""
+    y = min(np.float32(x), _LARGEST)
     if np.float64(y) > x:
         y = np.float32(y - np.float32(abs(y) * _STEP + _TINY))
     return y
+
+
+@inlined
+def box_limit(t, largest):
+    """The float32 distance beyond which the entry of a box says that it holds no hit at t or nearer."""
+    return round_up(t * largest) * FAR_PADDING
+
+
+class Ray(NamedTuple):
+    """One ray as it came: origin, direction, and the least t that counts."""
+
+    ox: float
+    oy: float
+    oz: float
+    dx: float
+    dy: float
+    dz: float
+    t_min: float
 
 
 class Slabs(NamedTuple):
@@ -63,7 +85,7 @@ class Slabs(NamedTuple):
     far_inverse_z: Any
 
 
-@kernel
+@inlined
 def _slab(axis, o, d, largest):
     """Near row, far row, origins and reciprocals for one axis, each rounded so that the slab only grows.
 
@@ -80,12 +102,12 @@ def _slab(axis, o, d, largest):
     return near_row, far_row, round_up(o), round_down(o), near_inverse, inverse
 
 
-@kernel
-def make_slabs(ox, oy, oz, dx, dy, dz, largest):
+@inlined
+def make_slabs(ray, largest):
     """Prepare a ray; ``largest`` is max(|dx|, |dy|, |dz|) > 0."""
-    nx, fx, nox, fox, nix, fix = _slab(0, ox, dx, largest)
-    ny, fy, noy, foy, niy, fiy = _slab(1, oy, dy, largest)
-    nz, fz, noz, foz, niz, fiz = _slab(2, oz, dz, largest)
+    nx, fx, nox, fox, nix, fix = _slab(0, ray.ox, ray.dx, largest)
+    ny, fy, noy, foy, niy, fiy = _slab(1, ray.oy, ray.dy, largest)
+    nz, fz, noz, foz, niz, fiz = _slab(2, ray.oz, ray.dz, largest)
     return Slabs(
         nx, ny, nz, fx, fy, fz,
         splat8(nox), splat8(noy), splat8(noz), splat8(fox), splat8(foy), splat8(foz),
@@ -93,7 +115,7 @@ def make_slabs(ox, oy, oz, dx, dy, dz, largest):
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def enter_boxes(nodes, node, slabs, lower, upper):
     """Entry distances (8 x float32) and the bits of the octants that the ray meets within [lower, upper].
 
@@ -130,9 +152,10 @@ class Shear(NamedTuple):
     shear_z: Any
 
 
-@kernel
-def make_shear(ox, oy, oz, dx, dy, dz):
+@inlined
+def make_shear(ray):
     """Turn the axes so that z is the largest component of the direction, then shear the direction onto it."""
+    ox, oy, oz, dx, dy, dz, _ = ray
     ax, ay, az = abs(dx), abs(dy), abs(dz)
     if az >= ax and az >= ay:
         return _shear(0, 4, 8, ox, oy, oz, dx, dy, dz)
@@ -141,20 +164,21 @@ def make_shear(ox, oy, oz, dx, dy, dz):
     return _shear(4, 8, 0, oy, oz, ox, dy, dz, dx)
 
 
-@kernel
+@inlined
 def _shear(row_x, row_y, row_z, ox, oy, oz, dx, dy, dz):
     return Shear(
         row_x, row_y, row_z, splat4(ox), splat4(oy), splat4(oz), splat4(dx / dz), splat4(dy / dz), splat4(1.0 / dz)
     )
 
 
-@kernel
+@inlined
 def hit_triangles(blocks, base, ray):
-    """Watertight test of one ray against the four triangles of a block: bits of those hit, their t, u and v.
+    """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt, t, u, v.
 
     Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
     ab - cd or is 0, and is antisymmetric, so two triangles never both miss on their shared edge; 0 counts as inside.
-    When all three edge functions are 0 (the ray lies in the plane, or the triangle has no area) it is a miss.
+    When all three edge functions are 0 (the ray lies in the plane, or the triangle has no area) it is a miss. A hit is
+    in doubt when the determinant is so small that rounding may have made it; ``meets_face_box`` then decides.
     """
     zero = splat4(0.0)
     z0 = load4(blocks, base + ray.row_z) - ray.origin_z
@@ -174,6 +198,48 @@ def hit_triangles(blocks, base, ray):
     determinant = e0 + e1 + e2
     bits = movemask((not_negative | not_positive) & (determinant != zero))
     if bits == 0:
-        return bits, zero, zero, zero
+        return bits, bits, zero, zero, zero
+    across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
+    along = magnitude(z0) + magnitude(z1) + magnitude(z2)
+    doubts = bits & movemask(magnitude(determinant) <= across * (across + along) * splat4(_DOUBT))
     t = (e0 * z0 + e1 * z1 + e2 * z2) * ray.shear_z / determinant
-    return bits, t, e1 / determinant, e2 / determinant
+    return bits, doubts, t, e1 / determinant, e2 / determinant
+
+
+@kernel
+def meets_face_box(blocks, at, ray, t):
+    """Whether the ray meets the box of the face at ``at`` no later than at t, and the face has an area.
+
+    Of a face seen edge-on the edge functions are noise, and so are the hit and its t. Such a hit counts only if the
+    face's own box is entered no later than at its t; then every box around it is, and no tree can lose it.
+    The arithmetic is that of ``enter_boxes``; it starts from the ray, because keeping ``Slabs`` for it costs every ray.
+    """
+    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
+    limit = box_limit(t, largest)
+    t0, t1 = round_down(ray.t_min * largest), limit
+    t0, t1 = _meet_slab(blocks, at, 0, ray.ox, ray.dx, largest, t0, t1)
+    t0, t1 = _meet_slab(blocks, at, 1, ray.oy, ray.dy, largest, t0, t1)
+    t0, t1 = _meet_slab(blocks, at, 2, ray.oz, ray.dz, largest, t0, t1)
+    return t0 <= np.float32(t1 * FAR_PADDING) and t0 <= limit and _has_area(blocks, at)
+
+
+@kernel
+def _meet_slab(blocks, at, axis, o, d, largest, t0, t1):
+    """Narrow [t0, t1] to one axis of a face's own box."""
+    row = at + 4 * axis
+    a, b, c = np.float64(blocks[row]), np.float64(blocks[row + 12]), np.float64(blocks[row + 24])
+    near, far = round_down(min(a, min(b, c))), round_up(max(a, max(b, c)))
+    near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = _slab(axis, o, d, largest)
+    if near_row > far_row:
+        near, far = far, near
+    n = np.float32(np.float32(near - near_origin) * near_inverse)
+    f = np.float32(np.float32(far - far_origin) * far_inverse)
+    return (n if n > t0 else t0), (f if f < t1 else t1)
+
+
+@kernel
+def _has_area(blocks, at):
+    ax, ay, az = np.float64(blocks[at]), np.float64(blocks[at + 4]), np.float64(blocks[at + 8])
+    bx, by, bz = blocks[at + 12] - ax, blocks[at + 16] - ay, blocks[at + 20] - az
+    cx, cy, cz = blocks[at + 24] - ax, blocks[at + 28] - ay, blocks[at + 32] - az
+    return by * cz - bz * cy != 0.0 or bz * cx - bx * cz != 0.0 or bx * cy - by * cx != 0.0

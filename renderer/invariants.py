@@ -32,7 +32,7 @@ def faults(tree: Tree, depth: int, mesh: Mesh) -> list[str]:
         for place in range(8):
             low, high, child = _octant(tree, node, place)
             where = f"node {node}, octant {place}"
-            if (low > high).any():
+            if not (low <= high).all():
                 if not (np.isposinf(low).all() and np.isneginf(high).all()):
                     found.append(f"{where}: inverted box that is not the empty one")
                 continue
@@ -73,12 +73,14 @@ def _leaf_faults(
 
 def _block_faults(tree: Tree, mesh: Mesh) -> list[str]:
     """Faults in the blocks by themselves: each face exactly once, with its vertices."""
-    found = []
+    found: list[str] = []
     used = tree.faces >= 0
-    counts = np.bincount(tree.faces[used], minlength=len(mesh.faces))
+    known = used & (tree.faces < len(mesh.faces))
+    bad = (used & ~known) | (tree.faces < -1)
+    found += [f"place {p}: face {tree.faces[p]} of {len(mesh.faces)}" for p in np.flatnonzero(bad)]
+    counts = np.bincount(tree.faces[known], minlength=len(mesh.faces))
     found += [f"face {f}: expected in 1 place, is in {counts[f]}" for f in np.flatnonzero(counts != 1)]
     rows = tree.blocks.reshape(-1, BLOCK_WORDS // LANES, LANES).transpose(0, 2, 1).reshape(-1, 3, 3)
-    known = used & (tree.faces < len(mesh.faces))
     wrong = (rows[known] != mesh.vertices[mesh.faces[tree.faces[known]]]).any(axis=(1, 2))
     found += [f"face {f}: its vertices in the block differ from the mesh's" for f in tree.faces[known][wrong]]
     idle = rows[~used]

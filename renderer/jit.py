@@ -19,9 +19,19 @@ def kernel(function: Callable[..., Any]) -> Any:
     Numba stamps a cached kernel with the file that defines it only, so an edited callee or constant would leave
     a stale kernel behind. The stamp is replaced by a digest of every source that the kernel's module imports.
     """
-    dispatcher = njit(nogil=True, cache=True, error_model="numpy")(function)
+    return _compiled(function, forceinline=False)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """A kernel that LLVM must inline: for the tests of the innermost loop, whose vectors would go through memory."""
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: Callable[..., Any], forceinline: bool) -> Any:
+    dispatcher = njit(nogil=True, cache=True, error_model="numpy", forceinline=forceinline)(function)
     module = Path(function.__code__.co_filename)
-    if module.parent == _PACKAGE:
+    # With NUMBA_DISABLE_JIT there is no dispatcher and no cache.
+    if module.parent == _PACKAGE and hasattr(dispatcher, "_cache"):
         dispatcher._cache._cache_file._source_stamp = source_digest(module.stem)
     return dispatcher
 

@@ -123,11 +123,11 @@ class Octree(_Accelerator):
         return octree
 
     def _build(self, mesh: Mesh, split: str, leaf_size: int, max_depth: int, threads: int | None) -> None:
-        expect(split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
+        expect(isinstance(split, str) and split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
         _expect_range("leaf_size", leaf_size, MAX_LEAF_SIZE)
         _expect_range("max_depth", max_depth, MAX_DEPTH)
         vertices, scale = _scaled(mesh)
-        tree, depth = build_tree(vertices, mesh.faces, Rule(SPLITS[split], leaf_size, max_depth))
+        tree, depth = build_tree(vertices, mesh.faces, Rule(SPLITS[split], int(leaf_size), int(max_depth)))
         super().__init__(mesh, Target(tree, depth, scale), threads)
 
 

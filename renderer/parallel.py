@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from numbers import Integral
 from threading import Event, Lock
 
 from renderer.errors import expect
@@ -21,14 +22,19 @@ def checked_threads(threads: int | None) -> int:
     """``threads``, or all available processors for None."""
     if threads is None:
         return available_threads()
-    good = isinstance(threads, int) and not isinstance(threads, bool) and threads >= 1
+    good = isinstance(threads, Integral) and not isinstance(threads, bool) and threads >= 1
     expect(good, "threads", "an integer >= 1 or None", repr(threads))
-    return threads
+    return int(threads)
 
 
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix="renderer")
+
+
+if hasattr(os, "register_at_fork"):
+    # A forked child has the pool but none of its threads.
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def for_chunks(
@@ -42,7 +48,7 @@ def for_chunks(
 
     Chunks must write to places of their own; then the result does not depend on who ran what. ``finished(items)``
     is called after each chunk, by one thread at a time. On an exception, Ctrl-C included, no further chunk starts,
-    the running ones end, and it is raised here.
+    the running ones end, and it is raised here. ``work`` must not call ``for_chunks``: it would wait for itself.
     """
     begins = iter(range(0, count, size))
     taking, stop = Lock(), Event()
@@ -56,12 +62,12 @@ def for_chunks(
             end = min(begin + size, count)
             try:
                 work(begin, end)
+                if finished is not None:
+                    with taking:
+                        finished(end - begin)
             except BaseException:
                 stop.set()
                 raise
-            if finished is not None:
-                with taking:
-                    finished(end - begin)
 
     workers = min(threads, -(-count // size))
     if workers <= 1:

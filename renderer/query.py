@@ -58,24 +58,31 @@ class Hits:
         return normals
 
 
-def _vectors(argument: str, values: ArrayLike) -> NDArray[np.float64]:
-    array = np.asarray(values)
+def _array(argument: str, values: ArrayLike) -> NDArray[Any]:
+    try:
+        array = np.asarray(values)
+    except ValueError as error:  # a ragged list
+        raise ValueError(f"{argument}: expected an array, got {error}") from None
     expect(array.dtype.kind in "fiu", argument, "real numbers", f"dtype {array.dtype}")
+    return array
+
+
+def _vectors(argument: str, values: ArrayLike) -> NDArray[np.float64]:
+    array = _array(argument, values)
     expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
     return np.ascontiguousarray(array, np.float64)
 
 
-def _bound(argument: str, value: ArrayLike, count: int) -> NDArray[np.float64]:
-    """One bound for all rays or one each, as a (1,) or (n,) array."""
-    array = np.asarray(value)
-    expect(array.dtype.kind in "fiu", argument, "real numbers", f"dtype {array.dtype}")
+def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArray[np.float64]:
+    """One bound for all rays or one each, from 0 to ``largest``, as a (1,) or (n,) array."""
+    array = _array(argument, value)
     fits = array.ndim == 0 or array.shape == (count,)
     expect(fits, argument, f"a number or shape ({count},)", f"shape {array.shape}")
     array = np.ascontiguousarray(np.atleast_1d(array), np.float64)
-    bad = np.isnan(array) | (array < 0.0)
-    if bad.any():
-        row = int(bad.argmax())
-        expect(False, argument, "numbers >= 0", f"{array[row]} in row {row}")
+    good = (array >= 0.0) & (array <= largest)
+    if not good.all():
+        row = int((~good).argmax())
+        expect(False, argument, f"numbers from 0 to {largest:.3g}", f"{array[row]} in row {row}")
     return array
 
 
@@ -98,8 +105,8 @@ def check_rays(
     """
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     expect(len(origins) == len(directions), "directions", f"{len(origins)} rows as in origins", len(directions))
-    low, high = _bound("t_min", t_min, len(origins)), _bound("t_max", t_max, len(origins))
-    expect(bool(np.isfinite(low).all()), "t_min", "finite numbers", "inf")
+    low = _bound("t_min", t_min, len(origins), float(np.finfo(np.float64).max))
+    high = _bound("t_max", t_max, len(origins), np.inf)
     row = first_bad_ray(origins, directions, scale)
     if row >= 0:
         bad_origin = not (np.abs(origins[row]) * scale <= FARTHEST).all()

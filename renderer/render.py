@@ -49,7 +49,7 @@ def render(
     began = time.perf_counter()
     mesh, world = pack(scene)
     built = Octree.from_mesh(mesh, split=split) if accelerator == "octree" else BruteForce.from_mesh(mesh)
-    expect(built.target.scale == 1.0, "scene", "coordinates between 2^-60 and 2^60", f"bounds {mesh.bounds}")
+    expect(built.target.scale == 1.0, "scene", "a largest coordinate from 2^-60 to 2^60", f"bounds {mesh.bounds}")
     target = Accelerator(built.target.tree, built.target.depth)
     camera, samples = scene.camera.rows(width, height), sample_offsets(chosen.samples)
     film = _film(width, height)

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from renderer.jit import kernel
-from renderer.vec3 import add, dot, scale, sub
+from renderer.vec3 import add, cross, dot, length, scale, sub
 
 _ROUNDOFF = 2.0**-53
 # gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).
@@ -78,18 +78,18 @@ def specular(d, n, light, shininess):
 
 
 @kernel
-def offset_distance(p, p0, p1, p2, u, v, n_g, double_area):
+def offset_distance(p, p0, p1, p2, u, v, n_g):
     """How far p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
 
     The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
-    matters where the first vanishes (on a plane through the origin) and for slivers. ``double_area`` is
-    |cross(p1 - p0, p2 - p0)|.
+    matters where the first vanishes (on a plane through the origin) and for slivers.
     """
     w, distance, reach = 1.0 - u - v, 0.0, 0.0
     for k in range(3):
         distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
         reach = max(reach, max(abs(p0[k] - p[k]), max(abs(p1[k] - p[k]), abs(p2[k] - p[k]))))
     # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
+    double_area = length(cross(sub(p1, p0), sub(p2, p0)))
     return _GAMMA7 * distance + _GAMMA264 * reach * (reach / double_area * reach)
 
 

@@ -1,9 +1,9 @@
 """Short vectors as values in Numba kernels: 8 x float32, 4 x float64 and their masks.
 
 This is the one file that touches llvmlite. A vector lives in a register; it is made by ``load*`` or ``splat*`` and
-leaves through ``store``, ``lane`` or ``movemask``. ``+ - *`` and the comparisons work lane by lane and give a mask;
-masks know ``&`` and ``|``. No operation carries fast-math flags, so nothing is contracted to a fused multiply-add:
-the signs of the edge functions in ``intersect`` depend on that.
+leaves through ``store``, ``lane`` or ``movemask``. ``+ - * /`` and the comparisons work lane by lane, the latter giving
+a mask that is unset where either is NaN, for ``!=`` too; masks know ``&`` and ``|``. No operation carries fast-math
+flags, so nothing becomes a fused multiply-add: the signs of the edge functions in ``intersect`` depend on that.
 """
 
 import operator
@@ -174,6 +174,17 @@ def select(typingctx, mask, chosen, other):
         return builder.select(args[0], args[1], args[2])
 
     return chosen(mask, chosen, other), codegen
+
+
+@intrinsic
+def magnitude(typingctx, vector):
+    """Absolute values, lane by lane."""
+
+    def codegen(context, builder, sig, args):
+        negative = builder.fcmp_ordered("<", args[0], ir.Constant(_llvm(sig.args[0]), None))
+        return builder.select(negative, builder.fneg(args[0]), args[0])
+
+    return vector(vector), codegen
 
 
 @intrinsic

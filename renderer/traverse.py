@@ -5,8 +5,17 @@ All of them share ``nearest_in_blocks`` and its triangle test, so they cannot di
 
 import numpy as np
 
-from renderer.intersect import FAR_PADDING, enter_boxes, hit_triangles, make_shear, make_slabs, round_down, round_up
-from renderer.jit import kernel
+from renderer.intersect import (
+    Ray,
+    box_limit,
+    enter_boxes,
+    hit_triangles,
+    make_shear,
+    make_slabs,
+    meets_face_box,
+    round_down,
+)
+from renderer.jit import inlined, kernel
 from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.simd import bits_float, float_bits, lane, lowest_bit, splat8
 
@@ -14,11 +23,19 @@ NO_FACE = np.iinfo(np.int32).max
 _LOW_WORD = 0xFFFFFFFF
 
 
-@kernel
-def nearest_in_blocks(tree, first, count, shear, t_min, t, face, u, v):
-    """The best of a hit so far and of ``count`` blocks from ``first``: smallest t, then lowest face."""
+@inlined
+def nearest_in_blocks(tree, first, count, t_min, shear, best):
+    """The better of ``best`` = (t, face, u, v) and the sure hits in ``count`` blocks: smallest t, then lowest face.
+
+    Also returns whether a hit was in doubt. A call to settle it here would cost every ray its registers, so it is left
+    to ``_closest_carefully``.
+    """
+    t, face, u, v = best
+    doubtful = np.int64(0)
     for block in range(first, first + count):
-        bits, t4, u4, v4 = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        bits, doubts, t4, u4, v4 = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        doubtful |= doubts
+        bits &= ~doubts
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
@@ -26,18 +43,66 @@ def nearest_in_blocks(tree, first, count, shear, t_min, t, face, u, v):
             fi = tree.faces[block * LANES + i]
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
                 t, face, u, v = ti, fi, lane(u4, i), lane(v4, i)
+    return t, face, u, v, doubtful
+
+
+@kernel
+def _nearest_carefully(tree, first, count, ray, shear, best):
+    """``nearest_in_blocks`` with the hits in doubt that the boxes of their own faces confirm."""
+    t, face, u, v = best
+    for block in range(first, first + count):
+        base = block * BLOCK_WORDS
+        bits, doubts, t4, u4, v4 = hit_triangles(tree.blocks, base, shear)
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            ti = lane(t4, i)
+            fi = tree.faces[block * LANES + i]
+            better = ti >= ray.t_min and (ti < t or (ti == t and fi < face))
+            if better and ((doubts >> i) & 1 == 0 or meets_face_box(tree.blocks, base + i, ray, ti)):
+                t, face, u, v = ti, fi, lane(u4, i), lane(v4, i)
     return t, face, u, v
 
 
 @kernel
-def push_octants(tree, node, t0, bits, stack, top):
-    """Push the octants in ``bits``, nearest last. An entry is the bits of its float32 distance above its child."""
+def _closest_carefully(tree, ray, t_max, stack):
+    """The closest hit with every doubt settled; in no order, because it is needed for few rays."""
+    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
+    slabs, shear = make_slabs(ray, largest), make_shear(ray)
+    lower = splat8(round_down(ray.t_min * largest))
+    best = (t_max, np.int32(NO_FACE), 0.0, 0.0)
+    top = 1
+    stack[0] = 0
+    while top > 0:
+        top -= 1
+        child = stack[top]
+        if child < 0:
+            code = ~child
+            best = _nearest_carefully(
+                tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray, shear, best
+            )
+            continue
+        _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
+        while bits != 0:
+            stack[top] = tree.links[child * NODE_WORDS + CHILDREN + lowest_bit(bits)]
+            bits &= bits - 1
+            top += 1
+    return best
+
+
+@inlined
+def _entry(tree, base, place, t0):
+    """An octant as it waits on the stack: the bits of its float32 distance above its child."""
+    return (float_bits(lane(t0, place)) << 32) | (np.int64(tree.links[base + place]) & _LOW_WORD)
+
+
+@kernel
+def push_octants(tree, base, t0, bits, stack, top):
+    """Push the octants in ``bits`` of the node whose children begin at ``base``, nearest last."""
     bottom = top
-    base = node * NODE_WORDS + CHILDREN
     while bits != 0:
-        i = lowest_bit(bits)
+        entry = _entry(tree, base, lowest_bit(bits), t0)
         bits &= bits - 1
-        entry = (float_bits(lane(t0, i)) << 32) | (np.int64(tree.links[base + i]) & _LOW_WORD)
         at = top
         while at > bottom and stack[at - 1] < entry:
             stack[at] = stack[at - 1]
@@ -56,12 +121,21 @@ def closest_hit(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
     not depend on the order of the visits. ``stack`` is int64 scratch of 7 * depth + 8 entries: each level leaves at
     most seven octants waiting. Watertight and deterministic (Woop et al. 2013); see ``intersect`` for the bounds.
     """
-    largest = max(abs(dx), abs(dy), abs(dz))
-    slabs = make_slabs(ox, oy, oz, dx, dy, dz, largest)
-    shear = make_shear(ox, oy, oz, dx, dy, dz)
-    t, face, u, v = t_max, np.int32(NO_FACE), 0.0, 0.0
-    lower = splat8(round_down(t_min * largest))
-    limit = round_up(t_max * largest) * FAR_PADDING
+    ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
+    t, face, u, v, doubtful = _closest_surely(tree, ray, t_max, stack)
+    if doubtful != 0:
+        return _closest_carefully(tree, ray, t_max, stack)
+    return t, face, u, v
+
+
+@kernel
+def _closest_surely(tree, ray, t_max, stack):
+    """The closest hit that is in no doubt, and whether there was any doubt."""
+    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
+    slabs, shear = make_slabs(ray, largest), make_shear(ray)
+    t, face, u, v, doubtful = t_max, np.int32(NO_FACE), 0.0, 0.0, np.int64(0)
+    lower = splat8(round_down(ray.t_min * largest))
+    limit = box_limit(t_max, largest)
     top = 0
     child = np.int64(0)
     while True:
@@ -69,37 +143,57 @@ def closest_hit(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
             # Enter the node: go on with its nearest octant, leave the others on the stack.
             t0, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(limit))
             if bits != 0:
-                if bits & (bits - 1) == 0:
-                    child = np.int64(tree.links[child * NODE_WORDS + CHILDREN + lowest_bit(bits)])
+                # One octant: go on there. Two, the usual case: order them without a branch. More: sort them all.
+                base = child * NODE_WORDS + CHILDREN
+                first = lowest_bit(bits)
+                others = bits & (bits - 1)
+                if others == 0:
+                    child = np.int64(tree.links[base + first])
                     continue
-                top = push_octants(tree, child, t0, bits, stack, top)
+                if others & (others - 1) == 0:
+                    a, b = _entry(tree, base, first, t0), _entry(tree, base, lowest_bit(others), t0)
+                    stack[top] = max(a, b)
+                    top += 1
+                    child = np.int64(np.int32(min(a, b) & _LOW_WORD))
+                    continue
+                top = push_octants(tree, base, t0, bits, stack, top)
         else:
             # Test the leaf's blocks.
             code = ~child
             before = t
-            t, face, u, v = nearest_in_blocks(
-                tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, shear, t_min, t, face, u, v
+            t, face, u, v, doubts = nearest_in_blocks(
+                tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray.t_min, shear, (t, face, u, v)
             )
+            doubtful |= doubts
             if t < before:
-                limit = round_up(t * largest) * FAR_PADDING
+                limit = box_limit(t, largest)
         # Take the next octant that is not beyond the best hit.
         while top > 0:
             top -= 1
             if bits_float(stack[top] >> 32) <= limit:
                 break
         else:
-            return t, face, u, v
+            return t, face, u, v, doubtful
         child = np.int64(np.int32(stack[top] & _LOW_WORD))
 
 
 @kernel
 def any_hit(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
     """Whether anything lies within [t_min, t_max] of one ray: the same test, in no order, ended by the first hit."""
-    largest = max(abs(dx), abs(dy), abs(dz))
-    slabs = make_slabs(ox, oy, oz, dx, dy, dz, largest)
-    shear = make_shear(ox, oy, oz, dx, dy, dz)
-    lower = splat8(round_down(t_min * largest))
-    upper = splat8(round_up(t_max * largest) * FAR_PADDING)
+    ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
+    found, doubtful = _any_surely(tree, ray, t_max, stack)
+    if not found and doubtful != 0:
+        return _closest_carefully(tree, ray, t_max, stack)[1] != NO_FACE
+    return found
+
+
+@kernel
+def _any_surely(tree, ray, t_max, stack):
+    """Whether there is a hit in no doubt, and whether there was any doubt before."""
+    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
+    slabs, shear = make_slabs(ray, largest), make_shear(ray)
+    lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
+    doubtful = np.int64(0)
     top = 1
     stack[0] = 0
     while top > 0:
@@ -107,39 +201,55 @@ def any_hit(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
         child = stack[top]
         if child < 0:
             code = ~child
-            if any_in_blocks(tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, shear, t_min, t_max):
-                return True
+            found, doubts = any_in_blocks(
+                tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray.t_min, t_max, shear
+            )
+            if found:
+                return True, doubtful
+            doubtful |= doubts
             continue
         _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
         while bits != 0:
             stack[top] = tree.links[child * NODE_WORDS + CHILDREN + lowest_bit(bits)]
             bits &= bits - 1
             top += 1
-    return False
+    return False, doubtful
 
 
-@kernel
-def any_in_blocks(tree, first, count, shear, t_min, t_max):
-    """Whether a triangle of ``count`` blocks from ``first`` is hit within [t_min, t_max]."""
+@inlined
+def any_in_blocks(tree, first, count, t_min, t_max, shear):
+    """Whether a triangle of ``count`` blocks from ``first`` is surely hit within [t_min, t_max]; any doubts."""
+    doubtful = np.int64(0)
     for block in range(first, first + count):
-        bits, t4, _, _ = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        bits, doubts, t4, _, _ = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        doubtful |= doubts
+        bits &= ~doubts
         while bits != 0:
             ti = lane(t4, lowest_bit(bits))
             bits &= bits - 1
             if t_min <= ti <= t_max:
-                return True
-    return False
+                return True, doubtful
+    return False, doubtful
 
 
 @kernel
 def closest_hit_brute(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
     """``closest_hit`` over every block; the nodes and the stack are not read."""
-    shear = make_shear(ox, oy, oz, dx, dy, dz)
-    count = len(tree.faces) // LANES
-    return nearest_in_blocks(tree, 0, count, shear, t_min, t_max, np.int32(NO_FACE), 0.0, 0.0)
+    ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
+    shear, miss, count = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0), len(tree.faces) // LANES
+    t, face, u, v, doubtful = nearest_in_blocks(tree, 0, count, t_min, shear, miss)
+    if doubtful != 0:
+        return _nearest_carefully(tree, 0, count, ray, shear, miss)
+    return t, face, u, v
 
 
 @kernel
 def any_hit_brute(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
     """``any_hit`` over every block; the nodes and the stack are not read."""
-    return any_in_blocks(tree, 0, len(tree.faces) // LANES, make_shear(ox, oy, oz, dx, dy, dz), t_min, t_max)
+    ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
+    shear, count = make_shear(ray), len(tree.faces) // LANES
+    found, doubtful = any_in_blocks(tree, 0, count, t_min, t_max, shear)
+    if not found and doubtful != 0:
+        miss = (t_max, np.int32(NO_FACE), 0.0, 0.0)
+        return _nearest_carefully(tree, 0, count, ray, shear, miss)[1] != NO_FACE
+    return found

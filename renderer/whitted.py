@@ -31,7 +31,6 @@ from renderer.vec3 import (
     columns3,
     cross,
     dot,
-    length,
     normalized,
     row3,
     scale,
@@ -129,13 +128,12 @@ def _occluded(accelerator, o, d, t_max, stack):
 def _surface(world, face, u, v):
     a, b, c = world.faces[face, 0], world.faces[face, 1], world.faces[face, 2]
     p0, p1, p2 = row3(world.vertices, a), row3(world.vertices, b), row3(world.vertices, c)
-    area = cross(sub(p1, p0), sub(p2, p0))
-    n_g = normalized(area)
+    n_g = normalized(cross(sub(p1, p0), sub(p2, p0)))
     p = barycentric(p0, p1, p2, u, v)
     n_s = n_g
     if world.smooth[face]:
         n_s = normalized(barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v))
-    error = offset_distance(p, p0, p1, p2, u, v, n_g, length(area))
+    error = offset_distance(p, p0, p1, p2, u, v, n_g)
     return Surface(p, error, n_g, n_s, world.material[face])
 
 
@@ -161,9 +159,9 @@ def _visible_light(accelerator, world, surface, n, light, offset, stack):
         return to_light, nothing, False, 0
     o = spawn_origin(surface.p, surface.error, surface.n_g, to_light, offset)
     shadow = sub(towards, o)
-    # A surface at the light must not hide it, and its t errs by some u times the aspect ratio: 2^-40 is 8192 u; what
-    # lies within 1e-12 of the distance before the light is taken to be at it. Mitsuba stops ten of its epsilons short.
-    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-40
+    # A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
+    # covers angles down to 2^-12. Mitsuba stops ten of its epsilons short.
+    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-36
     seen = not _occluded(accelerator, o, shadow, t_max, stack)
     return normalized(to_light), scale(arriving, 1.0 / squared), seen, 1
 

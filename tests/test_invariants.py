@@ -18,21 +18,21 @@ from renderer.shapes import icosphere, torus
 @given(meshes, options)
 def test_every_tree_is_sound(mesh, chosen):
     octree = Octree(*mesh, **chosen)
-    assert faults(octree.tree, octree.depth, octree.mesh) == []
+    assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
 
 
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_larger_trees_are_sound(kind, split):
     octree = Octree(*make_mesh(kind, 1, 2000), split=split)
-    assert faults(octree.tree, octree.depth, octree.mesh) == []
+    assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
 
 
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
 def test_trees_of_surfaces_are_sound(split):
     for mesh in (icosphere(4), torus(), Mesh([], [])):
         octree = Octree.from_mesh(mesh, split=split)
-        assert faults(octree.tree, octree.depth, octree.mesh) == []
+        assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
 
 
 class Broken:
@@ -40,9 +40,9 @@ class Broken:
 
     def __init__(self, kind="soup"):
         octree = Octree(*make_mesh(kind, 2, 301))
-        self.mesh, self.depth = octree.mesh, octree.depth
-        nodes = octree.tree.nodes.copy()
-        self.tree = Tree(nodes, nodes.view(np.int32), octree.tree.blocks.copy(), octree.tree.faces.copy())
+        self.mesh, self.depth = octree.mesh, octree.target.depth
+        nodes = octree.target.tree.nodes.copy()
+        self.tree = Tree(nodes, nodes.view(np.int32), octree.target.tree.blocks.copy(), octree.target.tree.faces.copy())
         self.links = self.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN:]
         self.boxes = nodes.reshape(-1, NODE_WORDS)[:, :CHILDREN].reshape(-1, 3, 2, 8)
         self.used = self.boxes[:, 0, 0] < np.inf

@@ -27,7 +27,7 @@ def cast(accelerator, origin, direction):
 def test_empty_mesh_and_empty_batch():
     for vertices in (np.empty((0, 3)), np.zeros((2, 3))):
         for accelerator in (Octree(vertices, np.empty((0, 3), int)), BruteForce(vertices, np.empty((0, 3), int))):
-            hits = accelerator.closest_hit([[0, 0, 1], [1, 2, 3]], [[0, 0, -1], [1e-300, 0, 0]])
+            hits = accelerator.closest_hit([[0, 0, 1], [1, 2, 3]], [[0, 0, -1], [1e-200, 0, 0]])
             assert hits.t.tolist() == [np.inf, np.inf] and hits.face.tolist() == [-1, -1]
             assert np.isnan(hits.points).all() and hits.points.shape == (2, 3)
             assert accelerator.any_hit([[0, 0, 1]], [[0, 0, -1]]).tolist() == [False]
@@ -134,7 +134,7 @@ def test_bounds_of_two_ulp_far_from_the_origin(split):
     rng = np.random.default_rng(4)
     vertices = 1e6 + rng.integers(0, 3, (300, 3)) * np.spacing(1e6)
     octree = Octree(vertices, np.arange(300).reshape(-1, 3), split=split, leaf_size=1)
-    assert octree.stats.references == 100 and faults(octree.tree, octree.depth, octree.mesh) == []
+    assert octree.stats.references == 100 and faults(octree.target.tree, octree.target.depth, octree.mesh) == []
     origins, directions = rays_at(vertices, octree.mesh.faces, 5)
     brute = BruteForce(vertices, octree.mesh.faces)
     assert_same_hits(octree.closest_hit(origins, directions), brute.closest_hit(origins, directions))
@@ -173,11 +173,13 @@ def test_extreme_coordinates_build_and_trace():
     origins = rng.uniform(-0.5, 0.5, (500, 3))
     directions = rng.normal(size=(500, 3))
     expected = Octree.from_mesh(sphere).closest_hit(origins, directions)
-    for exponent in (-149, -126, 125):
+    for exponent in (-900, -149, -126, 125, 900):
         for split in ("midpoint", "sah"):
             mesh = Mesh(np.ldexp(sphere.vertices, exponent), sphere.faces)
             octree = Octree.from_mesh(mesh, split=split)
-            assert faults(octree.tree, octree.depth, mesh) == []
+            scaled = Mesh(mesh.vertices * octree.target.scale, mesh.faces)
+            assert 0.5 <= np.abs(scaled.vertices).max() <= 1.0
+            assert faults(octree.target.tree, octree.target.depth, scaled) == []
             hits = octree.closest_hit(np.ldexp(origins, exponent), directions)
             np.testing.assert_array_equal(hits.face, expected.face)
             np.testing.assert_array_equal(hits.t, np.ldexp(expected.t, exponent))
@@ -233,7 +235,7 @@ assert os.waitpid(pid, 0)[1] == 0, "the child hangs"
 def test_stats_count_what_is_there():
     mesh = icosphere(3)
     octree = Octree.from_mesh(mesh, leaf_size=8)
-    stats, tree = octree.stats, octree.tree
+    stats, tree = octree.stats, octree.target.tree
     assert stats.faces == stats.references == 1280
     assert stats.bytes == tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes
     assert stats.fill == 1280 / (LANES * stats.blocks)
@@ -255,16 +257,16 @@ def test_options_shape_the_tree(split):
     assert deep != shallow
     for size in (1, 3, 4, 7, 32):
         octree = Octree.from_mesh(mesh, split=split, leaf_size=size)
-        links = octree.tree.links.reshape(-1, 56)[:, 48:]
+        links = octree.target.tree.links.reshape(-1, 56)[:, 48:]
         for code in ~links[links < 0]:
             first, count = code >> 3, (code & 7) + 1
-            assert (octree.tree.faces[first * LANES : (first + count) * LANES] >= 0).sum() <= size
+            assert (octree.target.tree.faces[first * LANES : (first + count) * LANES] >= 0).sum() <= size
 
 
 def test_float32_vertices_take_half_the_memory_and_give_the_same_hits():
     vertices, faces = make_mesh("soup_float32", 9, 500)
     narrow, wide = Octree(vertices, faces), Octree(np.concatenate([vertices, [[0.1, 0, 0]]]), faces)
-    assert narrow.tree.blocks.dtype == np.float32 and wide.tree.blocks.dtype == np.float64
+    assert narrow.target.tree.blocks.dtype == np.float32 and wide.target.tree.blocks.dtype == np.float64
     rays = rays_at(vertices, faces, 10)
     assert_same_hits(narrow.closest_hit(*rays), wide.closest_hit(*rays))
 
@@ -272,7 +274,7 @@ def test_float32_vertices_take_half_the_memory_and_give_the_same_hits():
 def test_the_tree_is_the_same_every_time_and_for_every_entrance():
     mesh = icosphere(3)
     first, second = Octree.from_mesh(mesh), Octree(mesh.vertices.tolist(), mesh.faces.tolist())
-    for a, b in zip(first.tree, second.tree, strict=True):
+    for a, b in zip(first.target.tree, second.target.tree, strict=True):
         assert a.tobytes() == b.tobytes()
     assert first.mesh is mesh
 
@@ -289,3 +291,18 @@ def test_normals_are_unit_at_every_scale(exponent):
     vertices = np.ldexp([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], exponent)
     hits = Octree(vertices, [[0, 1, 2]]).closest_hit(np.ldexp([[0.25, 0.25, 1]], exponent), [[0, 0, -1]])
     np.testing.assert_array_equal(hits.normals, [[0, 0, 1]])
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+@pytest.mark.parametrize("scale", [1e-300, 1e-40, 1e-30, 1e30, 1e40, 1e300])
+def test_meshes_beyond_float32_are_traced_exactly(accelerator, scale):
+    """Their vertices are brought near 1 by a power of two, and t comes back by the same."""
+    sphere = icosphere(2)
+    inside = accelerator(sphere.vertices * scale, sphere.faces)
+    directions = np.random.default_rng(3).normal(size=(200, 3))
+    hits = inside.closest_hit(np.zeros((200, 3)), directions)
+    plain = accelerator(sphere.vertices, sphere.faces).closest_hit(np.zeros((200, 3)), directions)
+    np.testing.assert_array_equal(hits.face, plain.face)
+    np.testing.assert_allclose(hits.t / scale, plain.t, rtol=8 * 2.0**-53)
+    assert inside.any_hit(np.zeros((200, 3)), directions, t_max=1.1 * plain.t * scale).all()
+    assert not inside.any_hit(np.zeros((200, 3)), directions, t_max=0.9 * plain.t * scale).any()

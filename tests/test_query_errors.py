@@ -163,8 +163,7 @@ def test_options_are_keywords():
         (VERTICES, [[0, 1]], ("faces", "(1, 2)")),
         ([[0, 0], [1, 1]], [[0, 1, 1]], ("vertices", "(2, 2)")),
         ([], FACES, ("faces", "row 0")),
-        ([[0, 0, 0], [1, 0, 2.0**127], [0, 1, 0]], FACES, ("vertices", "row 1")),
-        ([[0, 0, 0], [1, 0, 0], [0, -1e300, 0]], FACES, ("vertices", "row 2")),
+        ([[0, 0, 0], [1e-300, 0, 0], [0, -1e300, 0]], FACES, ("vertices", "row 1")),
     ],
 )
 def test_meshes(accelerator, vertices, faces, parts):

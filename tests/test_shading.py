@@ -294,8 +294,10 @@ def test_offset_distance_is_a_small_multiple_of_the_rounding(scale: float, shift
         magnitude = sum(
             abs(n_g[k]) * abs(w * q[k]) for k in range(3) for w, q in zip(weights, (p0, p1, p2), strict=True)
         )
-        # PBRT 4, 6.8.6: gamma(7) sum |b_i p_i| along the normal; ours adds 16 u of the distance to a vertex.
-        assert error == pytest.approx(7 * U * magnitude + 16 * U * reach, rel=1e-12)
+        # PBRT 4, 6.8.6: gamma(7) sum |b_i p_i| along the normal; ours adds 264 u of the reach, times the aspect.
+        double_area = np.linalg.norm(np.cross(np.subtract(p1, p0), np.subtract(p2, p0)))
+        aspect = reach * reach / double_area
+        assert error == pytest.approx(7 * U * magnitude + 264 * U * reach * aspect, rel=1e-9)
 
 
 def test_offset_does_not_vanish_on_a_plane_through_the_origin() -> None:
