@@ -111,6 +111,11 @@ class Instance:
     material: str
     smooth: bool
 
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """The file's own vertex normals, or else the mean of the faces around each vertex, (V, 3) float64."""
+        return self.mesh.normals if self.mesh.normals is not None else self.mesh.vertex_normals()
+
 
 class Scene(_Table):
     """Everything that a picture needs. Read one with ``load_scene`` or build it from keyword arguments."""

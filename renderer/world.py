@@ -71,11 +71,6 @@ def _normals(scene: Scene, count: int) -> np.ndarray[tuple[int, int], np.dtype[n
     for instance in scene.instances:
         end = start + len(instance.mesh.vertices)
         if instance.smooth:
-            normals[start:end] = vertex_normals(instance.mesh)
+            normals[start:end] = instance.normals
         start = end
     return normals
-
-
-def vertex_normals(mesh: Mesh) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """The file's own normals, or else the mean of the faces around each vertex, (V, 3) float64."""
-    return mesh.normals if mesh.normals is not None else mesh.vertex_normals()
