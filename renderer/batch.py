@@ -3,7 +3,8 @@
 import numpy as np
 
 from renderer.jit import kernel
-from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute
+from renderer.simd import pointer
+from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute, view
 
 # Origins as far as float32 boxes can tell from infinity, and directions whose reciprocals and distances to such an
 # origin stay normal float64 numbers.
@@ -38,15 +39,16 @@ def closest_chunk(tree, depth, scale, rays, out, begin, end):
     """
     origins, directions, t_min, t_max = rays
     t_out, face_out, u_out, v_out = out
-    stack = np.empty(7 * depth + 8, np.int64)
+    scratch = np.empty(7 * depth + 8, np.int64)
+    stack, seen = pointer(scratch), view(tree)
     for i in range(begin, end):
         ox, oy, oz = scale * origins[i, 0], scale * origins[i, 1], scale * origins[i, 2]
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
         low, high = scale * t_min[i if len(t_min) > 1 else 0], scale * t_max[i if len(t_max) > 1 else 0]
         if depth == 0:
-            t, face, u, v = closest_hit_brute(tree, ox, oy, oz, dx, dy, dz, low, high, stack)
+            t, face, u, v = closest_hit_brute(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
         else:
-            t, face, u, v = closest_hit(tree, ox, oy, oz, dx, dy, dz, low, high, stack)
+            t, face, u, v = closest_hit(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
         if face == NO_FACE:
             t_out[i], face_out[i], u_out[i], v_out[i] = np.inf, -1, np.nan, np.nan
         else:
@@ -57,12 +59,13 @@ def closest_chunk(tree, depth, scale, rays, out, begin, end):
 def any_chunk(tree, depth, scale, rays, out, begin, end):
     """Whether anything is hit by each of rays[begin:end], into ``out``; arguments as for ``closest_chunk``."""
     origins, directions, t_min, t_max = rays
-    stack = np.empty(7 * depth + 8, np.int64)
+    scratch = np.empty(7 * depth + 8, np.int64)
+    stack, seen = pointer(scratch), view(tree)
     for i in range(begin, end):
         ox, oy, oz = scale * origins[i, 0], scale * origins[i, 1], scale * origins[i, 2]
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
         low, high = scale * t_min[i if len(t_min) > 1 else 0], scale * t_max[i if len(t_max) > 1 else 0]
         if depth == 0:
-            out[i] = any_hit_brute(tree, ox, oy, oz, dx, dy, dz, low, high, stack)
+            out[i] = any_hit_brute(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
         else:
-            out[i] = any_hit(tree, ox, oy, oz, dx, dy, dz, low, high, stack)
+            out[i] = any_hit(seen, ox, oy, oz, dx, dy, dz, low, high, stack)

@@ -9,7 +9,7 @@ import numpy as np
 
 from renderer.jit import inlined, kernel
 from renderer.layout import NODE_WORDS
-from renderer.simd import load4, load8, magnitude, movemask, select, splat4, splat8
+from renderer.simd import get, load4, load8, magnitude, movemask, select, splat4, splat8
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).
@@ -173,7 +173,8 @@ def _shear(row_x, row_y, row_z, ox, oy, oz, dx, dy, dz):
 
 @inlined
 def hit_triangles(blocks, base, ray):
-    """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt, t, u, v.
+    """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt, t, and the
+    numerators of u and v with their denominator.
 
     Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
     ab - cd or is 0, and is antisymmetric, so two triangles never both miss on their shared edge; 0 counts as inside.
@@ -198,12 +199,12 @@ def hit_triangles(blocks, base, ray):
     determinant = e0 + e1 + e2
     bits = movemask((not_negative | not_positive) & (determinant != zero))
     if bits == 0:
-        return bits, bits, zero, zero, zero
+        return bits, bits, zero, zero, zero, zero
     across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
     doubts = bits & movemask(magnitude(determinant) <= across * (across + along) * splat4(_DOUBT))
     t = (e0 * z0 + e1 * z1 + e2 * z2) * ray.shear_z / determinant
-    return bits, doubts, t, e1 / determinant, e2 / determinant
+    return bits, doubts, t, e1, e2, determinant
 
 
 @kernel
@@ -227,7 +228,7 @@ def meets_face_box(blocks, at, ray, t):
 def _meet_slab(blocks, at, axis, o, d, largest, t0, t1):
     """Narrow [t0, t1] to one axis of a face's own box."""
     row = at + 4 * axis
-    a, b, c = np.float64(blocks[row]), np.float64(blocks[row + 12]), np.float64(blocks[row + 24])
+    a, b, c = np.float64(get(blocks, row)), np.float64(get(blocks, row + 12)), np.float64(get(blocks, row + 24))
     near, far = round_down(min(a, min(b, c))), round_up(max(a, max(b, c)))
     near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = _slab(axis, o, d, largest)
     if near_row > far_row:
@@ -239,7 +240,7 @@ def _meet_slab(blocks, at, axis, o, d, largest, t0, t1):
 
 @kernel
 def _has_area(blocks, at):
-    ax, ay, az = np.float64(blocks[at]), np.float64(blocks[at + 4]), np.float64(blocks[at + 8])
-    bx, by, bz = blocks[at + 12] - ax, blocks[at + 16] - ay, blocks[at + 20] - az
-    cx, cy, cz = blocks[at + 24] - ax, blocks[at + 28] - ay, blocks[at + 32] - az
+    ax, ay, az = np.float64(get(blocks, at)), np.float64(get(blocks, at + 4)), np.float64(get(blocks, at + 8))
+    bx, by, bz = get(blocks, at + 12) - ax, get(blocks, at + 16) - ay, get(blocks, at + 20) - az
+    cx, cy, cz = get(blocks, at + 24) - ax, get(blocks, at + 28) - ay, get(blocks, at + 32) - az
     return by * cz - bz * cy != 0.0 or bz * cx - bx * cz != 0.0 or bx * cy - by * cx != 0.0

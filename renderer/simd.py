@@ -99,9 +99,45 @@ _logic(operator.or_, lambda b, x, y: b.or_(x, y))
 
 
 def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any, vector: ir.VectorType) -> Any:
-    """Address of element ``index`` of a one-dimensional array, as a pointer to a vector."""
-    data = cgutils.create_struct_proxy(array_type)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
+    """Address of element ``index`` of an array or ``pointer``, as a pointer to a vector."""
+    if not isinstance(array_type, types.CPointer):
+        array = cgutils.create_struct_proxy(array_type)(context, builder, array).data
+    return builder.bitcast(builder.gep(array, [index]), vector.as_pointer())
+
+
+@intrinsic
+def pointer(typingctx, array):
+    """The address of an array's first element. It holds no reference: the caller must keep the array alive.
+
+    Numba counts a reference, with a locked instruction, whenever an array in a tuple goes through a function; what the
+    inner loops read goes through them as pointers instead.
+    """
+
+    def codegen(context, builder, sig, args):
+        return cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0]).data
+
+    return types.CPointer(array.dtype)(array), codegen
+
+
+@intrinsic
+def get(typingctx, base, index):
+    """The element at ``index`` of a ``pointer``."""
+
+    def codegen(context, builder, sig, args):
+        return context.unpack_value(builder, sig.args[0].dtype, builder.gep(args[0], [args[1]]))
+
+    return base.dtype(base, types.intp), codegen
+
+
+@intrinsic
+def put(typingctx, base, index, value):
+    """Write the element at ``index`` of a ``pointer``."""
+
+    def codegen(context, builder, sig, args):
+        context.pack_value(builder, sig.args[0].dtype, args[2], builder.gep(args[0], [args[1]]))
+        return context.get_dummy_value()
+
+    return types.void(base, types.intp, base.dtype), codegen
 
 
 def _load(builder: Any, pointer: Any, array_type: Any) -> Any:

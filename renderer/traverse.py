@@ -3,6 +3,8 @@
 All of them share ``nearest_in_blocks`` and its triangle test, so they cannot disagree on what a hit is.
 """
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from renderer.intersect import (
@@ -17,7 +19,26 @@ from renderer.intersect import (
 )
 from renderer.jit import inlined, kernel
 from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
-from renderer.simd import bits_float, float_bits, lane, lowest_bit, splat8
+from renderer.simd import bits_float, float_bits, get, lane, lowest_bit, pointer, put, splat8
+
+
+class View(NamedTuple):
+    """A ``Tree`` as the traversal reads it: pointers, and the number of blocks."""
+
+    nodes: Any
+    links: Any
+    blocks: Any
+    faces: Any
+    count: int
+
+
+@inlined
+def view(tree):
+    """Pointers into a tree, which the caller must keep alive."""
+    return View(
+        pointer(tree.nodes), pointer(tree.links), pointer(tree.blocks), pointer(tree.faces), len(tree.faces) // LANES
+    )
+
 
 NO_FACE = np.iinfo(np.int32).max
 _LOW_WORD = 0xFFFFFFFF
@@ -33,16 +54,16 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
     t, face, u, v = best
     doubtful = np.int64(0)
     for block in range(first, first + count):
-        bits, doubts, t4, u4, v4 = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
         doubtful |= doubts
         bits &= ~doubts
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
             ti = lane(t4, i)
-            fi = tree.faces[block * LANES + i]
+            fi = get(tree.faces, block * LANES + i)
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
-                t, face, u, v = ti, fi, lane(u4, i), lane(v4, i)
+                t, face, u, v = ti, fi, lane(u4, i) / lane(w4, i), lane(v4, i) / lane(w4, i)
     return t, face, u, v, doubtful
 
 
@@ -52,15 +73,15 @@ def _nearest_carefully(tree, first, count, ray, shear, best):
     t, face, u, v = best
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
-        bits, doubts, t4, u4, v4 = hit_triangles(tree.blocks, base, shear)
+        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree.blocks, base, shear)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
             ti = lane(t4, i)
-            fi = tree.faces[block * LANES + i]
+            fi = get(tree.faces, block * LANES + i)
             better = ti >= ray.t_min and (ti < t or (ti == t and fi < face))
             if better and ((doubts >> i) & 1 == 0 or meets_face_box(tree.blocks, base + i, ray, ti)):
-                t, face, u, v = ti, fi, lane(u4, i), lane(v4, i)
+                t, face, u, v = ti, fi, lane(u4, i) / lane(w4, i), lane(v4, i) / lane(w4, i)
     return t, face, u, v
 
 
@@ -72,10 +93,10 @@ def _closest_carefully(tree, ray, t_max, stack):
     lower = splat8(round_down(ray.t_min * largest))
     best = (t_max, np.int32(NO_FACE), 0.0, 0.0)
     top = 1
-    stack[0] = 0
+    put(stack, 0, 0)
     while top > 0:
         top -= 1
-        child = stack[top]
+        child = get(stack, top)
         if child < 0:
             code = ~child
             best = _nearest_carefully(
@@ -84,7 +105,7 @@ def _closest_carefully(tree, ray, t_max, stack):
             continue
         _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
         while bits != 0:
-            stack[top] = tree.links[child * NODE_WORDS + CHILDREN + lowest_bit(bits)]
+            put(stack, top, np.int64(get(tree.links, child * NODE_WORDS + CHILDREN + lowest_bit(bits))))
             bits &= bits - 1
             top += 1
     return best
@@ -93,7 +114,7 @@ def _closest_carefully(tree, ray, t_max, stack):
 @inlined
 def _entry(tree, base, place, t0):
     """An octant as it waits on the stack: the bits of its float32 distance above its child."""
-    return (float_bits(lane(t0, place)) << 32) | (np.int64(tree.links[base + place]) & _LOW_WORD)
+    return (float_bits(lane(t0, place)) << 32) | (np.int64(get(tree.links, base + place)) & _LOW_WORD)
 
 
 @kernel
@@ -104,10 +125,10 @@ def push_octants(tree, base, t0, bits, stack, top):
         entry = _entry(tree, base, lowest_bit(bits), t0)
         bits &= bits - 1
         at = top
-        while at > bottom and stack[at - 1] < entry:
-            stack[at] = stack[at - 1]
+        while at > bottom and get(stack, at - 1) < entry:
+            put(stack, at, get(stack, at - 1))
             at -= 1
-        stack[at] = entry
+        put(stack, at, entry)
         top += 1
     return top
 
@@ -148,11 +169,11 @@ def _closest_surely(tree, ray, t_max, stack):
                 first = lowest_bit(bits)
                 others = bits & (bits - 1)
                 if others == 0:
-                    child = np.int64(tree.links[base + first])
+                    child = np.int64(get(tree.links, base + first))
                     continue
                 if others & (others - 1) == 0:
                     a, b = _entry(tree, base, first, t0), _entry(tree, base, lowest_bit(others), t0)
-                    stack[top] = max(a, b)
+                    put(stack, top, max(a, b))
                     top += 1
                     child = np.int64(np.int32(min(a, b) & _LOW_WORD))
                     continue
@@ -170,11 +191,11 @@ def _closest_surely(tree, ray, t_max, stack):
         # Take the next octant that is not beyond the best hit.
         while top > 0:
             top -= 1
-            if bits_float(stack[top] >> 32) <= limit:
+            if bits_float(get(stack, top) >> 32) <= limit:
                 break
         else:
             return t, face, u, v, doubtful
-        child = np.int64(np.int32(stack[top] & _LOW_WORD))
+        child = np.int64(np.int32(get(stack, top) & _LOW_WORD))
 
 
 @kernel
@@ -195,10 +216,10 @@ def _any_surely(tree, ray, t_max, stack):
     lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
     doubtful = np.int64(0)
     top = 1
-    stack[0] = 0
+    put(stack, 0, 0)
     while top > 0:
         top -= 1
-        child = stack[top]
+        child = get(stack, top)
         if child < 0:
             code = ~child
             found, doubts = any_in_blocks(
@@ -210,7 +231,7 @@ def _any_surely(tree, ray, t_max, stack):
             continue
         _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
         while bits != 0:
-            stack[top] = tree.links[child * NODE_WORDS + CHILDREN + lowest_bit(bits)]
+            put(stack, top, np.int64(get(tree.links, child * NODE_WORDS + CHILDREN + lowest_bit(bits))))
             bits &= bits - 1
             top += 1
     return False, doubtful
@@ -221,7 +242,7 @@ def any_in_blocks(tree, first, count, t_min, t_max, shear):
     """Whether a triangle of ``count`` blocks from ``first`` is surely hit within [t_min, t_max]; any doubts."""
     doubtful = np.int64(0)
     for block in range(first, first + count):
-        bits, doubts, t4, _, _ = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        bits, doubts, t4, _, _, _ = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
         doubtful |= doubts
         bits &= ~doubts
         while bits != 0:
@@ -236,7 +257,7 @@ def any_in_blocks(tree, first, count, t_min, t_max, shear):
 def closest_hit_brute(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
     """``closest_hit`` over every block; the nodes and the stack are not read."""
     ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
-    shear, miss, count = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0), len(tree.faces) // LANES
+    shear, miss, count = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0), tree.count
     t, face, u, v, doubtful = nearest_in_blocks(tree, 0, count, t_min, shear, miss)
     if doubtful != 0:
         return _nearest_carefully(tree, 0, count, ray, shear, miss)
@@ -247,7 +268,7 @@ def closest_hit_brute(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
 def any_hit_brute(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
     """``any_hit`` over every block; the nodes and the stack are not read."""
     ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
-    shear, count = make_shear(ray), len(tree.faces) // LANES
+    shear, count = make_shear(ray), tree.count
     found, doubtful = any_in_blocks(tree, 0, count, t_min, t_max, shear)
     if not found and doubtful != 0:
         miss = (t_max, np.int32(NO_FACE), 0.0, 0.0)

@@ -2,7 +2,8 @@
 
 import math
 
-from renderer.jit import kernel
+from renderer.jit import inlined, kernel
+from renderer.simd import get
 
 
 @kernel
@@ -61,16 +62,16 @@ def length(a):
     return largest * math.sqrt(dot(b, b))
 
 
-@kernel
-def row3(array, i):
-    """Row i of an (n, 3) array."""
-    return (array[i, 0], array[i, 1], array[i, 2])
+@inlined
+def three(base, at):
+    """Three numbers of a ``pointer``, from ``at``."""
+    return (get(base, at), get(base, at + 1), get(base, at + 2))
 
 
-@kernel
-def columns3(array, i, k):
-    """Three columns of row i, from column k."""
-    return (array[i, k], array[i, k + 1], array[i, k + 2])
+@inlined
+def row3(base, i):
+    """Row i of a ``pointer`` to rows of three."""
+    return three(base, 3 * i)
 
 
 @kernel

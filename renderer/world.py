@@ -12,7 +12,7 @@ from renderer.whitted import MAX_MEDIA, World
 def pack(scene: Scene) -> tuple[Mesh, World]:
     """The merged mesh of all instances in their order, and everything else that the kernel reads."""
     instances = scene.instances
-    rows = {name: i for i, name in enumerate(scene.materials)}
+    rows = {name: i * MATERIAL_COLUMNS for i, name in enumerate(scene.materials)}
     starts = np.cumsum([0] + [len(i.mesh.vertices) for i in instances])
     if instances:
         vertices = np.concatenate([i.mesh.vertices for i in instances])
