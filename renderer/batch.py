@@ -3,7 +3,7 @@
 import numpy as np
 
 from renderer.jit import kernel
-from renderer.simd import pointer
+from renderer.simd import keep, pointer
 from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute, view
 
 # Origins as far as float32 boxes can tell from infinity, and directions whose reciprocals and distances to such an
@@ -53,6 +53,7 @@ def closest_chunk(tree, depth, scale, rays, out, begin, end):
             t_out[i], face_out[i], u_out[i], v_out[i] = np.inf, -1, np.nan, np.nan
         else:
             t_out[i], face_out[i], u_out[i], v_out[i] = t / scale, face, u, v
+    keep(scratch)
 
 
 @kernel
@@ -69,3 +70,4 @@ def any_chunk(tree, depth, scale, rays, out, begin, end):
             out[i] = any_hit_brute(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
         else:
             out[i] = any_hit(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
+    keep(scratch)

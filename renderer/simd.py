@@ -107,7 +107,8 @@ def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any
 
 @intrinsic
 def pointer(typingctx, array):
-    """The address of an array's first element. It holds no reference: the caller must keep the array alive.
+    """The address of an array's first element. It holds no reference: an array made in the kernel is freed after its
+    last use, so ``keep`` it behind the last use of its pointer.
 
     Numba counts a reference, with a locked instruction, whenever an array in a tuple goes through a function; what the
     inner loops read goes through them as pointers instead.
@@ -117,6 +118,16 @@ def pointer(typingctx, array):
         return cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0]).data
 
     return types.CPointer(array.dtype)(array), codegen
+
+
+@intrinsic
+def keep(typingctx, array):
+    """Do nothing, but count as a use of the array, which therefore lives until here."""
+
+    def codegen(context, builder, sig, args):
+        return context.get_dummy_value()
+
+    return types.void(array), codegen
 
 
 @intrinsic

@@ -24,7 +24,7 @@ from renderer.material import (
     TRANSMITTANCE,
 )
 from renderer.shading import fresnel, offset_distance, reflect, refract, spawn_origin, specular
-from renderer.simd import get, pointer, put
+from renderer.simd import get, keep, pointer, put
 from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute, view
 from renderer.vec3 import (
     add,
@@ -350,8 +350,8 @@ def render_tile(accelerator, world, settings, camera, samples, film, tile):
     x0, y0, x1, y1 = tile
     # Each ray leaves at most two, so one waits a level and one more.
     nodes, rays = np.empty(7 * accelerator.depth + 8, np.int64), np.empty((settings.max_depth + 2) * _RAY_WORDS)
-    media = np.empty((2, MAX_MEDIA), np.int64)
-    scratch = Scratch(pointer(nodes), pointer(rays), pointer(media[0]), pointer(media[1]))
+    media = np.empty(2 * MAX_MEDIA, np.int64)
+    scratch = Scratch(pointer(nodes), pointer(rays), pointer(media), pointer(media[MAX_MEDIA:]))
     seen, target = look_at(world), Accelerator(view(accelerator.tree), accelerator.depth)
     to_ray = pointer(camera)
     middle = len(samples) // 2 if len(samples) % 2 == 1 else (len(samples) + int(np.sqrt(len(samples)))) // 2
@@ -373,3 +373,6 @@ def render_tile(accelerator, world, settings, camera, samples, film, tile):
             for k in range(3):
                 film.radiance[y, x, k] = min(total[k] / len(samples), _BRIGHTEST)
             film.rays[y, x] = count
+    keep(nodes)
+    keep(rays)
+    keep(media)

@@ -7,11 +7,15 @@ from numba import njit
 from renderer.simd import (
     bits_float,
     float_bits,
+    get,
+    keep,
     lane,
     load4,
     load8,
     lowest_bit,
     movemask,
+    pointer,
+    put,
     select,
     splat4,
     splat8,
@@ -126,3 +130,21 @@ def test_bits():
     for k in range(63):
         assert bit_operations(np.float32(0), 1 << k)[2] == k
         assert bit_operations(np.float32(0), (1 << k) | (1 << 62))[2] == k
+
+
+@njit
+def _written_then_crowded():
+    first = np.empty(64, np.int64)
+    base = pointer(first)
+    put(base, 0, 7)
+    second = np.empty(64, np.int64)
+    second[:] = 9
+    found = get(base, 0)
+    keep(second)
+    keep(first)
+    return found
+
+
+def test_a_kept_array_outlives_its_pointer():
+    """Without ``keep`` Numba frees ``first`` before ``second`` is made, which then takes its memory."""
+    assert _written_then_crowded() == 7
