@@ -2,7 +2,7 @@
 
 from renderer.errors import MeshError, SceneError
 from renderer.image import Image
-from renderer.mesh import Mesh
+from renderer.mesh import Mesh, Repairs, RepairWarning
 from renderer.mesh_io import load_mesh
 from renderer.octree import BruteForce, Octree
 from renderer.query import Hits
@@ -16,6 +16,8 @@ __all__ = [
     "Mesh",
     "MeshError",
     "Octree",
+    "RepairWarning",
+    "Repairs",
     "Scene",
     "SceneError",
     "load_mesh",

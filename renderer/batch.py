@@ -6,10 +6,10 @@ from renderer.jit import kernel
 from renderer.simd import keep, pointer
 from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute, view
 
-# Origins as far as float32 boxes can tell from infinity, and directions whose reciprocals and distances to such an
-# origin stay normal float64 numbers.
+# Origins as far as float32 boxes can tell from infinity, and directions whose product with a determinant, at most
+# 2^254 there, stays a normal float64 number, as does one of 2^-300 with the shortest.
 FARTHEST = 2.0**126
-SHORTEST, LONGEST = 2.0**-800, 2.0**800
+SHORTEST, LONGEST = 2.0**-600, 2.0**700
 
 
 @kernel

@@ -71,6 +71,7 @@ class Image:
         """The picture as PNG; notebooks show it."""
         from PIL import Image as Pillow  # not needed to trace rays, and slow to import
 
+        expect(not np.isnan(self.radiance).any(), "radiance", "numbers that have a colour", "nan")
         buffer = io.BytesIO()
         Pillow.fromarray(srgb(self.radiance)).save(buffer, "png")
         return buffer.getvalue()

@@ -139,7 +139,9 @@ def enter_boxes(nodes, node, slabs, lower, upper):
 
 
 class Shear(NamedTuple):
-    """A ray prepared for ``hit_triangles``: the rows of its axes, its origin along them, and Woop's shear."""
+    """A ray prepared for ``hit_triangles``: the rows of its axes, its origin along them, Woop's shear, and the largest
+    component of its direction.
+    """
 
     row_x: Any
     row_y: Any
@@ -149,7 +151,7 @@ class Shear(NamedTuple):
     origin_z: Any
     shear_x: Any
     shear_y: Any
-    shear_z: Any
+    direction_z: Any
 
 
 @inlined
@@ -167,7 +169,7 @@ def make_shear(ray):
 @inlined
 def _shear(row_x, row_y, row_z, ox, oy, oz, dx, dy, dz):
     return Shear(
-        row_x, row_y, row_z, splat4(ox), splat4(oy), splat4(oz), splat4(dx / dz), splat4(dy / dz), splat4(1.0 / dz)
+        row_x, row_y, row_z, splat4(ox), splat4(oy), splat4(oz), splat4(dx / dz), splat4(dy / dz), splat4(dz)
     )
 
 
@@ -203,7 +205,7 @@ def hit_triangles(blocks, base, ray):
     across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
     doubts = bits & movemask(magnitude(determinant) <= across * (across + along) * splat4(_DOUBT))
-    t = (e0 * z0 + e1 * z1 + e2 * z2) * ray.shear_z / determinant
+    t = (e0 * z0 + e1 * z1 + e2 * z2) / (determinant * ray.direction_z)
     return bits, doubts, t, e1, e2, determinant
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import MeshError
 
@@ -18,6 +18,37 @@ T = TypeVar("T", bound=np.generic)
 
 # A face's corners are int32, so no vertex beyond this one can be named.
 MAX_VERTICES = 2**31 - 1
+
+
+class RepairWarning(UserWarning):
+    """A mesh file was loaded without what is bad in it; names the file and counts what was left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repairs:
+    """What ``Mesh.repaired`` left out; true where that is anything at all.
+
+    dropped_faces : rows of the given faces that name a vertex that is not finite or that is not there, (n,) int64.
+    bad_vertices : rows of the given vertices that are not finite, named by a face or not, (n,) int64.
+    kept_faces : the given row of each face that was kept, (F,) int64; it takes a hit's ``face`` to the given faces.
+
+    >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 9], [0, 1, 2]])
+    >>> print(repairs)
+    dropped 1 of 2 faces; 0 vertices are not finite
+    >>> repairs.kept_faces.tolist()
+    [1]
+    """
+
+    dropped_faces: NDArray[np.int64]
+    bad_vertices: NDArray[np.int64]
+    kept_faces: NDArray[np.int64]
+
+    def __bool__(self) -> bool:
+        return len(self.dropped_faces) + len(self.bad_vertices) > 0
+
+    def __str__(self) -> str:
+        dropped, bad = len(self.dropped_faces), len(self.bad_vertices)
+        return f"dropped {dropped} of {dropped + len(self.kept_faces)} faces; {bad} vertices are not finite"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +83,8 @@ class Mesh:
     name: str = ""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise MeshError(f"name: expected a string, got {type(self.name).__name__}")
         vertices = self._floats("vertices", 3, np.float64)
         faces = self._checked_faces(len(vertices))
         object.__setattr__(self, "vertices", _read_only(vertices))
@@ -68,45 +101,25 @@ class Mesh:
             self._reject_rows("colors", self.colors, outside, "values in [0, 1]")
 
     def _error(self, message: str) -> MeshError:
-        return MeshError(f"{self.name}: {message}" if self.name else message)
+        return _error(self.name, message)
 
     def _reject_rows(self, argument: str, array: NDArray[Any], bad: NDArray[np.bool_], expected: str) -> None:
         if bad.any():
             row = int(bad.any(axis=1).argmax())
             raise self._error(f"{argument}: expected {expected}, got {array[row].tolist()} in row {row}")
 
-    def _array(self, argument: str, width: int) -> NDArray[Any]:
-        try:
-            array = np.asarray(getattr(self, argument))
-        except ValueError as error:  # a ragged list
-            raise self._error(f"{argument}: expected an array of shape (n, {width}), got {error}") from error
-        if array.shape == (0,):
-            array = array.reshape(0, width)
-        if array.ndim != 2 or array.shape[1] != width:
-            raise self._error(f"{argument}: expected shape (n, {width}), got {array.shape}")
-        return array
-
     def _floats(self, argument: str, width: int, dtype: type[np.floating]) -> NDArray[Any]:
-        array = self._array(argument, width)
-        if array.size and array.dtype.kind not in "fiu":
-            raise self._error(f"{argument}: expected real numbers, got dtype {array.dtype}")
-        # What overflows to inf is rejected just below, and so is a signalling NaN, whose cast would warn.
-        with np.errstate(over="ignore", invalid="ignore"):
-            floats = np.array(array, dtype=dtype, order="C")
+        floats = _real_rows(self.name, argument, getattr(self, argument), width, dtype)
         finite = np.isfinite(floats)
         if not finite.all():
             self._reject_rows(argument, floats, ~finite, "finite values")
         return floats
 
     def _checked_faces(self, vertex_count: int) -> Int32Array:
-        faces = self._array("faces", 3)
-        if faces.size == 0:
-            return np.empty((0, 3), np.int32)
-        if faces.dtype.kind not in "iu":
-            raise self._error(f"faces: expected integers, got dtype {faces.dtype}")
+        faces = _index_rows(self.name, self.faces)
         if vertex_count > MAX_VERTICES:
             raise self._error(f"vertices: expected at most {MAX_VERTICES} rows, got {vertex_count}")
-        if faces.min() < 0 or faces.max() >= vertex_count:
+        if faces.size and (faces.min() < 0 or faces.max() >= vertex_count):
             row, corner = np.argwhere((faces < 0) | (faces >= vertex_count))[0]
             raise self._error(
                 f"faces: expected indices of {vertex_count} vertices, got {faces[row, corner]} in row {row}"
@@ -139,9 +152,7 @@ class Mesh:
 
     def face_normals(self) -> Float64Array:
         """Unit geometric normals, (F, 3) float64; zero for a face without area."""
-        corners = self.triangles
-        first, second = _scaled_edges(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return _unit(np.cross(first, second))
+        return face_normals(self.triangles)
 
     def vertex_normals(self) -> Float64Array:
         """Unit normals, (V, 3) float64: face normals weighted by the face's angle at the vertex.
@@ -187,29 +198,39 @@ class Mesh:
         """
         expected = "matrix: expected a finite affine (4, 4) with last row 0 0 0 1"
         try:
-            affine = np.asarray(matrix, dtype=np.float64)
-        except (TypeError, ValueError) as error:
+            given = np.asarray(matrix)
+        except ValueError as error:  # a ragged list
             raise self._error(f"{expected}, got {error}") from error
-        if affine.shape != (4, 4) or not np.isfinite(affine).all() or affine[3].tolist() != [0, 0, 0, 1]:
+        if given.shape != (4, 4) or given.dtype.kind not in "fiu":
+            raise self._error(f"{expected}, got shape {given.shape} of dtype {given.dtype}")
+        with np.errstate(over="ignore", invalid="ignore"):  # what float64 cannot hold is rejected just below
+            affine = given.astype(np.float64)
+        if not np.isfinite(affine).all() or affine[3].tolist() != [0, 0, 0, 1]:
             raise self._error(f"{expected}, got {affine.tolist()}")
         linear = affine[:3, :3]
-        mirrors = np.linalg.det(linear) < 0
+        mirrors = np.linalg.slogdet(linear).sign < 0  # the determinant itself may overflow or vanish
         normals = None
         if self.normals is not None:
             # The cofactors are det times the inverse transpose, and exist for a singular map too.
-            columns = linear.T
+            columns = np.ldexp(linear, -np.frexp(np.abs(linear).max())[1]).T
             cofactors = np.stack([np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)])
             normals = _unit(self.normals @ cofactors) * (-1.0 if mirrors else 1.0)
         faces = self.faces[:, [0, 2, 1]] if mirrors else self.faces
-        return replace(self, vertices=self.vertices @ linear.T + affine[:3, 3], faces=faces, normals=normals)
+        with np.errstate(over="ignore", invalid="ignore"):  # the constructor rejects it with its row
+            vertices = self.vertices @ linear.T + affine[:3, 3]
+        return replace(self, vertices=vertices, faces=faces, normals=normals)
 
     @classmethod
     def concatenate(cls, meshes: Iterable[Mesh], name: str = "") -> Mesh:
         """One mesh of all vertices and faces, in order.
 
-        Normals, colours and texture coordinates stay only where all the meshes have them.
+        Normals, colours and texture coordinates stay only where all the meshes have them. Raises ``MeshError``
+        where ``meshes`` holds anything else.
         """
-        parts = list(meshes)
+        parts = list(meshes) if isinstance(meshes, Iterable) else [meshes]
+        for row, part in enumerate(parts):
+            if not isinstance(part, Mesh):
+                raise _error(name, f"meshes: expected an iterable of Mesh, got {type(part).__name__} in row {row}")
         if not parts:
             return cls(np.empty((0, 3)), np.empty((0, 3), np.int32), name=name)
         starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
@@ -221,12 +242,108 @@ class Mesh:
         faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)])
         return cls(np.concatenate([part.vertices for part in parts]), faces, name=name, **attributes)
 
+    @classmethod
+    def repaired(
+        cls,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        normals: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
+        texcoords: ArrayLike | None = None,
+        name: str = "",
+    ) -> tuple[Mesh, Repairs]:
+        """The mesh of the faces that are right, in their order, and what was left out.
+
+        A face is dropped where it names a vertex with a NaN or infinite coordinate, or an index out of range. Such
+        a vertex stays in its row, so that indices keep their meaning, but at 0 with all its attributes. Arguments
+        as for the class. Whatever else is wrong is a ``MeshError`` as there: shapes, dtypes, attributes that are
+        not finite at a vertex that is. Right input gives the same mesh as the class does.
+
+        >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, np.nan, 0]], [[0, 1, 3], [0, 1, 2]])
+        >>> mesh.faces.tolist(), mesh.vertices[3].tolist(), repairs.bad_vertices.tolist()
+        ([[0, 1, 2]], [0.0, 0.0, 0.0], [3])
+        """
+        if not isinstance(name, str):
+            raise MeshError(f"name: expected a string, got {type(name).__name__}")
+        positions = _real_rows(name, "vertices", vertices, 3, np.float64)
+        finite = np.isfinite(positions).all(axis=1)
+        positions[~finite] = 0.0
+        indices = _index_rows(name, faces)
+        in_range = ((indices >= 0) & (indices < len(positions))).all(axis=1)
+        kept = np.zeros(len(indices), np.bool_)
+        kept[in_range] = finite[indices[in_range]].all(axis=1)
+        attributes: dict[str, Any] = {"normals": normals, "colors": colors, "texcoords": texcoords}
+        for attribute, width, dtype in _VERTEX_ATTRIBUTES:
+            if attributes[attribute] is not None:
+                rows = _real_rows(name, attribute, attributes[attribute], width, dtype)
+                if len(rows) == len(positions):  # the constructor rejects any other length
+                    rows[~finite] = 0.0
+                attributes[attribute] = rows
+        repairs = Repairs(*(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept)))
+        return cls(positions, indices[kept], name=name, **attributes), repairs
+
+
+def face_normals(corners: Float64Array) -> Float64Array:
+    """Unit normals of triangles (n, 3 corners, 3), (n, 3) float64; zero for one without area.
+
+    The edges are scaled by powers of two first, so that triangles of any size have one.
+    """
+    first, second = _scaled_edges(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return _unit(np.cross(first, second))
+
+
+def build_mesh(repairs: list[Repairs] | None, vertices: Any, faces: Any, **attributes: Any) -> Mesh:
+    """``Mesh(...)``, or, where a list of repairs is given, ``Mesh.repaired(...)`` with what it left out added there."""
+    if repairs is None:
+        return Mesh(vertices, faces, **attributes)
+    mesh, made = Mesh.repaired(vertices, faces, **attributes)
+    repairs.append(made)
+    return mesh
+
 
 _VERTEX_ATTRIBUTES: tuple[tuple[str, int, type[np.floating]], ...] = (
     ("normals", 3, np.float64),
     ("colors", 3, np.float32),
     ("texcoords", 2, np.float64),
 )
+
+
+def _error(name: str, message: str) -> MeshError:
+    return MeshError(f"{name}: {message}" if name else message)
+
+
+def _rows(name: str, argument: str, values: Any, width: int) -> NDArray[Any]:
+    try:
+        array = np.asarray(values)
+    except ValueError as error:  # a ragged list
+        raise _error(name, f"{argument}: expected an array of shape (n, {width}), got {error}") from error
+    if array.shape == (0,):
+        array = array.reshape(0, width)
+    if array.ndim != 2 or array.shape[1] != width:
+        raise _error(name, f"{argument}: expected shape (n, {width}), got {array.shape}")
+    return array
+
+
+def _real_rows(name: str, argument: str, values: Any, width: int, dtype: type[np.floating]) -> NDArray[Any]:
+    """A new (n, width) array of ``dtype``; what it cannot hold is inf."""
+    array = _rows(name, argument, values, width)
+    if array.size and array.dtype.kind not in "fiu":
+        raise _error(name, f"{argument}: expected real numbers, got dtype {array.dtype}")
+    if not array.size:
+        return np.empty((0, width), dtype)
+    # Overflow gives inf and a signalling NaN gives NaN: the caller looks for both, so neither need warn.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.array(array, dtype=dtype, order="C")
+
+
+def _index_rows(name: str, faces: Any) -> NDArray[Any]:
+    """(F, 3) of any integer type, not checked for range."""
+    array = _rows(name, "faces", faces, 3)
+    if array.size == 0:
+        return np.empty((0, 3), np.int32)
+    if array.dtype.kind not in "iu":
+        raise _error(name, f"faces: expected integers, got dtype {array.dtype}")
+    return array
 
 
 def _read_only(array: NDArray[T]) -> NDArray[T]:

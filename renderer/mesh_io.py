@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
@@ -13,25 +14,32 @@ from typing import Any
 import numpy as np
 
 from renderer.errors import MeshError
-from renderer.mesh import Mesh
+from renderer.mesh import Mesh, Repairs, RepairWarning, build_mesh
 from renderer.obj import parse_obj
 from renderer.ply import format_ply, parse_ply
 from renderer.stl import parse_stl
 
 
-def load_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
+def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: bool = False) -> Mesh:
     """Read a triangle mesh from a .ply, .obj, .stl or .glb file.
 
     name : the mesh's name; by default the file's, without its suffix.
+    repair : leave out the triangles that name a vertex that is not finite or an index out of range, keep the rest
+        as ``Mesh.repaired`` does, and issue one ``RepairWarning`` that names the file and the counts.
 
     Polygons are cut into fans, right for convex ones. Normals, colours and texture coordinates of vertices
     are kept. Positions are float64 whatever the file holds. An STL file shares no vertices between its faces.
 
     Raises ``MeshError`` that names the file and the fault: not there, not a file, unknown suffix, malformed
     or truncated, no faces, a face index out of range, a face of fewer than three vertices, values that are
-    not finite.
+    not finite. With ``repair`` it is raised where no face is right, and for every other fault all the same.
     """
-    path = Path(path)
+    try:
+        path = Path(path)
+    except TypeError as error:
+        raise MeshError(f"path: expected a string or path, got {type(path).__name__}") from error
+    if not isinstance(repair, bool):
+        raise MeshError(f"repair: expected True or False, got {repair!r}")
     if path.suffix.lower() not in _PARSERS:
         raise MeshError(f"{path}: expected a suffix of {', '.join(_PARSERS)}, got {path.suffix!r}")
     try:
@@ -39,21 +47,32 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None) -> Mesh:
     except (OSError, ValueError) as error:  # ValueError: a null byte in the path
         raise MeshError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
     try:
-        mesh = parse_mesh(content, path.suffix.lower())
+        repairs: list[Repairs] | None = [] if repair else None
+        mesh = parse_mesh(content, path.suffix.lower(), repairs)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from error
+    if repairs and any(repairs):
+        warnings.warn(f"{path}: {_total(repairs)}", RepairWarning, stacklevel=2)
     return replace(mesh, name=path.stem if name is None else name)
 
 
-def parse_mesh(content: bytes, suffix: str) -> Mesh:
+def parse_mesh(content: bytes, suffix: str, repairs: list[Repairs] | None = None) -> Mesh:
     """The mesh in a file's content; ``suffix`` is one of '.ply', '.obj', '.stl', '.glb'.
+
+    repairs : a list to which the repairs are added that ``load_mesh`` makes with ``repair``, one a mesh of the file.
 
     Raises ``MeshError`` as ``load_mesh`` does, without the file's name.
     """
-    mesh = _PARSERS[suffix](content)
+    mesh = _PARSERS[suffix](content, repairs)
     if len(mesh.faces) == 0:
-        raise MeshError("holds no faces")
+        raise MeshError(f"holds no good faces: {_total(repairs)}" if repairs and any(repairs) else "holds no faces")
     return mesh
+
+
+def _total(repairs: list[Repairs]) -> Repairs:
+    """All meshes' repairs as if they were one mesh's; only the counts mean something."""
+    dropped, bad, kept = zip(*((r.dropped_faces, r.bad_vertices, r.kept_faces) for r in repairs), strict=True)
+    return Repairs(np.concatenate(dropped), np.concatenate(bad), np.concatenate(kept))
 
 
 def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
@@ -70,19 +89,20 @@ def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
         unfinished.unlink(missing_ok=True)
 
 
-def _parse_glb(content: bytes) -> Mesh:
+def _parse_glb(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     """All triangle meshes, each placed by the scene's transforms; points and lines have no surface."""
     import trimesh  # half a second, which scenes of PLY files need not spend
 
     _check_glb_frame(content)
     try:
-        scene = trimesh.load_scene(BytesIO(content), file_type="glb", process=False)
+        with np.errstate(over="ignore", invalid="ignore"):  # a signalling NaN, which Mesh rejects or repairs
+            scene = trimesh.load_scene(BytesIO(content), file_type="glb", process=False)
         meshes = []
         for node in scene.graph.nodes_geometry:
             transform, geometry_name = scene.graph[node]
             geometry = scene.geometry[geometry_name]
             if isinstance(geometry, trimesh.Trimesh):
-                meshes.append(_from_trimesh(geometry).transformed(transform))
+                meshes.append(_from_trimesh(geometry, repairs).transformed(transform))
         return Mesh.concatenate(meshes)
     except MeshError:
         raise
@@ -104,17 +124,17 @@ def _check_glb_frame(content: bytes) -> None:
         raise MeshError(f"malformed GLB: its JSON chunk: {str(error)[:120]}") from error
 
 
-def _from_trimesh(geometry: Any) -> Mesh:
+def _from_trimesh(geometry: Any, repairs: list[Repairs] | None) -> Mesh:
     # trimesh computes normals when asked; only those that stood in the file are in its cache.
     normals = geometry.vertex_normals if "vertex_normals" in geometry._cache else None
     colors = None
     if geometry.visual.kind == "vertex":
         colors = (np.asarray(geometry.visual.vertex_colors)[:, :3] / 255).astype(np.float32)
     texcoords = getattr(geometry.visual, "uv", None)
-    return Mesh(geometry.vertices, geometry.faces, normals=normals, colors=colors, texcoords=texcoords)
+    return build_mesh(repairs, geometry.vertices, geometry.faces, normals=normals, colors=colors, texcoords=texcoords)
 
 
-_PARSERS: dict[str, Callable[[bytes], Mesh]] = {
+_PARSERS: dict[str, Callable[[bytes, list[Repairs] | None], Mesh]] = {
     ".ply": parse_ply,
     ".obj": parse_obj,
     ".stl": parse_stl,

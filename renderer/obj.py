@@ -6,6 +6,7 @@ face uses (NaN among them), and reorders faces by material.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -13,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from renderer.errors import MeshError
-from renderer.mesh import Mesh
+from renderer.mesh import Mesh, Repairs, build_mesh
 
 # Statements that say nothing about surfaces made of polygons. Free-form surfaces are refused, not dropped.
 _IGNORED = {
@@ -24,26 +25,28 @@ _IGNORED = {
 
 @dataclass
 class _Statements:
+    keeps_bad_faces: bool
     positions: list[list[float]] = field(default_factory=list)
     colors: list[list[float]] = field(default_factory=list)
     texcoords: list[list[float]] = field(default_factory=list)
     normals: list[list[float]] = field(default_factory=list)
-    # One (position, texcoord, normal) a corner, three corners a triangle; -1 where a corner has none.
+    # One (position, texcoord, normal) a corner, three corners a triangle; -1 where a corner has none, or, for
+    # positions, where an index is out of range and bad faces are to be dropped.
     corners: list[tuple[int, int, int]] = field(default_factory=list)
 
 
-def parse_obj(content: bytes) -> Mesh:
+def parse_obj(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     """The mesh in an OBJ file's content.
 
     Polygons are cut into fans from their first corner, right for convex ones. A vertex is split where its
     faces differ in texture coordinate or normal. Where only some faces have texture coordinates, the others
     get (0, 0); where only some have normals, the normals are left out, since they follow from the faces.
     Vertex colours after the position are kept where every vertex has them. Lines, points, groups and
-    materials are ignored.
+    materials are ignored. ``repairs`` as for ``build_mesh``; faces are then dropped for any index out of range.
 
     Raises ``MeshError`` with the line's number; it does not know the file's name.
     """
-    statements = _Statements()
+    statements = _Statements(keeps_bad_faces=repairs is not None)
     for number, line in _logical_lines(content.decode("utf-8", "replace")):
         words = line.split()
         if not words or words[0].startswith("#"):
@@ -54,13 +57,14 @@ def parse_obj(content: bytes) -> Mesh:
             _read_statement(words[0], words[1:], statements)
         except ValueError as error:
             raise MeshError(f"line {number}: {str(error)[:100]}, got {line.strip()[:80]!r}") from error
-    return _mesh(statements)
+    return _mesh(statements, repairs)
 
 
 def _logical_lines(text: str) -> Iterator[tuple[int, str]]:
     """Lines and their numbers, those that end in a backslash joined to the next."""
     begun = ""
-    for number, line in enumerate(text.splitlines(), start=1):
+    # Not splitlines(), which also cuts at a form feed or a Unicode separator within a comment or name.
+    for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1):
         if line.endswith("\\"):
             begun += line[:-1] + " "
             continue
@@ -101,29 +105,36 @@ def _corner(word: str, statements: _Statements) -> tuple[int, int, int]:
     if len(parts) > 3:
         raise ValueError("expected a corner like 1, 1/2, 1//3 or 1/2/3")
     position, texcoord, normal = [*parts, "", ""][:3]
-    return (
-        _index(position, len(statements.positions)),
-        _index(texcoord, len(statements.texcoords)) if texcoord else -1,
-        _index(normal, len(statements.normals)) if normal else -1,
-    )
+    try:
+        return (
+            _index(int(position), len(statements.positions)),
+            _index(int(texcoord), len(statements.texcoords)) if texcoord else -1,
+            _index(int(normal), len(statements.normals)) if normal else -1,
+        )
+    except IndexError as error:
+        if statements.keeps_bad_faces:
+            return (-1, -1, -1)
+        raise ValueError(str(error)) from error
 
 
-def _index(word: str, count: int) -> int:
+def _index(index: int, count: int) -> int:
     """From 1 .. count, or -1 .. -count for the latest back to the first, to 0 .. count - 1."""
-    index = int(word)
     if not 1 <= abs(index) <= count:
-        raise ValueError(f"face index out of range: expected 1 to {count} or -{count} to -1")
+        raise IndexError(f"face index out of range: expected 1 to {count} or -{count} to -1")
     return index - 1 if index > 0 else count + index
 
 
-def _mesh(statements: _Statements) -> Mesh:
+def _mesh(statements: _Statements, repairs: list[Repairs] | None) -> Mesh:
     corners = np.array(statements.corners, np.int64).reshape(-1, 3)
     colors = statements.colors if len(statements.colors) == len(statements.positions) else None
-    by_position = Mesh(
+    by_position = build_mesh(
+        repairs,
         np.array(statements.positions, np.float64),
         corners[:, 0].reshape(-1, 3).astype(np.int32),
-        colors=None if colors is None else np.array(colors, np.float32),
+        colors=None if colors is None else np.array(colors, np.float64),
     )
+    if repairs:
+        corners = corners.reshape(-1, 9)[repairs[-1].kept_faces].reshape(-1, 3)
     if (corners[:, 1:] == -1).all():
         return by_position
     distinct, faces = np.unique(corners, axis=0, return_inverse=True)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.build import SPLITS, Rule, build_blocks, build_tree
 from renderer.errors import MeshError, expect
 from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS
-from renderer.mesh import Mesh
+from renderer.mesh import Mesh, Repairs
 from renderer.parallel import checked_threads
 from renderer.query import Hits, Target, any_hits, check_rays, closest_hits
 
@@ -39,10 +39,15 @@ class Stats:
 
 
 class _Accelerator:
-    """Ray queries on one mesh; safe to call from many threads at once."""
+    """Ray queries on one mesh; safe to call from many threads at once.
+
+    ``mesh`` is what was built, and what a hit's ``face`` refers to. ``repairs`` says what ``repair=True`` left out of
+    the given arrays, and is None without it.
+    """
 
     def __init__(self, mesh: Mesh, target: Target, threads: int | None) -> None:
         self.mesh = mesh
+        self.repairs: Repairs | None = None
         self.target = target
         self.threads = checked_threads(threads)
 
@@ -52,8 +57,9 @@ class _Accelerator:
         """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
 
         ``origins`` and ``directions`` are (n, 3), finite, directions non-zero and of any length; ``t_min`` and
-        ``t_max`` are >= 0, one number or (n,), in units of |direction|. No face is culled; a ray in a face's plane
-        misses it. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.
+        ``t_max`` are >= 0, one number or (n,), in units of |direction|. No face is culled. A ray in a face's plane
+        misses it, unless the rounding of its slopes lifts it out of the plane. The same bits for any number of
+        threads. Raises ``ValueError`` naming argument and row.
         """
         rays = check_rays(origins, directions, t_min, t_max, self.target.scale)
         return closest_hits(self.target, rays, self.mesh, self.threads)
@@ -88,6 +94,10 @@ class Octree(_Accelerator):
     leaf_size  the most faces of a leaf, 1 to 32
     max_depth  the deepest level that the split rule may cut, 1 to 64; below it faces are shared out evenly
     threads    for queries; None takes all processors
+    repair     build without the faces that name a vertex that is not finite or an index out of range, which are errors
+               otherwise. A hit's ``face`` is then one of ``octree.mesh``, the faces that were kept; ``octree.repairs``
+               (None without this option) tells what was dropped, and ``repairs.kept_faces[hits.face[hits.hit]]``
+               gives the rows of the given ``faces``
 
     >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> octree.closest_hit([[0.25, 0.25, 2.0]], [[0, 0, -1]]).t
@@ -103,9 +113,11 @@ class Octree(_Accelerator):
         leaf_size: int = 4,
         max_depth: int = 32,
         threads: int | None = None,
+        repair: bool = False,
     ) -> None:
-        mesh = Mesh(vertices, faces)  # type: ignore[arg-type]  # Mesh checks and converts
+        mesh, repairs = _mesh(vertices, faces, repair)
         self._build(mesh, split, leaf_size, max_depth, threads)
+        self.repairs = repairs
 
     @classmethod
     def from_mesh(
@@ -118,6 +130,7 @@ class Octree(_Accelerator):
         threads: int | None = None,
     ) -> "Octree":
         """Build over a mesh that is already checked; options as in the class."""
+        _expect_mesh(mesh)
         octree = cls.__new__(cls)
         octree._build(mesh, split, leaf_size, max_depth, threads)
         return octree
@@ -132,18 +145,36 @@ class Octree(_Accelerator):
 
 
 class BruteForce(_Accelerator):
-    """Every ray against every face, through the octree's own triangle test: its honest baseline."""
+    """Every ray against every face, through the octree's own triangle test: its honest baseline.
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, threads: int | None = None) -> None:
-        mesh = Mesh(vertices, faces)  # type: ignore[arg-type]  # Mesh checks and converts
+    ``threads`` and ``repair`` as for ``Octree``.
+    """
+
+    def __init__(
+        self, vertices: ArrayLike, faces: ArrayLike, *, threads: int | None = None, repair: bool = False
+    ) -> None:
+        mesh, repairs = _mesh(vertices, faces, repair)
         super().__init__(mesh, _all_blocks(mesh), threads)
+        self.repairs = repairs
 
     @classmethod
     def from_mesh(cls, mesh: Mesh, *, threads: int | None = None) -> "BruteForce":
         """The same over a mesh that is already checked."""
+        _expect_mesh(mesh)
         brute = cls.__new__(cls)
         _Accelerator.__init__(brute, mesh, _all_blocks(mesh), threads)
         return brute
+
+
+def _mesh(vertices: ArrayLike, faces: ArrayLike, repair: bool) -> tuple[Mesh, Repairs | None]:
+    expect(isinstance(repair, bool), "repair", "True or False", repr(repair))
+    if repair:
+        return Mesh.repaired(vertices, faces)
+    return Mesh(vertices, faces), None  # type: ignore[arg-type]  # Mesh checks and converts
+
+
+def _expect_mesh(mesh: object) -> None:
+    expect(isinstance(mesh, Mesh), "mesh", "a Mesh", type(mesh).__name__)
 
 
 def _expect_range(argument: str, value: object, largest: int) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh import Float64Array, Mesh
+from renderer.mesh import Float64Array, Mesh, Repairs, build_mesh
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -60,14 +60,14 @@ class _Column:
 _Columns = dict[str, _Column]
 
 
-def parse_ply(content: bytes) -> Mesh:
+def parse_ply(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     """The mesh in a PLY file's content.
 
     Faces come from the elements ``face`` (polygons are cut into fans from their first corner, right for
     convex ones) and ``tristrips`` (-1 restarts a strip; every second triangle is turned; stitching triangles
     without area stay), in the file's order. Vertex normals, colours (red, green, blue; unsigned integers are
     divided by their type's maximum) and texture coordinates (s t, u v or texture_u texture_v) are kept; other
-    properties and elements are ignored.
+    properties and elements are ignored. ``repairs`` as for ``build_mesh``.
 
     Raises ``MeshError``, which does not know the file's name.
     """
@@ -85,7 +85,8 @@ def parse_ply(content: bytes) -> Mesh:
     readers = {"face": _fans, "tristrips": _strips}
     faces = [readers[e.name](_corners(e.name, columns[e.name])) for e in elements if e.name in readers]
     texcoords = (_vertex_columns(vertex, names) for names in _TEXCOORD_NAMES)
-    return Mesh(
+    return build_mesh(
+        repairs,
         positions,
         np.concatenate([np.empty((0, 3), np.int64), *faces]),
         normals=_vertex_columns(vertex, ("nx", "ny", "nz")),
@@ -289,7 +290,7 @@ def _vertex_columns(vertex: _Columns, names: tuple[str, ...]) -> Float64Array | 
         return np.stack([column.values.astype(np.float64) for column in columns], axis=1)
 
 
-def _colors(vertex: _Columns) -> NDArray[np.float32] | None:
+def _colors(vertex: _Columns) -> Float64Array | None:
     names = ("red", "green", "blue")
     colors = _vertex_columns(vertex, names)
     if colors is None:
@@ -298,7 +299,7 @@ def _colors(vertex: _Columns) -> NDArray[np.float32] | None:
     if any(type_.kind == "i" for type_ in types):
         raise MeshError(f"element vertex: expected colours of an unsigned or floating type, got {types[0]}")
     scale = [1 if type_.kind == "f" else np.iinfo(type_).max for type_ in types]
-    return (colors / scale).astype(np.float32)
+    return colors / scale
 
 
 def _corners(element: str, columns: _Columns) -> _Column:

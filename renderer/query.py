@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.batch import FARTHEST, LONGEST, SHORTEST, any_chunk, closest_chunk, first_bad_ray
 from renderer.errors import expect
 from renderer.layout import Tree
-from renderer.mesh import Mesh
+from renderer.mesh import Mesh, face_normals
 from renderer.parallel import for_chunks
 
 # Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
@@ -53,8 +53,7 @@ class Hits:
         normals = np.full((len(self.t), 3), np.nan)
         hit = self.hit
         corners = self._mesh.vertices[self._mesh.faces[self.face[hit]]]
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals[hit] = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+        normals[hit] = face_normals(corners)
         return normals
 
 
@@ -70,7 +69,12 @@ def _array(argument: str, values: ArrayLike) -> NDArray[Any]:
 def _vectors(argument: str, values: ArrayLike) -> NDArray[np.float64]:
     array = _array(argument, values)
     expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
-    return np.ascontiguousarray(array, np.float64)
+    return _doubles(array)
+
+
+def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
+    with np.errstate(over="ignore", invalid="ignore"):  # infinities and NaN are rejected with their row
+        return np.ascontiguousarray(array, np.float64)
 
 
 def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArray[np.float64]:
@@ -78,7 +82,7 @@ def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArr
     array = _array(argument, value)
     fits = array.ndim == 0 or array.shape == (count,)
     expect(fits, argument, f"a number or shape ({count},)", f"shape {array.shape}")
-    array = np.ascontiguousarray(np.atleast_1d(array), np.float64)
+    array = _doubles(np.atleast_1d(array))
     good = (array >= 0.0) & (array <= largest)
     if not good.all():
         row = int((~good).argmax())

@@ -40,10 +40,12 @@ def render(
 
     The same bits for any number of threads. Raises ``ValueError`` naming the argument. Ctrl-C stops between tiles.
     """
+    expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
     chosen = _settings(scene, settings)
     width, height = chosen.resolution
-    expect(accelerator in ("octree", "brute"), "accelerator", "'octree' or 'brute'", repr(accelerator))
-    expect(split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
+    named = isinstance(accelerator, str) and accelerator in ("octree", "brute")
+    expect(named, "accelerator", "'octree' or 'brute'", repr(accelerator))
+    expect(isinstance(split, str) and split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
     threads = checked_threads(threads)
     kernel_settings = Settings(chosen.max_depth, chosen.min_weight, _offset(offset))
     began = time.perf_counter()

@@ -57,7 +57,7 @@ class RenderSettings(_Table):
     """
 
     resolution: tuple[_Pixels, _Pixels] = (512, 512)
-    samples: Annotated[int, Field(strict=True)] = 1
+    samples: Annotated[int, Field(le=65536, strict=True)] = 1
     max_depth: Annotated[int, Field(ge=0, le=64, strict=True)] = 6
     min_weight: Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] = 0.0
 

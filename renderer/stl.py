@@ -11,7 +11,7 @@ import re
 import numpy as np
 
 from renderer.errors import MeshError
-from renderer.mesh import Mesh
+from renderer.mesh import Mesh, Repairs, build_mesh
 
 _HEADER_BYTES = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -21,10 +21,11 @@ _CORNER = ["vertex", None, None, None]
 _FACET = ["facet", "normal", None, None, None, "outer", "loop", *_CORNER * 3, "endloop", "endfacet"]
 
 
-def parse_stl(content: bytes) -> Mesh:
+def parse_stl(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     """The mesh in an STL file's content; its faces share no vertices.
 
     A file is binary where its length says so. Normals are left out, since they follow from the winding.
+    ``repairs`` as for ``build_mesh``.
 
     Raises ``MeshError``, which does not know the file's name.
     """
@@ -40,7 +41,7 @@ def parse_stl(content: bytes) -> Mesh:
             f" faces, got {len(content)} bytes"
         )
     faces = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
-    return Mesh(corners.reshape(-1, 3), faces)
+    return build_mesh(repairs, corners.reshape(-1, 3), faces)
 
 
 def _text_corners(text: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

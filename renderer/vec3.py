@@ -37,9 +37,14 @@ def scale(a, s):
 
 
 @kernel
+def _product(x, y):
+    return x * y if x > 0.0 and y > 0.0 else 0.0
+
+
+@kernel
 def times(a, b):
-    """Component by component, as weights multiply colours."""
-    return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
+    """Component by component, as weights multiply colours: none is negative, and 0 times infinite light is 0."""
+    return (_product(a[0], b[0]), _product(a[1], b[1]), _product(a[2], b[2]))
 
 
 @kernel

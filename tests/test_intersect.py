@@ -170,7 +170,7 @@ def woop(corners, origin, direction):
     size = np.abs(direction)
     z = 2 if size[2] >= size[0] and size[2] >= size[1] else 1 if size[1] >= size[0] else 0
     x, y = (z + 1) % 3, (z + 2) % 3
-    shear_x, shear_y, shear_z = direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]
+    shear_x, shear_y = direction[x] / direction[z], direction[y] / direction[z]
     a, b, c = corners - origin
     ax, bx, cx = (p[x] - shear_x * p[z] for p in (a, b, c))
     ay, by, cy = (p[y] - shear_y * p[z] for p in (a, b, c))
@@ -180,7 +180,7 @@ def woop(corners, origin, direction):
     whole = u + v + w
     if whole == 0:
         return None
-    return (u * a[z] + v * b[z] + w * c[z]) * shear_z / whole, v / whole, w / whole
+    return (u * a[z] + v * b[z] + w * c[z]) / (whole * direction[z]), v / whole, w / whole
 
 
 @pytest.mark.parametrize("kind", ["soup", "soup_float32", "lattice", "sizes", "far_away"])

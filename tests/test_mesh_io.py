@@ -637,7 +637,7 @@ def test_ply_body_of_any_bytes(body: bytes) -> None:
 
 
 def test_the_mutation_test_would_see_a_reader_that_lets_an_exception_through(monkeypatch: pytest.MonkeyPatch) -> None:
-    def careless(content: bytes) -> Mesh:
+    def careless(content: bytes, repairs: object = None) -> Mesh:
         raise KeyError("x")
 
     monkeypatch.setitem(mesh_io._PARSERS, ".ply", careless)

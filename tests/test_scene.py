@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from renderer.camera import OrthographicCamera, PerspectiveCamera
 from renderer.errors import MeshError, SceneError
 from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Mirror, Phong
+from renderer.material import MATERIAL_COLUMNS, Dielectric, Mirror, Phong
 from renderer.mesh import Mesh
 from renderer.mesh_io import save_ply
 from renderer.scene import Floor, Scene, SceneObject, load_scene
@@ -596,7 +596,8 @@ def test_packed_rows_follow_the_instances(folder: Path) -> None:
     scene = load(folder, FULL)
     mesh, world = pack(scene)
     names = list(scene.materials)
-    assert [names[i] for i in world.material] == ["glass"] * 12 + ["mirror"] * 12 + ["clay"] * 6 + ["glass"] * 6
+    rows = world.material // MATERIAL_COLUMNS
+    assert [names[i] for i in rows] == ["glass"] * 12 + ["mirror"] * 12 + ["clay"] * 6 + ["glass"] * 6
     assert world.smooth.tolist() == [True] * 12 + [False] * 24
     start = 0
     for instance in scene.instances:

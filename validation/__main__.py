@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-SECTIONS = ("hits", "images", "efficiency")
+SECTIONS = ("hits", "images", "stability", "efficiency")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -88,6 +88,10 @@ def _section(
         from validation import images
 
         return images.run(quick, pictures, step)
+    if name == "stability":
+        from validation import numerical
+
+        return numerical.run(quick, step)
     from validation import efficiency
 
     return efficiency.run(quick, step), []

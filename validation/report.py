@@ -6,6 +6,8 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from validation.plots import stability_figures
+
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -15,6 +17,7 @@ def page(metrics: dict[str, Any], pictures: Path) -> str:
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters["number"] = number
+    environment.globals["figures"] = stability_figures
     environment.globals["picture"] = lambda name: _data_uri(pictures / name)
     return environment.get_template("report.html").render(m=metrics)
 

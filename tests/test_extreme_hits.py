@@ -1,0 +1,131 @@
+"""Rows 1 to 32 of the extreme cases hold, and each judgement fails when what it judges is broken."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from renderer import Hits, Mesh, Octree
+from validation import extreme_builds
+from validation.extreme import ExtremeCase
+from validation.extreme_hits import CASES
+
+ROWS = {case.number: case for case in CASES}
+Break = Callable[[Hits], Hits]
+
+
+def test_the_table_has_every_row_once_and_in_order():
+    assert [case.number for case in CASES] == list(range(1, 33))
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: str(case.number))
+def test_the_row_holds(case: ExtremeCase):
+    record = case.record(quick=True)
+    assert record["holds"] is True, record
+    assert record["ours"]
+    assert case.tolerance and case.judges
+
+
+def broken(monkeypatch: pytest.MonkeyPatch, spoil: Break) -> None:
+    """Octrees, but not brute force, answer what ``spoil`` makes of the right hits."""
+    right = Octree.closest_hit
+    monkeypatch.setattr(Octree, "closest_hit", lambda *ray, **bounds: spoil(right(*ray, **bounds)))
+
+
+def a_hit_lost(hits: Hits) -> Hits:
+    rows = np.flatnonzero(hits.hit)
+    t, face, u, v = hits.t.copy(), hits.face.copy(), hits.u.copy(), hits.v.copy()
+    lost = rows[len(rows) // 2 : len(rows) // 2 + 1]
+    t[lost], face[lost], u[lost], v[lost] = np.inf, -1, np.nan, np.nan
+    return replace(hits, t=t, face=face, u=u, v=v)
+
+
+def t_an_ulp_off(hits: Hits) -> Hits:
+    return replace(hits, t=np.nextafter(hits.t, np.inf))
+
+
+def t_as_rough_as_float32(hits: Hits) -> Hits:
+    """Relative, because some rows go beyond float32's range."""
+    return replace(hits, t=hits.t * (1 + 2.0**-22))
+
+
+def another_duplicate(hits: Hits) -> Hits:
+    return replace(hits, face=np.where(hits.hit, hits.face + 1, -1))
+
+
+def everything_hit(hits: Hits) -> Hits:
+    hit = hits.hit
+    filled = [np.where(hit, a, b) for a, b in ((hits.t, 1.0), (hits.face, 0), (hits.u, 0.25), (hits.v, 0.25))]
+    return Hits(*filled, hits._mesh)
+
+
+@pytest.mark.parametrize(
+    "spoil, rows",
+    [
+        (a_hit_lost, (1, 2, 3, 4, 5, 6, 8, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 26, 29, 30, 31)),
+        (t_an_ulp_off, (4, 5, 6, 13, 20, 21, 22, 23, 24, 26, 30, 31)),
+        (t_as_rough_as_float32, (3, 14, 16, 18, 19, 29)),
+        (another_duplicate, (18, 19, 21, 30)),
+        (everything_hit, (7, 9, 25, 28, 26)),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_the_row_fails_when_the_octree_is_broken(monkeypatch, spoil: Break, rows: tuple[int, ...]):
+    broken(monkeypatch, spoil)
+    assert [row for row in rows if ROWS[row].run(True).holds] == []
+
+
+def test_row_11_fails_where_the_interval_is_open(monkeypatch):
+    right = Octree.closest_hit
+
+    def open_interval(self, origins, directions, t_min=0.0, t_max=np.inf):
+        return right(self, origins, directions, np.nextafter(t_min, np.inf), t_max)
+
+    monkeypatch.setattr(Octree, "closest_hit", open_interval)
+    assert not ROWS[11].run(True).holds
+
+
+def test_row_10_fails_where_bad_rays_pass(monkeypatch):
+    right = Octree.any_hit
+    monkeypatch.setattr(
+        Octree, "any_hit", lambda self, origins, directions: right(self, np.ones((5, 3)), np.ones((5, 3)))
+    )
+    assert not ROWS[10].run(True).holds
+
+
+def test_rows_1_20_and_25_look_at_any_hit_too(monkeypatch):
+    monkeypatch.setattr(Octree, "any_hit", lambda self, origins, directions: np.zeros(len(origins), np.bool_))
+    assert not ROWS[1].run(True).holds
+    assert not ROWS[20].run(True).holds
+    monkeypatch.setattr(Octree, "any_hit", lambda self, origins, directions: np.ones(len(origins), np.bool_))
+    assert not ROWS[25].run(True).holds
+
+
+@pytest.mark.parametrize("row", [26, 27])
+def test_bad_meshes_must_be_refused(monkeypatch, row):
+    def mend(self):
+        """Accept what came, as a mesh that silently drops the bad does."""
+        object.__setattr__(self, "vertices", np.eye(3))
+        object.__setattr__(self, "faces", np.array([[0, 1, 2]], np.int32))
+
+    monkeypatch.setattr(Mesh, "__post_init__", mend)
+    assert not ROWS[row].run(True).holds
+
+
+@pytest.mark.parametrize("row", [21, 22, 23, 32])
+def test_builds_that_copy_references_fail(monkeypatch, row):
+    right = Octree.stats.fget
+    monkeypatch.setattr(
+        Octree, "stats", property(lambda self: replace(right(self), references=8 * len(self.mesh.faces)))
+    )
+    assert not ROWS[row].run(True).holds
+
+
+def test_row_32_fails_on_a_wrong_hit_and_on_too_much_memory(monkeypatch):
+    monkeypatch.setattr(extreme_builds, "MEMORY_LIMIT_GB", 0.01)
+    assert not ROWS[32].run(True).holds
+    monkeypatch.undo()
+    some = np.arange(10_000) % 1000 == 0
+    broken(monkeypatch, lambda hits: replace(hits, t=np.where(some, hits.t * 1.001, hits.t)))
+    assert not ROWS[32].run(True).holds

@@ -1,0 +1,98 @@
+"""The stability curves: ours passes, and a shift, a miss or a wrong face is found by the gates."""
+
+import json
+
+import numpy as np
+import pytest
+
+from validation import exact, stability
+from validation.compare_hits import HitArrays
+
+EFFORT = stability.Effort(rays=20, leaks=300)
+
+
+def judged(sweep, x, monkeypatch, change):
+    """The gates of one point when our answers are changed."""
+    answered = stability.answer
+
+    def changed(kernel, sample):
+        found = answered(kernel, sample)
+        return change(found) if kernel == "ours" else found
+
+    monkeypatch.setattr(stability, "answer", changed)
+    point = stability.point(sweep, x, 20, np.random.default_rng(3))
+    wrong, beyond = stability.judge(sweep.name, [point])
+    return wrong, beyond
+
+
+SWEEPS = {sweep.name: sweep for sweep in stability.SWEEPS}
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_our_hits_are_right_at_both_ends_of_each_curve(name, monkeypatch):
+    for x in (SWEEPS[name].xs[0], SWEEPS[name].xs[-1]):
+        wrong, beyond = judged(SWEEPS[name], x, monkeypatch, lambda found: found)
+        assert wrong.passed and beyond.passed
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_a_shift_of_t_by_1e12th_fails(name, monkeypatch):
+    x = SWEEPS[name].xs[0]
+    wrong, beyond = judged(SWEEPS[name], x, monkeypatch, lambda f: HitArrays(f.t * (1 + 1e-12), f.face))
+    assert wrong.passed and not beyond.passed
+
+
+def test_a_missed_ray_fails(monkeypatch):
+    def drop(found):
+        first = np.arange(len(found.t)) == 0
+        return HitArrays(np.where(first, np.inf, found.t), np.where(first, -1, found.face))
+
+    wrong, beyond = judged(SWEEPS["scale"], 1.0, monkeypatch, drop)
+    assert wrong.value == 1 and beyond.passed
+
+
+def test_a_wrong_face_fails(monkeypatch):
+    wrong, _ = judged(SWEEPS["scale"], 1.0, monkeypatch, lambda f: HitArrays(f.t, (f.face + 1) % 1280))
+    assert wrong.value == 20
+
+
+def test_a_false_hit_is_counted():
+    vertices, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]], np.int32)
+    rays = stability._towards(np.array([[2.0, 2, 1], [0.25, 0.25, 1]]), np.array([[2.0, 2, 0], [0.25, 0.25, 0]]))
+    truth = exact.closest_hits(vertices, faces, rays.origins, rays.directions)
+    found = HitArrays(np.array([1.0, 1.0]), np.array([0, 0]))
+    errors = stability.errors_of(found, stability.Sample(vertices, faces, rays), truth)
+    assert (errors.false_hits, errors.missed, errors.wrong_face, errors.beyond_bound) == (1, 0, 0, 0)
+    assert errors.relative.tolist() == [0.0] and errors.ulp.tolist() == [0.0]
+
+
+def test_errors_are_counted_in_ulp_and_relative():
+    vertices, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]], np.int32)
+    rays = stability._towards(np.array([[0.25, 0.25, 1]]), np.array([[0.25, 0.25, 0.5]]))
+    truth = exact.closest_hits(vertices, faces, rays.origins, rays.directions)
+    found = HitArrays(np.array([2.0 + 3 * 2.0**-51]), np.array([0]))
+    errors = stability.errors_of(found, stability.Sample(vertices, faces, rays), truth)
+    assert errors.ulp.tolist() == [3.0] and errors.relative.tolist() == [3 * 2.0**-52]
+
+
+@pytest.mark.parametrize("angle", [1e-1, 1e-4])
+def test_grazing_rays_have_their_angle(angle):
+    for sample in stability.grazing(angle, 20, np.random.default_rng(1)):
+        a, b, c = sample.vertices
+        normal = np.cross(b - a, c - a)
+        cosine = sample.rays.directions @ normal / np.linalg.norm(sample.rays.directions, axis=1)
+        assert np.abs(cosine) / np.linalg.norm(normal) == pytest.approx(np.full(2, np.sin(angle)), rel=1e-9)
+
+
+def test_the_record_is_json_and_complete(monkeypatch):
+    monkeypatch.setattr(stability, "QUICK", EFFORT)
+    record, gates = stability.run(True, lambda name: None)
+    json.dumps(record, allow_nan=False)
+    assert len(gates) == 2 * len(SWEEPS) and all(gate.passed for gate in gates)
+    assert [p["x"] for p in record["offset"]["points"]] == [10.0**k for k in range(10)]
+    assert [row["faces"] for row in record["leaks"]] == [1280, 5120, 20480, 81920]
+    assert all(row["ours"] == 0 and row["embree_default"] > 0 for row in record["leaks"])
+    # Float32 cannot tell the sphere from a point there: all is wrong, and there is no error to speak of.
+    farthest = record["offset"]["points"][-1]
+    assert farthest["embree_robust"]["wrong_share"] == 1.0 and farthest["embree_robust"]["relative_max"] is None
+    assert farthest["ours"]["wrong_share"] == 0.0

@@ -1,0 +1,183 @@
+"""Curves as inline SVG, for light and dark pages: drawn from stored records, with no font, link or date inside."""
+
+import hashlib
+import io
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Errors of 0 have no place on a logarithmic axis; this lies below the roundoff of float64, 1.1e-16.
+FLOOR = 1e-17
+# Okabe and Ito's blue, vermilion and green, which colour-blind readers tell apart, at a lightness between a white and
+# a dark page; markers and strokes differ as well.
+_LOOKS = (("#2f86c9", "o", "-"), ("#dd6b20", "s", "-"), ("#169b74", "^", "--"), ("#b86fa0", "D", "-."))
+_GREY = "#808790"
+# Text takes the page's own colour: this one, which nothing else has, is replaced.
+_INK = "#010203"
+_SVG = "http://www.w3.org/2000/svg"
+_HREF = "{http://www.w3.org/1999/xlink}href"
+_FONT = "DejaVu Sans"  # comes with matplotlib; text is laid out with it and shown in the page's own sans-serif
+_PIXELS = 100.0  # an inch
+
+_NAMES = {"ours": "ours (float64)", "embree_default": "Embree default", "embree_robust": "Embree robust"}
+
+
+class Series(NamedTuple):
+    """One curve; a y that is None, as where nothing was hit, is left out."""
+
+    name: str
+    x: Sequence[float]
+    y: Sequence[float | None]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves over one pair of axes; x is logarithmic, y too unless it is a share from 0 to 1.
+
+    With ``roundoffs`` y is a relative error, and an axis on the right counts it in ulp of float64 at 1.
+    """
+
+    series: Sequence[Series]
+    y_label: str
+    share: bool = False
+    roundoffs: bool = False
+
+
+def loglog(series: Sequence[Series], *, x_label: str, y_label: str, title: str) -> str:
+    """One panel of 600 x 360 pixels, both axes logarithmic; a y of 0 is drawn at ``FLOOR``.
+
+    Returns an ``<svg>`` element to be put into a page: equal arguments give equal text, and its ids are its own as
+    long as no other plot of the page has the same arguments. Raises ``ValueError`` for an x that is not positive.
+    """
+    return draw([Panel(series, y_label)], x_label=x_label, title=title)
+
+
+def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
+    """Panels one below the other, the first the largest, with one x axis and one legend; see ``loglog``."""
+    bad = [x for panel in panels for s in panel.series for x in s.x if not 0.0 < x < math.inf]
+    if bad:
+        raise ValueError(f"series: expected positive, finite x for {title!r}, got {bad[0]}")
+    identity = hashlib.sha256(repr((panels, x_label, title)).encode()).hexdigest()[:10]
+    settings: dict[Any, Any] = {
+        "svg.hashsalt": identity, "svg.fonttype": "none", "font.family": _FONT, "font.size": 9.0,
+        "axes.edgecolor": _GREY, "xtick.color": _GREY, "ytick.color": _GREY, "xtick.labelcolor": _INK,
+        "ytick.labelcolor": _INK, "axes.labelcolor": _INK, "text.color": _INK,
+        "axes.spines.top": False, "axes.spines.right": False,
+    }  # fmt: skip
+    with matplotlib.rc_context(settings):
+        height = 360.0 + 150.0 * (len(panels) - 1)
+        figure = Figure(figsize=(600 / _PIXELS, height / _PIXELS), dpi=_PIXELS, layout="constrained")
+        figure.patch.set_visible(False)
+        ratios = [2.4] + [1.0] * (len(panels) - 1)
+        rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+        for panel, axes in zip(panels, rows, strict=True):
+            _plot(panel, axes)
+        rows[-1].set_xlabel(x_label)
+        handles, names = rows[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper center", ncols=len(names), frameon=False)
+        text = io.StringIO()
+        metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        figure.savefig(text, format="svg", metadata=metadata)
+    return _inline(text.getvalue(), title, f"plot-{identity}")
+
+
+def stability_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
+    """The figures of the record of ``validation.stability.run``: for each a title (its caption too) and an SVG."""
+    sweeps = {name: part for name, part in record.items() if isinstance(part, dict) and "points" in part}
+    return [_error_figure(name, part) for name, part in sweeps.items()] + [_leak_figure(record["leaks"])]
+
+
+def _error_figure(name: str, sweep: Mapping[str, Any]) -> dict[str, str]:
+    points = sweep["points"]
+    x = [p["x"] for p in points]
+    errors = [Series(shown, x, [p[kernel]["relative_max"] for p in points]) for kernel, shown in _NAMES.items()]
+    wrong = [Series(shown, x, [p[kernel]["wrong_share"] for p in points]) for kernel, shown in _NAMES.items()]
+    panels = [Panel(errors, "largest relative error of t", roundoffs=True), Panel(wrong, "wrong", share=True)]
+    title = (
+        f"Error against {name}: the largest of {points[0]['rays']} rays at each point, and the share with a wrong "
+        f"verdict (missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}; a point is left out "
+        "where nothing was hit."
+    )
+    return {"title": title, "svg": draw(panels, x_label=sweep["label"], title=f"Error of t against {name}")}
+
+
+def _leak_figure(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    x = [row["faces"] for row in rows]
+    # Half a ray stands for none: the most that this many rays can say.
+    floor = 0.5e6 / max(row["rays"] for row in rows)
+    series = [Series(s, x, [1e6 * row[k] / row["rays"] or floor for row in rows]) for k, s in _NAMES.items()]
+    title = (
+        f"Leaks from inside icospheres: of {rows[0]['rays']:,} rays a mesh, half aimed at edges and half at vertices. "
+        f"No leak at all is drawn at {floor:.3g} a million, half a ray."
+    )
+    svg = loglog(series, x_label="faces", y_label="leaks per million rays", title="Leaks against mesh size")
+    return {"title": title, "svg": svg}
+
+
+def _plot(panel: Panel, axes: Axes) -> None:
+    axes.patch.set_visible(False)
+    axes.set_xscale("log")
+    axes.set_ylabel(panel.y_label)
+    if panel.share:
+        axes.set_ylim(-0.05, 1.05)
+        axes.set_yticks([0.0, 0.5, 1.0], ["0 %", "50 %", "100 %"])
+    else:
+        axes.set_yscale("log")
+    if panel.roundoffs:
+        right = axes.secondary_yaxis("right", functions=(_in_ulp, _relative))
+        right.set_ylabel("in ulp of float64")
+    for index, series in enumerate(panel.series):
+        colour, marker, stroke = _LOOKS[index % len(_LOOKS)]
+        y = [math.nan if value is None else value if panel.share else max(value, FLOOR) for value in series.y]
+        axes.plot(series.x, y, color=colour, marker=marker, ls=stroke, markersize=4.5, linewidth=1.4, label=series.name)
+    axes.grid(color=_GREY, alpha=0.25, linewidth=0.6)
+
+
+def _in_ulp(relative: Any) -> Any:
+    return relative * 2.0**52
+
+
+def _relative(ulp: Any) -> Any:
+    return ulp * 2.0**-52
+
+
+def _inline(svg: str, title: str, prefix: str) -> str:
+    """The bare element, its ids under ``prefix``, named for readers that do not see it."""
+    ElementTree.register_namespace("", _SVG)
+    root = ElementTree.fromstring(svg)
+    # Within a page a <style> would hold for all of it; these two properties are inherited as well.
+    for parent in list(root.iter()):
+        for child in [c for c in parent if c.tag in (f"{{{_SVG}}}metadata", f"{{{_SVG}}}style")]:
+            parent.remove(child)
+    root.set("style", "stroke-linejoin: round; stroke-linecap: butt")
+    for element in root.iter():
+        element.attrib = {_local(name): _own(name, value, prefix) for name, value in element.attrib.items()}
+    for name in ("width", "height", "version"):
+        root.attrib.pop(name, None)
+    root.attrib |= {"role": "img", "aria-labelledby": f"{prefix}-title"}
+    named = ElementTree.Element(f"{{{_SVG}}}title", {"id": f"{prefix}-title"})
+    named.text = title
+    root.insert(0, named)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _local(name: str) -> str:
+    """An attribute's name; ``href`` needs no namespace in SVG 2."""
+    return "href" if name == _HREF else name
+
+
+def _own(name: str, value: str, prefix: str) -> str:
+    """An attribute's value with ids made this plot's own and the ink made the page's."""
+    if name == "id":
+        return f"{prefix}-{value}"
+    if name in ("href", _HREF) and value.startswith("#"):
+        return f"#{prefix}-{value[1:]}"
+    own = value.replace("url(#", f"url(#{prefix}-").replace(_INK, "currentColor")
+    return re.sub(rf"'?{_FONT}'?(, sans-serif)?", "sans-serif", own)

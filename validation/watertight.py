@@ -1,0 +1,300 @@
+"""No ray leaves a closed mesh unseen: a sweep over shapes, places, sizes and ways to build the tree.
+
+From points inside a closed mesh every ray hits, so each miss is a leak, and nobody's arithmetic need be trusted to
+say so. The rays are aimed in float64 at points of edges and at vertices, where neighbours must agree to the last bit.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.mesh import Mesh
+from renderer.mesh_io import load_mesh
+from renderer.octree import Octree
+from renderer.shapes import icosphere, lattice_faces, torus
+from validation.cases import SCENES
+from validation.embree import Embree
+from validation.gates import Gate
+from validation.rays import RayBatch, float32_exact
+
+Floats = NDArray[np.float64]
+
+SEED = 2027
+OFFSETS = (0.0, 1e2, 1e4, 1e6)
+SCALES = (1e-6, 1.0, 1e6)
+# Where float32 boxes cannot tell one face from another each ray meets all faces, and fewer rays take as long.
+CROWDED = 0.1
+KINDS = ("edge", "vertex")
+# The offset has this direction, so that no coordinate is as far as another.
+_AWAY = np.array([1.0, -0.75, 0.375])
+# An orthogonal matrix with no structure; its rounding moves vertices, but neighbours still share them.
+_TURN = np.linalg.qr(np.array([[2.0, 3.0, 1.0], [-1.0, 2.0, 5.0], [4.0, -1.0, 1.0]]))[0]
+
+
+class Closed(NamedTuple):
+    """A closed mesh and points within it, (n, 3) for a generator and n."""
+
+    name: str
+    mesh: Mesh
+    inside: Callable[[Generator, int], Floats]
+
+
+class Build(NamedTuple):
+    """Options of ``Octree``."""
+
+    split: Literal["midpoint", "sah"]
+    leaf_size: int
+    max_depth: int
+
+
+SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
+BUILDS = tuple(Build(*options) for options in product(SPLITS, (1, 4, 32), (1, 8, 32)))
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Rays of each kind in all, how many of ``BUILDS`` each placement is built with, rays of each kind for Embree."""
+
+    rays: int
+    builds: int
+    embree: int
+
+
+class Shot(NamedTuple):
+    """What one kernel let through of the rays of one kind in one place; the build's options are of ours alone."""
+
+    kernel: str
+    mesh: str
+    kind: str
+    offset: float
+    scale: float
+    split: str
+    leaf_size: int
+    max_depth: int
+    rays: int
+    leaks: int
+
+
+QUICK = Effort(rays=100_000, builds=1, embree=500)
+FULL = Effort(rays=1_000_000, builds=9, embree=5_000)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A closed mesh turned or not, scaled, then moved; ``place`` does the same to any point."""
+
+    closed: Closed
+    turned: bool
+    offset: float
+    scale: float
+
+    def place(self, points: Floats) -> Floats:
+        """Points (n, 3) of the mesh's own frame where they are in this placement."""
+        return self._turn(points) * self.scale + self.offset * _AWAY
+
+    def vertices(self) -> Floats:
+        """The placed vertices, rounded to float64; with the same faces the mesh is still closed."""
+        return self.place(self.closed.mesh.vertices)
+
+    def rays(self, kind: str, count: int, rng: Generator) -> RayBatch:
+        """``count`` rays from inside, aimed at the placed vertices or at the edges between them."""
+        return aimed(kind, self.vertices(), self.closed.mesh.faces, self.place(self.closed.inside(rng, count)), rng)
+
+    def keeps_sides(self, vertices: Floats) -> bool:
+        """Whether the rounded ``vertices`` leave every face an area, on the side where it was."""
+        before = _area_vectors(self._turn(self.closed.mesh.vertices), self.closed.mesh.faces)
+        after = _area_vectors(vertices, self.closed.mesh.faces)
+        return bool(((before * after).sum(axis=1) > 0).all())
+
+    @property
+    def weight(self) -> float:
+        """How many rays it gets beside the others: ``CROWDED`` where float32's ulp is as large as the mesh."""
+        return CROWDED if self.scale <= self.offset * 2.0**-23 else 1.0
+
+    def record(self) -> dict[str, object]:
+        """For JSON."""
+        return {"mesh": self.closed.name, "turned": self.turned, "offset": self.offset, "scale": self.scale}
+
+    def _turn(self, points: Floats) -> Floats:
+        return points @ _TURN.T if self.turned else points
+
+
+def aimed(kind: str, vertices: Floats, faces: NDArray[np.int32], origins: Floats, rng: Generator) -> RayBatch:
+    """One ray from each of ``origins`` (n, 3) at a random vertex, or at a random point of a random edge.
+
+    The corners are seen from the origin before a point between them is taken: far from zero that keeps the ray within
+    rounding of the edge as the kernel sees it; through a rounded point it would pass the edge at a distance.
+    """
+    count = len(origins)
+    corners = vertices[faces[rng.integers(0, len(faces), count)]] - origins[:, None]
+    first = rng.integers(0, 3, count)
+    start, end = corners[np.arange(count), first], corners[np.arange(count), (first + 1) % 3]
+    if kind == "vertex":
+        return RayBatch(kind, origins, start)
+    along = rng.random((count, 1))
+    return RayBatch(kind, origins, (1 - along) * start + along * end)
+
+
+def leaks(octree: Octree, rays: RayBatch) -> int:
+    """Rays that closest hit or any hit lets through."""
+    missed = ~octree.closest_hit(rays.origins, rays.directions).hit
+    missed |= ~octree.any_hit(rays.origins, rays.directions)
+    return int(np.count_nonzero(missed))
+
+
+def embree_leaks(embree: Embree, rays: RayBatch) -> int:
+    """Rays that Embree's closest hit lets through."""
+    return int(np.count_nonzero(embree.closest_hit(rays.origins, rays.directions)[1] < 0))
+
+
+def closed_meshes() -> tuple[Closed, ...]:
+    """What is shot at from inside: convex and not, a knot, and a box whose every number is an integer."""
+    balls = (Closed(f"icosphere {level}", icosphere(level), _cube(0.0, 0.4)) for level in (3, 4, 5, 6))
+    ring = torus(1.0, 0.4, 100, 40)
+    knot = load_mesh(SCENES / "models" / "torus_knot.ply")
+    # Its vertices lie section by section, 50 to each: the mean of a section is in the middle of the tube.
+    core = knot.vertices.reshape(-1, 50, 3).mean(axis=1)
+    hills = icosphere(4)
+    return (
+        *balls,
+        Closed("integer box", integer_box(), _cube(4.0, 3.0)),
+        Closed("torus", ring, _in_ring),
+        Closed("hilly sphere", Mesh(hilly(hills.vertices), hills.faces), _cube(0.0, 0.2)),
+        Closed("torus knot", knot, lambda rng, count: core[rng.integers(0, len(core), count)]),
+    )
+
+
+def integer_box(size: int = 8) -> Mesh:
+    """The box [0, size]^3 of unit squares, two faces each; neighbours share vertices, every number is an integer."""
+    row, column = np.divmod(np.arange((size + 1) ** 2), size + 1)
+    squares = lattice_faces(size + 1, size + 1)
+    corners = []
+    for axis in range(3):
+        for side in ((column, row, np.full(row.shape, size)), (row, column, np.zeros(row.shape, int))):
+            corners.append(np.roll(side, axis, axis=0).T[squares])
+    vertices, index = np.unique(np.concatenate(corners).reshape(-1, 3), axis=0, return_inverse=True)
+    return Mesh(vertices.astype(np.float64), index.reshape(-1, 3).astype(np.int32), name="integer box")
+
+
+def hilly(points: Floats) -> Floats:
+    """Points of the unit sphere moved along their radius by up to 0.3: not convex, seen whole from the centre."""
+    x, y, z = 6.0 * points.T
+    return points * (1.0 + 0.3 * np.sin(x) * np.sin(y + 1.0) * np.sin(z + 2.0))[:, None]
+
+
+def placements(closed: Closed) -> Iterator[Placement]:
+    """One closed mesh in every place."""
+    for turned, offset, scale in product((False, True), OFFSETS, SCALES):
+        yield Placement(closed, turned, offset, scale)
+
+
+def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:
+    """Sweep all; returns a record for JSON and a gate for each mesh and kind of ray."""
+    effort = QUICK if quick else FULL
+    shot: list[Shot] = []
+    left_out = []
+    meshes = closed_meshes()
+    share = effort.rays / effort.builds / sum(p.weight for closed in meshes for p in placements(closed))
+    for index, closed in enumerate(meshes):
+        step(f"watertight: {closed.name}")
+        for place, placement in enumerate(placements(closed)):
+            if not placement.keeps_sides(placement.vertices()):
+                left_out.append(placement.record())
+                continue
+            # Seeded by place, so that leaving one out changes no other.
+            rng = np.random.default_rng([SEED, index, place])
+            shot += shoot(placement, builds(place, effort.builds), share, rng)
+            shot += shoot_embree(placement, effort.embree, rng)
+    record = {
+        "meshes": sums(shot, "mesh", "kind"),
+        "places": sums(shot, "offset", "scale"),
+        "builds": sums([s for s in shot if s.kernel == "ours"], "split", "leaf_size", "max_depth"),
+        "left_out": left_out,
+        "seed": SEED,
+    }
+    return record, gates(shot)
+
+
+def gates(shot: Sequence[Shot]) -> list[Gate]:
+    """No leak of ours in any mesh, for each kind of ray."""
+    reason = "a closed mesh has no holes, wherever it lies and however its tree is built"
+    found = []
+    for row in sums([s for s in shot if s.kernel == "ours"], "mesh", "kind"):
+        subject = f"{row['mesh']}, {row['ours_rays']:,} {row['kind']} rays from inside, all places and builds"
+        found.append(Gate("stability", subject, "leaks", row["ours"], "at most", 0.0, reason))
+    return found
+
+
+def sums(shot: Sequence[Shot], *keys: str) -> list[dict[str, Any]]:
+    """One row for each combination of ``keys`` that occurs: rays and leaks of each kernel in ``shot``.
+
+    Leaks are None where a kernel got no rays.
+    """
+    kernels = sorted({s.kernel for s in shot}, reverse=True)
+    rows: dict[tuple[object, ...], Counter[str]] = {}
+    leaked: dict[tuple[object, ...], Counter[str]] = {}
+    for s in shot:
+        row = tuple(getattr(s, key) for key in keys)
+        rows.setdefault(row, Counter())[s.kernel] += s.rays
+        leaked.setdefault(row, Counter())[s.kernel] += s.leaks
+    found = []
+    for row, rays in rows.items():
+        counts = {f"{k}_rays": rays[k] for k in kernels} | {k: leaked[row][k] if rays[k] else None for k in kernels}
+        found.append(dict(zip(keys, row, strict=True)) | counts)
+    return found
+
+
+def builds(place: int, count: int) -> list[Build]:
+    """``count`` builds for a mesh's place: with 1 each mesh meets all, with 9 it does at each offset and scale."""
+    # As the mesh is and turned are half the places apart, and must take builds of different parity.
+    first = place - place // (len(OFFSETS) * len(SCALES))
+    return [BUILDS[(first + 2 * i) % len(BUILDS)] for i in range(count)]
+
+
+def shoot(placement: Placement, built: Sequence[Build], share: float, rng: Generator) -> Iterator[Shot]:
+    """Our rays in one placement, ``share`` times its weight of each kind through each of the trees ``built``."""
+    vertices = placement.vertices()
+    count = math.ceil(share * placement.weight)
+    for build in built:
+        octree = Octree(vertices, placement.closed.mesh.faces, **build._asdict())
+        for kind in KINDS:
+            lost = leaks(octree, placement.rays(kind, count, rng))
+            yield Shot("ours", placement.closed.name, kind, placement.offset, placement.scale, *build, count, lost)
+
+
+def shoot_embree(placement: Placement, count: int, rng: Generator) -> Iterator[Shot]:
+    """The same by Embree for information, on vertices and origins as float32 holds them, if the mesh survives that."""
+    vertices, faces = float32_exact(placement.vertices()), placement.closed.mesh.faces
+    if not placement.keeps_sides(vertices):
+        return
+    for kind in KINDS:
+        origins = float32_exact(placement.place(placement.closed.inside(rng, count)))
+        rays = aimed(kind, vertices, faces, origins, rng)
+        for mode in ("robust", "default"):
+            embree = Embree(vertices, faces, robust=mode == "robust")
+            lost = embree_leaks(embree, rays)
+            where = placement.closed.name, kind, placement.offset, placement.scale
+            yield Shot(f"embree_{mode}", *where, "", 0, 0, count, lost)
+
+
+def _area_vectors(vertices: Floats, faces: NDArray[np.int32]) -> Floats:
+    corners = vertices[faces]
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _cube(centre: float, half: float) -> Callable[[Generator, int], Floats]:
+    return lambda rng, count: centre + rng.uniform(-half, half, (count, 3))
+
+
+def _in_ring(rng: Generator, count: int) -> Floats:
+    """Points near the circle of radius 1 about the y axis, in the tube of ``torus(1, 0.4)``."""
+    angle = rng.uniform(0.0, 2.0 * np.pi, count)
+    ring = np.stack([np.cos(angle), np.zeros(count), np.sin(angle)], axis=1)
+    return ring + rng.uniform(-0.1, 0.1, (count, 3))
