@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from renderer.intersect import Ray
 from renderer.jit import kernel
 from renderer.simd import keep, pointer
 from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute, view
@@ -42,13 +43,14 @@ def closest_chunk(tree, depth, scale, rays, out, begin, end):
     scratch = np.empty(7 * depth + 8, np.int64)
     stack, seen = pointer(scratch), view(tree)
     for i in range(begin, end):
+        low = scale * t_min[i if len(t_min) > 1 else 0]
+        high = scale * t_max[i if len(t_max) > 1 else 0]
         ox, oy, oz = scale * origins[i, 0], scale * origins[i, 1], scale * origins[i, 2]
-        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        low, high = scale * t_min[i if len(t_min) > 1 else 0], scale * t_max[i if len(t_max) > 1 else 0]
+        ray = Ray(ox, oy, oz, directions[i, 0], directions[i, 1], directions[i, 2], low)
         if depth == 0:
-            t, face, u, v = closest_hit_brute(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
+            t, face, u, v = closest_hit_brute(seen, ray, high, stack)
         else:
-            t, face, u, v = closest_hit(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
+            t, face, u, v = closest_hit(seen, ray, high, stack)
         if face == NO_FACE:
             t_out[i], face_out[i], u_out[i], v_out[i] = np.inf, -1, np.nan, np.nan
         else:
@@ -63,11 +65,12 @@ def any_chunk(tree, depth, scale, rays, out, begin, end):
     scratch = np.empty(7 * depth + 8, np.int64)
     stack, seen = pointer(scratch), view(tree)
     for i in range(begin, end):
+        low = scale * t_min[i if len(t_min) > 1 else 0]
+        high = scale * t_max[i if len(t_max) > 1 else 0]
         ox, oy, oz = scale * origins[i, 0], scale * origins[i, 1], scale * origins[i, 2]
-        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        low, high = scale * t_min[i if len(t_min) > 1 else 0], scale * t_max[i if len(t_max) > 1 else 0]
+        ray = Ray(ox, oy, oz, directions[i, 0], directions[i, 1], directions[i, 2], low)
         if depth == 0:
-            out[i] = any_hit_brute(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
+            out[i] = any_hit_brute(seen, ray, high, stack)
         else:
-            out[i] = any_hit(seen, ox, oy, oz, dx, dy, dz, low, high, stack)
+            out[i] = any_hit(seen, ray, high, stack)
     keep(scratch)

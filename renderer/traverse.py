@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.intersect import (
-    Ray,
     box_limit,
     enter_boxes,
     hit_triangles,
@@ -134,7 +133,7 @@ def push_octants(tree, base, t0, bits, stack, top):
 
 
 @kernel
-def closest_hit(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
+def closest_hit(tree, ray, t_max, stack):
     """Closest hit of one ray: (t, face, u, v), with face = NO_FACE and t = t_max on a miss.
 
     The interval [t_min, t_max] is closed; t counts in units of |direction|; no face is culled. Among equal t the
@@ -142,7 +141,6 @@ def closest_hit(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
     not depend on the order of the visits. ``stack`` is int64 scratch of 7 * depth + 8 entries: each level leaves at
     most seven octants waiting. Watertight and deterministic (Woop et al. 2013); see ``intersect`` for the bounds.
     """
-    ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
     t, face, u, v, doubtful = _closest_surely(tree, ray, t_max, stack)
     if doubtful != 0:
         return _closest_carefully(tree, ray, t_max, stack)
@@ -199,9 +197,8 @@ def _closest_surely(tree, ray, t_max, stack):
 
 
 @kernel
-def any_hit(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
+def any_hit(tree, ray, t_max, stack):
     """Whether anything lies within [t_min, t_max] of one ray: the same test, in no order, ended by the first hit."""
-    ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
     found, doubtful = _any_surely(tree, ray, t_max, stack)
     if not found and doubtful != 0:
         return _closest_carefully(tree, ray, t_max, stack)[1] != NO_FACE
@@ -254,22 +251,20 @@ def any_in_blocks(tree, first, count, t_min, t_max, shear):
 
 
 @kernel
-def closest_hit_brute(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
+def closest_hit_brute(tree, ray, t_max, stack):
     """``closest_hit`` over every block; the nodes and the stack are not read."""
-    ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
     shear, miss, count = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0), tree.count
-    t, face, u, v, doubtful = nearest_in_blocks(tree, 0, count, t_min, shear, miss)
+    t, face, u, v, doubtful = nearest_in_blocks(tree, 0, count, ray.t_min, shear, miss)
     if doubtful != 0:
         return _nearest_carefully(tree, 0, count, ray, shear, miss)
     return t, face, u, v
 
 
 @kernel
-def any_hit_brute(tree, ox, oy, oz, dx, dy, dz, t_min, t_max, stack):
+def any_hit_brute(tree, ray, t_max, stack):
     """``any_hit`` over every block; the nodes and the stack are not read."""
-    ray = Ray(ox, oy, oz, dx, dy, dz, t_min)
     shear, count = make_shear(ray), tree.count
-    found, doubtful = any_in_blocks(tree, 0, count, t_min, t_max, shear)
+    found, doubtful = any_in_blocks(tree, 0, count, ray.t_min, t_max, shear)
     if not found and doubtful != 0:
         miss = (t_max, np.int32(NO_FACE), 0.0, 0.0)
         return _nearest_carefully(tree, 0, count, ray, shear, miss)[1] != NO_FACE

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.intersect import Ray
 from renderer.jit import inlined, kernel
 from renderer.layout import Tree
 from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
@@ -139,16 +140,18 @@ class Surface(NamedTuple):
 
 @kernel
 def _closest(accelerator, o, d, stack):
+    ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
     if accelerator.depth == 0:
-        return closest_hit_brute(accelerator.tree, o[0], o[1], o[2], d[0], d[1], d[2], 0.0, np.inf, stack)
-    return closest_hit(accelerator.tree, o[0], o[1], o[2], d[0], d[1], d[2], 0.0, np.inf, stack)
+        return closest_hit_brute(accelerator.tree, ray, np.inf, stack)
+    return closest_hit(accelerator.tree, ray, np.inf, stack)
 
 
 @kernel
 def _occluded(accelerator, o, d, t_max, stack):
+    ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
     if accelerator.depth == 0:
-        return any_hit_brute(accelerator.tree, o[0], o[1], o[2], d[0], d[1], d[2], 0.0, t_max, stack)
-    return any_hit(accelerator.tree, o[0], o[1], o[2], d[0], d[1], d[2], 0.0, t_max, stack)
+        return any_hit_brute(accelerator.tree, ray, t_max, stack)
+    return any_hit(accelerator.tree, ray, t_max, stack)
 
 
 @kernel
