@@ -35,8 +35,13 @@ class ExtremeCase:
     run: Callable[[bool], Outcome]
 
     def record(self, quick: bool) -> dict[str, object]:
-        """Run the case; everything for JSON."""
-        outcome = self.run(quick)
+        """Run the case; everything for JSON. A case that raises does not hold; a missing reference is no such case."""
+        try:
+            outcome = self.run(quick)
+        except ImportError:
+            raise
+        except Exception as error:
+            outcome = Outcome(f"{type(error).__name__}: {error}", holds=False)
         return {
             "number": self.number,
             "construct": self.construct,
