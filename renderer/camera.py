@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Vector = tuple[float, float, float]
 FiniteVector = tuple[
     Annotated[float, Field(allow_inf_nan=False, strict=True)],
     Annotated[float, Field(allow_inf_nan=False, strict=True)],
