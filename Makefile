@@ -19,7 +19,8 @@ help:
 	@echo "                QUICK=1 for the short run, ARGS='--only hits' for a part"
 	@echo "make test       run the tests; ARGS='-k octree' for some"
 	@echo "make lint       check style, types, import order and the absence of other languages"
-	@echo "make bench      measure run time and error"
+	@echo "make bench      measure speed beside other systems; writes reports/benchmark.html"
+	@echo "                QUICK=1 for the short run, ARGS='--mesh FILE' or '--huge' for more"
 	@echo "make clean      remove everything that make made, .venv included"
 
 validate: $(STAMP)
@@ -29,7 +30,7 @@ test: $(STAMP)
 	$(BIN)/python -m pytest $(ARGS)
 
 bench: $(STAMP)
-	$(BIN)/python -m validation --only efficiency $(ARGS)
+	$(BIN)/python -m validation.benchmark $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

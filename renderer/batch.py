@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from renderer.intersect import Ray
 from renderer.jit import kernel
+from renderer.leaf import view
 from renderer.simd import keep, pointer
-from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute, view
+from renderer.traverse import Found, Rays, make_memory, make_scratch, trace
 
 # Origins as far as float32 boxes can tell from infinity, and directions whose product with a determinant, at most
 # 2^254 there, stays a normal float64 number, as does one of 2^-300 with the shortest.
@@ -33,44 +33,20 @@ def first_bad_ray(origins, directions, scale):
 
 
 @kernel
-def closest_chunk(tree, depth, scale, rays, out, begin, end):
-    """Closest hits of rays[begin:end] into the four arrays of ``out``; depth 0 tests every block.
+def trace_chunk(tree, depth, scale, rays, out, begin, end, any_hit):
+    """Hits of rays[begin:end] into the arrays of ``out``: t, face, u, v, or with ``any_hit`` only the fifth, hit.
 
-    ``scale``, a power of two, is what the tree's vertices were multiplied by; it goes in and out of t exactly.
+    ``scale``, a power of two, is what the tree's vertices were multiplied by; ``depth`` 0 tests every block.
     """
     origins, directions, t_min, t_max = rays
-    t_out, face_out, u_out, v_out = out
-    scratch = np.empty(7 * depth + 8, np.int64)
-    stack, seen = pointer(scratch), view(tree)
-    for i in range(begin, end):
-        low = scale * t_min[i if len(t_min) > 1 else 0]
-        high = scale * t_max[i if len(t_max) > 1 else 0]
-        ox, oy, oz = scale * origins[i, 0], scale * origins[i, 1], scale * origins[i, 2]
-        ray = Ray(ox, oy, oz, directions[i, 0], directions[i, 1], directions[i, 2], low)
-        if depth == 0:
-            t, face, u, v = closest_hit_brute(seen, ray, high, stack)
-        else:
-            t, face, u, v = closest_hit(seen, ray, high, stack)
-        if face == NO_FACE:
-            t_out[i], face_out[i], u_out[i], v_out[i] = np.inf, -1, np.nan, np.nan
-        else:
-            t_out[i], face_out[i], u_out[i], v_out[i] = t / scale, face, u, v
-    keep(scratch)
-
-
-@kernel
-def any_chunk(tree, depth, scale, rays, out, begin, end):
-    """Whether anything is hit by each of rays[begin:end], into ``out``; arguments as for ``closest_chunk``."""
-    origins, directions, t_min, t_max = rays
-    scratch = np.empty(7 * depth + 8, np.int64)
-    stack, seen = pointer(scratch), view(tree)
-    for i in range(begin, end):
-        low = scale * t_min[i if len(t_min) > 1 else 0]
-        high = scale * t_max[i if len(t_max) > 1 else 0]
-        ox, oy, oz = scale * origins[i, 0], scale * origins[i, 1], scale * origins[i, 2]
-        ray = Ray(ox, oy, oz, directions[i, 0], directions[i, 1], directions[i, 2], low)
-        if depth == 0:
-            out[i] = any_hit_brute(seen, ray, high, stack)
-        else:
-            out[i] = any_hit(seen, ray, high, stack)
-    keep(scratch)
+    t, face, u, v, hit = out
+    memory = make_memory(depth, end - begin)
+    source = Rays(
+        pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
+        np.int64(len(t_min) > 1), np.int64(len(t_max) > 1), scale,
+    )  # fmt: skip
+    found = Found(pointer(t), pointer(face), pointer(u), pointer(v), pointer(hit))
+    trace(view(tree), depth, source, found, begin, end, make_scratch(memory, depth), any_hit)
+    keep(memory.floats)
+    keep(memory.doubles)
+    keep(memory.integers)

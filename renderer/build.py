@@ -1,469 +1,185 @@
-"""Building the tree: octants at the midpoint with fitted boxes and merged leaves, or binary SAH splits.
+"""Building the tree: a top that is cut level by level, subtrees below it that are built side by side, and their joint.
 
-A node starts as one group of faces. Groups are opened, largest first, until its eight places are used; then small
-neighbours are merged. What still holds more than a leaf's faces becomes a node of its own.
+Faces are cut into a binary hierarchy, by octants at the midpoint or by the surface area heuristic, with fitted boxes;
+then parts of it are chosen as leaves and as children of nodes of eight. Where the top ends depends on the number of
+faces only, so that the tree is the same for any number of threads.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.intersect import round_down, round_up
-from renderer.jit import kernel
-from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, NODE_WORDS, Tree
+from renderer.blocks import fill_blocks
+from renderer.bounds import BOX, Faces, face_boxes, fit
+from renderer.collapse import collapse
+from renderer.emit import WAITING, emit_nodes, moved_link, place_subtree
+from renderer.hierarchy import MIDPOINT, SAH, Hierarchy, Rule, add_part, first_parts, new_hierarchy
+from renderer.layout import LANES, NODE_WORDS, Tree, cache_aligned
+from renderer.parallel import for_chunks
+from renderer.subtree import Workspace, build_subtree, cut_once, new_room, new_workspace
 
-MIDPOINT, SAH = 0, 1
 SPLITS = {"midpoint": MIDPOINT, "sah": SAH}
 
-# Seven groups, and the eight that opening one more makes of it.
-_GROUPS = 16
-_BINS = 16
-
-
-class Rule(NamedTuple):
-    """How to build: the split rule, the most faces of a leaf, and the deepest level that the rule may split."""
-
-    split: int
-    leaf_size: int
-    max_depth: int
-
-
-class FaceOrder(NamedTuple):
-    """The faces being sorted: ``order`` (F,) int32, the boxes it points into, and scratch for a counting sort."""
-
-    boxes: NDArray[np.float32]
-    order: NDArray[np.int32]
-    scratch: NDArray[np.int32]
-    codes: NDArray[np.uint8]
-    start: NDArray[np.int64]
-
-
-class Groups(NamedTuple):
-    """The groups of one node: ranges of ``order``, their boxes, and what merging needs."""
-
-    begin: NDArray[np.int64]
-    end: NDArray[np.int64]
-    box: NDArray[np.float32]
-    owner: NDArray[np.int64]
-    size: NDArray[np.int64]
-    cost: NDArray[np.float32]
-    ends: NDArray[np.int64]
-
-
-def _new_groups() -> Groups:
-    begin, end, owner, size = np.zeros((4, _GROUPS), np.int64)
-    box, cost = np.zeros((_GROUPS, 6), np.float32), np.zeros((_GROUPS, _GROUPS), np.float32)
-    return Groups(begin, end, box, owner, size, cost, np.zeros(8, np.int64))
-
-
-@kernel
-def face_boxes(vertices, faces, boxes):
-    """Bounds of each face, (F, 6) float32: lower x, y, z, upper x, y, z, rounded outwards."""
-    for f in range(len(faces)):
-        a, b, c = faces[f]
-        for k in range(3):
-            x, y, z = vertices[a, k], vertices[b, k], vertices[c, k]
-            boxes[f, k] = round_down(min(x, min(y, z)))
-            boxes[f, 3 + k] = round_up(max(x, max(y, z)))
-
-
-@kernel
-def _fit(boxes, order, begin, end, box):
-    """The union of the boxes of ``order[begin:end]``."""
-    x0 = y0 = z0 = np.float32(np.inf)
-    x1 = y1 = z1 = np.float32(-np.inf)
-    for i in range(begin, end):
-        b = boxes[order[i]]
-        x0, y0, z0 = min(x0, b[0]), min(y0, b[1]), min(z0, b[2])
-        x1, y1, z1 = max(x1, b[3]), max(y1, b[4]), max(z1, b[5])
-    box[0], box[1], box[2], box[3], box[4], box[5] = x0, y0, z0, x1, y1, z1
-
-
-@kernel
-def _half_area(box):
-    x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
-    return x * y + y * z + z * x
-
-
-@kernel
-def _union_half_area(a, b):
-    x = max(a[3], b[3]) - min(a[0], b[0])
-    y = max(a[4], b[4]) - min(a[1], b[1])
-    z = max(a[5], b[5]) - min(a[2], b[2])
-    return x * y + y * z + z * x
-
-
-@kernel
-def _centre_bounds(boxes, order, begin, end):
-    """Bounds of the doubled centres lower + upper, as six float32."""
-    x0 = y0 = z0 = np.float32(np.inf)
-    x1 = y1 = z1 = np.float32(-np.inf)
-    for i in range(begin, end):
-        b = boxes[order[i]]
-        x, y, z = b[0] + b[3], b[1] + b[4], b[2] + b[5]
-        x0, y0, z0 = min(x0, x), min(y0, y), min(z0, z)
-        x1, y1, z1 = max(x1, x), max(y1, y), max(z1, z)
-    return x0, y0, z0, x1, y1, z1
-
-
-@kernel
-def _middle(low, high):
-    """The midpoint, formed without overflow; ``low`` itself when nothing lies between."""
-    return low + (high - low) * np.float32(0.5)
-
-
-@kernel
-def _open_octants(faces, begin, end, ends):
-    """Sort ``order[begin:end]`` into octants about the middle of its centres. Returns how many are not empty.
-
-    Their ends go to ``ends``. 1 means that the centres do not separate. The sort is stable.
-    """
-    x0, y0, z0, x1, y1, z1 = _centre_bounds(faces.boxes, faces.order, begin, end)
-    mx, my, mz = _middle(x0, x1), _middle(y0, y1), _middle(z0, z1)
-    start = faces.start
-    start[:] = 0
-    for i in range(begin, end):
-        b = faces.boxes[faces.order[i]]
-        code = np.int64(b[0] + b[3] > mx) + 2 * np.int64(b[1] + b[4] > my) + 4 * np.int64(b[2] + b[5] > mz)
-        faces.codes[i] = code
-        start[code + 1] += 1
-    opened = 0
-    for k in range(8):
-        if start[k + 1] > 0:
-            start[k + 1] += start[k]
-            ends[opened] = begin + start[k + 1]
-            opened += 1
-        else:
-            start[k + 1] = start[k]
-    if opened > 1:
-        _scatter(faces, begin, end)
-    return opened
-
-
-@kernel
-def _scatter(faces, begin, end):
-    """Stable counting sort of ``order[begin:end]`` by ``codes``; ``start`` holds each code's offset."""
-    for i in range(begin, end):
-        code = faces.codes[i]
-        faces.scratch[begin + faces.start[code]] = faces.order[i]
-        faces.start[code] += 1
-    faces.order[begin:end] = faces.scratch[begin:end]
-
-
-@kernel
-def _open_evenly(begin, end, parts, ends):
-    """Cut a range whose faces do not separate into equal parts, so that the build ends."""
-    for k in range(parts):
-        ends[k] = begin + (end - begin) * (k + 1) // parts
-    return parts
-
-
-@kernel
-def _open_sah(faces, begin, end, ends):
-    """Two groups by the binned surface area heuristic, cost counted in blocks of four. 1: no plane separates."""
-    bounds = _centre_bounds(faces.boxes, faces.order, begin, end)
-    best, best_axis, best_bin = np.float32(np.inf), -1, 0
-    counts, bins, right = np.empty(_BINS, np.int64), np.empty((_BINS, 6), np.float32), np.empty(_BINS, np.float32)
-    for axis in range(3):
-        low, extent = bounds[axis], bounds[3 + axis] - bounds[axis]
-        if extent > 0.0:
-            _fill_bins(faces, begin, end, axis, (low, np.float32(_BINS) / extent), (counts, bins))
-            cost, at = _best_plane(counts, bins, right)
-            if cost < best:
-                best, best_axis, best_bin = cost, axis, at
-    if best_axis < 0:
-        return 1
-    low = bounds[best_axis]
-    scale = np.float32(_BINS) / (bounds[3 + best_axis] - low)
-    start = faces.start
-    start[:] = 0
-    for i in range(begin, end):
-        b = faces.boxes[faces.order[i]]
-        code = 0 if _bin(b[best_axis] + b[3 + best_axis], low, scale) <= best_bin else 1
-        faces.codes[i] = code
-        start[code + 1] += 1
-    start[2] += start[1]
-    ends[0], ends[1] = begin + start[1], end
-    _scatter(faces, begin, end)
-    return 2
-
-
-@kernel
-def _bin(centre, low, scale):
-    return min(_BINS - 1, max(0, int((centre - low) * scale)))
-
-
-@kernel
-def _fill_bins(faces, begin, end, axis, to_bin, result):
-    """Counts and bounds of the faces whose centres fall into each bin of an axis."""
-    low, scale = to_bin
-    counts, bins = result
-    counts[:] = 0
-    bins[:, :3] = np.inf
-    bins[:, 3:] = -np.inf
-    for i in range(begin, end):
-        b = faces.boxes[faces.order[i]]
-        k = _bin(b[axis] + b[3 + axis], low, scale)
-        counts[k] += 1
-        for j in range(3):
-            bins[k, j] = min(bins[k, j], b[j])
-            bins[k, 3 + j] = max(bins[k, 3 + j], b[3 + j])
-
-
-@kernel
-def _grow(box, other):
-    for j in range(3):
-        box[j] = min(box[j], other[j])
-        box[3 + j] = max(box[3 + j], other[3 + j])
-
-
-@kernel
-def _best_plane(counts, bins, right):
-    """The cheapest plane between two bins: sum of half area times blocks on both sides."""
-    box = bins[_BINS - 1].copy()
-    n = np.int64(0)
-    for k in range(_BINS - 1, 0, -1):
-        _grow(box, bins[k])
-        n += counts[k]
-        right[k] = _half_area(box) * ((n + LANES - 1) // LANES) if n > 0 else np.float32(np.inf)
-    best, at = np.float32(np.inf), -1
-    box[:] = bins[0]
-    n = np.int64(0)
-    for k in range(_BINS - 1):
-        _grow(box, bins[k])
-        n += counts[k]
-        if n > 0:
-            cost = _half_area(box) * ((n + LANES - 1) // LANES) + right[k + 1]
-            if cost < best:
-                best, at = cost, k
-    return best, at
-
-
-@kernel
-def _open(rule, deep, faces, begin, end, ends):
-    """Open one group by the split rule, or evenly where the rule cannot or the tree is as deep as allowed."""
-    opened = 1
-    if not deep:
-        opened = _open_sah(faces, begin, end, ends) if rule.split == SAH else _open_octants(faces, begin, end, ends)
-    if opened == 1:
-        opened = _open_evenly(begin, end, min(2 if rule.split == SAH else 8, end - begin), ends)
-    return opened
-
-
-@kernel
-def _make_groups(rule, deep, faces, groups, begin, end):
-    """Open groups of ``order[begin:end]``, the one of largest area first, until eight places are used."""
-    ends = groups.ends
-    groups.begin[0], groups.end[0] = begin, end
-    _fit(faces.boxes, faces.order, begin, end, groups.box[0])
-    count = 1
-    while count < 8:
-        most, chosen = np.float32(-1.0), -1
-        for g in range(count):
-            area = _half_area(groups.box[g])
-            # "not <=" also takes an area that overflowed to NaN, so that the build always goes on.
-            if groups.end[g] - groups.begin[g] > rule.leaf_size and not area <= most:
-                most, chosen = area, g
-        if chosen < 0:
-            break
-        begin = groups.begin[chosen]
-        opened = _open(rule, deep, faces, begin, groups.end[chosen], ends)
-        for k in range(opened):
-            g = chosen if k == 0 else count + k - 1
-            groups.begin[g], groups.end[g] = begin, ends[k]
-            _fit(faces.boxes, faces.order, begin, ends[k], groups.box[g])
-            begin = ends[k]
-        count += opened - 1
-    return count
-
-
-@kernel
-def _merge(rule, groups, count):
-    """Merge pairs of groups while they fit one leaf, or while there are more than eight.
-
-    Each time the pair that adds least area times faces. ``owner[g]`` becomes the group that g belongs to, and
-    ``size`` and ``box`` of an owner those of all its groups.
-    """
-    owner, size, cost = groups.owner, groups.size, groups.cost
-    for g in range(count):
-        owner[g], size[g] = g, groups.end[g] - groups.begin[g]
-    for a in range(count):
-        for b in range(a + 1, count):
-            cost[a, b] = _merge_cost(groups, a, b)
-    left = count
-    while left > 1:
-        least, a, b = np.float32(np.inf), -1, -1
-        for i in range(count):
-            if owner[i] != i:
-                continue
-            for j in range(i + 1, count):
-                if owner[j] == j and cost[i, j] < least and (left > 8 or size[i] + size[j] <= rule.leaf_size):
-                    least, a, b = cost[i, j], i, j
-        if a < 0:
-            break
-        _grow(groups.box[a], groups.box[b])
-        size[a] += size[b]
-        for g in range(count):
-            if owner[g] == b:
-                owner[g] = a
-        for g in range(count):
-            if owner[g] == g and g != a:
-                cost[min(a, g), max(a, g)] = _merge_cost(groups, min(a, g), max(a, g))
-        left -= 1
-
-
-@kernel
-def _merge_cost(groups, a, b):
-    """What one box for both costs more than two: added half area times faces; finite, so that any pair can win."""
-    added = _union_half_area(groups.box[a], groups.box[b]) * (groups.size[a] + groups.size[b])
-    added -= _half_area(groups.box[a]) * groups.size[a] + _half_area(groups.box[b]) * groups.size[b]
-    largest = np.float32(3.0e38)
-    return min(np.float32(added), largest) if added == added else largest
-
-
-@kernel
-def _gather(faces, groups, count):
-    """Move merged groups' faces side by side and set each owner's ``begin`` and ``end`` to the whole."""
-    first = groups.begin[0]
-    for g in range(count):
-        first = min(first, groups.begin[g])
-    at = first
-    for a in range(count):
-        for g in range(a, count):
-            if groups.owner[a] == a and groups.owner[g] == a:
-                for i in range(groups.begin[g], groups.end[g]):
-                    faces.scratch[at] = faces.order[i]
-                    at += 1
-    faces.order[first:at] = faces.scratch[first:at]
-    for a in range(count):
-        if groups.owner[a] == a:
-            groups.begin[a], groups.end[a] = first, first + groups.size[a]
-            first += groups.size[a]
-
-
-@kernel
-def _longer(array, length):
-    """``array``, or a copy of at least twice its length when it holds fewer than ``length``."""
-    if length <= len(array):
-        return array
-    longer = np.empty(max(length, 2 * len(array)), array.dtype)
-    longer[: len(array)] = array
-    return longer
-
-
-@kernel
-def _emit_leaf(order, begin, end, block_faces, blocks):
-    """Write a leaf's faces into blocks; returns the child's code, the grown array and the number of blocks."""
-    count = (end - begin + LANES - 1) // LANES
-    block_faces = _longer(block_faces, (blocks + count) * LANES)
-    for i in range(count * LANES):
-        block_faces[blocks * LANES + i] = order[begin + i] if begin + i < end else -1
-    return ~((blocks << LEAF_BITS) | (count - 1)), block_faces, blocks + count
-
-
-@kernel
-def _clear_node(nodes, links, base):
-    for k in range(8):
-        for axis in range(3):
-            nodes[base + 16 * axis + k] = np.inf
-            nodes[base + 16 * axis + 8 + k] = -np.inf
-        links[base + CHILDREN + k] = 0
-
-
-@kernel
-def _set_bounds(nodes, base, place, box):
-    for axis in range(3):
-        nodes[base + 16 * axis + place] = box[axis]
-        nodes[base + 16 * axis + 8 + place] = box[3 + axis]
-
-
-@kernel
-def build_nodes(faces, groups, rule, pending):
-    """Nodes and leaves over all faces: (node words float32, block faces int32, levels of nodes).
-
-    Children are written in the order of their groups and nodes in depth-first order, so the result depends on
-    nothing but the input. ``pending`` (n, 4) int64 is the stack: begin, end, level, the parent's link.
-    """
-    count = len(faces.order)
-    nodes = np.empty(max(1, count // 8) * NODE_WORDS, np.float32)
-    block_faces = np.empty(max(1, count // 3) * LANES, np.int32)
-    pending[0, 0], pending[0, 1], pending[0, 2], pending[0, 3] = 0, count, 1, -1
-    top, used, blocks, depth = 1, 0, 0, 0
-    while top > 0:
-        # Make the node and hang it below its parent.
-        top -= 1
-        begin, end, level, parent = pending[top, 0], pending[top, 1], pending[top, 2], pending[top, 3]
-        depth = max(depth, level)
-        base = used * NODE_WORDS
-        nodes = _longer(nodes, base + NODE_WORDS)
-        links = nodes.view(np.int32)
-        _clear_node(nodes, links, base)
-        if parent >= 0:
-            links[parent] = used
-        used += 1
-        # Cut its faces into at most eight groups.
-        made = _make_groups(rule, level > rule.max_depth, faces, groups, begin, end)
-        _merge(rule, groups, made)
-        _gather(faces, groups, made)
-        # Each group becomes a leaf or waits to become a node.
-        place = 0
-        for g in range(made):
-            if groups.owner[g] != g or groups.size[g] == 0:
-                continue
-            _set_bounds(nodes, base, place, groups.box[g])
-            link = base + CHILDREN + place
-            if groups.size[g] <= rule.leaf_size:
-                code, block_faces, blocks = _emit_leaf(
-                    faces.order, groups.begin[g], groups.end[g], block_faces, blocks
-                )
-                links[link] = code
-            else:
-                pending[top, 0], pending[top, 1] = groups.begin[g], groups.end[g]
-                pending[top, 2], pending[top, 3] = level + 1, link
-                top += 1
-            place += 1
-    return nodes[: used * NODE_WORDS].copy(), block_faces[: blocks * LANES].copy(), depth
-
-
-@kernel
-def fill_blocks(vertices, faces, block_faces, blocks):
-    """Copy the vertices of each block's faces into its rows; unused places repeat the block's first vertex."""
-    for place in range(len(block_faces)):
-        face = block_faces[place]
-        first = faces[block_faces[place // LANES * LANES], 0]
-        base = place // LANES * BLOCK_WORDS + place % LANES
-        for corner in range(3):
-            vertex = first if face < 0 else faces[face, corner]
-            for axis in range(3):
-                blocks[base + LANES * (3 * corner + axis)] = vertices[vertex, axis]
-
-
-def _blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], block_faces: NDArray[np.int32]) -> Any:
-    """The blocks, in float32 when that holds every vertex exactly."""
-    with np.errstate(over="ignore"):
-        exact = bool((vertices.astype(np.float32) == vertices).all())
-    blocks = np.empty(len(block_faces) // LANES * BLOCK_WORDS, np.float32 if exact else np.float64)
-    fill_blocks(vertices, faces, block_faces, blocks)
-    return blocks
-
-
-def build_tree(vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule) -> tuple[Tree, int]:
+# Parts of at most so many faces are subtrees: a millisecond of work, in memory that stays in a core's cache.
+_SUBTREE = 4096
+# Faces whose boxes are one chunk: some tenths of a millisecond.
+_BOXES = 1 << 14
+# The most parts of one cut: itself, two halves, four quarters and eight octants.
+_PARTS = 15
+
+
+class _Subtree(NamedTuple):
+    """A built subtree, its links counted from its own first node and block."""
+
+    nodes: NDArray[np.float32]
+    block_faces: NDArray[np.int32]
+    link: int
+    cost: float
+    depth: int
+
+
+def build_tree(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, threads: int = 1
+) -> tuple[Tree, int]:
     """Build the tree over all faces; returns it with the number of levels of nodes."""
-    count = len(faces)
-    boxes = np.empty((count, 6), np.float32)
-    face_boxes(vertices, faces, boxes)
-    scratch, codes = np.empty(count, np.int32), np.empty(count, np.uint8)
-    order = FaceOrder(boxes, np.arange(count, dtype=np.int32), scratch, codes, np.zeros(9, np.int64))
-    # Depth-first with at most eight children waiting a level; even cuts end within 64 levels of any count.
-    pending = np.empty((8 * (rule.max_depth + 64), 4), np.int64)
-    nodes, block_faces, depth = build_nodes(order, _new_groups(), rule, pending)
-    return Tree(nodes, nodes.view(np.int32), _blocks(vertices, faces, block_faces), block_faces), depth
+    top, subtrees = _build_parts(vertices, faces, rule, threads)
+    if len(subtrees) == 1:
+        built = next(iter(subtrees.values()))
+        nodes, block_faces, depth = cache_aligned(len(built.nodes), np.float32), built.block_faces, built.depth
+        nodes[:] = built.nodes
+    else:
+        nodes, block_faces, depth = _join(top, subtrees, rule, threads)
+    return Tree(nodes, nodes.view(np.int32), fill_blocks(vertices, faces, block_faces, threads), block_faces), depth
 
 
-def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Tree:
+def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], threads: int = 1) -> Tree:
     """The blocks alone, in the order of the faces, for a search without a tree."""
     block_faces = np.full(-(-len(faces) // LANES) * LANES, -1, np.int32)
     block_faces[: len(faces)] = np.arange(len(faces))
     nodes = np.empty(0, np.float32)
-    return Tree(nodes, nodes.view(np.int32), _blocks(vertices, faces, block_faces), block_faces)
+    return Tree(nodes, nodes.view(np.int32), fill_blocks(vertices, faces, block_faces, threads), block_faces)
+
+
+def _build_parts(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, threads: int
+) -> tuple[Hierarchy, dict[int, _Subtree]]:
+    """The top of the hierarchy and the subtree of each whole part of it."""
+    boxes = cache_aligned(len(faces) * BOX, np.float32)
+    order = Faces(boxes, boxes.view(np.int32), cache_aligned(len(boxes), np.float32))
+    for_chunks(
+        lambda begin, end: face_boxes(vertices, faces, boxes, order.numbers, begin, end), len(faces), _BOXES, threads
+    )
+    top, levels = _cut_top(order, rule, threads)
+    return top, _build_subtrees(order, rule, top, levels, threads)
+
+
+def _cut_top(order: Faces, rule: Rule, threads: int) -> tuple[Hierarchy, list[int]]:
+    """Cut all faces until no part is larger than a subtree; also the levels of cuts above each part."""
+    count = len(order.boxes) // BOX
+    top, levels = new_hierarchy(1), [0]
+    add_part(top, 0, 0, count)
+    fit(order.boxes, 0, count, top.boxes, 0)
+    waiting = [0] if count > _SUBTREE else []
+    while waiting:
+        pieces = _cut_each(order, rule, top, levels, waiting, threads)
+        before = len(top.halves)
+        top = _grafted(top, waiting, [piece for piece, _ in pieces])
+        levels += [level for piece, level in pieces for _ in piece.halves[1:]]
+        sizes = top.ranges[:, 1] - top.ranges[:, 0]
+        waiting = [part for part in range(before, len(sizes)) if top.halves[part] < 0 and sizes[part] > _SUBTREE]
+    return top, levels
+
+
+def _cut_each(
+    order: Faces, rule: Rule, top: Hierarchy, levels: list[int], parts: list[int], threads: int
+) -> list[tuple[Hierarchy, int]]:
+    """Cut each of some parts once: what it becomes, as a hierarchy of its own, and the level of what was cut off."""
+    cut: dict[int, tuple[Hierarchy, int]] = {}
+
+    def work(begin: int, end: int) -> None:
+        for part in parts[begin:end]:
+            piece = new_hierarchy(_PARTS)
+            add_part(piece, 0, *top.ranges[part].tolist())
+            piece.boxes[:BOX] = top.boxes[part * BOX : (part + 1) * BOX]
+            count, level = cut_once(order, piece, rule, levels[part], new_room())
+            cut[part] = first_parts(piece, count), level
+
+    for_chunks(work, len(parts), 1, threads)
+    return [cut[part] for part in parts]
+
+
+def _grafted(top: Hierarchy, parts: list[int], pieces: list[Hierarchy]) -> Hierarchy:
+    """The hierarchy in which each of some whole parts has become its piece; new parts come last."""
+    halves, count = [top.halves.copy()], len(top.halves)
+    for part, piece in zip(parts, pieces, strict=True):
+        moved = np.where(piece.halves < 0, np.int32(-1), piece.halves + np.int32(count - 1))
+        halves[0][part] = moved[0]
+        halves.append(moved[1:])
+        count += len(moved) - 1
+    grown = new_hierarchy(count)
+    grown.halves[:] = np.concatenate(halves)
+    grown.boxes[:] = np.concatenate([top.boxes] + [piece.boxes[BOX:] for piece in pieces])
+    grown.ranges[:] = np.concatenate([top.ranges] + [piece.ranges[1:] for piece in pieces])
+    return grown
+
+
+def _build_subtrees(order: Faces, rule: Rule, top: Hierarchy, levels: list[int], threads: int) -> dict[int, _Subtree]:
+    """The subtree of each whole part, by the part's number in ascending order."""
+    parts = np.flatnonzero(top.halves < 0).tolist()
+    built: dict[int, _Subtree] = {}
+    idle: list[Workspace] = []
+    largest = int((top.ranges[parts, 1] - top.ranges[parts, 0]).max())
+
+    def work(begin: int, end: int) -> None:
+        space = idle.pop() if idle else new_workspace(largest)
+        for part in parts[begin:end]:
+            found = build_subtree(order, rule, *top.ranges[part].tolist(), levels[part], space)
+            link, cost, nodes, blocks, depth = found
+            built[part] = _Subtree(
+                space.nodes[: nodes * NODE_WORDS].copy(), space.block_faces[: blocks * LANES].copy(), link, cost, depth
+            )
+        idle.append(space)
+
+    for_chunks(work, len(parts), 1, threads)
+    return {part: built[part] for part in parts}
+
+
+def _join(
+    top: Hierarchy, subtrees: dict[int, _Subtree], rule: Rule, threads: int
+) -> tuple[NDArray[np.float32], NDArray[np.int32], int]:
+    """The nodes of the top followed by those of each subtree, the faces of all blocks, and the levels of nodes."""
+    for part, built in subtrees.items():
+        top.costs[8 * part] = built.cost
+    collapse(top, len(top.halves), rule.leaf_size)
+    # The top's own nodes, written once to count them, and again with the links that follow from their number.
+    above, _ = _emit_top(top, subtrees, [(0, 0)] * len(subtrees))
+    parts = list(subtrees.values())
+    nodes_before = np.cumsum([len(above)] + [len(built.nodes) for built in parts]) // NODE_WORDS
+    blocks_before = np.cumsum([0] + [len(built.block_faces) for built in parts]) // LANES
+    starts = list(zip(nodes_before.tolist(), blocks_before.tolist(), strict=True))
+    above, depth = _emit_top(top, subtrees, starts[:-1])
+    nodes = cache_aligned(int(nodes_before[-1]) * NODE_WORDS, np.float32)
+    block_faces = np.empty(int(blocks_before[-1]) * LANES, np.int32)
+    nodes[: len(above)] = above
+    links = nodes.view(np.int32)
+
+    def place(begin: int, end: int) -> None:
+        for built, start in zip(parts[begin:end], starts[begin:end], strict=True):
+            place_subtree(built.nodes.view(np.int32), built.block_faces, start, links, block_faces)
+
+    for_chunks(place, len(parts), 1, threads)
+    return nodes, block_faces, depth
+
+
+def _emit_top(
+    top: Hierarchy, subtrees: dict[int, _Subtree], starts: list[tuple[int, int]]
+) -> tuple[NDArray[np.float32], int]:
+    """The nodes above the subtrees, whose first nodes and blocks are ``starts``, and the levels of all nodes."""
+    ends = np.zeros((len(top.halves), 2), np.int32)
+    for (part, built), start in zip(subtrees.items(), starts, strict=True):
+        ends[part] = moved_link(built.link, *start), built.depth
+    nodes = np.empty(len(top.halves) * NODE_WORDS, np.float32)
+    none = np.empty(0, np.int32)
+    used, _, depth = emit_nodes(top, none, ends, nodes, nodes.view(np.int32), none, np.empty((WAITING, 3), np.int32))
+    return nodes[: used * NODE_WORDS], depth

@@ -1,10 +1,14 @@
 """The command line: arguments in, calls to the library, one line and exit code 2 for anything wrong."""
 
 import argparse
+import logging
 import sys
-from collections.abc import Sequence
+from _thread import interrupt_main
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
+from threading import Timer
 
 from renderer.errors import expect
 
@@ -12,8 +16,11 @@ from renderer.errors import expect
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``octree-render``; returns the exit code: 0, 2 for bad input, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
+    if arguments is None:
+        _hide_scipy_from_numba()
     try:
-        options.command(options)
+        with _interrupts_kept(), _compile_notices(silent=getattr(options, "quiet", False)):
+            options.command(options)
     except KeyboardInterrupt:
         print("octree-render: interrupted, nothing written", file=sys.stderr)
         return 130
@@ -21,6 +28,62 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"octree-render: {_one_line(error)}", file=sys.stderr)
         return 2
     return 0
+
+
+def _hide_scipy_from_numba() -> None:
+    """Spare a process of our own the fifth of a second in which Numba loads SciPy's BLAS, which no kernel calls."""
+    if "scipy" not in sys.modules:
+        sys.modules["scipy"] = None  # type: ignore[assignment]  # so the import statement finds none
+        import numba.np.arraymath  # noqa: F401
+
+        del sys.modules["scipy"]
+
+
+@contextmanager
+def _interrupts_kept() -> Iterator[None]:
+    """Send Ctrl-C once more where a destructor or callback, of which compiling calls many, swallowed it."""
+    usual = sys.unraisablehook
+
+    def resend(lost: "sys.UnraisableHookArgs") -> None:
+        if lost.exc_type is not KeyboardInterrupt:
+            usual(lost)
+            return
+        # Later and from aside: sent from here it would be raised, and lost again, in this very function.
+        timer = Timer(0.01, interrupt_main)
+        timer.daemon = True
+        timer.start()
+
+    sys.unraisablehook = resend
+    try:
+        yield
+    finally:
+        sys.unraisablehook = usual
+
+
+@contextmanager
+def _compile_notices(silent: bool) -> Iterator[None]:
+    """Show on standard error which kernels are compiled, so that nobody takes the first run for the usual one."""
+    log, notices = logging.getLogger("renderer.jit"), _Notices()
+    level = log.level
+    if silent:
+        yield
+        return
+    log.addHandler(notices)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(notices)
+        log.setLevel(level)
+
+
+class _Notices(logging.Handler):
+    """Log lines on standard error, above a progress bar that may stand there."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        from tqdm import tqdm
+
+        tqdm.write(f"octree-render: {record.getMessage()}", file=sys.stderr)
 
 
 def _one_line(error: Exception) -> str:
@@ -48,12 +111,14 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--accelerator", choices=("octree", "brute"), default="octree")
     render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help="how the octree is cut")
     render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
-    render.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    render.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
     render.set_defaults(command=_render)
     info = commands.add_parser("info", help="say what a scene holds and what its octree looks like")
     info.add_argument("scene", type=Path)
     info.add_argument("--split", choices=("midpoint", "sah"), default="midpoint")
     info.set_defaults(command=_info)
+    ahead = commands.add_parser("compile", help="compile all kernels now, for CI and container images")
+    ahead.set_defaults(command=_compile)
     return parser
 
 
@@ -94,7 +159,15 @@ def _render(options: argparse.Namespace) -> None:
         )
 
 
+def _compile(_options: argparse.Namespace) -> None:
+    from renderer.warm import compile_all
+
+    compile_all()
+    print("all kernels are compiled")
+
+
 def _info(options: argparse.Namespace) -> None:
+    from renderer.needs import examine, needs_of
     from renderer.octree import Octree
     from renderer.scene import load_scene
     from renderer.world import pack
@@ -109,11 +182,15 @@ def _info(options: argparse.Namespace) -> None:
             f"  {instance.mesh.name or 'mesh':<20} {len(instance.mesh.faces):>9} faces  {normals:<7} "
             f"{instance.material} ({material.type})"
         )
-    stats = Octree.from_mesh(pack(scene)[0], split=options.split).stats
-    print(
-        f"octree ({options.split}): {stats.nodes} nodes, {stats.leaves} leaves, depth {stats.depth}, "
-        f"{stats.references} references in {stats.blocks} blocks ({stats.fill:.0%} full), {stats.bytes / 1e6:.1f} MB"
-    )
+    if needs_of(scene).octree:
+        stats = Octree.from_mesh(pack(scene)[0], split=options.split).stats
+        print(
+            f"octree ({options.split}): {stats.nodes} nodes, {stats.leaves} leaves, depth {stats.depth}, "
+            f"{stats.references} references in {stats.blocks} blocks ({stats.fill:.0%} full), "
+            f"{stats.bytes / 1e6:.1f} MB"
+        )
+    for feature, value, reason in examine(scene):
+        print(f"  {feature.replace('_', ' '):<16} {'needed' if value else 'left out'}: {reason}")
 
 
 if __name__ == "__main__":

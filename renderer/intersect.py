@@ -26,19 +26,18 @@ _DOUBT = 2.0**-30
 @inlined
 def round_up(x):
     """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN."""
+    # No branch, here and below: whether a random ray takes it cannot be predicted.
     y = max(np.float32(x), -_LARGEST)
-    if np.float64(y) < x:
-        y = np.float32(y + np.float32(abs(y) * _STEP + _TINY))
-    return y
+    step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) < x else np.float32(0.0)
+    return np.float32(y + step)
 
 
 @inlined
 def round_down(x):
     """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN."""
     y = min(np.float32(x), _LARGEST)
-    if np.float64(y) > x:
-        y = np.float32(y - np.float32(abs(y) * _STEP + _TINY))
-    return y
+    step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) > x else np.float32(0.0)
+    return np.float32(y - step)
 
 
 @inlined
@@ -93,13 +92,12 @@ def _slab(axis, o, d, largest):
     above the true one; the far one may be infinite: with lower - o = 0 that makes a NaN, which drops out.
     """
     inverse = np.float32(largest / d)
-    if np.signbit(d):
-        near_row, far_row = 16 * axis + 8, 16 * axis
-        near_inverse = max(inverse, -_LARGEST)
-        return near_row, far_row, round_down(o), round_up(o), near_inverse, inverse
-    near_row, far_row = 16 * axis, 16 * axis + 8
-    near_inverse = min(inverse, _LARGEST)
-    return near_row, far_row, round_up(o), round_down(o), near_inverse, inverse
+    back = np.signbit(d)
+    flip = 8 if back else 0
+    down, up = round_down(o), round_up(o)
+    near_inverse = min(max(inverse, -_LARGEST), _LARGEST)
+    near_origin, far_origin = (down if back else up), (up if back else down)
+    return 16 * axis + flip, 16 * axis + 8 - flip, near_origin, far_origin, near_inverse, inverse
 
 
 @inlined
@@ -109,9 +107,7 @@ def make_slabs(ray, largest):
     ny, fy, noy, foy, niy, fiy = _slab(1, ray.oy, ray.dy, largest)
     nz, fz, noz, foz, niz, fiz = _slab(2, ray.oz, ray.dz, largest)
     return Slabs(
-        nx, ny, nz, fx, fy, fz,
-        splat8(nox), splat8(noy), splat8(noz), splat8(fox), splat8(foy), splat8(foz),
-        splat8(nix), splat8(niy), splat8(niz), splat8(fix), splat8(fiy), splat8(fiz),
+        nx, ny, nz, fx, fy, fz, nox, noy, noz, fox, foy, foz, nix, niy, niz, fix, fiy, fiz
     )  # fmt: skip
 
 
@@ -123,19 +119,24 @@ def enter_boxes(nodes, node, slabs, lower, upper):
     the interval as it was.
     """
     base = node * NODE_WORDS
-    n = (load8(nodes, base + slabs.near_x) - slabs.near_origin_x) * slabs.near_inverse_x
+    n = _distances(nodes, base + slabs.near_x, slabs.near_origin_x, slabs.near_inverse_x)
     t0 = select(n > lower, n, lower)
-    n = (load8(nodes, base + slabs.near_y) - slabs.near_origin_y) * slabs.near_inverse_y
+    n = _distances(nodes, base + slabs.near_y, slabs.near_origin_y, slabs.near_inverse_y)
     t0 = select(n > t0, n, t0)
-    n = (load8(nodes, base + slabs.near_z) - slabs.near_origin_z) * slabs.near_inverse_z
+    n = _distances(nodes, base + slabs.near_z, slabs.near_origin_z, slabs.near_inverse_z)
     t0 = select(n > t0, n, t0)
-    f = (load8(nodes, base + slabs.far_x) - slabs.far_origin_x) * slabs.far_inverse_x
+    f = _distances(nodes, base + slabs.far_x, slabs.far_origin_x, slabs.far_inverse_x)
     t1 = select(f < upper, f, upper)
-    f = (load8(nodes, base + slabs.far_y) - slabs.far_origin_y) * slabs.far_inverse_y
+    f = _distances(nodes, base + slabs.far_y, slabs.far_origin_y, slabs.far_inverse_y)
     t1 = select(f < t1, f, t1)
-    f = (load8(nodes, base + slabs.far_z) - slabs.far_origin_z) * slabs.far_inverse_z
+    f = _distances(nodes, base + slabs.far_z, slabs.far_origin_z, slabs.far_inverse_z)
     t1 = select(f < t1, f, t1)
     return t0, movemask(t0 <= t1 * splat8(FAR_PADDING))
+
+
+@inlined
+def _distances(nodes, row, origin, inverse):
+    return (load8(nodes, row) - splat8(origin)) * splat8(inverse)
 
 
 class Shear(NamedTuple):
@@ -157,56 +158,98 @@ class Shear(NamedTuple):
 @inlined
 def make_shear(ray):
     """Turn the axes so that z is the largest component of the direction, then shear the direction onto it."""
-    ox, oy, oz, dx, dy, dz, _ = ray
-    ax, ay, az = abs(dx), abs(dy), abs(dz)
-    if az >= ax and az >= ay:
-        return _shear(0, 4, 8, ox, oy, oz, dx, dy, dz)
-    if ay >= ax:
-        return _shear(8, 0, 4, oz, ox, oy, dz, dx, dy)
-    return _shear(4, 8, 0, oy, oz, ox, dy, dz, dx)
-
-
-@inlined
-def _shear(row_x, row_y, row_z, ox, oy, oz, dx, dy, dz):
+    ax, ay, az = abs(ray.dx), abs(ray.dy), abs(ray.dz)
+    on_z = az >= ax and az >= ay
+    on_y = not on_z and ay >= ax
+    dx = _turned(on_z, on_y, ray.dy, ray.dz, ray.dx)
+    dy = _turned(on_z, on_y, ray.dz, ray.dx, ray.dy)
+    dz = _turned(on_z, on_y, ray.dx, ray.dy, ray.dz)
     return Shear(
-        row_x, row_y, row_z, splat4(ox), splat4(oy), splat4(oz), splat4(dx / dz), splat4(dy / dz), splat4(dz)
+        _turned(on_z, on_y, 4, 8, 0),
+        _turned(on_z, on_y, 8, 0, 4),
+        _turned(on_z, on_y, 0, 4, 8),
+        _turned(on_z, on_y, ray.oy, ray.oz, ray.ox),
+        _turned(on_z, on_y, ray.oz, ray.ox, ray.oy),
+        _turned(on_z, on_y, ray.ox, ray.oy, ray.oz),
+        dx / dz,
+        dy / dz,
+        dz,
     )
 
 
 @inlined
-def hit_triangles(blocks, base, ray):
-    """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt, t, and the
-    numerators of u and v with their denominator.
+def _turned(on_z, on_y, if_x, if_y, if_z):
+    return if_z if on_z else (if_y if on_y else if_x)
+
+
+class Edges(NamedTuple):
+    """Four triangles as a ray sees them: sheared corners, edge functions, and their sum, the determinant."""
+
+    x0: Any
+    x1: Any
+    x2: Any
+    y0: Any
+    y1: Any
+    y2: Any
+    z0: Any
+    z1: Any
+    z2: Any
+    e0: Any
+    e1: Any
+    e2: Any
+    determinant: Any
+
+
+@inlined
+def see_triangles(blocks, base, ray):
+    """The ``Edges`` of a block's four triangles, and the mask of those whose edges a ray passes on the same side.
 
     Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
     ab - cd or is 0, and is antisymmetric, so two triangles never both miss on their shared edge; 0 counts as inside.
-    When all three edge functions are 0 (the ray lies in the plane, or the triangle has no area) it is a miss. A hit is
-    in doubt when the determinant is so small that rounding may have made it; ``meets_face_box`` then decides.
+    When all three edge functions are 0 (the ray lies in the plane, or the triangle has no area) it is a miss.
     """
-    zero = splat4(0.0)
-    z0 = load4(blocks, base + ray.row_z) - ray.origin_z
-    z1 = load4(blocks, base + 12 + ray.row_z) - ray.origin_z
-    z2 = load4(blocks, base + 24 + ray.row_z) - ray.origin_z
-    x0 = (load4(blocks, base + ray.row_x) - ray.origin_x) - ray.shear_x * z0
-    x1 = (load4(blocks, base + 12 + ray.row_x) - ray.origin_x) - ray.shear_x * z1
-    x2 = (load4(blocks, base + 24 + ray.row_x) - ray.origin_x) - ray.shear_x * z2
-    y0 = (load4(blocks, base + ray.row_y) - ray.origin_y) - ray.shear_y * z0
-    y1 = (load4(blocks, base + 12 + ray.row_y) - ray.origin_y) - ray.shear_y * z1
-    y2 = (load4(blocks, base + 24 + ray.row_y) - ray.origin_y) - ray.shear_y * z2
+    zero, ox, oy, oz = splat4(0.0), splat4(ray.origin_x), splat4(ray.origin_y), splat4(ray.origin_z)
+    sx, sy = splat4(ray.shear_x), splat4(ray.shear_y)
+    z0 = load4(blocks, base + ray.row_z) - oz
+    z1 = load4(blocks, base + 12 + ray.row_z) - oz
+    z2 = load4(blocks, base + 24 + ray.row_z) - oz
+    x0 = (load4(blocks, base + ray.row_x) - ox) - sx * z0
+    x1 = (load4(blocks, base + 12 + ray.row_x) - ox) - sx * z1
+    x2 = (load4(blocks, base + 24 + ray.row_x) - ox) - sx * z2
+    y0 = (load4(blocks, base + ray.row_y) - oy) - sy * z0
+    y1 = (load4(blocks, base + 12 + ray.row_y) - oy) - sy * z1
+    y2 = (load4(blocks, base + 24 + ray.row_y) - oy) - sy * z2
     e0 = x2 * y1 - y2 * x1
     e1 = x0 * y2 - y0 * x2
     e2 = x1 * y0 - y1 * x0
     not_negative = (e0 >= zero) & (e1 >= zero) & (e2 >= zero)
     not_positive = (e0 <= zero) & (e1 <= zero) & (e2 <= zero)
     determinant = e0 + e1 + e2
-    bits = movemask((not_negative | not_positive) & (determinant != zero))
-    if bits == 0:
-        return bits, bits, zero, zero, zero, zero
+    seen = (not_negative | not_positive) & (determinant != zero)
+    return Edges(x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant), seen
+
+
+@inlined
+def meet_planes(edges, ray):
+    """t of four triangles, and the mask of those in doubt: where rounding may have made the determinant."""
+    x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant = edges
     across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
-    doubts = bits & movemask(magnitude(determinant) <= across * (across + along) * splat4(_DOUBT))
-    t = (e0 * z0 + e1 * z1 + e2 * z2) / (determinant * ray.direction_z)
-    return bits, doubts, t, e1, e2, determinant
+    doubt = magnitude(determinant) <= across * (across + along) * splat4(_DOUBT)
+    return (e0 * z0 + e1 * z1 + e2 * z2) / (determinant * splat4(ray.direction_z)), doubt
+
+
+@inlined
+def hit_triangles(blocks, base, ray):
+    """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt, t, and the
+    numerators of u and v with their denominator. Of a hit in doubt ``meets_face_box`` decides.
+    """
+    edges, seen = see_triangles(blocks, base, ray)
+    bits, zero = movemask(seen), splat4(0.0)
+    if bits == 0:
+        return bits, bits, zero, zero, zero, zero
+    t, doubt = meet_planes(edges, ray)
+    return bits, bits & movemask(doubt), t, edges.e1, edges.e2, edges.determinant
 
 
 @kernel

@@ -1,14 +1,17 @@
 """The records in memory: what a node and a block of triangles look like. Kernels and builder both read this page."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-# A node is NODE_WORDS 32-bit words. Words 0-47 are six rows of eight float32, one value an octant: lower x,
-# upper x, lower y, upper y, lower z, upper z. Words CHILDREN to CHILDREN + 7 are its children as int32 (the same
-# memory seen through ``links``). An empty octant has lower = +inf and upper = -inf, which no ray enters.
-NODE_WORDS = 56
+CACHE_LINE = 64
+
+# A node is NODE_WORDS 32-bit words, four cache lines. Words 0-47 are six rows of eight float32, one value an octant:
+# lower x, upper x, lower y, upper y, lower z, upper z. Words CHILDREN to CHILDREN + 7 are its children as int32 (the
+# same memory seen through ``links``); the last eight are unused. An empty octant has lower = +inf and upper = -inf,
+# which no ray enters.
+NODE_WORDS = 64
 CHILDREN = 48
 
 # A child >= 0 is a node. A child < 0 is a leaf: ~child holds its first block and, in the low three bits, its number
@@ -35,3 +38,11 @@ class Tree(NamedTuple):
     links: NDArray[np.int32]
     blocks: NDArray[np.float32] | NDArray[np.float64]
     faces: NDArray[np.int32]
+
+
+def cache_aligned(count: int, dtype: type[np.generic]) -> NDArray[Any]:
+    """An uninitialised array of ``count`` values that begins on a cache line, as every record of 64 bytes then does."""
+    size = count * np.dtype(dtype).itemsize
+    memory = np.empty(size + CACHE_LINE, np.uint8)
+    start = -memory.ctypes.data % CACHE_LINE
+    return memory[start : start + size].view(dtype)

@@ -12,7 +12,8 @@ from renderer.light import Color
 KIND, AMBIENT, DIFFUSE, SPECULAR, REFLECTANCE, TRANSMITTANCE = 0, 1, 4, 7, 10, 13
 SHININESS, IOR = 16, 17
 MATERIAL_COLUMNS = 18
-PHONG, MIRROR, DIELECTRIC = 0, 1, 2
+# A Phong material without highlights is LAMBERT; without a diffuse colour too it is UNLIT, and needs no shadow rays.
+PHONG, MIRROR, DIELECTRIC, LAMBERT, UNLIT = 0, 1, 2, 3, 4
 
 _Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 _BLACK = (0.0, 0.0, 0.0)
@@ -43,11 +44,21 @@ class Phong(_Material):
         """Whether rays go through the surface into the object."""
         return any(self.transmittance)
 
+    @property
+    def receives_light(self) -> bool:
+        """Whether direct light changes what is seen of the surface."""
+        return any(self.diffuse) or any(self.specular)
+
+    @property
+    def kind(self) -> int:
+        """What the kernels need to work out of it."""
+        return PHONG if any(self.specular) else LAMBERT if any(self.diffuse) else UNLIT
+
     def row(self) -> NDArray[np.float64]:
         """(MATERIAL_COLUMNS,) float64."""
         ambient = self.diffuse if self.ambient is None else self.ambient
         colors = (*ambient, *self.diffuse, *self.specular, *self.reflectance, *self.transmittance)
-        return np.array([PHONG, *colors, self.shininess, self.ior])
+        return np.array([self.kind, *colors, self.shininess, self.ior])
 
 
 class Mirror(_Material):

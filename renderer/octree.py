@@ -1,17 +1,19 @@
 """The public accelerators: ``Octree``, and ``BruteForce`` as its baseline with the same interface and triangle test."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.build import SPLITS, Rule, build_blocks, build_tree
+from renderer.build import SPLITS, build_blocks, build_tree
 from renderer.errors import MeshError, expect
-from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS
+from renderer.hierarchy import Rule
+from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 from renderer.mesh import Mesh, Repairs
 from renderer.parallel import checked_threads
 from renderer.query import Hits, Target, any_hits, check_rays, closest_hits
+from renderer.refit import refit_tree
 
 MAX_LEAF_SIZE = LANES * MAX_LEAF_BLOCKS
 MAX_DEPTH = 64
@@ -22,7 +24,12 @@ _SMALLEST, _LARGEST = 2.0**-60, 2.0**60
 
 @dataclass(frozen=True)
 class Stats:
-    """What was built. ``references`` counts the faces in all leaves; each face is in exactly one."""
+    """What was built. ``references`` counts the faces in all leaves; each face is in exactly one.
+
+    ``cost`` is what the surface area heuristic expects of a line that crosses the mesh's bounds and is stopped by
+    nothing: how many nodes it enters plus how many blocks it tests (the shares of the root's area that their boxes
+    have). It compares trees of one mesh, such as before and after a refit: rays slow down about as it grows.
+    """
 
     faces: int
     nodes: int
@@ -31,6 +38,7 @@ class Stats:
     blocks: int
     references: int
     bytes: int
+    cost: float
 
     @property
     def fill(self) -> float:
@@ -46,10 +54,23 @@ class _Accelerator:
     """
 
     def __init__(self, mesh: Mesh, target: Target, threads: int | None) -> None:
-        self.mesh = mesh
+        # One reference, so that a refit on another thread changes both at once.
+        self._built = (mesh, target)
         self.repairs: Repairs | None = None
-        self.target = target
         self.threads = checked_threads(threads)
+
+    @property
+    def mesh(self) -> Mesh:
+        return self._built[0]
+
+    @property
+    def target(self) -> Target:
+        """The arrays that rays are shot at."""
+        return self._built[1]
+
+    @target.setter
+    def target(self, target: Target) -> None:
+        self._built = (self.mesh, target)
 
     def closest_hit(
         self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
@@ -61,39 +82,65 @@ class _Accelerator:
         misses it, unless the rounding of its slopes lifts it out of the plane. The same bits for any number of
         threads. Raises ``ValueError`` naming argument and row.
         """
-        rays = check_rays(origins, directions, t_min, t_max, self.target.scale)
-        return closest_hits(self.target, rays, self.mesh, self.threads)
+        mesh, target = self._built
+        rays = check_rays(origins, directions, t_min, t_max, target.scale)
+        return closest_hits(target, rays, mesh, self.threads)
 
     def any_hit(
         self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
     ) -> NDArray[np.bool_]:
         """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above."""
-        return any_hits(self.target, check_rays(origins, directions, t_min, t_max, self.target.scale), self.threads)
+        target = self.target
+        return any_hits(target, check_rays(origins, directions, t_min, t_max, target.scale), self.threads)
+
+    def refit(self, vertices: ArrayLike) -> None:
+        """Move the vertices and keep the faces: ``vertices`` is (V, 3), finite, V as built.
+
+        Hits are from then on, bit for bit, those of a new build over the moved mesh. Only boxes and blocks are made
+        anew, which takes a fraction of a build; which faces share a leaf stays, so rays slow down when neighbours move
+        apart. ``stats.cost`` before and after tells how much: build anew where it has grown by more than rays may slow
+        down. Normals, colours and texture coordinates of ``mesh`` stay as they are.
+
+        A query that runs meanwhile sees the mesh before or after, never a mixture; ``Hits`` keep the mesh that they
+        hit. Raises ``MeshError``, and changes nothing, where ``vertices`` are no new positions of the same vertices.
+
+        >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> octree.refit([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
+        >>> octree.closest_hit([[0.25, 0.25, 2.0]], [[0, 0, -1]]).t
+        array([1.])
+        """
+        mesh, target = self._built
+        moved = _moved(mesh, vertices)
+        scaled, scale = _scaled(moved)
+        tree = refit_tree(target.tree, scaled, moved.faces, self.threads)
+        self._built = (moved, Target(tree, target.depth, scale))
 
     @property
     def stats(self) -> Stats:
         """Counts and bytes of the built arrays, those of the mesh left out."""
-        tree = self.target.tree
-        children = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN:]
+        mesh, target = self._built
+        tree = target.tree
+        children = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
         return Stats(
-            faces=len(self.mesh.faces),
+            faces=len(mesh.faces),
             nodes=len(children),
             leaves=int((children < 0).sum()),
-            depth=self.target.depth,
+            depth=target.depth,
             blocks=len(tree.faces) // LANES,
             references=int((tree.faces >= 0).sum()),
             bytes=tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes,
+            cost=_cost(tree),
         )
 
 
 class Octree(_Accelerator):
     """An octree over triangles with fitted boxes, eight octants tested at once and blocks of four triangles.
 
-    split      "midpoint": octants at the middle of the faces' centres, small ones merged; "sah": binary splits by
-               the surface area heuristic, slower to build and a little faster to trace
-    leaf_size  the most faces of a leaf, 1 to 32
+    split      "midpoint": octants about the middle of each box, and the surface area heuristic for the last few faces;
+               "sah": that heuristic throughout, slower to build and a little faster to trace
+    leaf_size  the most faces of a leaf, 1 to 32; one of more than four only where that is the cheaper
     max_depth  the deepest level that the split rule may cut, 1 to 64; below it faces are shared out evenly
-    threads    for queries; None takes all processors
+    threads    for the build and queries; None takes all processors; results do not depend on it
     repair     build without the faces that name a vertex that is not finite or an index out of range, which are errors
                otherwise. A hit's ``face`` is then one of ``octree.mesh``, the faces that were kept; ``octree.repairs``
                (None without this option) tells what was dropped, and ``repairs.kept_faces[hits.face[hits.hit]]``
@@ -140,7 +187,8 @@ class Octree(_Accelerator):
         _expect_range("leaf_size", leaf_size, MAX_LEAF_SIZE)
         _expect_range("max_depth", max_depth, MAX_DEPTH)
         vertices, scale = _scaled(mesh)
-        tree, depth = build_tree(vertices, mesh.faces, Rule(SPLITS[split], int(leaf_size), int(max_depth)))
+        rule = Rule(SPLITS[split], int(leaf_size), int(max_depth))
+        tree, depth = build_tree(vertices, mesh.faces, rule, checked_threads(threads))
         super().__init__(mesh, Target(tree, depth, scale), threads)
 
 
@@ -154,7 +202,7 @@ class BruteForce(_Accelerator):
         self, vertices: ArrayLike, faces: ArrayLike, *, threads: int | None = None, repair: bool = False
     ) -> None:
         mesh, repairs = _mesh(vertices, faces, repair)
-        super().__init__(mesh, _all_blocks(mesh), threads)
+        super().__init__(mesh, _all_blocks(mesh, checked_threads(threads)), threads)
         self.repairs = repairs
 
     @classmethod
@@ -162,7 +210,7 @@ class BruteForce(_Accelerator):
         """The same over a mesh that is already checked."""
         _expect_mesh(mesh)
         brute = cls.__new__(cls)
-        _Accelerator.__init__(brute, mesh, _all_blocks(mesh), threads)
+        _Accelerator.__init__(brute, mesh, _all_blocks(mesh, checked_threads(threads)), threads)
         return brute
 
 
@@ -182,9 +230,37 @@ def _expect_range(argument: str, value: object, largest: int) -> None:
     expect(bool(good), argument, f"an integer from 1 to {largest}", repr(value))
 
 
-def _all_blocks(mesh: Mesh) -> Target:
+def _all_blocks(mesh: Mesh, threads: int) -> Target:
     vertices, scale = _scaled(mesh)
-    return Target(build_blocks(vertices, mesh.faces), 0, scale)
+    return Target(build_blocks(vertices, mesh.faces, threads), 0, scale)
+
+
+def _moved(mesh: Mesh, vertices: ArrayLike) -> Mesh:
+    """The mesh with other positions of its vertices."""
+    try:
+        shape = np.shape(vertices)
+    except ValueError:  # a ragged list, of which Mesh tells more
+        shape = mesh.vertices.shape
+    if shape != mesh.vertices.shape:
+        raise MeshError(f"vertices: expected shape {mesh.vertices.shape} as built, got {shape}")
+    return replace(mesh, vertices=vertices)  # type: ignore[arg-type]  # Mesh checks and converts
+
+
+def _cost(tree: Tree) -> float:
+    """``Stats.cost``; every box counts whole where the root's has no area, and every block where there is no node."""
+    if not len(tree.nodes):
+        return float(len(tree.faces) // LANES)
+    rows = tree.nodes.reshape(-1, NODE_WORDS)[:, :CHILDREN].reshape(-1, 3, 2, 8)
+    children = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
+    used = children != 0
+    extents = np.where(used[:, None], np.float64(rows[:, :, 1]) - rows[:, :, 0], 0.0)
+    areas = (extents * np.roll(extents, 1, axis=1)).sum(axis=1)
+    lower, upper = rows[0, :, 0].min(axis=1), rows[0, :, 1].max(axis=1)
+    x, y, z = np.float64(upper) - lower
+    whole = x * y + y * z + z * x
+    shares = areas / whole if 0.0 < whole < np.inf else used.astype(np.float64)
+    blocks = np.where(children < 0, (~children & (MAX_LEAF_BLOCKS - 1)) + 1, 1)
+    return 1.0 + float((shares * blocks).sum())
 
 
 def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
@@ -208,6 +284,6 @@ def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
 
 def _is_extreme(mesh: Mesh) -> bool:
     """Whether any vertex, used or not, lies outside the comfortable sizes."""
-    lower, upper = mesh.bounds
-    largest = float(max(np.abs(lower).max(), np.abs(upper).max())) if len(mesh.vertices) else 1.0
+    # Not from mesh.bounds: the least of each column takes thirty times as long as the least of all.
+    largest = float(max(mesh.vertices.max(), -mesh.vertices.min())) if len(mesh.vertices) else 1.0
     return not _SMALLEST <= largest <= _LARGEST

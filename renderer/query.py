@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.batch import FARTHEST, LONGEST, SHORTEST, any_chunk, closest_chunk, first_bad_ray
+from renderer.batch import FARTHEST, LONGEST, SHORTEST, first_bad_ray, trace_chunk
 from renderer.errors import expect
 from renderer.layout import Tree
 from renderer.mesh import Mesh, face_normals
@@ -135,22 +135,22 @@ class Target:
 def closest_hits(target: Target, rays: Rays, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
     count = len(rays.origins)
-    out = (np.empty(count), np.empty(count, np.int64), np.empty(count), np.empty(count))
-    _run(closest_chunk, target, rays, out, threads)
+    out = np.empty(count), np.empty(count, np.int64), np.empty(count), np.empty(count)
+    _run(target, rays, (*out, np.empty(0, np.bool_)), threads, any_hit=False)
     return Hits(*out, mesh)
 
 
 def any_hits(target: Target, rays: Rays, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
-    out = np.empty(len(rays.origins), np.bool_)
-    _run(any_chunk, target, rays, out, threads)
+    none, out = np.empty(0), np.empty(len(rays.origins), np.bool_)
+    _run(target, rays, (none, np.empty(0, np.int64), none, none, out), threads, any_hit=True)
     return out
 
 
-def _run(chunk: Any, target: Target, rays: Rays, out: Any, threads: int) -> None:
+def _run(target: Target, rays: Rays, out: Any, threads: int, any_hit: bool) -> None:
     arrays = (rays.origins, rays.directions, rays.t_min, rays.t_max)
     for_chunks(
-        lambda begin, end: chunk(target.tree, target.depth, target.scale, arrays, out, begin, end),
+        lambda begin, end: trace_chunk(target.tree, target.depth, target.scale, arrays, out, begin, end, any_hit),
         len(rays.origins),
         CHUNK,
         threads,

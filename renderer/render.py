@@ -10,11 +10,16 @@ from renderer.build import SPLITS
 from renderer.camera import sample_offsets
 from renderer.errors import expect
 from renderer.image import Image
+from renderer.layout import Tree, cache_aligned
+from renderer.mesh import Mesh
+from renderer.needs import Needs, checked_needs
 from renderer.octree import BruteForce, Octree
 from renderer.parallel import checked_threads, for_chunks
 from renderer.scene import RenderSettings, Scene
 from renderer.shading import BOUNDED, MITSUBA_EPSILON
-from renderer.whitted import Accelerator, Film, Settings, render_tile
+from renderer.sight import MAX_MEDIA
+from renderer.tile import Film, render_tile
+from renderer.whitted import Accelerator, Settings
 from renderer.world import pack
 
 # Pixels a side: 256 tiles share a 512 x 512 picture evenly, and neighbouring rays find their nodes in the cache.
@@ -24,8 +29,9 @@ TILE = 32
 def render(
     scene: Scene,
     *,
-    accelerator: Literal["octree", "brute"] = "octree",
+    accelerator: Literal["auto", "octree", "brute"] = "auto",
     split: Literal["midpoint", "sah"] = "midpoint",
+    needs: Needs | None = None,
     offset: Literal["bounded", "mitsuba"] | float = "bounded",
     threads: int | None = None,
     progress: bool = False,
@@ -33,7 +39,10 @@ def render(
 ) -> Image:
     """Render ``scene``; ``resolution``, ``samples``, ``max_depth`` and ``min_weight`` override the scene's own.
 
-    accelerator  "octree", or "brute" to test every ray against every face
+    accelerator  "octree", "brute" to test every ray against every face, or "auto": the octree unless the faces are so
+                 few that it does not pay
+    needs        what to have ready: at least what ``needs_of`` says, which None stands for. More changes no bit of
+                 radiance, depth, normal or face, and costs time and memory
     offset       how spawned rays leave a surface: "bounded" by their rounding error, or Mitsuba's rule with its
                  epsilon or another one
     progress     a bar on standard error when that is a terminal
@@ -43,16 +52,15 @@ def render(
     expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
     chosen = _settings(scene, settings)
     width, height = chosen.resolution
-    named = isinstance(accelerator, str) and accelerator in ("octree", "brute")
-    expect(named, "accelerator", "'octree' or 'brute'", repr(accelerator))
+    named = isinstance(accelerator, str) and accelerator in ("auto", "octree", "brute")
+    expect(named, "accelerator", "'auto', 'octree' or 'brute'", repr(accelerator))
     expect(isinstance(split, str) and split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
     threads = checked_threads(threads)
-    kernel_settings = Settings(chosen.max_depth, chosen.min_weight, _offset(offset))
+    wanted = checked_needs(needs, scene, chosen.max_depth)
+    kernel_settings = kernel_settings_of(wanted, chosen, _offset(offset))
     began = time.perf_counter()
-    mesh, world = pack(scene)
-    built = Octree.from_mesh(mesh, split=split) if accelerator == "octree" else BruteForce.from_mesh(mesh)
-    expect(built.target.scale == 1.0, "scene", "a largest coordinate from 2^-60 to 2^60", f"bounds {mesh.bounds}")
-    target = Accelerator(built.target.tree, built.target.depth)
+    mesh, world = pack(scene, wanted)
+    target = build_target(mesh, accelerator, split, wanted)
     camera, samples = scene.camera.rows(width, height), sample_offsets(chosen.samples)
     film = _film(width, height)
     ready = time.perf_counter()
@@ -67,6 +75,28 @@ def render(
     with _bar(tiles, progress) as bar:
         for_chunks(render_one, tiles, 1, threads, bar.update)
     return Image(*film, build_seconds=ready - began, render_seconds=time.perf_counter() - ready)
+
+
+def build_target(mesh: Mesh, accelerator: str, split: Literal["midpoint", "sah"], needs: Needs) -> Accelerator:
+    """What the rays are shot at: a tree, or the blocks alone where ``accelerator`` is "brute" or no tree is needed."""
+    with_tree = needs.octree if accelerator == "auto" else accelerator == "octree"
+    built = Octree.from_mesh(mesh, split=split) if with_tree else BruteForce.from_mesh(mesh)
+    expect(built.target.scale == 1.0, "scene", "a largest coordinate from 2^-60 to 2^60", f"bounds {mesh.bounds}")
+    tree = built.target.tree
+    return Accelerator(_widened(tree) if needs.float64_vertices else tree, built.target.depth)
+
+
+def _widened(tree: Tree) -> Tree:
+    """The tree with its vertices in float64, whether they need it or not."""
+    blocks = cache_aligned(len(tree.blocks), np.float64)
+    blocks[:] = tree.blocks
+    return tree._replace(blocks=blocks)
+
+
+def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: float) -> Settings:
+    """The kernel's settings: no bounces where nothing bounces, and no media where nothing refracts."""
+    bounces = chosen.max_depth if needs.reflection or needs.refraction else 0
+    return Settings(bounces, chosen.min_weight, offset, MAX_MEDIA if needs.refraction else 0)
 
 
 def _settings(scene: Scene, given: dict[str, Any]) -> RenderSettings:

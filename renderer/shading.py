@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from renderer.jit import kernel
+from renderer.jit import inlined, kernel
 from renderer.vec3 import add, cross, dot, length, scale, sub
 
 _ROUNDOFF = 2.0**-53
@@ -18,13 +18,14 @@ _GAMMA7 = 7.0 * _ROUNDOFF / (1.0 - 7.0 * _ROUNDOFF)
 # errs by 56 u L^2; the sum of the three e z errs by 3 (56 + 8 + 24) u L^3. Divided by the determinant, which is
 # |cross(p1 - p0, p2 - p0) . d| / |d_z|, and projected onto the normal, the direction drops out: 264 u L^3 / |cross|.
 _GAMMA264 = 264.0 * _ROUNDOFF / (1.0 - 264.0 * _ROUNDOFF)
+_SMALLEST = 2.0**-1074
 # Mitsuba 3's RayEpsilon: 1500 times the unit roundoff of float32.
 MITSUBA_EPSILON = 1500.0 * 2.0**-24
 # ``offset`` below 0 asks for the error-bounded rule.
 BOUNDED = -1.0
 
 
-@kernel
+@inlined
 def reflect(d, n):
     """The mirror image of the unit direction d."""
     return sub(d, scale(n, 2.0 * dot(d, n)))
@@ -77,7 +78,7 @@ def specular(d, n, light, shininess):
     return math.exp(shininess * math.log1p(-short)) if short < 1.0 else 0.0
 
 
-@kernel
+@inlined
 def offset_distance(p, p0, p1, p2, u, v, n_g):
     """How far p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
 
@@ -93,18 +94,20 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
     return _GAMMA7 * distance + _GAMMA264 * reach * (reach / double_area * reach)
 
 
-@kernel
+@inlined
 def _away(x, step):
     """x + step, rounded at least one float64 further in the direction of ``step``."""
     y = x + step
-    if step > 0.0:
-        return np.nextafter(y, np.inf)
-    if step < 0.0:
-        return np.nextafter(y, -np.inf)
-    return y
+    if step == 0.0 or not math.isfinite(y):
+        return y
+    # nextafter without its call: the bits of a float64 count up away from 0.
+    if y == 0.0:
+        return math.copysign(_SMALLEST, step)
+    away = 1 if (y > 0.0) == (step > 0.0) else -1
+    return np.int64(np.float64(y).view(np.int64) + away).view(np.float64)
 
 
-@kernel
+@inlined
 def spawn_origin(p, error, n_g, w, offset):
     """Where a ray from the surface point p in direction w starts, so that it does not meet that surface again.
 

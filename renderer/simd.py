@@ -141,6 +141,32 @@ def get(typingctx, base, index):
 
 
 @intrinsic
+def at(typingctx, base, index):
+    """A ``pointer`` to the element at ``index`` of another."""
+
+    def codegen(context, builder, sig, args):
+        return builder.gep(args[0], [args[1]])
+
+    return base(base, types.intp), codegen
+
+
+@intrinsic
+def prefetch(typingctx, base, index):
+    """Ask for the cache line that holds the element at ``index`` of a ``pointer``; any index is allowed."""
+
+    def codegen(context, builder, sig, args):
+        byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
+        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        address = builder.bitcast(builder.gep(args[0], [args[1]]), byte)
+        # To be read, into all levels of cache, data.
+        builder.call(function, [address, word(0), word(3), word(1)])
+        return context.get_dummy_value()
+
+    return types.void(base, types.intp), codegen
+
+
+@intrinsic
 def put(typingctx, base, index, value):
     """Write the element at ``index`` of a ``pointer``."""
 
@@ -245,6 +271,34 @@ def lane(typingctx, vector, index):
     return result(vector, types.intp), codegen
 
 
+def _fold(predicate: str) -> Any:
+    """The one lane of a vector without NaN that ``predicate`` puts before all others."""
+
+    def codegen(context, builder, sig, args):
+        vector, lanes = args[0], sig.args[0].lanes
+        step = lanes // 2
+        while step > 0:
+            order = [(i + step) % lanes for i in range(lanes)]
+            turned = builder.shuffle_vector(vector, vector, ir.Constant(ir.VectorType(ir.IntType(32), lanes), order))
+            vector = builder.select(builder.fcmp_ordered(predicate, turned, vector), turned, vector)
+            step //= 2
+        return builder.extract_element(vector, ir.IntType(32)(0))
+
+    return codegen
+
+
+@intrinsic
+def least(typingctx, vector):
+    """The smallest lane of eight float32, none of them NaN."""
+    return types.float32(F32X8), _fold("<")
+
+
+@intrinsic
+def most(typingctx, vector):
+    """The largest lane of eight float32, none of them NaN."""
+    return types.float32(F32X8), _fold(">")
+
+
 @intrinsic
 def movemask(typingctx, mask):
     """The mask as an integer, lane i in bit i."""
@@ -262,6 +316,16 @@ def lowest_bit(typingctx, bits):
 
     def codegen(context, builder, sig, args):
         return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
+
+    return types.int64(types.int64), codegen
+
+
+@intrinsic
+def count_bits(typingctx, bits):
+    """Number of set bits of an int64."""
+
+    def codegen(context, builder, sig, args):
+        return builder.ctpop(args[0])
 
     return types.int64(types.int64), codegen
 

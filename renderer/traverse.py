@@ -1,96 +1,149 @@
-"""Closest and any hit of one ray, through the tree or over every block.
-
-All of them share ``nearest_in_blocks`` and its triangle test, so they cannot disagree on what a hit is.
-"""
+"""Closest and any hits of a range of rays: coherent sixteens as packets, others as a stream, doubts settled singly."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.intersect import (
-    box_limit,
-    enter_boxes,
-    hit_triangles,
-    make_shear,
-    make_slabs,
-    meets_face_box,
-    round_down,
-)
+from renderer.intersect import Ray, box_limit, enter_boxes, make_shear, make_slabs, round_down
 from renderer.jit import inlined, kernel
-from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
-from renderer.simd import bits_float, float_bits, get, lane, lowest_bit, pointer, put, splat8
+from renderer.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
+from renderer.leaf import NO_FACE, nearest_carefully, search_all_blocks
+from renderer.packet import trace_packet
+from renderer.prepared import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare
+from renderer.simd import at, get, lowest_bit, pointer, put, splat8
+from renderer.stream import (
+    END,
+    LANE_DOUBLES,
+    LANE_FLOATS,
+    LANE_INTEGERS,
+    Lanes,
+    begin_ray,
+    leave_leaf,
+    leave_node,
+    make_lanes,
+    meet_leaves,
+    meet_nodes,
+    take_hits,
+)
+
+# Rays whose slopes against their dominant axis differ by more than this from the first one's are no packet. It only
+# spares rays that point anywhere the attempt: whether a packet pays, its budget tells.
+_SPREAD = 0.125
+# After a packet that gave up, this many sixteens go without an attempt, and twice as many after each further one.
+_PATIENCE = 1
+_MOST_PATIENCE = 64
 
 
-class View(NamedTuple):
-    """A ``Tree`` as the traversal reads it: pointers, and the number of blocks."""
-
-    nodes: Any
-    links: Any
-    blocks: Any
-    faces: Any
-    count: int
-
-
-@inlined
-def view(tree):
-    """Pointers into a tree, which the caller must keep alive."""
-    return View(
-        pointer(tree.nodes), pointer(tree.links), pointer(tree.blocks), pointer(tree.faces), len(tree.faces) // LANES
-    )
-
-
-NO_FACE = np.iinfo(np.int32).max
-_LOW_WORD = 0xFFFFFFFF
-
-
-@inlined
-def nearest_in_blocks(tree, first, count, t_min, shear, best):
-    """The better of ``best`` = (t, face, u, v) and the sure hits in ``count`` blocks: smallest t, then lowest face.
-
-    Also returns whether a hit was in doubt. A call to settle it here would cost every ray its registers, so it is left
-    to ``_closest_carefully``.
+class Rays(NamedTuple):
+    """Pointers to (n, 3) origins and directions and to t_min and t_max, which have one value a ray or (step 0) one for
+    all. The tree's vertices were multiplied by ``scale``, a power of two, so t goes in and out of its units exactly.
     """
-    t, face, u, v = best
-    doubtful = np.int64(0)
-    for block in range(first, first + count):
-        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
-        doubtful |= doubts
-        bits &= ~doubts
-        while bits != 0:
-            i = lowest_bit(bits)
-            bits &= bits - 1
-            ti = lane(t4, i)
-            fi = get(tree.faces, block * LANES + i)
-            if ti >= t_min and (ti < t or (ti == t and fi < face)):
-                t, face, u, v = ti, fi, lane(u4, i) / lane(w4, i), lane(v4, i) / lane(w4, i)
-    return t, face, u, v, doubtful
+
+    origins: Any
+    directions: Any
+    t_min: Any
+    t_max: Any
+    min_step: int
+    max_step: int
+    scale: float
+
+
+class Found(NamedTuple):
+    """Pointers to what is written: t, face, u, v as ``Hits`` has them, and for any hits only ``hit``, a bool."""
+
+    t: Any
+    face: Any
+    u: Any
+    v: Any
+    hit: Any
+
+
+class Scratch(NamedTuple):
+    """Memory of one thread, as pointers: sixteen prepared rays and their lanes; of each whether it met a doubt and its
+    number; and the numbers of the rays that wait for a stream.
+    """
+
+    prepared: Prepared
+    lanes: Lanes
+    doubtful: Any
+    number: Any
+    waiting: Any
+
+
+class Memory(NamedTuple):
+    """The arrays behind a ``Scratch``, which its user must ``keep``."""
+
+    floats: Any
+    doubles: Any
+    integers: Any
 
 
 @kernel
-def _nearest_carefully(tree, first, count, ray, shear, best):
-    """``nearest_in_blocks`` with the hits in doubt that the boxes of their own faces confirm."""
-    t, face, u, v = best
-    for block in range(first, first + count):
-        base = block * BLOCK_WORDS
-        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree.blocks, base, shear)
-        while bits != 0:
-            i = lowest_bit(bits)
-            bits &= bits - 1
-            ti = lane(t4, i)
-            fi = get(tree.faces, block * LANES + i)
-            better = ti >= ray.t_min and (ti < t or (ti == t and fi < face))
-            if better and ((doubts >> i) & 1 == 0 or meets_face_box(tree.blocks, base + i, ray, ti)):
-                t, face, u, v = ti, fi, lane(u4, i) / lane(w4, i), lane(v4, i) / lane(w4, i)
-    return t, face, u, v
+def stack_size(depth):
+    """Entries of one stack: each level leaves at most seven octants waiting, and some are written above the top."""
+    return 7 * depth + 24
 
 
 @kernel
-def _closest_carefully(tree, ray, t_max, stack):
+def make_memory(depth, rays):
+    """Memory for ranges of up to ``rays`` rays against a tree of ``depth`` levels."""
+    integers = INTEGERS + 2 * WIDTH + LANE_INTEGERS + WIDTH * stack_size(depth) + rays
+    floats, doubles = np.empty(FLOATS + LANE_FLOATS, np.float32), np.empty(DOUBLES + LANE_DOUBLES)
+    return Memory(floats, doubles, np.empty(integers, np.int64))
+
+
+@inlined
+def make_scratch(memory, depth):
+    """Pointers into a ``Memory``."""
+    floats, doubles, integers = pointer(memory.floats), pointer(memory.doubles), pointer(memory.integers)
+    doubtful = at(integers, INTEGERS)
+    number = at(doubtful, WIDTH)
+    lane_integers = at(number, WIDTH)
+    size = stack_size(depth)
+    lanes = make_lanes(lane_integers, at(floats, FLOATS), at(doubles, DOUBLES), size)
+    waiting = at(lane_integers, LANE_INTEGERS + WIDTH * size)
+    return Scratch(Prepared(floats, doubles, integers), lanes, doubtful, number, waiting)
+
+
+@inlined
+def ray_at(rays, i):
+    """Ray ``i`` in the tree's units, and its t_max."""
+    k, s = 3 * i, rays.scale
+    o, d = rays.origins, rays.directions
+    ray = Ray(
+        s * get(o, k), s * get(o, k + 1), s * get(o, k + 2), get(d, k), get(d, k + 1), get(d, k + 2),
+        s * get(rays.t_min, i * rays.min_step),
+    )  # fmt: skip
+    return ray, s * get(rays.t_max, i * rays.max_step)
+
+
+@kernel
+def _are_coherent(rays, begin):
+    """Whether the sixteen rays from ``begin`` on share their dominant axis, its sign and nearly their slopes."""
+    d = at(rays.directions, 3 * begin)
+    ax, ay, az = abs(get(d, 0)), abs(get(d, 1)), abs(get(d, 2))
+    w = 2 if az >= ax and az >= ay else (1 if ay >= ax else 0)
+    u, v = (w + 1) % 3, (w + 2) % 3
+    first = get(d, w)
+    slope_u, slope_v = get(d, u) / first, get(d, v) / first
+    for r in range(1, WIDTH):
+        dw, du, dv = get(d, 3 * r + w), get(d, 3 * r + u), get(d, 3 * r + v)
+        size = abs(dw)
+        # Of two equal components the axis that ``make_shear`` takes depends on which they are.
+        dominant = size > abs(du) and size > abs(dv) and dw * first > 0.0
+        if not (dominant and abs(du - slope_u * dw) <= _SPREAD * size and abs(dv - slope_v * dw) <= _SPREAD * size):
+            return False
+    size = abs(first)
+    return size > abs(get(d, u)) and size > abs(get(d, v))
+
+
+@kernel
+def closest_carefully(tree, ray, t_max, stack):
     """The closest hit with every doubt settled; in no order, because it is needed for few rays."""
     largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
     lower = splat8(round_down(ray.t_min * largest))
-    best = (t_max, np.int32(NO_FACE), 0.0, 0.0)
+    best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
     top = 1
     put(stack, 0, 0)
     while top > 0:
@@ -98,9 +151,7 @@ def _closest_carefully(tree, ray, t_max, stack):
         child = get(stack, top)
         if child < 0:
             code = ~child
-            best = _nearest_carefully(
-                tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray, shear, best
-            )
+            best = nearest_carefully(tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray, shear, best)
             continue
         _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
         while bits != 0:
@@ -111,161 +162,119 @@ def _closest_carefully(tree, ray, t_max, stack):
 
 
 @inlined
-def _entry(tree, base, place, t0):
-    """An octant as it waits on the stack: the bits of its float32 distance above its child."""
-    return (float_bits(lane(t0, place)) << 32) | (np.int64(get(tree.links, base + place)) & _LOW_WORD)
-
-
-@kernel
-def push_octants(tree, base, t0, bits, stack, top):
-    """Push the octants in ``bits`` of the node whose children begin at ``base``, nearest last."""
-    bottom = top
-    while bits != 0:
-        entry = _entry(tree, base, lowest_bit(bits), t0)
-        bits &= bits - 1
-        at = top
-        while at > bottom and get(stack, at - 1) < entry:
-            put(stack, at, get(stack, at - 1))
-            at -= 1
-        put(stack, at, entry)
-        top += 1
-    return top
-
-
-@kernel
-def closest_hit(tree, ray, t_max, stack):
-    """Closest hit of one ray: (t, face, u, v), with face = NO_FACE and t = t_max on a miss.
-
-    The interval [t_min, t_max] is closed; t counts in units of |direction|; no face is culled. Among equal t the
-    lowest face wins: a node is left behind only when its entry is beyond the best t, never at it, so the answer does
-    not depend on the order of the visits. ``stack`` is int64 scratch of 7 * depth + 8 entries: each level leaves at
-    most seven octants waiting. Watertight and deterministic (Woop et al. 2013); see ``intersect`` for the bounds.
-    """
-    t, face, u, v, doubtful = _closest_surely(tree, ray, t_max, stack)
-    if doubtful != 0:
-        return _closest_carefully(tree, ray, t_max, stack)
-    return t, face, u, v
-
-
-@kernel
-def _closest_surely(tree, ray, t_max, stack):
-    """The closest hit that is in no doubt, and whether there was any doubt."""
-    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
-    slabs, shear = make_slabs(ray, largest), make_shear(ray)
-    t, face, u, v, doubtful = t_max, np.int32(NO_FACE), 0.0, 0.0, np.int64(0)
-    lower = splat8(round_down(ray.t_min * largest))
-    limit = box_limit(t_max, largest)
-    top = 0
-    child = np.int64(0)
-    while True:
-        if child >= 0:
-            # Enter the node: go on with its nearest octant, leave the others on the stack.
-            t0, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(limit))
-            if bits != 0:
-                # One octant: go on there. Two, the usual case: order them without a branch. More: sort them all.
-                base = child * NODE_WORDS + CHILDREN
-                first = lowest_bit(bits)
-                others = bits & (bits - 1)
-                if others == 0:
-                    child = np.int64(get(tree.links, base + first))
-                    continue
-                if others & (others - 1) == 0:
-                    a, b = _entry(tree, base, first, t0), _entry(tree, base, lowest_bit(others), t0)
-                    put(stack, top, max(a, b))
-                    top += 1
-                    child = np.int64(np.int32(min(a, b) & _LOW_WORD))
-                    continue
-                top = push_octants(tree, base, t0, bits, stack, top)
-        else:
-            # Test the leaf's blocks.
-            code = ~child
-            before = t
-            t, face, u, v, doubts = nearest_in_blocks(
-                tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray.t_min, shear, (t, face, u, v)
-            )
-            doubtful |= doubts
-            if t < before:
-                limit = box_limit(t, largest)
-        # Take the next octant that is not beyond the best hit.
-        while top > 0:
-            top -= 1
-            if bits_float(get(stack, top) >> 32) <= limit:
-                break
-        else:
-            return t, face, u, v, doubtful
-        child = np.int64(np.int32(get(stack, top) & _LOW_WORD))
-
-
-@kernel
-def any_hit(tree, ray, t_max, stack):
-    """Whether anything lies within [t_min, t_max] of one ray: the same test, in no order, ended by the first hit."""
-    found, doubtful = _any_surely(tree, ray, t_max, stack)
-    if not found and doubtful != 0:
-        return _closest_carefully(tree, ray, t_max, stack)[1] != NO_FACE
-    return found
-
-
-@kernel
-def _any_surely(tree, ray, t_max, stack):
-    """Whether there is a hit in no doubt, and whether there was any doubt before."""
-    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
-    slabs, shear = make_slabs(ray, largest), make_shear(ray)
-    lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
-    doubtful = np.int64(0)
-    top = 1
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            code = ~child
-            found, doubts = any_in_blocks(
-                tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray.t_min, t_max, shear
-            )
-            if found:
-                return True, doubtful
-            doubtful |= doubts
-            continue
-        _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
-        while bits != 0:
-            put(stack, top, np.int64(get(tree.links, child * NODE_WORDS + CHILDREN + lowest_bit(bits))))
-            bits &= bits - 1
-            top += 1
-    return False, doubtful
+def _write(found, i, scale, best, any_hit):
+    t, face, u, v, w = best
+    hit = face != NO_FACE
+    if any_hit:
+        put(found.hit, i, hit)
+        return
+    put(found.t, i, t / scale if hit else np.inf)
+    put(found.face, i, np.int64(face if hit else -1))
+    put(found.u, i, u / w if hit else np.nan)
+    put(found.v, i, v / w if hit else np.nan)
 
 
 @inlined
-def any_in_blocks(tree, first, count, t_min, t_max, shear):
-    """Whether a triangle of ``count`` blocks from ``first`` is surely hit within [t_min, t_max]; any doubts."""
-    doubtful = np.int64(0)
-    for block in range(first, first + count):
-        bits, doubts, t4, _, _, _ = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
-        doubtful |= doubts
-        bits &= ~doubts
-        while bits != 0:
-            ti = lane(t4, lowest_bit(bits))
-            bits &= bits - 1
-            if t_min <= ti <= t_max:
-                return True, doubtful
-    return False, doubtful
+def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
+    """Write the hit of ray ``i``, in place ``r``, after a careful search on its stack if there was a doubt."""
+    best = best_of(scratch.prepared, r)
+    if doubtful:
+        ray, t_max = ray_at(rays, i)
+        best = closest_carefully(tree, ray, t_max, at(scratch.lanes.stacks, r * scratch.lanes.stack_size))
+    _write(found, i, rays.scale, best, any_hit)
+
+
+@inlined
+def _load(rays, scratch, r, i):
+    """Let ray ``i`` begin in lane ``r``."""
+    ray, t_max = ray_at(rays, i)
+    prepare(scratch.prepared, r, ray, t_max)
+    begin_ray(scratch.lanes, r)
+    put(scratch.number, r, i)
+    put(scratch.doubtful, r, 0)
 
 
 @kernel
-def closest_hit_brute(tree, ray, t_max, stack):
-    """``closest_hit`` over every block; the nodes and the stack are not read."""
-    shear, miss, count = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0), tree.count
-    t, face, u, v, doubtful = nearest_in_blocks(tree, 0, count, ray.t_min, shear, miss)
-    if doubtful != 0:
-        return _nearest_carefully(tree, 0, count, ray, shear, miss)
-    return t, face, u, v
+def _trace_stream(tree, rays, found, scratch, count, any_hit):
+    """Trace the ``count`` rays in ``scratch.waiting``, sixteen in turn."""
+    prepared, lanes, waiting = scratch.prepared, scratch.lanes, scratch.waiting
+    following = min(count, WIDTH)
+    for r in range(following):
+        _load(rays, scratch, r, get(waiting, r))
+        put(lanes.at_node, r, r)
+    nodes, leaves = following, 0
+    while nodes + leaves > 0:
+        meet_nodes(tree, prepared, lanes, nodes)
+        entered, nodes = nodes, 0
+        for k in range(entered):
+            r = get(lanes.at_node, k)
+            child = leave_node(tree, prepared, lanes, r, any_hit)
+            put(lanes.at_node, nodes, r)
+            nodes += np.int64(child >= 0)
+            put(lanes.at_leaf, leaves, r)
+            leaves += np.int64(child < 0)
+        meet_leaves(tree, prepared, lanes, leaves)
+        entered, leaves = leaves, 0
+        for k in range(entered):
+            r = get(lanes.at_leaf, k)
+            child, hit = get(lanes.child, r), False
+            if child != END:
+                hit, doubtful = take_hits(tree, prepared, lanes, r)
+                put(scratch.doubtful, r, get(scratch.doubtful, r) | np.int64(doubtful))
+                child = leave_leaf(tree, prepared, lanes, r)
+            if child == END or (any_hit and hit):
+                i, doubtful = get(scratch.number, r), get(scratch.doubtful, r) != 0
+                _finish(tree, rays, found, i, scratch, r, doubtful, any_hit)
+                if following == count:
+                    continue
+                _load(rays, scratch, r, get(waiting, following))
+                following += 1
+                child = 0
+            put(lanes.at_node, nodes, r)
+            nodes += np.int64(child >= 0)
+            put(lanes.at_leaf, leaves, r)
+            leaves += np.int64(child < 0)
+
+
+@inlined
+def _trace_sixteen(tree, rays, found, first, scratch, any_hit):
+    """Trace the rays from ``first`` on as a packet; returns False if it gave up."""
+    prepared = scratch.prepared
+    for r in range(WIDTH):
+        ray, t_max = ray_at(rays, first + r)
+        prepare(prepared, r, ray, t_max)
+    complete, doubtful = trace_packet(tree, prepared, scratch.lanes.stacks, any_hit)
+    if complete:
+        for r in range(WIDTH):
+            _finish(tree, rays, found, first + r, scratch, r, (doubtful >> r) & 1 != 0, any_hit)
+    return complete
 
 
 @kernel
-def any_hit_brute(tree, ray, t_max, stack):
-    """``any_hit`` over every block; the nodes and the stack are not read."""
-    shear, count = make_shear(ray), tree.count
-    found, doubtful = any_in_blocks(tree, 0, count, ray.t_min, t_max, shear)
-    if not found and doubtful != 0:
-        miss = (t_max, np.int32(NO_FACE), 0.0, 0.0)
-        return _nearest_carefully(tree, 0, count, ray, shear, miss)[1] != NO_FACE
-    return found
+def trace(tree, depth, rays, found, begin, end, scratch, any_hit):
+    """Closest hits, or with ``any_hit`` whether there is one, of the rays from ``begin`` to ``end``.
+
+    The interval [t_min, t_max] is closed; t counts in units of |direction|; no face is culled. Among equal t the lowest
+    face wins: a node is left behind only when its entry is beyond the best t, never at it, so the answer depends
+    neither on the order of the visits nor on the rays that travel together. ``depth`` 0 tests every block. Watertight
+    and deterministic (Woop et al. 2013); see ``intersect`` for the bounds.
+    """
+    if depth == 0:
+        for i in range(begin, end):
+            ray, t_max = ray_at(rays, i)
+            _write(found, i, rays.scale, search_all_blocks(tree, ray, t_max, any_hit), any_hit)
+        return
+    count, pause, patience = 0, 0, _PATIENCE
+    for first in range(begin, end, WIDTH):
+        if pause > 0:
+            pause -= 1
+        elif first + WIDTH <= end and _are_coherent(rays, first):
+            if _trace_sixteen(tree, rays, found, first, scratch, any_hit):
+                patience = _PATIENCE
+                continue
+            pause, patience = patience, min(2 * patience, _MOST_PATIENCE)
+        for i in range(first, min(first + WIDTH, end)):
+            put(scratch.waiting, count, i)
+            count += 1
+    if count > 0:
+        _trace_stream(tree, rays, found, scratch, count, any_hit)

@@ -1,105 +1,47 @@
-"""The radiance of one camera ray: Whitted's recursion as a loop over an explicit stack of weighted rays.
+"""The radiance of a bundle of camera rays: Whitted's recursion as a loop over an explicit stack of bundles.
 
 I(x) = k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light + k_r I(reflected) + k_t I(refracted)
+
+A bundle leaves two: its refracted and its reflected rays. The reflected one goes first, with all that comes of it, so
+each pixel adds up its light in the order of its own recursion, whichever pixels travel with it.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from renderer.intersect import Ray
+from renderer.bundle import (
+    BUNDLE_DOUBLES,
+    SIZE,
+    append,
+    bundle_at,
+    bundle_integers,
+    clear,
+    count_of,
+    depth_of,
+)
+from renderer.direct import (
+    BOUND,
+    GEOMETRIC,
+    INSIDE,
+    LIGHT,
+    MATERIAL,
+    NORMAL,
+    POINT,
+    SHADOW_DOUBLES,
+    SURFACE_DOUBLES,
+    is_lit,
+    light_surfaces,
+    put3,
+)
 from renderer.jit import inlined, kernel
 from renderer.layout import Tree
-from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
-from renderer.material import (
-    AMBIENT,
-    DIELECTRIC,
-    DIFFUSE,
-    IOR,
-    KIND,
-    PHONG,
-    REFLECTANCE,
-    SHININESS,
-    SPECULAR,
-    TRANSMITTANCE,
-)
-from renderer.shading import fresnel, offset_distance, reflect, refract, spawn_origin, specular
-from renderer.simd import get, keep, pointer, put
-from renderer.traverse import NO_FACE, any_hit, any_hit_brute, closest_hit, closest_hit_brute, view
-from renderer.vec3 import (
-    add,
-    barycentric,
-    cross,
-    dot,
-    normalized,
-    row3,
-    scale,
-    sub,
-    three,
-    times,
-)
-
-# One waiting ray: origin, direction, weight, depth, and the media it is in: how many, then their materials' rows,
-# outermost first. A ninth medium is not remembered; leaving it then leads back into the eighth.
-MAX_MEDIA = 8
-_BRIGHTEST = np.finfo(np.float32).max
-_DEPTH, _MEDIA = 9, 10
-_RAY_WORDS = _MEDIA + 1 + MAX_MEDIA
-
-
-class World(NamedTuple):
-    """What the kernel reads of a scene; rows of materials and lights as in ``material`` and ``light``.
-
-    vertices (V, 3), normals (V, 3) or (0, 3), faces (F, 3) int32, material (F,) int32, smooth (F,) bool,
-    materials (M, MATERIAL_COLUMNS), lights (L, LIGHT_COLUMNS), colors (2, 3): ambient and background,
-    media (m,) int64, m <= MAX_MEDIA: where in ``materials`` the rows begin of those that the eye is in, outermost
-    first; ``material`` says the same of each face.
-    """
-
-    vertices: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    faces: NDArray[np.int32]
-    material: NDArray[np.int32]
-    smooth: NDArray[np.bool_]
-    materials: NDArray[np.float64]
-    lights: NDArray[np.float64]
-    colors: NDArray[np.float64]
-    media: NDArray[np.int64]
-
-
-class Sight(NamedTuple):
-    """A ``World`` as the kernels read it: pointers, and the numbers of lights and of media around the eye."""
-
-    vertices: Any
-    normals: Any
-    faces: Any
-    material: Any
-    smooth: Any
-    materials: Any
-    lights: Any
-    colors: Any
-    media: Any
-    light_count: int
-    media_count: int
-
-
-@inlined
-def look_at(world):
-    """Pointers into a world, which the caller must keep alive."""
-    return Sight(
-        pointer(world.vertices),
-        pointer(world.normals),
-        pointer(world.faces),
-        pointer(world.material),
-        pointer(world.smooth),
-        pointer(world.materials),
-        pointer(world.lights),
-        pointer(world.colors),
-        pointer(world.media),
-        len(world.lights),
-        len(world.media),
-    )
+from renderer.material import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
+from renderer.shading import fresnel, reflect, refract, spawn_origin
+from renderer.sight import surface_at
+from renderer.simd import at, get, put
+from renderer.traverse import Found, Rays, Scratch, trace
+from renderer.vec3 import add, dot, normalized, row3, scale, three, times
 
 
 class Accelerator(NamedTuple):
@@ -110,142 +52,94 @@ class Accelerator(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """Bounces, the weight below which a ray ends, and the offset rule of ``shading.spawn_origin``."""
+    """Bounces, the weight below which a ray ends, the offset rule of ``shading.spawn_origin``, and how many media a ray
+    remembers: ``sight.MAX_MEDIA``, or 0 where nothing refracts.
+    """
 
     max_depth: int
     min_weight: float
     offset: float
+    media: int
 
 
-class Scratch(NamedTuple):
-    """Memory of one thread, as pointers: nodes that wait in a traversal, rays that wait in a recursion, and media on
-    both sides of a surface.
+class Work(NamedTuple):
+    """Memory of one thread, as pointers.
+
+    The bundles and the order in which their places are used: first those that wait, then the free ones. What tracing
+    needs and finds, a zero and an infinity for its bounds. Of the bundle under way the surfaces, its shadow rays, the
+    list of its lit rays, and one ray's media beyond a surface. Of each pixel its colour and the rays traced.
     """
 
-    nodes: Any
-    rays: Any
-    media: Any
+    bundles: Any
+    bundle_words: Any
+    order: Any
+    trace: Scratch
+    found: Found
+    zero: Any
+    infinity: Any
+    surfaces: Any
+    shadows: Any
+    lit: Any
     beyond: Any
-
-
-class Surface(NamedTuple):
-    """Where a ray met the scene: point, its distance bound, normals n_g and n_s, where its material's row begins."""
-
-    p: tuple
-    error: float
-    n_g: tuple
-    n_s: tuple
-    material: int
+    color: Any
+    traced: Any
 
 
 @kernel
-def _closest(accelerator, o, d, stack):
-    ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
-    if accelerator.depth == 0:
-        return closest_hit_brute(accelerator.tree, ray, np.inf, stack)
-    return closest_hit(accelerator.tree, ray, np.inf, stack)
+def work_lengths(settings):
+    """Words of float64 and of int64 of the arrays behind a ``Work``, less those of ``trace``.
 
-
-@kernel
-def _occluded(accelerator, o, d, t_max, stack):
-    ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
-    if accelerator.depth == 0:
-        return any_hit_brute(accelerator.tree, ray, t_max, stack)
-    return any_hit(accelerator.tree, ray, t_max, stack)
-
-
-@kernel
-def _surface(world, face, u, v):
-    a, b, c = row3(world.faces, np.int64(face))
-    p0, p1, p2 = row3(world.vertices, a), row3(world.vertices, b), row3(world.vertices, c)
-    n_g = normalized(cross(sub(p1, p0), sub(p2, p0)))
-    p = barycentric(p0, p1, p2, u, v)
-    n_s = n_g
-    if get(world.smooth, face):
-        n_s = normalized(barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v))
-    error = offset_distance(p, p0, p1, p2, u, v, n_g)
-    return Surface(p, error, n_g, n_s, get(world.material, face))
-
-
-@kernel
-def _visible_light(accelerator, world, surface, n, light, offset, stack):
-    """Unit direction to a light, the light that arrives (irradiance facing it), and whether any does.
-
-    A shadow ray to a point light ends at the light: t counts in units of the distance, and a surface at the light
-    itself does not hide it.
+    Each bundle leaves at most one waiting a level; one more is under way and two are free for what it leaves.
     """
-    row = light * LIGHT_COLUMNS
-    towards, arriving = three(world.lights, row + 1), three(world.lights, row + 4)
-    nothing = (0.0, 0.0, 0.0)
-    if get(world.lights, row) == DIRECTIONAL:
-        if dot(n, towards) <= 0.0:
-            return towards, nothing, False, 0
-        o = spawn_origin(surface.p, surface.error, surface.n_g, towards, offset)
-        return towards, arriving, not _occluded(accelerator, o, towards, np.inf, stack), 1
-    to_light = sub(towards, surface.p)
-    squared = dot(to_light, to_light)
-    # A light within rounding of the surface lies on it and does not light it; this also bounds 1 / r^2.
-    if dot(n, to_light) <= surface.error:
-        return to_light, nothing, False, 0
-    o = spawn_origin(surface.p, surface.error, surface.n_g, to_light, offset)
-    shadow = sub(towards, o)
-    # A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
-    # covers angles down to 2^-12. Mitsuba stops ten of its epsilons short.
-    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-36
-    seen = not _occluded(accelerator, o, shadow, t_max, stack)
-    return normalized(to_light), scale(arriving, 1.0 / squared), seen, 1
+    slots = settings.max_depth + 4
+    doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE
+    return doubles, slots * (bundle_integers(settings.media) + 1) + SIZE + 1 + 2 * SIZE + settings.media + SIZE
 
 
-@kernel
-def _local(accelerator, world, surface, d, n, offset, stack):
-    """Ambient, diffuse and specular light of a Phong surface, and the shadow rays that it took."""
-    m, materials = surface.material, world.materials
-    total = times(three(materials, m + AMBIENT), row3(world.colors, 0))
-    diffuse, glossy = three(materials, m + DIFFUSE), three(materials, m + SPECULAR)
-    shines = max(glossy[0], max(glossy[1], glossy[2])) > 0.0
-    rays = 0
-    for light in range(world.light_count):
-        towards, arriving, seen, traced = _visible_light(accelerator, world, surface, n, light, offset, stack)
-        rays += traced
-        if not seen:
-            continue
-        factor = scale(diffuse, dot(n, towards))
-        if shines:
-            factor = add(factor, scale(glossy, specular(d, n, towards, get(materials, m + SHININESS))))
-        total = add(total, times(factor, arriving))
-    return total, rays
+@inlined
+def make_work(doubles, integers, hits, settings, scratch):
+    """A ``Work`` in memory of ``work_lengths``, SIZE bools and a scratch for tracing."""
+    slots = settings.max_depth + 4
+    t = at(doubles, slots * BUNDLE_DOUBLES)
+    u, v, zero = at(t, SIZE), at(t, 2 * SIZE), at(t, 3 * SIZE)
+    infinity, surfaces = at(zero, 1), at(zero, 2)
+    shadows = at(surfaces, SIZE * SURFACE_DOUBLES)
+    order = at(integers, slots * bundle_integers(settings.media))
+    face = at(order, slots)
+    lit = at(face, SIZE)
+    beyond = at(lit, 1 + 2 * SIZE)
+    put(zero, 0, 0.0)
+    put(infinity, 0, np.inf)
+    for slot in range(slots):
+        put(order, slot, slot)
+    found = Found(t, face, u, v, hits)
+    return Work(
+        doubles, integers, order, scratch, found, zero, infinity, surfaces, shadows, lit, beyond,
+        at(shadows, SHADOW_DOUBLES), at(beyond, settings.media),
+    )  # fmt: skip
 
 
-@kernel
-def _push(rays, top, o, d, weight, depth, media, count):
-    """Let a ray wait above ``top`` in the first ``count`` of ``media``. Returns the new top."""
-    at = top * _RAY_WORDS
-    for k in range(3):
-        put(rays, at + k, o[k])
-        put(rays, at + 3 + k, d[k])
-        put(rays, at + 6 + k, weight[k])
-    put(rays, at + _DEPTH, float(depth))
-    put(rays, at + _MEDIA, float(count))
-    for k in range(count):
-        put(rays, at + _MEDIA + 1 + k, float(get(media, k)))
-    return top + 1
+@inlined
+def slot(work, settings, k):
+    """The bundle in the k-th place of the order."""
+    return bundle_at(work.bundles, work.bundle_words, settings.media, get(work.order, k))
 
 
-@kernel
+@inlined
 def _goes_on(weight, min_weight):
     largest = max(weight[0], max(weight[1], weight[2]))
     return largest > 0.0 and largest >= min_weight
 
 
 @kernel
-def _enter_or_leave(media, count, material, inside):
-    """Cross the surface of ``material``: change ``media`` in place, return how many there are then.
+def _enter_or_leave(media, count, material, inside, limit):
+    """Cross the surface of ``material``: change ``media`` in place, return how many there are then, ``limit`` at most.
 
     Leaving takes out the innermost entry of that material, wherever it stands, so overlapping objects are left one
     by one.
     """
     if not inside:
-        if count < MAX_MEDIA:
+        if count < limit:
             put(media, count, np.int64(material))
             count += 1
         return count
@@ -257,125 +151,134 @@ def _enter_or_leave(media, count, material, inside):
     return count
 
 
-@kernel
+@inlined
 def _innermost_ior(world, media, count):
     return get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0
 
 
-@kernel
-def _spawn(world, surface, ray, settings, scratch, top):
-    """Push the reflected and the refracted ray of a hit. Returns the new top of the stack.
+@inlined
+def _meet_surface(world, bundle, work, i):
+    """Note the surface that ray ``i`` met, and its ambient light."""
+    found, surface = work.found, at(work.surfaces, i * SURFACE_DOUBLES)
+    met = surface_at(world, get(found.face, i), get(found.u, i), get(found.v, i))
+    # The shading normal faces the eye; a surface without light from behind has two sides.
+    inside = dot(row3(bundle.directions, i), met.n_s) > 0.0
+    put3(surface, POINT, met.p)
+    put3(surface, NORMAL, scale(met.n_s, -1.0) if inside else met.n_s)
+    put3(surface, GEOMETRIC, met.n_g)
+    put(surface, BOUND, met.error)
+    put(surface, MATERIAL, float(met.material))
+    put(surface, INSIDE, 1.0 if inside else 0.0)
+    put3(surface, LIGHT, times(three(world.materials, met.material + AMBIENT), row3(world.colors, 0)))
+    return met.material
 
-    ``scratch.media[:count]`` are the media that the ray came through.
-    """
-    d, n, inside, weight, depth, count = ray
-    m, materials, media = surface.material, world.materials, scratch.media
+
+@kernel
+def _meet_surfaces(world, bundle, work):
+    """Note what each ray met; rays that left the scene add the background. Lists the lit ones."""
+    lit = 0
+    for i in range(count_of(bundle)):
+        pixel = get(bundle.pixels, i)
+        put(work.traced, pixel, get(work.traced, pixel) + 1)
+        if get(work.found.face, i) < 0:
+            seen = times(row3(bundle.weights, i), row3(world.colors, 1))
+            put3(work.color, 3 * pixel, add(row3(work.color, pixel), seen))
+        elif is_lit(world.materials, _meet_surface(world, bundle, work, i)):
+            lit += 1
+            put(work.lit, lit, i)
+    put(work.lit, 0, lit)
+
+
+@inlined
+def _refract(world, bundle, surface, i, settings, beyond):
+    """The refracted ray: (its direction, whether there is one, k_r, k_t, the media beyond, in ``beyond``)."""
+    m, materials, count = np.int64(get(surface, MATERIAL)), world.materials, get(bundle.media_counts, i)
+    d, n, inside = row3(bundle.directions, i), three(surface, NORMAL), get(surface, INSIDE) != 0.0
     k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
-    if max(k_t[0], max(k_t[1], k_t[2])) > 0.0 or get(materials, m + KIND) == DIELECTRIC:
-        beyond = scratch.beyond
-        for k in range(count):
-            put(beyond, k, get(media, k))
-        left = _enter_or_leave(beyond, count, m, inside)
-        # From inside, n1 is this material even where no entry was seen: an open mesh.
-        n1 = get(materials, m + IOR) if inside else _innermost_ior(world, media, count)
-        n2 = _innermost_ior(world, beyond, left) if inside else get(materials, m + IOR)
-        cos_t, through = refract(d, n, n1, n2)
-        if get(materials, m + KIND) == DIELECTRIC:
-            f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
-            k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
-        passed = times(weight, k_t)
-        if cos_t >= 0.0 and _goes_on(passed, settings.min_weight):
-            through = normalized(through)
-            o = spawn_origin(surface.p, surface.error, surface.n_g, through, settings.offset)
-            top = _push(scratch.rays, top, o, through, passed, depth, beyond, left)
-    returned = times(weight, k_r)
-    if _goes_on(returned, settings.min_weight):
-        mirrored = normalized(reflect(d, n))
-        o = spawn_origin(surface.p, surface.error, surface.n_g, mirrored, settings.offset)
-        top = _push(scratch.rays, top, o, mirrored, returned, depth, media, count)
-    return top
+    media = at(bundle.media, i * bundle.limit)
+    for k in range(count):
+        put(beyond, k, get(media, k))
+    left = _enter_or_leave(beyond, count, m, inside, bundle.limit)
+    # From inside, n1 is this material even where no entry was seen: an open mesh.
+    n1 = get(materials, m + IOR) if inside else _innermost_ior(world, media, count)
+    n2 = _innermost_ior(world, beyond, left) if inside else get(materials, m + IOR)
+    cos_t, through = refract(d, n, n1, n2)
+    if get(materials, m + KIND) == DIELECTRIC:
+        f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
+        k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
+    return through, cos_t >= 0.0, k_r, k_t, left
+
+
+@inlined
+def _leave(bundle, surface, i, w, weight, children, media, count, settings):
+    """Add the ray in direction ``w`` from the surface that ray ``i`` met, if its weight counts, to ``children``."""
+    if _goes_on(weight, settings.min_weight):
+        w = normalized(w)
+        p, n_g = three(surface, POINT), three(surface, GEOMETRIC)
+        o = spawn_origin(p, get(surface, BOUND), n_g, w, settings.offset)
+        append(children, o, w, weight, get(bundle.pixels, i), media, count)
 
 
 @kernel
-def radiance(accelerator, world, settings, o, d, scratch):
-    """Linear radiance (r, g, b) along one unit ray, what its first hit was, and the rays traced.
-
-    Returns (color, t, face, n_s, rays) with t = inf and face = NO_FACE where the ray leaves the scene. The stack
-    never holds more than ``max_depth + 2`` rays: each one popped leaves at most two of the next depth.
-    """
-    color, first_t, first_face, first_n, traced = (0.0, 0.0, 0.0), np.inf, NO_FACE, (0.0, 0.0, 0.0), 0
-    rays, media = scratch.rays, scratch.media
-    top = _push(rays, 0, o, d, (1.0, 1.0, 1.0), 0, world.media, world.media_count)
-    while top > 0:
-        top -= 1
-        at = top * _RAY_WORDS
-        o, d, weight = three(rays, at), three(rays, at + 3), three(rays, at + 6)
-        depth, count = int(get(rays, at + _DEPTH)), int(get(rays, at + _MEDIA))
-        t, face, u, v = _closest(accelerator, o, d, scratch.nodes)
-        traced += 1
-        if face == NO_FACE:
-            color = add(color, times(weight, row3(world.colors, 1)))
+def _bounce(world, bundle, settings, work, refracted, reflected):
+    """Collect the rays that a bundle leaves."""
+    materials = world.materials
+    for i in range(count_of(bundle)):
+        if get(work.found.face, i) < 0:
             continue
-        surface = _surface(world, face, u, v)
-        if traced == 1:
-            first_t, first_face, first_n = t, face, surface.n_s
-        # The shading normal faces the eye; a surface without light from behind has two sides.
-        inside = dot(d, surface.n_s) > 0.0
-        n = scale(surface.n_s, -1.0) if inside else surface.n_s
-        if get(world.materials, surface.material + KIND) == PHONG:
-            local, shadow_rays = _local(accelerator, world, surface, d, n, settings.offset, scratch.nodes)
-            color = add(color, times(weight, local))
-            traced += shadow_rays
-        if depth < settings.max_depth:
-            # The children may take this ray's place on the stack, so its media move out first.
-            for k in range(count):
-                put(media, k, int(get(rays, at + _MEDIA + 1 + k)))
-            top = _spawn(world, surface, (d, n, inside, weight, depth + 1, count), settings, scratch, top)
-    return color, first_t, first_face, first_n, traced
+        surface = at(work.surfaces, i * SURFACE_DOUBLES)
+        m, weight = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i)
+        k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
+        if max(k_t[0], max(k_t[1], k_t[2])) > 0.0 or get(materials, m + KIND) == DIELECTRIC:
+            w, passes, k_r, k_t, left = _refract(world, bundle, surface, i, settings, work.beyond)
+            if passes:
+                _leave(bundle, surface, i, w, times(weight, k_t), refracted, work.beyond, left, settings)
+        media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
+        w = reflect(row3(bundle.directions, i), three(surface, NORMAL))
+        _leave(bundle, surface, i, w, times(weight, k_r), reflected, media, count, settings)
 
 
-class Film(NamedTuple):
-    """What a tile writes: radiance and normal (h, w, 3), depth (h, w), face and rays (h, w)."""
-
-    radiance: NDArray[np.float32]
-    depth: NDArray[np.float64]
-    normal: NDArray[np.float32]
-    face: NDArray[np.int32]
-    rays: NDArray[np.int32]
+@inlined
+def _collect_light(world, bundle, work):
+    """Add what the surfaces of a bundle show of their own to the pixels."""
+    for i in range(count_of(bundle)):
+        if get(work.found.face, i) < 0:
+            continue
+        surface = at(work.surfaces, i * SURFACE_DOUBLES)
+        kind = get(world.materials, np.int64(get(surface, MATERIAL)) + KIND)
+        if kind != MIRROR and kind != DIELECTRIC:
+            pixel = get(bundle.pixels, i)
+            own = times(row3(bundle.weights, i), three(surface, LIGHT))
+            put3(work.color, 3 * pixel, add(row3(work.color, pixel), own))
 
 
 @kernel
-def render_tile(accelerator, world, settings, camera, samples, film, tile):
-    """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
+def trace_bundle(target, world, settings, bundle, work):
+    """Trace the rays of a bundle and light what they meet; what they leave is up to ``_bounce``."""
+    rays = Rays(bundle.origins, bundle.directions, work.zero, work.infinity, 0, 0, 1.0)
+    trace(target.tree, target.depth, rays, work.found, 0, count_of(bundle), work.trace, False)
+    _meet_surfaces(world, bundle, work)
+    light_surfaces(target, world, bundle, work.surfaces, work.lit, settings.offset, work)
+    _collect_light(world, bundle, work)
 
-    Depth, face and normal come from the middle sample (the pixel's centre for one sample), radiance from the mean.
+
+@inlined
+def push_children(world, settings, work, bundle, top):
+    """Let the bundle in place ``top`` leave its rays in the two free places above it. Returns the new top.
+
+    The bundle's own place is free then, and goes behind the others; an empty bundle does not wait.
     """
-    x0, y0, x1, y1 = tile
-    # Each ray leaves at most two, so one waits a level and one more.
-    nodes, rays = np.empty(7 * accelerator.depth + 8, np.int64), np.empty((settings.max_depth + 2) * _RAY_WORDS)
-    media = np.empty(2 * MAX_MEDIA, np.int64)
-    scratch = Scratch(pointer(nodes), pointer(rays), pointer(media), pointer(media[MAX_MEDIA:]))
-    seen, target = look_at(world), Accelerator(view(accelerator.tree), accelerator.depth)
-    to_ray = pointer(camera)
-    middle = len(samples) // 2 if len(samples) % 2 == 1 else (len(samples) + int(np.sqrt(len(samples)))) // 2
-    for y in range(y0, y1):
-        for x in range(x0, x1):
-            total, count = (0.0, 0.0, 0.0), 0
-            for s in range(len(samples)):
-                px, py = x + samples[s, 0], y + samples[s, 1]
-                o = add(row3(to_ray, 0), add(scale(row3(to_ray, 1), px), scale(row3(to_ray, 2), py)))
-                d = add(row3(to_ray, 3), add(scale(row3(to_ray, 4), px), scale(row3(to_ray, 5), py)))
-                color, t, face, n, traced = radiance(target, seen, settings, o, normalized(d), scratch)
-                total = add(total, color)
-                count += traced
-                if s == middle:
-                    film.depth[y, x], film.face[y, x] = t, -1 if face == NO_FACE else face
-                    for k in range(3):
-                        film.normal[y, x, k] = n[k]
-            # The brightest float32 stands for anything brighter: a light within 1e-15 of a surface.
-            for k in range(3):
-                film.radiance[y, x, k] = min(total[k] / len(samples), _BRIGHTEST)
-            film.rays[y, x] = count
-    keep(nodes)
-    keep(rays)
-    keep(media)
+    if depth_of(bundle) >= settings.max_depth:
+        return top
+    refracted, reflected = slot(work, settings, top + 1), slot(work, settings, top + 2)
+    clear(refracted, depth_of(bundle) + 1)
+    clear(reflected, depth_of(bundle) + 1)
+    _bounce(world, bundle, settings, work, refracted, reflected)
+    order, own = work.order, get(work.order, top)
+    first, second = get(order, top + 1), get(order, top + 2)
+    if count_of(refracted) == 0:
+        first, second = second, first
+    put(order, top, first)
+    put(order, top + 1, second)
+    put(order, top + 2, own)
+    return top + np.int64(count_of(refracted) > 0) + np.int64(count_of(reflected) > 0)

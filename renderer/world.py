@@ -1,16 +1,22 @@
 """A scene's instances merged into the arrays that the Whitted kernel reads, and the mesh that the tree is built on."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.light import LIGHT_COLUMNS
-from renderer.material import MATERIAL_COLUMNS
+from renderer.material import KIND, LAMBERT, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.mesh import Mesh
+from renderer.needs import Needs, needs_of
 from renderer.scene import Scene
-from renderer.whitted import MAX_MEDIA, World
+from renderer.sight import MAX_MEDIA, World
 
 
-def pack(scene: Scene) -> tuple[Mesh, World]:
-    """The merged mesh of all instances in their order, and everything else that the kernel reads."""
+def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, World]:
+    """The merged mesh of all instances in their order, and everything else that the kernel reads.
+
+    Only what ``needs`` names is there, and for None only what the scene needs.
+    """
+    needs = needs_of(scene) if needs is None else needs
     instances = scene.instances
     rows = {name: i * MATERIAL_COLUMNS for i, name in enumerate(scene.materials)}
     starts = np.cumsum([0] + [len(i.mesh.vertices) for i in instances])
@@ -23,19 +29,40 @@ def pack(scene: Scene) -> tuple[Mesh, World]:
     mesh = Mesh(vertices, faces)
     world = World(
         vertices=mesh.vertices,
-        normals=_normals(scene, len(vertices)),
+        normals=_normals(scene, len(vertices)) if needs.smooth_normals else np.zeros((0, 3)),
         faces=mesh.faces,
         material=np.repeat(np.array([rows[i.material] for i in instances], np.int32), counts),
-        smooth=np.repeat(np.array([i.smooth for i in instances], np.bool_), counts),
-        materials=np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS),
-        lights=np.array([light.row() for light in scene.lights]).reshape(-1, LIGHT_COLUMNS),
+        smooth=np.repeat([i.smooth for i in instances], counts if needs.smooth_normals else 0).astype(np.bool_),
+        materials=_materials(scene, needs),
+        lights=_lights(scene, needs),
         colors=np.array([scene.ambient, scene.background]),
-        media=_media(scene, rows),
+        media=_media(scene, rows) if needs.refraction else np.zeros(0, np.int64),
     )
     return mesh, world
 
 
-def _media(scene: Scene, rows: dict[str, int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def _materials(scene: Scene, needs: Needs) -> NDArray[np.float64]:
+    """The materials' rows. Asked for what the scene does not need, they are worked out all the same."""
+    rows = np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)
+    own, kinds = needs_of(scene), rows[:, KIND]
+    if needs.shadows and not own.shadows:
+        kinds[kinds == UNLIT] = LAMBERT
+    if needs.specular and not own.specular:
+        kinds[kinds == LAMBERT] = PHONG
+    return rows
+
+
+def _lights(scene: Scene, needs: Needs) -> NDArray[np.float64]:
+    """The rows of the lights that shine, and of as many others as ``needs`` asks for, in the scene's order."""
+    if not needs.shadows:
+        return np.zeros((0, LIGHT_COLUMNS))
+    rows = np.array([light.row() for light in scene.lights]).reshape(-1, LIGHT_COLUMNS)
+    dark = ~rows[:, 4:].any(axis=1)
+    extra = np.cumsum(dark) <= needs.lights - np.count_nonzero(~dark)
+    return rows[~dark | (dark & extra)]
+
+
+def _media(scene: Scene, rows: dict[str, int]) -> NDArray[np.int64]:
     """Materials of the closed, light-passing meshes around the eye, outermost (by volume) first."""
     around = []
     for instance in scene.instances:
@@ -62,15 +89,14 @@ def _winding(mesh: Mesh, point: tuple[float, float, float]) -> float:
     return float(2.0 * np.arctan2(volume, denominator).sum() / (4.0 * np.pi))
 
 
-def _normals(scene: Scene, count: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Vertex normals, (V, 3), or (0, 3) where no instance is smooth."""
-    if not any(i.smooth for i in scene.instances):
-        return np.zeros((0, 3))
+def _normals(scene: Scene, count: int) -> NDArray[np.float64]:
+    """Vertex normals, (V, 3): those of the smooth instances, or of all where none is."""
+    flat_too = not any(i.smooth for i in scene.instances)
     normals = np.zeros((count, 3))
     start = 0
     for instance in scene.instances:
         end = start + len(instance.mesh.vertices)
-        if instance.smooth:
+        if instance.smooth or flat_too:
             normals[start:end] = instance.normals
         start = end
     return normals

@@ -15,7 +15,20 @@ from meshes import assert_same_hits, make_mesh, rays_at
 from numpy.typing import NDArray
 
 import renderer
-from renderer import BruteForce, Image, Mesh, MeshError, Octree, Scene, SceneError, load_mesh, load_scene, render
+from renderer import (
+    BruteForce,
+    Image,
+    Mesh,
+    MeshError,
+    Needs,
+    Octree,
+    Scene,
+    SceneError,
+    load_mesh,
+    load_scene,
+    needs_of,
+    render,
+)
 from renderer.mesh_io import save_ply
 from renderer.shapes import box
 
@@ -453,6 +466,7 @@ BAD_SETTINGS: dict[str, list[Any]] = {
     "samples": [0, -1, 2, 1.0, np.inf, "1", True, [1], 10**30],
     "max_depth": [-1, 65, 1.5, np.nan, True, "3", 10**40, [3]],
     "min_weight": [-1, 1, np.nan, np.inf, "0", 1j, [0.1], -1e-300],
+    "needs": [3, "x", {}, Needs, Needs(*[None] * 8), Needs(*[1] * 8), Needs(*[np.nan] * 8)],  # type: ignore[arg-type]
     "colour": [1],
 }
 
@@ -470,6 +484,14 @@ def test_settings_of_render(name: str, bad: Any) -> None:
 def test_render_takes_scenes(bad: Any) -> None:
     with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
         render(bad, resolution=(4, 4))
+    with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
+        needs_of(bad)
+
+
+@pytest.mark.parametrize("bad", [-1, 1.5, "1", True, np.nan, [1]], ids=repr)
+def test_bounces_of_needs_of(bad: Any) -> None:
+    with pytest.raises(ValueError, match=r"^max_depth: expected an integer >= 0 or None, got"):
+        needs_of(SCENE, bad)
 
 
 # --- scenes from Python ---------------------------------------------------------------------------------------

@@ -15,9 +15,16 @@ import pytest
 from renderer.cli import main
 from renderer.render import render
 from renderer.scene import load_scene
+from renderer.warm import compile_all
 
 ROOT = Path(__file__).parents[1]
 STAIRS = ROOT / "scenes" / "stairs.toml"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    """Compile before the tests, which look at what stands on standard error."""
+    compile_all()
 
 
 def run(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[str]":
@@ -60,6 +67,11 @@ def test_quiet_says_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert capsys.readouterr() == ("", "")
 
 
+def test_compile(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compile"]) == 0
+    assert capsys.readouterr() == ("all kernels are compiled\n", "")
+
+
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
 def test_info(capsys: pytest.CaptureFixture[str], split: str) -> None:
     assert main(["info", str(STAIRS), "--split", split]) == 0
@@ -79,7 +91,9 @@ def test_as_a_module(tmp_path: Path) -> None:
     assert done.returncode == 2 and done.stdout == "" and len(done.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["render", "--help"], ["info", "--help"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["--version"], ["render", "--help"], ["info", "--help"], ["compile", "--help"]]
+)
 def test_help_and_version(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(arguments)

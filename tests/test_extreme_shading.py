@@ -103,9 +103,9 @@ class TestJudgesFindABrokenRefraction:
 FAULTS = [
     ("whitted.py", "return get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "return 1.0"),
     ("whitted.py", "return largest > 0.0 and largest >= min_weight", "return largest > 0.02"),
-    ("whitted.py", "if dot(n, to_light) <= surface.error:", "if dot(n, to_light) < -1e-3:"),
-    ("whitted.py", "factor = scale(diffuse, dot(n, towards))", "factor = scale(diffuse, abs(dot(n, towards)))"),
-    ("whitted.py", "else 1.0 - 2.0**-36", "else 2.0"),
+    ("direct.py", "if dot(n, to_light) <= error:", "if dot(n, to_light) < -1e-3:"),
+    ("direct.py", "m + DIFFUSE), dot(n, towards))", "m + DIFFUSE), abs(dot(n, towards)))"),
+    ("direct.py", "else 1.0 - 2.0**-36", "else 2.0"),
     ("shading.py", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
 ]
 NOTICED = [40, 41, 42, 43, 44, 45]

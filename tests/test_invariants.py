@@ -43,7 +43,7 @@ class Broken:
         self.mesh, self.depth = octree.mesh, octree.target.depth
         nodes = octree.target.tree.nodes.copy()
         self.tree = Tree(nodes, nodes.view(np.int32), octree.target.tree.blocks.copy(), octree.target.tree.faces.copy())
-        self.links = self.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN:]
+        self.links = self.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
         self.boxes = nodes.reshape(-1, NODE_WORDS)[:, :CHILDREN].reshape(-1, 3, 2, 8)
         self.used = self.boxes[:, 0, 0] < np.inf
         assert self.depth > 2 and (~self.used).any() and (self.tree.faces < 0).any()

@@ -1,6 +1,7 @@
 """The kernel cache: an edit of any source below a kernel shows, an edit beside it costs nothing."""
 
-import re
+import ast
+import os
 import shutil
 import subprocess
 import sys
@@ -8,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from renderer.jit import source_digest
+from renderer.jit import _imports, source_digest
 
 PACKAGE = Path(__file__).parents[1] / "renderer"
 
@@ -33,6 +34,11 @@ RUN = """
 from renderer.upper import answer
 print(answer(3), sum(answer.stats.cache_hits.values()), sum(answer.stats.cache_misses.values()))
 """
+TELL = """
+import logging, sys
+logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message)s")
+"""
+TOLD = ["compiling", "answer"]
 
 
 @pytest.fixture
@@ -49,10 +55,9 @@ def package(tmp_path):
     return folder
 
 
-def run(folder, script):
-    done = subprocess.run(
-        [sys.executable, "-B", "-c", script], cwd=folder.parent, capture_output=True, text=True, timeout=100
-    )
+def run(folder, script, **environment):
+    command, own = [sys.executable, "-B", "-c", script], {**os.environ, **environment}
+    done = subprocess.run(command, cwd=folder.parent, env=own, capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
     return done.stdout.split()
 
@@ -91,7 +96,8 @@ print(brute.any_hit([[0.25, 0.25, 1]], [[0, 0, -1]])[0])
 
 def digests(folder):
     modules = [path.stem for path in folder.glob("*.py")]
-    out = run(folder, f"from renderer.jit import source_digest\nfor m in {modules!r}: print(source_digest(m))")
+    tell = f"for m in {modules!r}: print(source_digest(Path('renderer').resolve() / (m + '.py')))"
+    out = run(folder, f"from pathlib import Path\nfrom renderer.jit import _imports, source_digest\n{tell}")
     return dict(zip(modules, out, strict=True))
 
 
@@ -109,12 +115,113 @@ def test_a_digest_covers_exactly_the_modules_that_are_imported(tmp_path):
     assert not changed & {"simd", "jit", "errors", "mesh", "vec3", "parallel"}
 
 
-def test_every_import_in_the_package_has_the_form_that_the_digest_follows():
-    for path in PACKAGE.glob("*.py"):
-        for line in path.read_text().splitlines():
-            if re.match(r"\s*(from|import)\b.*\brenderer\b", line) and path.stem != "__init__":
-                assert re.match(r"from renderer\.\w+ import ", line.lstrip()), f"{path.name}: {line}"
+def package_imports(path):
+    """The modules of the package that a source imports, by Python's own parser; refuses what the digest cannot see."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path.name}:{node.lineno}: a relative import"
+            names = [node.module]
+        else:
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        for name in names:
+            if name.partition(".")[0] == "renderer":
+                assert isinstance(node, ast.ImportFrom), f"{path.name}:{node.lineno}: import {name}"
+                assert name.count(".") == 1, f"{path.name}:{node.lineno}: from {name}"
+                # What is imported inside a function, a kernel cannot use.
+                found |= {name.split(".")[1]} if node.col_offset == 0 else set()
+    return found
+
+
+@pytest.mark.parametrize("path", [p for p in PACKAGE.glob("*.py") if p.stem != "__init__"], ids=lambda p: p.stem)
+def test_every_import_in_the_package_has_the_form_that_the_digest_follows(path):
+    assert {p.stem for p in _imports(path)} == package_imports(path)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["from . import jit", "from .jit import kernel", "import renderer.jit as j", "from renderer import jit",
+     "import numpy, renderer.jit", "if True:\n    from renderer.viewer.page import x"],
+)  # fmt: skip
+def test_forms_that_the_digest_does_not_follow_are_found(tmp_path, line):
+    (tmp_path / "a.py").write_text(line)
+    with pytest.raises(AssertionError, match=r"a\.py:"):
+        package_imports(tmp_path / "a.py")
 
 
 def test_an_unknown_module_has_the_digest_of_nothing():
-    assert source_digest("no_such_module") != source_digest("jit")
+    assert source_digest(PACKAGE / "no_such_module.py") != source_digest(PACKAGE / "jit.py")
+
+
+def test_a_renamed_module_below_a_kernel_shows(package):
+    assert run(package, RUN) == ["17", "0", "1"]
+    (package / "bottom.py").rename(package / "floor.py")
+    (package / "middle.py").write_text(MIDDLE.replace("renderer.bottom", "renderer.floor"))
+    assert run(package, RUN) == ["17", "0", "1"]
+    (package / "floor.py").write_text("STEP = 20\n")
+    assert run(package, RUN) == ["27", "0", "1"]
+
+
+def test_another_compiler_version_shows(package):
+    pretend = "import llvmlite\nllvmlite.__version__ = '99.0'\n"
+    assert run(package, RUN) == ["17", "0", "1"]
+    assert run(package, pretend + RUN) == ["17", "0", "1"]
+    assert run(package, pretend + RUN) == ["17", "1", "0"]
+
+
+def test_a_kernel_of_another_package_follows_ours(package):
+    # By an import that the digest need not follow: it covers all of ours.
+    ours = "from renderer.middle import (\n    doubled,\n)"
+    mine = UPPER.replace(ours, "import renderer.middle as m\ndoubled = m.doubled")
+    assert mine != UPPER
+    (package.parent / "mine.py").write_text(mine)
+    script = RUN.replace("renderer.upper", "mine")
+    assert run(package, script) == ["17", "0", "1"]
+    assert run(package, script) == ["17", "1", "0"]
+    (package / "bottom.py").write_text("STEP = 20\n")
+    assert run(package, script) == ["27", "0", "1"]
+
+
+def test_code_never_outlives_its_sources(package):
+    """A process of older sources, or one killed between the index and the code, leaves an index that names old code."""
+    assert run(package, RUN) == ["17", "0", "1"]
+    cached = package / "__pycache__"
+    old = {path.name: path.read_bytes() for path in cached.glob("*.nbc")}
+    (package / "bottom.py").write_text("STEP = 20\n")
+    assert run(package, RUN) == ["27", "0", "1"]
+    new = [path for path in cached.glob("upper.answer*.nbc")]
+    assert len(new) == 1 and not old.keys() & {path.name for path in cached.glob("*.nbc")}
+    for name, code in old.items():
+        (cached / name).write_bytes(code)
+    new[0].unlink()
+    assert run(package, RUN) == ["27", "0", "1"]
+
+
+def test_a_folder_that_cannot_be_written_falls_back_to_the_users_own(package, tmp_path):
+    (package / "__pycache__").write_text("a file in the way, because root may write anywhere")
+    users = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "NUMBA_CACHE_DIR": ""}
+    assert run(package, RUN, **users) == ["17", "0", "1"]
+    assert run(package, RUN, **users) == ["17", "1", "0"]
+    assert list((tmp_path / "cache" / "numba").rglob("upper.answer*.nbc"))
+    (package / "bottom.py").write_text("STEP = 20\n")
+    assert run(package, RUN, **users) == ["27", "0", "1"]
+    (tmp_path / "blocked").touch()
+    nowhere = {**users, "XDG_CACHE_HOME": str(tmp_path / "blocked")}
+    for _ in range(2):
+        told = " ".join(run(package, TELL + RUN, **nowhere))
+        assert told == "compiling answer (for this process only: no cache folder can be written) 27 0 1"
+
+
+def test_what_is_compiled_is_logged_and_what_is_loaded_is_not(package):
+    kept = f"(once, kept in {package / '__pycache__'})"
+    assert run(package, TELL + RUN) == [*TOLD, *kept.split(), "17", "0", "1"]
+    assert run(package, TELL + RUN) == ["17", "1", "0"]
+
+
+def test_two_processes_that_compile_at_the_same_time_agree(package):
+    command = [sys.executable, "-B", "-c", RUN]
+    both = [subprocess.Popen(command, cwd=package.parent, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    for process in both:
+        out, _ = process.communicate(timeout=100)
+        assert process.returncode == 0 and out.split()[0] == "17"
+    assert run(package, RUN) == ["17", "1", "0"]

@@ -10,7 +10,7 @@ import pytest
 from meshes import assert_same_hits, make_mesh, rays_at
 
 from renderer.invariants import faults
-from renderer.layout import LANES
+from renderer.layout import CHILDREN, LANES, NODE_WORDS
 from renderer.mesh import Mesh
 from renderer.octree import MAX_DEPTH, MAX_LEAF_SIZE, BruteForce, Octree
 from renderer.shapes import grid, icosphere
@@ -239,7 +239,7 @@ def test_stats_count_what_is_there():
     assert stats.faces == stats.references == 1280
     assert stats.bytes == tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes
     assert stats.fill == 1280 / (LANES * stats.blocks)
-    assert stats.nodes * 56 * 4 == tree.nodes.nbytes and stats.blocks * LANES == len(tree.faces)
+    assert stats.nodes * NODE_WORDS * 4 == tree.nodes.nbytes and stats.blocks * LANES == len(tree.faces)
     # Each leaf and each node but the root hangs in one place of a node.
     used = int((tree.nodes.reshape(stats.nodes, -1)[:, :8] < np.inf).sum())
     assert used == stats.leaves + stats.nodes - 1
@@ -257,7 +257,7 @@ def test_options_shape_the_tree(split):
     assert deep != shallow
     for size in (1, 3, 4, 7, 32):
         octree = Octree.from_mesh(mesh, split=split, leaf_size=size)
-        links = octree.target.tree.links.reshape(-1, 56)[:, 48:]
+        links = octree.target.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
         for code in ~links[links < 0]:
             first, count = code >> 3, (code & 7) + 1
             assert (octree.target.tree.faces[first * LANES : (first + count) * LANES] >= 0).sum() <= size

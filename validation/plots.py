@@ -17,7 +17,10 @@ from matplotlib.figure import Figure
 FLOOR = 1e-17
 # Okabe and Ito's blue, vermilion and green, which colour-blind readers tell apart, at a lightness between a white and
 # a dark page; markers and strokes differ as well.
-_LOOKS = (("#2f86c9", "o", "-"), ("#dd6b20", "s", "-"), ("#169b74", "^", "--"), ("#b86fa0", "D", "-."))
+_LOOKS = (
+    ("#2f86c9", "o", "-"), ("#dd6b20", "s", "-"), ("#169b74", "^", "--"), ("#b86fa0", "D", "-."),
+    ("#3fa7b5", "v", ":"), ("#b59a1b", "P", "--"), ("#8c6bd1", "X", "-."), ("#808790", "", ":"),
+)  # fmt: skip
 _GREY = "#808790"
 # Text takes the page's own colour: this one, which nothing else has, is replaced.
 _INK = "#010203"
@@ -30,16 +33,20 @@ _NAMES = {"ours": "ours (float64)", "embree_default": "Embree default", "embree_
 
 
 class Series(NamedTuple):
-    """One curve; a y that is None, as where nothing was hit, is left out."""
+    """One curve; a y that is None, as where nothing was hit, is left out.
+
+    ``look`` is a row of the colours and strokes, for curves that keep theirs from panel to panel; None: by position.
+    """
 
     name: str
     x: Sequence[float]
     y: Sequence[float | None]
+    look: int | None = None
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves over one pair of axes; x is logarithmic, y too unless it is a share from 0 to 1.
+    """Curves over one pair of axes; x is logarithmic, y too unless it is a share from 0 to 1 or ``linear`` from 0 up.
 
     With ``roundoffs`` y is a relative error, and an axis on the right counts it in ulp of float64 at 1.
     """
@@ -48,6 +55,7 @@ class Panel:
     y_label: str
     share: bool = False
     roundoffs: bool = False
+    linear: bool = False
 
 
 def loglog(series: Sequence[Series], *, x_label: str, y_label: str, title: str) -> str:
@@ -80,8 +88,10 @@ def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
         for panel, axes in zip(panels, rows, strict=True):
             _plot(panel, axes)
         rows[-1].set_xlabel(x_label)
-        handles, names = rows[0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside upper center", ncols=len(names), frameon=False)
+        named = {name: h for axes in rows[::-1] for h, name in zip(*axes.get_legend_handles_labels(), strict=True)}
+        names = dict.fromkeys(name for axes in rows for name in axes.get_legend_handles_labels()[1])
+        columns = len(names) if len(names) <= 4 else 3
+        figure.legend([named[n] for n in names], list(names), loc="outside upper center", ncols=columns, frameon=False)
         text = io.StringIO()
         metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
         figure.savefig(text, format="svg", metadata=metadata)
@@ -128,15 +138,17 @@ def _plot(panel: Panel, axes: Axes) -> None:
     if panel.share:
         axes.set_ylim(-0.05, 1.05)
         axes.set_yticks([0.0, 0.5, 1.0], ["0 %", "50 %", "100 %"])
-    else:
+    elif not panel.linear:
         axes.set_yscale("log")
     if panel.roundoffs:
         right = axes.secondary_yaxis("right", functions=(_in_ulp, _relative))
         right.set_ylabel("in ulp of float64")
     for index, series in enumerate(panel.series):
-        colour, marker, stroke = _LOOKS[index % len(_LOOKS)]
+        colour, marker, stroke = _LOOKS[(index if series.look is None else series.look) % len(_LOOKS)]
         y = [math.nan if value is None else value if panel.share else max(value, FLOOR) for value in series.y]
         axes.plot(series.x, y, color=colour, marker=marker, ls=stroke, markersize=4.5, linewidth=1.4, label=series.name)
+    if panel.linear:
+        axes.set_ylim(bottom=0.0)
     axes.grid(color=_GREY, alpha=0.25, linewidth=0.6)
 
 

@@ -1,0 +1,79 @@
+"""Rays of neighbouring pixels that bounce together: up to 64, so that they can be traced as packets or streams."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.jit import inlined
+from renderer.simd import at, get, put
+
+# Pixels a side of a block that one bundle begins with, and rays of a bundle.
+SIDE = 8
+SIZE = SIDE * SIDE
+# Columns of float64: origin, direction and weight of each ray. Columns of int64: how many rays and their depth; the
+# pixel of each and the media that it is in: how many, then their materials' rows, outermost first.
+_ORIGIN, _DIRECTION, _WEIGHT, BUNDLE_DOUBLES = 0, 3 * SIZE, 6 * SIZE, 9 * SIZE
+_PIXEL, _COUNT, _MEDIA = 2, 2 + SIZE, 2 + 2 * SIZE
+
+
+class Bundle(NamedTuple):
+    """Pointers to one bundle's columns, and how many media a ray remembers."""
+
+    origins: Any
+    directions: Any
+    weights: Any
+    header: Any
+    pixels: Any
+    media_counts: Any
+    media: Any
+    limit: int
+
+
+@inlined
+def bundle_integers(limit):
+    """Words of int64 that a bundle takes whose rays remember ``limit`` media."""
+    return _MEDIA + SIZE * limit
+
+
+@inlined
+def bundle_at(doubles, integers, limit, slot):
+    """The bundle in place ``slot`` of two arrays of bundles."""
+    doubles, integers = at(doubles, slot * BUNDLE_DOUBLES), at(integers, slot * bundle_integers(limit))
+    return Bundle(
+        at(doubles, _ORIGIN), at(doubles, _DIRECTION), at(doubles, _WEIGHT),
+        integers, at(integers, _PIXEL), at(integers, _COUNT), at(integers, _MEDIA), limit,
+    )  # fmt: skip
+
+
+@inlined
+def clear(bundle, depth):
+    """Empty a bundle, for rays of ``depth`` bounces."""
+    put(bundle.header, 0, 0)
+    put(bundle.header, 1, np.int64(depth))
+
+
+@inlined
+def count_of(bundle):
+    """How many rays a bundle holds."""
+    return get(bundle.header, 0)
+
+
+@inlined
+def depth_of(bundle):
+    """How often its rays have bounced."""
+    return get(bundle.header, 1)
+
+
+@inlined
+def append(bundle, o, d, weight, pixel, media, count):
+    """Add a ray that is in the first ``count`` of ``media``."""
+    i = get(bundle.header, 0)
+    put(bundle.header, 0, i + 1)
+    for k in range(3):
+        put(bundle.origins, 3 * i + k, o[k])
+        put(bundle.directions, 3 * i + k, d[k])
+        put(bundle.weights, 3 * i + k, weight[k])
+    put(bundle.pixels, i, pixel)
+    put(bundle.media_counts, i, count)
+    for k in range(count):
+        put(bundle.media, i * bundle.limit + k, get(media, k))

@@ -1,0 +1,64 @@
+"""Which parts of a binary hierarchy become the children of nodes of eight: the choice of least expected cost.
+
+Dynamic programming from the leaves up (Ylitie, Karras and Laine, Efficient Incoherent Ray Traversal on GPUs Through
+Compressed Wide BVHs, HPG 2017, sec. 3.1), with leaves counted in blocks.
+"""
+
+import numpy as np
+
+from renderer.bounds import BOX, half_area
+from renderer.jit import kernel
+from renderer.layout import LANES
+from renderer.simd import load8
+
+# What a ray pays for entering a node and for testing a block.
+NODE_COST = np.float32(1.0)
+BLOCK_COST = np.float32(1.0)
+
+
+@kernel
+def leaf_cost(tree, part):
+    """The expected cost of a part as one leaf."""
+    blocks = (tree.ranges[part, 1] - tree.ranges[part, 0] + LANES - 1) // LANES
+    return half_area(load8(tree.boxes, part * BOX)) * np.float32(blocks) * BLOCK_COST
+
+
+@kernel
+def collapse(tree, count, leaf_size):
+    """Fill ``costs`` and ``choices`` of ``count`` parts; of whole parts only ``costs[8 * part]`` must be there.
+
+    costs[8 * part + i - 1] is the least cost of the part as at most i children. Its choice is, for i = 1, 0 for a leaf,
+    or how many of the eight children of the node that it becomes come from its first half; for more, 0 when one child
+    less costs no more, or how many of the i children come from the first half.
+    """
+    for part in range(count - 1, -1, -1):
+        at = 8 * part
+        first = tree.halves[part]
+        if first < 0:
+            for i in range(8):
+                tree.costs[at + i], tree.choices[at + i] = tree.costs[at], 0
+            continue
+        for children in range(8, 0, -1):
+            # At last, in the place of i = 1, the node whose eight children the part may be.
+            share = children if children > 1 else 8
+            tree.costs[at + children - 1], tree.choices[at + children - 1] = _share(tree.costs, first, share)
+        tree.costs[at] += half_area(load8(tree.boxes, part * BOX)) * NODE_COST
+        if tree.ranges[part, 1] - tree.ranges[part, 0] <= leaf_size:
+            whole = leaf_cost(tree, part)
+            if not tree.costs[at] < whole:
+                tree.costs[at], tree.choices[at] = whole, 0
+        for i in range(1, 8):
+            if not tree.costs[at + i] < tree.costs[at + i - 1]:
+                tree.costs[at + i], tree.choices[at + i] = tree.costs[at + i - 1], 0
+
+
+@kernel
+def _share(costs, first, children):
+    """The least cost of two halves as ``children`` children in all, and how many of them the first half gets."""
+    left, right = 8 * first - 1, 8 * (first + 1) - 1
+    best, chosen = costs[left + 1] + costs[right + children - 1], 1
+    for k in range(2, children):
+        cost = costs[left + k] + costs[right + children - k]
+        if cost < best:
+            best, chosen = cost, k
+    return best, chosen

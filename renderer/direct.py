@@ -1,0 +1,118 @@
+"""Light that comes straight from the lights to the surfaces of a bundle: Phong with shadows.
+
+k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light
+"""
+
+import numpy as np
+
+from renderer.bundle import SIZE
+from renderer.jit import inlined, kernel
+from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
+from renderer.material import DIELECTRIC, DIFFUSE, KIND, MIRROR, PHONG, SHININESS, SPECULAR, UNLIT
+from renderer.shading import spawn_origin, specular
+from renderer.simd import at, get, put
+from renderer.traverse import Rays, trace
+from renderer.vec3 import add, dot, normalized, row3, scale, sub, three, times
+
+# What a lit ray of a bundle leaves for its light and its children, one column of SURFACE_DOUBLES float64 a ray.
+POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT = 0, 3, 6, 9, 10, 11, 12
+SURFACE_DOUBLES = 15
+# A shadow ray: where it starts, where it goes, how far, the unit direction to the light and what arrives from there.
+_ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
+_TOWARDS, _ARRIVING, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE
+
+
+@inlined
+def put3(base, first, a):
+    """Write three numbers."""
+    put(base, first, a[0])
+    put(base, first + 1, a[1])
+    put(base, first + 2, a[2])
+
+
+@inlined
+def is_lit(materials, m):
+    """Whether the material in row ``m`` shows light that comes straight from lights."""
+    kind = get(materials, m + KIND)
+    return kind != MIRROR and kind != DIELECTRIC and kind != UNLIT
+
+
+@inlined
+def _aim(world, surface, light, offset):
+    """The shadow ray from a surface to a light: (whether the light faces it, origin, direction, t_max, unit direction,
+    the irradiance that arrives facing it).
+
+    A shadow ray to a point light ends at the light: t counts in units of the distance, and a surface at the light
+    itself does not hide it.
+    """
+    row = light * LIGHT_COLUMNS
+    towards, arriving = three(world.lights, row + 1), three(world.lights, row + 4)
+    p, n, n_g, error = three(surface, POINT), three(surface, NORMAL), three(surface, GEOMETRIC), get(surface, BOUND)
+    if get(world.lights, row) == DIRECTIONAL:
+        if dot(n, towards) <= 0.0:
+            return False, p, towards, 0.0, towards, arriving
+        return True, spawn_origin(p, error, n_g, towards, offset), towards, np.inf, towards, arriving
+    to_light = sub(towards, p)
+    squared = dot(to_light, to_light)
+    # A light within rounding of the surface lies on it and does not light it; this also bounds 1 / r^2.
+    if dot(n, to_light) <= error:
+        return False, p, to_light, 0.0, to_light, arriving
+    o = spawn_origin(p, error, n_g, to_light, offset)
+    # A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
+    # covers angles down to 2^-12. Mitsuba stops ten of its epsilons short.
+    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-36
+    return True, o, sub(towards, o), t_max, normalized(to_light), scale(arriving, 1.0 / squared)
+
+
+@kernel
+def _aim_all(world, surfaces, lit, count, light, offset, shadows):
+    """Aim the ``count`` rays in ``lit`` at a light. Returns how many face it; they go to ``lit`` from SIZE on."""
+    aimed = 0
+    for k in range(count):
+        i = get(lit, k)
+        faces, o, d, t_max, towards, arriving = _aim(world, at(surfaces, i * SURFACE_DOUBLES), light, offset)
+        if faces:
+            put3(shadows, _ORIGIN + 3 * aimed, o)
+            put3(shadows, _DIRECTION + 3 * aimed, d)
+            put(shadows, _T_MAX + aimed, t_max)
+            put3(shadows, _TOWARDS + 3 * aimed, towards)
+            put3(shadows, _ARRIVING + 3 * aimed, arriving)
+            put(lit, SIZE + aimed, i)
+            aimed += 1
+    return aimed
+
+
+@inlined
+def _shine(world, bundle, surface, i, towards, arriving):
+    """Add what ray ``i`` sees of a light that reaches its surface."""
+    m, n, d = np.int64(get(surface, MATERIAL)), three(surface, NORMAL), row3(bundle.directions, i)
+    materials = world.materials
+    factor = scale(three(materials, m + DIFFUSE), dot(n, towards))
+    if get(materials, m + KIND) == PHONG:
+        shininess = get(materials, m + SHININESS)
+        factor = add(factor, scale(three(materials, m + SPECULAR), specular(d, n, towards, shininess)))
+    put3(surface, LIGHT, add(three(surface, LIGHT), times(factor, arriving)))
+
+
+@kernel
+def light_surfaces(target, world, bundle, surfaces, lit, offset, work):
+    """Direct light of the surfaces that a bundle met, into their LIGHT.
+
+    ``lit`` lists, after their number, the rays whose material shows it, with room for as many again. Shadow rays are
+    counted in ``work.traced`` of their pixels.
+    """
+    count, lit = get(lit, 0), at(lit, 1)
+    shadows = work.shadows
+    for light in range(world.light_count):
+        aimed = _aim_all(world, surfaces, lit, count, light, offset, shadows)
+        rays = Rays(
+            at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 0, 1, 1.0
+        )  # fmt: skip
+        trace(target.tree, target.depth, rays, work.found, 0, aimed, work.trace, True)
+        for k in range(aimed):
+            i = get(lit, SIZE + k)
+            pixel = get(bundle.pixels, i)
+            put(work.traced, pixel, get(work.traced, pixel) + 1)
+            if not get(work.found.hit, k):
+                towards, arriving = three(shadows, _TOWARDS + 3 * k), three(shadows, _ARRIVING + 3 * k)
+                _shine(world, bundle, at(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)

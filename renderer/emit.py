@@ -1,0 +1,135 @@
+"""Writing a collapsed hierarchy as nodes and leaves."""
+
+import numpy as np
+
+from renderer.bounds import BOX, FACE
+from renderer.jit import kernel
+from renderer.layout import CHILDREN, LANES, LEAF_BITS, NODE_WORDS
+
+# Parts that wait to become nodes: at most seven a level. Levels of cuts end at 3 * 64 by ``max_depth``, even halves
+# within 31 more.
+WAITING = 8 * 256
+
+
+@kernel
+def emit_nodes(tree, numbers, ends, nodes, links, block_faces, waiting):
+    """Write the nodes below part 0, which becomes node 0, depth first. Returns (nodes, blocks, levels of nodes).
+
+    ``ends`` (n, 2) int32 tells the link and the levels below it for each whole part; when it is empty, whole parts and
+    those that ``collapse`` chose are written as leaves. ``nodes`` and ``links`` are the same memory. ``waiting`` is
+    (WAITING, 3) int32 scratch.
+    """
+    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 1, -1
+    top, used, blocks, depth = 1, np.int64(0), np.int64(0), 0
+    shares = np.empty((9, 2), np.int32)
+    while top > 0:
+        # Make the node and hang it below its parent.
+        top -= 1
+        part, level, parent = np.int64(waiting[top, 0]), waiting[top, 1], waiting[top, 2]
+        depth = max(depth, level)
+        base = used * NODE_WORDS
+        _clear_node(nodes, links, base)
+        if parent >= 0:
+            links[parent] = used
+        used += 1
+        # Its children: hand out its eight places between the halves, until each part takes one.
+        place, shared = 0, _first_shares(tree, part, shares)
+        while shared > 0:
+            shared -= 1
+            child, share = np.int64(shares[shared, 0]), shares[shared, 1]
+            while share > 1 and tree.choices[8 * child + share - 1] == 0:
+                share -= 1
+            if share > 1:
+                shared = _share_out(tree, child, tree.choices[8 * child + share - 1], share, shares, shared)
+                continue
+            _set_bounds(nodes, base, place, tree.boxes, child * BOX)
+            link = base + CHILDREN + place
+            place += 1
+            if tree.choices[8 * child] > 0:
+                waiting[top, 0], waiting[top, 1], waiting[top, 2] = child, level + 1, link
+                top += 1
+            elif len(ends) > 0:
+                links[link] = ends[child, 0]
+                depth = max(depth, level + ends[child, 1])
+            else:
+                links[link] = leaf_link(blocks, tree.ranges[child, 1] - tree.ranges[child, 0])
+                blocks = emit_leaf(tree, child, numbers, block_faces, blocks)
+    return used, blocks, depth
+
+
+@kernel
+def _first_shares(tree, part, shares):
+    """Start to hand out a node's places; a whole part has itself as its only child, and none when it is empty."""
+    if tree.choices[8 * part] > 0:
+        return _share_out(tree, part, tree.choices[8 * part], 8, shares, 0)
+    shares[0, 0], shares[0, 1] = part, 1
+    return 1 if tree.ranges[part, 1] > tree.ranges[part, 0] else 0
+
+
+@kernel
+def _share_out(tree, part, left, share, shares, shared):
+    """Give ``left`` of a part's places to its first half, which goes on top, and the others to its second."""
+    first = tree.halves[part]
+    shares[shared, 0], shares[shared, 1] = first + 1, share - left
+    shares[shared + 1, 0], shares[shared + 1, 1] = first, left
+    return shared + 2
+
+
+@kernel
+def leaf_link(block, count):
+    """The link to a leaf of ``count`` faces whose first block is ``block``."""
+    return ~((block << LEAF_BITS) | ((count + LANES - 1) // LANES - 1))
+
+
+@kernel
+def emit_leaf(tree, part, numbers, block_faces, blocks):
+    """Write a part's faces into blocks, which it fills up with -1; returns the number of blocks then."""
+    begin, end = tree.ranges[part]
+    at = blocks * LANES
+    for i in range(begin, end):
+        block_faces[at] = numbers[i * BOX + FACE]
+        at += 1
+    while at % LANES > 0:
+        block_faces[at] = -1
+        at += 1
+    return at // LANES
+
+
+@kernel
+def _clear_node(nodes, links, base):
+    nodes[base : base + NODE_WORDS] = 0.0
+    for k in range(8):
+        for axis in range(3):
+            nodes[base + 16 * axis + k] = np.inf
+            nodes[base + 16 * axis + 8 + k] = -np.inf
+
+
+@kernel
+def _set_bounds(nodes, base, place, boxes, box):
+    for axis in range(3):
+        nodes[base + 16 * axis + place] = boxes[box + axis]
+        nodes[base + 16 * axis + 8 + place] = -boxes[box + 4 + axis]
+
+
+@kernel
+def moved_link(link, node, block):
+    """The link of a subtree whose first node and block are ``node`` and ``block`` of the whole."""
+    return link + node if link >= 0 else link - (block << LEAF_BITS)
+
+
+@kernel
+def place_subtree(words, block_faces, start, links, all_block_faces):
+    """Copy a subtree's nodes and the faces of its blocks to their ``start`` = (node, block) in the whole.
+
+    Nodes are copied as int32. No node links to the subtree's first, so a link of 0 is that of an unused octant.
+    """
+    node, block = start
+    base = node * NODE_WORDS
+    for i in range(len(words)):
+        links[base + i] = words[i]
+    for at in range(base, base + len(words), NODE_WORDS):
+        for k in range(at + CHILDREN, at + CHILDREN + 8):
+            if links[k] != 0:
+                links[k] = moved_link(links[k], node, block)
+    for i in range(len(block_faces)):
+        all_block_faces[block * LANES + i] = block_faces[i]

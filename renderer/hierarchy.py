@@ -1,0 +1,68 @@
+"""The binary hierarchy that a split rule makes of faces, before it is collapsed into nodes of eight."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.bounds import BOX
+from renderer.jit import kernel
+from renderer.layout import LANES
+
+MIDPOINT, SAH = 0, 1
+
+
+class Rule(NamedTuple):
+    """How to build: the split rule, the most faces of a leaf, and the deepest level that the rule may split."""
+
+    split: int
+    leaf_size: int
+    max_depth: int
+
+
+class Hierarchy(NamedTuple):
+    """Parts: ranges of faces, each whole or cut in two. The two stand side by side, after what they were cut from.
+
+    boxes    (n * BOX,) float32, their bounds
+    ranges   (n, 2) int32, begin and end
+    halves   (n,) int32, the first of the two, or -1 for a part that is whole
+    costs    (n * 8,) float32, what rays pay for the part as one to eight children of a node
+    choices  (n * 8,) uint8, how to pay least, see ``collapse``
+    """
+
+    boxes: NDArray[np.float32]
+    ranges: NDArray[np.int32]
+    halves: NDArray[np.int32]
+    costs: NDArray[np.float32]
+    choices: NDArray[np.uint8]
+
+
+def new_hierarchy(parts: int) -> Hierarchy:
+    """Room for ``parts``."""
+    costs, choices = np.empty(parts * 8, np.float32), np.empty(parts * 8, np.uint8)
+    boxes, ranges, halves = np.empty(parts * BOX, np.float32), np.empty((parts, 2), np.int32), np.empty(parts, np.int32)
+    return Hierarchy(boxes, ranges, halves, costs, choices)
+
+
+def first_parts(tree: Hierarchy, count: int) -> Hierarchy:
+    """The first ``count`` parts, in the same memory."""
+    return Hierarchy(
+        tree.boxes[: count * BOX],
+        tree.ranges[:count],
+        tree.halves[:count],
+        tree.costs[: count * 8],
+        tree.choices[: count * 8],
+    )
+
+
+@kernel
+def add_part(tree, part, begin, end):
+    """Write a whole part, all but its box."""
+    tree.ranges[part, 0], tree.ranges[part, 1] = begin, end
+    tree.halves[part] = -1
+
+
+@kernel
+def whole_size(rule):
+    """Parts of so many faces are never cut: they fill one block."""
+    return min(rule.leaf_size, LANES)

@@ -1,0 +1,91 @@
+"""Triangles of a leaf's blocks, or of all blocks, against one ray: the one place that says what a hit is."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.intersect import hit_triangles, make_shear, meets_face_box
+from renderer.jit import inlined, kernel
+from renderer.layout import BLOCK_WORDS, LANES
+from renderer.simd import get, lane, lowest_bit, pointer
+
+
+class View(NamedTuple):
+    """A ``Tree`` as the traversal reads it: pointers, and the number of blocks."""
+
+    nodes: Any
+    links: Any
+    blocks: Any
+    faces: Any
+    count: int
+
+
+@inlined
+def view(tree):
+    """Pointers into a tree, which the caller must keep alive."""
+    return View(
+        pointer(tree.nodes), pointer(tree.links), pointer(tree.blocks), pointer(tree.faces), len(tree.faces) // LANES
+    )
+
+
+NO_FACE = np.iinfo(np.int32).max
+# How often a search of all blocks for any hit looks whether it has one.
+_BLOCKS_AT_ONCE = 16
+
+
+@inlined
+def nearest_in_blocks(tree, first, count, t_min, shear, best):
+    """The better of ``best`` = (t, face, u, v, w) and the sure hits in ``count`` blocks: smallest t, then lowest face.
+
+    The barycentrics are u / w and v / w; their division waits for the hit that stays.
+    Also returns whether a hit was in doubt. A call to settle it here would cost every ray its registers, so it is left
+    to ``nearest_carefully``.
+    """
+    t, face, u, v, w = best
+    doubtful = np.int64(0)
+    for block in range(first, first + count):
+        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        doubtful |= doubts
+        bits &= ~doubts
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            ti = lane(t4, i)
+            fi = get(tree.faces, block * LANES + i)
+            if ti >= t_min and (ti < t or (ti == t and fi < face)):
+                t, face, u, v, w = ti, fi, lane(u4, i), lane(v4, i), lane(w4, i)
+    return t, face, u, v, w, doubtful
+
+
+@kernel
+def nearest_carefully(tree, first, count, ray, shear, best):
+    """``nearest_in_blocks`` with the hits in doubt that the boxes of their own faces confirm."""
+    t, face, u, v, w = best
+    for block in range(first, first + count):
+        base = block * BLOCK_WORDS
+        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree.blocks, base, shear)
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            ti = lane(t4, i)
+            fi = get(tree.faces, block * LANES + i)
+            better = ti >= ray.t_min and (ti < t or (ti == t and fi < face))
+            if better and ((doubts >> i) & 1 == 0 or meets_face_box(tree.blocks, base + i, ray, ti)):
+                t, face, u, v, w = ti, fi, lane(u4, i), lane(v4, i), lane(w4, i)
+    return t, face, u, v, w
+
+
+@kernel
+def search_all_blocks(tree, ray, t_max, any_hit):
+    """The best hit (t, face, u, v, w) over every block; with ``any_hit`` it may stop at the first."""
+    shear, best, doubtful = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(0)
+    for first in range(0, tree.count, _BLOCKS_AT_ONCE):
+        count = min(_BLOCKS_AT_ONCE, tree.count - first)
+        t, face, u, v, w, doubts = nearest_in_blocks(tree, first, count, ray.t_min, shear, best)
+        best = t, face, u, v, w
+        doubtful |= doubts
+        if any_hit and face != NO_FACE:
+            return best
+    if doubtful != 0:
+        return nearest_carefully(tree, 0, tree.count, ray, shear, (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0))
+    return best

@@ -1,0 +1,263 @@
+"""Coherent rays through the tree together: sixteen rays, one test of a node's octants against all of them.
+
+The test asks for the octants that meet the beam around the rays: the range of origins, swept along the dominant axis
+within the range of slopes. It is implied by each ray's own test, so a packet visits every leaf that its rays would
+visit alone, and only rays that meet a leaf's own box are tested against its triangles. Hits are the same to the last
+bit.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.intersect import FAR_PADDING
+from renderer.jit import inlined, kernel
+from renderer.layout import CHILDREN, NODE_WORDS
+from renderer.prepared import (
+    BLOCK_ROW,
+    DIRECTION_Z,
+    FAR_INVERSE,
+    FAR_ORIGIN,
+    LIMIT,
+    LOWER,
+    NEAR_INVERSE,
+    NEAR_ORIGIN,
+    SLOPE_U,
+    SLOPE_V,
+    WIDTH,
+    nearest_in_leaf,
+)
+from renderer.simd import (
+    bits_float,
+    count_bits,
+    float_bits,
+    get,
+    lane,
+    least,
+    load8,
+    lowest_bit,
+    most,
+    movemask,
+    put,
+    select,
+    splat8,
+)
+
+# A beam's slopes widen by 2^-18 of their size, four times the padding of a single ray's boxes, which covers that and
+# the five roundings between the two forms of the test; and by what a slope loses below the normal float32.
+_WIDER = np.float32(2.0**-18)
+_LEAST_SLOPE = np.float32(2.0**-140)
+_LOW_WORD = 0xFFFFFFFF
+# A packet gives up when it has visited this many octants. Each costs about as much as a visit of a single ray, of which
+# sixteen need 160 to 190 in all; most packets end after 40, and those along a silhouette take a few hundred.
+BUDGET = 512
+
+
+class Beam(NamedTuple):
+    """What bounds sixteen rays that share their dominant axis w and the sign along it.
+
+    Rows of a node, then ranges of float32: near and far origins along w, origins along u and v, slopes along u and v;
+    the sign, the least distance that counts, and a ray in the middle by which the octants are ordered.
+    """
+
+    near_row: Any
+    far_row: Any
+    row_u: Any
+    row_v: Any
+    near_origin: Any
+    far_origin: Any
+    low_u: Any
+    high_u: Any
+    low_v: Any
+    high_v: Any
+    least_u: Any
+    most_u: Any
+    least_v: Any
+    most_v: Any
+    sign: Any
+    lower: Any
+
+
+@inlined
+def _least(floats, row):
+    a, b = load8(floats, row), load8(floats, row + 8)
+    return least(select(a < b, a, b))
+
+
+@inlined
+def _most(floats, row):
+    a, b = load8(floats, row), load8(floats, row + 8)
+    return most(select(a > b, a, b))
+
+
+@inlined
+def _lowest_origin(floats, axis):
+    row = axis * WIDTH
+    return min(_least(floats, NEAR_ORIGIN + row), _least(floats, FAR_ORIGIN + row))
+
+
+@inlined
+def _highest_origin(floats, axis):
+    row = axis * WIDTH
+    return max(_most(floats, NEAR_ORIGIN + row), _most(floats, FAR_ORIGIN + row))
+
+
+@inlined
+def _make_beam(rays):
+    """The beam around sixteen rays; the first one tells the axis."""
+    floats = rays.floats
+    w = get(rays.integers, BLOCK_ROW + 2 * WIDTH) >> 2
+    u, v = (w + 1) % 3, (w + 2) % 3
+    forward = get(rays.doubles, DIRECTION_Z) > 0.0
+    flip = 0 if forward else 8
+    low_w, high_w = _lowest_origin(floats, w), _highest_origin(floats, w)
+    least_u, most_u = _least(floats, SLOPE_U), _most(floats, SLOPE_U)
+    least_v, most_v = _least(floats, SLOPE_V), _most(floats, SLOPE_V)
+    return Beam(
+        16 * w + flip,
+        16 * w + 8 - flip,
+        16 * u,
+        16 * v,
+        high_w if forward else low_w,
+        low_w if forward else high_w,
+        _lowest_origin(floats, u),
+        _highest_origin(floats, u),
+        _lowest_origin(floats, v),
+        _highest_origin(floats, v),
+        least_u - (abs(least_u) * _WIDER + _LEAST_SLOPE),
+        most_u + (abs(most_u) * _WIDER + _LEAST_SLOPE),
+        least_v - (abs(least_v) * _WIDER + _LEAST_SLOPE),
+        most_v + (abs(most_v) * _WIDER + _LEAST_SLOPE),
+        np.float32(1.0) if forward else np.float32(-1.0),
+        _least(floats, LOWER),
+    )
+
+
+@inlined
+def enter_beam(nodes, base, beam, limit):
+    """The bits of the octants of the node at word ``base`` that the beam meets, and their distances along its axis."""
+    sign, lower, upper = splat8(beam.sign), splat8(beam.lower), splat8(limit)
+    n = (load8(nodes, base + beam.near_row) - splat8(beam.near_origin)) * sign
+    t0 = select(n > lower, n, lower)
+    f = (load8(nodes, base + beam.far_row) - splat8(beam.far_origin)) * sign
+    t1 = select(f < upper, f, upper)
+    meets = t0 <= t1 * splat8(FAR_PADDING)
+    a, b = splat8(beam.most_u) * t0, splat8(beam.most_u) * t1
+    meets = meets & (load8(nodes, base + beam.row_u) - splat8(beam.high_u) <= select(a > b, a, b))
+    a, b = splat8(beam.least_u) * t0, splat8(beam.least_u) * t1
+    meets = meets & (load8(nodes, base + beam.row_u + 8) - splat8(beam.low_u) >= select(a < b, a, b))
+    a, b = splat8(beam.most_v) * t0, splat8(beam.most_v) * t1
+    meets = meets & (load8(nodes, base + beam.row_v) - splat8(beam.high_v) <= select(a > b, a, b))
+    a, b = splat8(beam.least_v) * t0, splat8(beam.least_v) * t1
+    meets = meets & (load8(nodes, base + beam.row_v + 8) - splat8(beam.low_v) >= select(a < b, a, b))
+    return t0, movemask(meets)
+
+
+@inlined
+def _meet_box(nodes, at, floats, half):
+    """The bits of eight rays, from ``half`` on, that meet the octant whose first word is ``at``: ``enter_boxes``."""
+    t0, t1 = load8(floats, LOWER + half), load8(floats, LIMIT + half)
+    for axis in range(3):
+        low, high = splat8(get(nodes, at + 16 * axis)), splat8(get(nodes, at + 16 * axis + 8))
+        row = axis * WIDTH + half
+        inverse = load8(floats, NEAR_INVERSE + row)
+        forward = inverse > splat8(np.float32(0.0))
+        n = (select(forward, low, high) - load8(floats, NEAR_ORIGIN + row)) * inverse
+        t0 = select(n > t0, n, t0)
+        f = (select(forward, high, low) - load8(floats, FAR_ORIGIN + row)) * load8(floats, FAR_INVERSE + row)
+        t1 = select(f < t1, f, t1)
+    return movemask(t0 <= t1 * splat8(FAR_PADDING))
+
+
+@inlined
+def _middle_entry(nodes, base, beam, rays, t0):
+    """The distances at which a ray in the middle enters the octants, by which they are ordered."""
+    floats, middle = rays.floats, WIDTH // 2
+    for row in (beam.row_u, beam.row_v):
+        axis = row >> 4
+        inverse = get(floats, NEAR_INVERSE + axis * WIDTH + middle)
+        near = row + (8 if inverse < 0.0 else 0)
+        n = (load8(nodes, base + near) - splat8(get(floats, NEAR_ORIGIN + axis * WIDTH + middle))) * splat8(inverse)
+        t0 = select(n > t0, n, t0)
+    return t0
+
+
+@inlined
+def _push_sorted(node, bits, t0, key, stack, top):
+    """Push the octants in ``bits`` of a node, the one with the least key last: t0 over the octant's number.
+
+    Each one's place is the number of those behind it, so that no branch depends on the keys.
+    """
+    for i in range(8):
+        k = splat8(lane(key, i))
+        before, after = movemask(key >= k) & ((1 << i) - 1), movemask(key > k) & (0xFF << (i + 1))
+        place = count_bits((before | after) & bits) if (bits >> i) & 1 else 8
+        put(stack, top + place, (float_bits(lane(t0, i)) << 32) | (node * 8 + i))
+    return top + count_bits(bits)
+
+
+@inlined
+def _push_all(node, bits, t0, stack, top):
+    while bits != 0:
+        i = lowest_bit(bits)
+        bits &= bits - 1
+        put(stack, top, (float_bits(lane(t0, i)) << 32) | (node * 8 + i))
+        top += 1
+    return top
+
+
+@inlined
+def _next_octant(stack, top, limit):
+    """The octant on top of the stack that is not beyond the limit, or -1, and the top below it."""
+    while top > 0:
+        top -= 1
+        entry = get(stack, top)
+        if bits_float(entry >> 32) <= limit:
+            return entry & _LOW_WORD, top
+    return -1, top
+
+
+@kernel
+def trace_packet(tree, rays, stack, any_hit):
+    """Search for hits of sixteen prepared rays with one dominant axis and sign; the results stay in ``rays``.
+
+    With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns whether the packet came to its end (if
+    not, it gave up) and the bits of the rays in doubt. ``stack`` is scratch as ``traverse.stack_size`` says.
+    """
+    beam, floats, nodes = _make_beam(rays), rays.floats, tree.nodes
+    limit, doubtful, top, node, left = _most(floats, LIMIT), np.int64(0), 0, np.int64(0), BUDGET
+    while True:
+        base = node * NODE_WORDS
+        t0, bits = enter_beam(nodes, base, beam, limit)
+        if any_hit:
+            top = _push_all(node, bits, t0, stack, top)
+        elif bits != 0:
+            top = _push_sorted(node, bits, t0, _middle_entry(nodes, base, beam, rays, t0), stack, top)
+        while True:
+            octant, top = _next_octant(stack, top, limit)
+            left -= 1
+            if octant < 0 or left < 0:
+                return octant < 0, doubtful
+            base, place = (octant >> 3) * NODE_WORDS, octant & 7
+            node = np.int64(get(tree.links, base + CHILDREN + place))
+            if node >= 0:
+                break
+            meeting = _meet_box(nodes, base + place, floats, 0) | (_meet_box(nodes, base + place, floats, 8) << 8)
+            if meeting != 0:
+                doubtful |= _test_leaf(tree, rays, meeting, node, any_hit)
+                limit = _most(floats, LIMIT)
+
+
+@inlined
+def _test_leaf(tree, rays, meeting, leaf, any_hit):
+    """Test the rays in ``meeting`` against a leaf. Returns the bits of those in doubt."""
+    doubtful = np.int64(0)
+    while meeting != 0:
+        r = lowest_bit(meeting)
+        meeting &= meeting - 1
+        hit, doubts = nearest_in_leaf(tree, rays, r, leaf)
+        doubtful |= np.int64(doubts != 0) << r
+        if any_hit and hit:
+            # Nothing is nearer than this: the ray meets no further box.
+            put(rays.floats, LIMIT + r, np.float32(-np.inf))
+    return doubtful

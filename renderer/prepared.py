@@ -1,0 +1,135 @@
+"""Sixteen rays prepared for traversal, side by side in memory: packets read whole rows of them, streams single rays."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.intersect import Shear, Slabs, box_limit, make_shear, make_slabs, round_down
+from renderer.jit import inlined
+from renderer.layout import LEAF_BITS, MAX_LEAF_BLOCKS
+from renderer.leaf import NO_FACE, nearest_in_blocks
+from renderer.simd import get, put
+
+WIDTH = 16
+
+# Rows of float32: what ``Slabs`` holds, three axes each; the least and the farthest distance that count, in units in
+# which the largest component of the direction is 1; and, in these units too, the slopes along the two other axes.
+NEAR_ORIGIN, FAR_ORIGIN, NEAR_INVERSE, FAR_INVERSE = 0, 3 * WIDTH, 6 * WIDTH, 9 * WIDTH
+LOWER, LIMIT, SLOPE_U, SLOPE_V = 12 * WIDTH, 13 * WIDTH, 14 * WIDTH, 15 * WIDTH
+FLOATS = 16 * WIDTH
+# Rows of float64: what ``Shear`` holds, the interval, the best hit's barycentric numerators and their denominator, and
+# the largest component of the direction.
+ORIGIN, SHEAR, DIRECTION_Z, T_MIN, T = 0, 3 * WIDTH, 5 * WIDTH, 6 * WIDTH, 7 * WIDTH
+U, V, W, LARGEST = 8 * WIDTH, 9 * WIDTH, 10 * WIDTH, 11 * WIDTH
+DOUBLES = 12 * WIDTH
+# Rows of int64: the near rows of a node and the rows of a block, three axes each, and the best hit's face.
+NEAR_ROW, BLOCK_ROW, FACE = 0, 3 * WIDTH, 6 * WIDTH
+INTEGERS = 7 * WIDTH
+
+
+class Prepared(NamedTuple):
+    """Pointers to the rows: FLOATS float32, DOUBLES float64 and INTEGERS int64."""
+
+    floats: Any
+    doubles: Any
+    integers: Any
+
+
+@inlined
+def prepare(rays, r, ray, t_max):
+    """Make ``ray`` the ray in place ``r``, which has met nothing yet."""
+    floats, doubles, integers = rays
+    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
+    slabs, shear = make_slabs(ray, largest), make_shear(ray)
+    _put_axes(floats, NEAR_ORIGIN + r, slabs.near_origin_x, slabs.near_origin_y, slabs.near_origin_z)
+    _put_axes(floats, FAR_ORIGIN + r, slabs.far_origin_x, slabs.far_origin_y, slabs.far_origin_z)
+    _put_axes(floats, NEAR_INVERSE + r, slabs.near_inverse_x, slabs.near_inverse_y, slabs.near_inverse_z)
+    _put_axes(floats, FAR_INVERSE + r, slabs.far_inverse_x, slabs.far_inverse_y, slabs.far_inverse_z)
+    put(floats, LOWER + r, round_down(ray.t_min * largest))
+    put(floats, LIMIT + r, box_limit(t_max, largest))
+    # The shear counts in units of a component that may be negative, the slopes in units of its size.
+    sign = 1.0 if shear.direction_z > 0.0 else -1.0
+    put(floats, SLOPE_U + r, np.float32(shear.shear_x * sign))
+    put(floats, SLOPE_V + r, np.float32(shear.shear_y * sign))
+    _put_axes(doubles, ORIGIN + r, shear.origin_x, shear.origin_y, shear.origin_z)
+    put(doubles, SHEAR + r, shear.shear_x)
+    put(doubles, SHEAR + WIDTH + r, shear.shear_y)
+    put(doubles, DIRECTION_Z + r, shear.direction_z)
+    put(doubles, T_MIN + r, ray.t_min)
+    put(doubles, LARGEST + r, largest)
+    _put_axes(integers, NEAR_ROW + r, slabs.near_x, slabs.near_y, slabs.near_z)
+    _put_axes(integers, BLOCK_ROW + r, shear.row_x, shear.row_y, shear.row_z)
+    put_best(rays, r, (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0))
+
+
+@inlined
+def _put_axes(base, first, x, y, z):
+    put(base, first, x)
+    put(base, first + WIDTH, y)
+    put(base, first + 2 * WIDTH, z)
+
+
+@inlined
+def slabs_of(rays, r):
+    """The ray's ``Slabs``."""
+    floats, _, integers = rays
+    row = NEAR_ROW + r
+    nx, ny, nz = get(integers, row), get(integers, row + WIDTH), get(integers, row + 2 * WIDTH)
+    return Slabs(
+        nx, ny, nz, 8 - nx, 40 - ny, 72 - nz,
+        get(floats, NEAR_ORIGIN + r), get(floats, NEAR_ORIGIN + WIDTH + r), get(floats, NEAR_ORIGIN + 2 * WIDTH + r),
+        get(floats, FAR_ORIGIN + r), get(floats, FAR_ORIGIN + WIDTH + r), get(floats, FAR_ORIGIN + 2 * WIDTH + r),
+        get(floats, NEAR_INVERSE + r), get(floats, NEAR_INVERSE + WIDTH + r), get(floats, NEAR_INVERSE + 2 * WIDTH + r),
+        get(floats, FAR_INVERSE + r), get(floats, FAR_INVERSE + WIDTH + r), get(floats, FAR_INVERSE + 2 * WIDTH + r),
+    )  # fmt: skip
+
+
+@inlined
+def shear_of(rays, r):
+    _, doubles, integers = rays
+    return Shear(
+        get(integers, BLOCK_ROW + r), get(integers, BLOCK_ROW + WIDTH + r), get(integers, BLOCK_ROW + 2 * WIDTH + r),
+        get(doubles, ORIGIN + r), get(doubles, ORIGIN + WIDTH + r), get(doubles, ORIGIN + 2 * WIDTH + r),
+        get(doubles, SHEAR + r), get(doubles, SHEAR + WIDTH + r), get(doubles, DIRECTION_Z + r),
+    )  # fmt: skip
+
+
+@inlined
+def best_of(rays, r):
+    """(t, face, u, v, w) of the best hit so far: barycentrics u / w and v / w, face = NO_FACE for none."""
+    _, doubles, integers = rays
+    return (
+        get(doubles, T + r),
+        np.int32(get(integers, FACE + r)),
+        get(doubles, U + r),
+        get(doubles, V + r),
+        get(doubles, W + r),
+    )
+
+
+@inlined
+def put_best(rays, r, best):
+    _, doubles, integers = rays
+    t, face, u, v, w = best
+    put(doubles, T + r, t)
+    put(integers, FACE + r, np.int64(face))
+    put(doubles, U + r, u)
+    put(doubles, V + r, v)
+    put(doubles, W + r, w)
+
+
+@inlined
+def nearest_in_leaf(tree, rays, r, leaf):
+    """Test a leaf, a negative child, for a better hit of ray ``r``. Returns whether it has any hit now, and doubts."""
+    code = ~leaf
+    t, face, u, v, w, doubts = nearest_in_blocks(
+        tree,
+        code >> LEAF_BITS,
+        (code & (MAX_LEAF_BLOCKS - 1)) + 1,
+        get(rays.doubles, T_MIN + r),
+        shear_of(rays, r),
+        best_of(rays, r),
+    )
+    put_best(rays, r, (t, face, u, v, w))
+    put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
+    return face != NO_FACE, doubts

@@ -1,0 +1,96 @@
+"""What kernels see of a scene: its arrays, and the surface where a ray met it."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.jit import inlined
+from renderer.shading import offset_distance
+from renderer.simd import get, pointer
+from renderer.vec3 import barycentric, cross, normalized, row3, sub
+
+# Media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
+MAX_MEDIA = 8
+
+
+class World(NamedTuple):
+    """What the kernel reads of a scene; rows of materials and lights as in ``material`` and ``light``.
+
+    vertices (V, 3), normals (V, 3), faces (F, 3) int32, material (F,) int32, smooth (F,) bool (normals and smooth
+    without rows where no face is smooth), materials (M, MATERIAL_COLUMNS), lights (L, LIGHT_COLUMNS), colors (2, 3):
+    ambient and background, media (m,) int64, m <= MAX_MEDIA: where in ``materials`` the rows begin of those that the
+    eye is in, outermost first; ``material`` says the same of each face.
+    """
+
+    vertices: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    material: NDArray[np.int32]
+    smooth: NDArray[np.bool_]
+    materials: NDArray[np.float64]
+    lights: NDArray[np.float64]
+    colors: NDArray[np.float64]
+    media: NDArray[np.int64]
+
+
+class Sight(NamedTuple):
+    """A ``World`` as the kernels read it: pointers, the numbers of lights and of media around the eye, and whether any
+    face is smooth.
+    """
+
+    vertices: Any
+    normals: Any
+    faces: Any
+    material: Any
+    smooth: Any
+    materials: Any
+    lights: Any
+    colors: Any
+    media: Any
+    light_count: int
+    media_count: int
+    has_smooth: bool
+
+
+@inlined
+def look_at(world):
+    """Pointers into a world, which the caller must keep alive."""
+    return Sight(
+        pointer(world.vertices),
+        pointer(world.normals),
+        pointer(world.faces),
+        pointer(world.material),
+        pointer(world.smooth),
+        pointer(world.materials),
+        pointer(world.lights),
+        pointer(world.colors),
+        pointer(world.media),
+        len(world.lights),
+        len(world.media),
+        len(world.smooth) > 0,
+    )
+
+
+class Surface(NamedTuple):
+    """Where a ray met the scene: point, its distance bound, normals n_g and n_s, where its material's row begins."""
+
+    p: tuple
+    error: float
+    n_g: tuple
+    n_s: tuple
+    material: int
+
+
+@inlined
+def surface_at(world, face, u, v):
+    """The ``Surface`` at barycentrics u, v of a face."""
+    a, b, c = row3(world.faces, face)
+    p0, p1, p2 = row3(world.vertices, a), row3(world.vertices, b), row3(world.vertices, c)
+    n_g = normalized(cross(sub(p1, p0), sub(p2, p0)))
+    p = barycentric(p0, p1, p2, u, v)
+    n_s = n_g
+    if world.has_smooth and get(world.smooth, face):
+        n_s = normalized(barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v))
+    error = offset_distance(p, p0, p1, p2, u, v, n_g)
+    return Surface(p, error, n_g, n_s, get(world.material, face))

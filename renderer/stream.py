@@ -1,0 +1,210 @@
+"""Incoherent rays through the tree in turn, sixteen at a time; a ray that ends makes room for the next one.
+
+Whether a ray goes on, waits or ends cannot be predicted, and a wrong guess costs all that was begun behind it. So every
+round first computes what each ray meets, without a branch, and then decides: by then the numbers are there, and a wrong
+guess costs little. Meanwhile the records for the next round come from memory.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.intersect import box_limit, enter_boxes, meet_planes, see_triangles
+from renderer.jit import inlined, kernel
+from renderer.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
+from renderer.prepared import LARGEST, LIMIT, LOWER, T_MIN, WIDTH, T, best_of, put_best, shear_of, slabs_of
+from renderer.simd import (
+    at,
+    bits_float,
+    count_bits,
+    float_bits,
+    get,
+    lowest_bit,
+    movemask,
+    prefetch,
+    put,
+    splat4,
+    splat8,
+    store,
+)
+
+_LOW_WORD = 0xFFFFFFFF
+# What lies at the bottom of a ray's stack: no leaf's code, and at distance 0, so that nothing is beyond it.
+END = -(1 << 31)
+_LINE = CACHE_LINE // 4
+
+
+@inlined
+def _entry(tree, base, place, t0):
+    """An octant as it waits on the stack: the bits of its float32 distance above its child."""
+    return (float_bits(get(t0, place)) << 32) | (np.int64(get(tree.links, base + place)) & _LOW_WORD)
+
+
+@kernel
+def _push_octants(tree, base, t0, bits, stack, top, any_hit):
+    """Push the octants in ``bits`` of the node whose children begin at ``base``, nearest last unless any will do."""
+    bottom = top
+    while bits != 0:
+        entry = _entry(tree, base, lowest_bit(bits), t0)
+        bits &= bits - 1
+        at = top
+        while not any_hit and at > bottom and get(stack, at - 1) < entry:
+            put(stack, at, get(stack, at - 1))
+            at -= 1
+        put(stack, at, entry)
+        top += 1
+    return top
+
+
+@inlined
+def _prefetch_child(tree, child):
+    """Ask for the record that a ray's next step will read."""
+    if child >= 0:
+        for line in range(NODE_WORDS // _LINE):
+            prefetch(tree.nodes, child * NODE_WORDS + line * _LINE)
+    else:
+        # The last vertex of a float64 block lies two lines further on; the hardware fetches what follows by itself.
+        for line in range(3):
+            prefetch(tree.blocks, (~child >> LEAF_BITS) * BLOCK_WORDS + line * _LINE)
+
+
+class Lanes(NamedTuple):
+    """Sixteen rays under way, as pointers: per ray its next child and the top of its stack; the lists of those that are
+    at a node and at a leaf; and what a round computed: the octants' distances, the triangles' t, u, v, w, and the bits
+    of both.
+    """
+
+    child: Any
+    top: Any
+    stacks: Any
+    stack_size: int
+    at_node: Any
+    at_leaf: Any
+    bits: Any
+    doubts: Any
+    distances: Any
+    hits: Any
+
+
+# Words that ``Lanes`` takes of int64, beside the stacks, of float32 and of float64.
+LANE_INTEGERS, LANE_FLOATS, LANE_DOUBLES = 6 * WIDTH, 8 * WIDTH, 4 * LANES * WIDTH
+
+
+@inlined
+def make_lanes(integers, floats, doubles, stack_size):
+    """Lanes in the given memory; the stacks, ``stack_size`` entries each, follow LANE_INTEGERS other words."""
+    return Lanes(
+        integers, at(integers, WIDTH), at(integers, LANE_INTEGERS), stack_size, at(integers, 2 * WIDTH),
+        at(integers, 3 * WIDTH), at(integers, 4 * WIDTH), at(integers, 5 * WIDTH), floats, doubles,
+    )  # fmt: skip
+
+
+@inlined
+def begin_ray(lanes, r):
+    """Let the prepared ray ``r`` start at the root."""
+    put(lanes.child, r, 0)
+    put(lanes.top, r, 1)
+    put(lanes.stacks, r * lanes.stack_size, END & _LOW_WORD)
+
+
+@inlined
+def meet_nodes(tree, rays, lanes, count):
+    """Compute what each of ``count`` rays meets in its node."""
+    for k in range(count):
+        r = get(lanes.at_node, k)
+        lower, upper = splat8(get(rays.floats, LOWER + r)), splat8(get(rays.floats, LIMIT + r))
+        t0, bits = enter_boxes(tree.nodes, get(lanes.child, r), slabs_of(rays, r), lower, upper)
+        store(lanes.distances, 8 * r, t0)
+        put(lanes.bits, r, bits)
+
+
+@inlined
+def leave_node(tree, rays, lanes, r, any_hit):
+    """Choose where ray ``r`` goes from its node: the nearest octant it meets, or what waited. Returns that child.
+
+    The other octants are pushed. Up to two, the usual case, go without a branch; octant 7 stands in for those that are
+    not there.
+    """
+    base, bits, top = get(lanes.child, r) * NODE_WORDS + CHILDREN, get(lanes.bits, r), get(lanes.top, r)
+    t0, stack = at(lanes.distances, 8 * r), at(lanes.stacks, r * lanes.stack_size)
+    others = bits & (bits - 1)
+    if others & (others - 1) != 0:
+        top = _push_octants(tree, base, t0, bits, stack, top, any_hit) - 1
+        entry = get(stack, top)
+    else:
+        a, b = _entry(tree, base, lowest_bit(bits | 128), t0), _entry(tree, base, lowest_bit(others | 128), t0)
+        waiting = get(stack, top - 1)
+        put(stack, top, max(a, b))
+        nearest = min(a, b) if others != 0 else a
+        entry = nearest if bits != 0 else waiting
+        top += count_bits(bits) - 1
+    return _go_on(tree, rays, lanes, r, stack, entry, top)
+
+
+@inlined
+def _go_on(tree, rays, lanes, r, stack, entry, top):
+    """Take ``entry``, or the next one below ``top`` that is not beyond the best hit."""
+    limit = get(rays.floats, LIMIT + r)
+    while bits_float(entry >> 32) > limit:
+        top -= 1
+        entry = get(stack, top)
+    child = np.int64(np.int32(entry & _LOW_WORD))
+    put(lanes.child, r, child)
+    put(lanes.top, r, top)
+    _prefetch_child(tree, child)
+    return child
+
+
+@inlined
+def meet_leaves(tree, rays, lanes, count):
+    """Compute what each of ``count`` rays hits in the first block of its leaf; END passes as a block like any other."""
+    for k in range(count):
+        r = get(lanes.at_leaf, k)
+        child = get(lanes.child, r)
+        block = (~child >> LEAF_BITS) if child != END else 0
+        shear = shear_of(rays, r)
+        edges, seen = see_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        t, doubt = meet_planes(edges, shear)
+        # What lies beyond the best hit matters no more, in doubt or not.
+        seen = seen & (t >= splat4(get(rays.doubles, T_MIN + r))) & (t <= splat4(get(rays.doubles, T + r)))
+        put(lanes.bits, r, movemask(seen))
+        put(lanes.doubts, r, movemask(doubt))
+        hits = 4 * LANES * r
+        store(lanes.hits, hits, t)
+        store(lanes.hits, hits + LANES, edges.e1)
+        store(lanes.hits, hits + 2 * LANES, edges.e2)
+        store(lanes.hits, hits + 3 * LANES, edges.determinant)
+
+
+@inlined
+def take_hits(tree, rays, lanes, r):
+    """Keep the best hit of a leaf's first block. Returns whether it has one, and whether there was a doubt."""
+    block, bits, hits = ~get(lanes.child, r) >> LEAF_BITS, get(lanes.bits, r), at(lanes.hits, 4 * LANES * r)
+    doubtful = bits & get(lanes.doubts, r)
+    bits &= ~doubtful
+    if bits != 0:
+        t, face, u, v, w = best_of(rays, r)
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            ti, fi = get(hits, i), get(tree.faces, block * LANES + i)
+            if ti < t or (ti == t and fi < face):
+                t, face = ti, fi
+                u, v, w = get(hits, LANES + i), get(hits, 2 * LANES + i), get(hits, 3 * LANES + i)
+        put_best(rays, r, (t, face, u, v, w))
+        put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
+        return True, doubtful != 0
+    return False, doubtful != 0
+
+
+@inlined
+def leave_leaf(tree, rays, lanes, r):
+    """Choose where ray ``r`` goes from its leaf: to its next block, or to what waited. Returns that child."""
+    child = get(lanes.child, r)
+    if ~child & (MAX_LEAF_BLOCKS - 1) != 0:
+        # One block on, and one less to go.
+        child -= MAX_LEAF_BLOCKS - 1
+        put(lanes.child, r, child)
+        return child
+    stack, top = at(lanes.stacks, r * lanes.stack_size), get(lanes.top, r) - 1
+    return _go_on(tree, rays, lanes, r, stack, get(stack, top), top)

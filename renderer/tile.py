@@ -1,0 +1,142 @@
+"""A tile of the picture: camera rays in blocks of 8 x 8 pixels, one bundle a sample, and what they bring home."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.bundle import SIDE, SIZE, append, clear, count_of
+from renderer.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
+from renderer.jit import inlined, kernel
+from renderer.leaf import view
+from renderer.sight import look_at
+from renderer.simd import at, get, keep, pointer, put
+from renderer.traverse import make_memory, make_scratch
+from renderer.vec3 import add, normalized, row3, scale, three
+from renderer.whitted import Accelerator, Settings, make_work, push_children, slot, trace_bundle, work_lengths
+
+_BRIGHTEST = np.finfo(np.float32).max
+# Pixels a side of the squares that become packets.
+_SQUARE = 4
+
+
+class Film(NamedTuple):
+    """What a tile writes: radiance and normal (h, w, 3), depth (h, w), face and rays (h, w)."""
+
+    radiance: NDArray[np.float32]
+    depth: NDArray[np.float64]
+    normal: NDArray[np.float32]
+    face: NDArray[np.int32]
+    rays: NDArray[np.int32]
+
+
+class Camera(NamedTuple):
+    """Pointers to the rows of the camera's affine map and to the samples' places in a pixel, and their number."""
+
+    rows: Any
+    samples: Any
+    count: int
+
+
+@inlined
+def _place(k):
+    """Column and row in a block of its k-th pixel: square by square, so that sixteen in a row are a packet."""
+    square, rest = k // (_SQUARE * _SQUARE), k % (_SQUARE * _SQUARE)
+    across = SIDE // _SQUARE
+    return square % across * _SQUARE + rest % _SQUARE, square // across * _SQUARE + rest // _SQUARE
+
+
+@inlined
+def _shoot(camera, world, bundle, sample, block):
+    """Fill a bundle with the camera rays of a block = (x0, y0, x1, y1); pixels count row by row, SIDE a row."""
+    x0, y0, x1, y1 = block
+    clear(bundle, 0)
+    for k in range(SIZE):
+        i, j = _place(k)
+        x, y = x0 + i, y0 + j
+        if x < x1 and y < y1:
+            px, py = x + get(camera.samples, 2 * sample), y + get(camera.samples, 2 * sample + 1)
+            rows = camera.rows
+            o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))
+            d = add(row3(rows, 3), add(scale(row3(rows, 4), px), scale(row3(rows, 5), py)))
+            append(bundle, o, normalized(d), (1.0, 1.0, 1.0), j * SIDE + i, world.media, world.media_count)
+
+
+@inlined
+def _write_first_hits(film, bundle, work, x0, y0):
+    """Depth, face and shading normal of the camera rays, straight after they were traced."""
+    for i in range(count_of(bundle)):
+        pixel, surface = get(bundle.pixels, i), at(work.surfaces, i * SURFACE_DOUBLES)
+        x, y, face = x0 + pixel % SIDE, y0 + pixel // SIDE, get(work.found.face, i)
+        film.depth[y, x], film.face[y, x] = get(work.found.t, i), face
+        if face >= 0:
+            n = three(surface, NORMAL)
+            n = scale(n, -1.0) if get(surface, INSIDE) != 0.0 else n
+            for k in range(3):
+                film.normal[y, x, k] = n[k]
+
+
+@kernel
+def _render_block(target, world, settings, camera, film, block, work, total):
+    """Fill the pixels of one block."""
+    x0, y0, x1, y1 = block
+    for k in range(SIZE):
+        put(work.traced, k, 0)
+        put3(total, 3 * k, (0.0, 0.0, 0.0))
+    count = camera.count
+    middle = count // 2 if count % 2 == 1 else (count + int(np.sqrt(count))) // 2
+    for sample in range(count):
+        for k in range(SIZE):
+            put3(work.color, 3 * k, (0.0, 0.0, 0.0))
+        _shoot(camera, world, slot(work, settings, 0), sample, block)
+        top, first = 1, True
+        while top > 0:
+            top -= 1
+            bundle = slot(work, settings, top)
+            trace_bundle(target, world, settings, bundle, work)
+            if first and sample == middle:
+                _write_first_hits(film, bundle, work, x0, y0)
+            first = False
+            top = push_children(world, settings, work, bundle, top)
+        for k in range(SIZE):
+            put3(total, 3 * k, add(row3(total, k), row3(work.color, k)))
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            pixel = (y - y0) * SIDE + x - x0
+            # The brightest float32 stands for anything brighter: a light within 1e-15 of a surface.
+            for k in range(3):
+                film.radiance[y, x, k] = min(get(total, 3 * pixel + k) / count, _BRIGHTEST)
+            film.rays[y, x] = get(work.traced, pixel)
+
+
+def scratch_bytes(depth: int, settings: Settings) -> int:
+    """Bytes that ``render_tile`` takes beside its film, for a tree of ``depth`` levels."""
+    doubles, integers = work_lengths(settings)
+    memory = make_memory(depth, SIZE)
+    return 8 * (doubles + 3 * SIZE + integers) + SIZE + sum(array.nbytes for array in memory)
+
+
+@kernel
+def render_tile(accelerator, world, settings, camera, samples, film, tile):
+    """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
+
+    Depth, face and normal come from the middle sample (the pixel's centre for one sample), radiance from the mean.
+    """
+    x0, y0, x1, y1 = tile
+    depth = accelerator.depth
+    memory, (double_count, integer_count) = make_memory(depth, SIZE), work_lengths(settings)
+    doubles, integers = np.empty(double_count + 3 * SIZE), np.empty(integer_count, np.int64)
+    hits = np.empty(SIZE, np.bool_)
+    work = make_work(pointer(doubles), pointer(integers), pointer(hits), settings, make_scratch(memory, depth))
+    target, seen = Accelerator(view(accelerator.tree), depth), look_at(world)
+    shooting = Camera(pointer(camera), pointer(samples), len(samples))
+    for y in range(y0, y1, SIDE):
+        for x in range(x0, x1, SIDE):
+            block = x, y, min(x + SIDE, x1), min(y + SIDE, y1)
+            _render_block(target, seen, settings, shooting, film, block, work, at(pointer(doubles), double_count))
+    keep(memory.floats)
+    keep(memory.doubles)
+    keep(memory.integers)
+    keep(doubles)
+    keep(integers)
+    keep(hits)

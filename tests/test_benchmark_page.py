@@ -1,0 +1,151 @@
+"""One small run from the command line: the record, its way through JSON, and the page drawn from it alone."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from renderer.mesh_io import save_ply
+from validation.benchmark import __main__ as command
+from validation.benchmark import ablation, frames, knobs, memory, meshes, page, processes, record, systems
+from validation.benchmark.ours import OURS, OURS_ONE
+
+
+def _frames(*_: Any) -> dict[str, Any]:
+    names = (frames.OURS, frames.LISTS, frames.SCALAR)
+    return {
+        "scene": "checkered", "size": 256, "max_depth": 6, "faces": 9, "labels": {n: frames.LABELS[n] for n in names},
+        "contenders": {n: {"seconds": [0.1], "median": 0.1} for n in names}, "ratios": {n: 1.0 for n in names[1:]},
+        "rays": {frames.OURS: {"all": 12}, frames.LISTS: {"rays": 9, "shadow_rays": 3}},
+        "pictures": {frames.LISTS: {"ssim": 0.9987654, "mean_error": 0.0, "pixel_share": 0.0}},
+    }  # fmt: skip
+
+
+def _processes(*_: Any) -> dict[str, Any]:
+    names = (processes.WARM, processes.FIRST, processes.IMPORT)
+    return {name: {"command": f"python {name}", "seconds": [0.25], "median": 0.25} for name in names}
+
+
+def _ablation(*_: Any) -> dict[str, Any]:
+    pair = {"without": 1, "with": 2}
+    row = {"scene": "stairs", "feature": "refraction", "seconds": pair, "bytes": pair, "rays": pair, "difference": 0.0,
+           "identical": True}  # fmt: skip
+    return {"rows": [row], "passed": True, "runs": 1, "size": 8}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run on three tiny meshes and one by path; what takes long is replaced by records of the same form."""
+    folder = tmp_path_factory.mktemp("benchmark")
+    save_ply(meshes.displaced_spheres(500), folder / "own.ply")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(meshes, "QUICK", (100, 400, 1_000))
+        patch.setattr(command, "QUICK_RAYS", 300)
+        patch.setattr(frames, "measure", _frames)
+        patch.setattr(processes, "measure", _processes)
+        patch.setattr(ablation, "run", _ablation)
+        patch.setattr(knobs, "run", lambda *_: None)
+        row = {"systems": {OURS: {"rest": 100, "peak": 200, "own": 90}}}
+        patch.setattr(memory, "measure", lambda mesh, *_: row | {"mesh": mesh.name, "faces": len(mesh.faces)})
+        patch.setitem(systems._PEERS, "nobody", "pip install nobody")
+        arguments = ["--quick", "--mesh", str(folder / "own.ply"), "--output", str(folder)]
+        assert command.main(arguments) == 0
+    return folder
+
+
+def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
+    found = record.read(folder / "benchmark.json")
+    assert found["command"].startswith("python -m validation.benchmark --quick --mesh") and found["quick"]
+    assert found["missing"]["nobody"] == "pip install nobody"
+    assert found["environment"]["packages"]["numba"] and found["environment"]["threads"] >= 1
+    assert len(found["series"]) == 3 and "own" not in found["series"]
+    assert len(found["queries"]) == 4 * 4 * 2
+    for row in found["queries"]:
+        ours = row["contenders"][OURS]
+        assert row["agree"] and len(ours["seconds"]) == 5 and min(ours["seconds"]) <= ours["median"]
+        assert ours["ns"] == pytest.approx(1e3 / ours["mrays"])
+    # The mesh by path is none of the series, so no fit knows of it: a fit needs all three others.
+    assert {f["contender"] for f in found["fits"]} >= {OURS, OURS_ONE, "embree", "trimesh", "mitsuba_scalar"}
+    for row in found["builds"]:
+        assert {"ours_midpoint", "ours_sah", "embree"} <= set(row["contenders"])
+
+
+def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stored = json.loads((folder / "benchmark.json").read_text())
+    stored["queries"][0]["ratios"]["embree"] = 12.34
+    stored["environment"]["processor"] = "A <made-up> processor"
+    record.write(stored, folder / "benchmark.json")
+    assert command.main(["--page-only", "--output", str(folder)]) == 0
+    text = (folder / "benchmark.html").read_text()
+    assert "12.34" in text and "A &lt;made-up&gt; processor" in text and "pip install nobody" in text
+    assert text.count("<svg") == 8 + 2
+    assert "0.9987654" in text
+    assert "12.34" in capsys.readouterr().out
+    for outside in ("http://", "https://", "<script", "<link"):
+        assert outside not in text.replace("http://www.w3.org", "")
+
+
+def test_the_terminal_shows_ratios_and_what_is_missing(folder: Path) -> None:
+    lines = page.ratios(record.read(folder / "benchmark.json")).splitlines()
+    assert any(line.startswith("spheres_") and "bounce" in line for line in lines)
+    assert any("target import renderer: 0.25 s (below 0.5) met" in line for line in lines)
+    assert "not measured: nobody; pip install nobody" in lines
+
+
+def test_a_disagreement_is_shown(folder: Path) -> None:
+    stored = record.read(folder / "benchmark.json")
+    assert "contenders disagree on hits" not in page.ratios(stored)
+    stored["queries"][3]["agree"] = False
+    assert "contenders disagree on hits" in page.ratios(stored)
+
+
+def test_a_record_goes_through_json_unchanged(folder: Path, tmp_path: Path) -> None:
+    stored = record.read(folder / "benchmark.json")
+    record.write(stored, tmp_path / "again.json")
+    assert record.read(tmp_path / "again.json") == stored
+
+
+def test_other_records_are_refused(folder: Path, tmp_path: Path) -> None:
+    stored = record.read(folder / "benchmark.json")
+    path = tmp_path / "benchmark.json"
+    path.write_text(json.dumps(stored | {"schema": 99}))
+    with pytest.raises(ValueError, match="schema 1, got 99"):
+        record.read(path)
+    path.write_text(json.dumps({k: v for k, v in stored.items() if k != "fits"}))
+    with pytest.raises(ValueError, match="expected the keys"):
+        record.read(path)
+    with pytest.raises(ValueError, match="JSON compliant"):
+        record.write(stored | {"seconds": float("nan")}, path)
+
+
+def test_a_wrong_path_is_one_line_and_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["--mesh", "nowhere.ply", "--output", str(tmp_path)]) == 2
+    assert "--mesh: expected a file, got 'nowhere.ply'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+    assert command.main(["--page-only", "--output", str(tmp_path)]) == 2
+
+
+def test_ctrl_c_stops_and_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "_measure_mesh", interrupted)
+    assert command.main(["--quick", "--output", str(tmp_path)]) == 130
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_memory_grows_with_the_mesh_and_not_with_the_library() -> None:
+    if not Path("/proc/self/clear_refs").exists():
+        pytest.skip("needs Linux's /proc/self/clear_refs")
+    mesh = meshes.displaced_spheres(200_000)
+    chosen = [system for system in systems.available()[0] if system.name in (OURS, "embree")]
+    row = memory.measure(mesh, chosen, lambda _: None)
+    assert row is not None and set(row["systems"]) == {OURS, "embree"}
+    for found in row["systems"].values():
+        # A face and its share of the tree take 30 to 300 bytes; a library would be tens of megabytes, 100 times that.
+        assert 30 < found["rest"] / len(mesh.faces) < 300
+        assert found["peak"] >= found["rest"]
+    ours = row["systems"][OURS]
+    # Resident memory is counted in pages and includes the octree's small objects and what the allocator keeps.
+    assert ours["rest"] == pytest.approx(ours["own"], rel=0.25)

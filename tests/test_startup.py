@@ -1,0 +1,190 @@
+"""Start-up: what is imported when, what is said about compiling, and that compiling ahead leaves nothing to compile."""
+
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import renderer
+from renderer.cli import main
+
+ROOT = Path(__file__).parents[1]
+HEAVY = {
+    "numba",
+    "numpy",
+    "pydantic",
+    "trimesh",
+    "plyfile",
+    "PIL",
+    "tqdm",
+    "scipy.linalg",
+    "matplotlib",
+    "mitsuba",
+    "embreex",
+}
+
+
+def output(script: str) -> str:
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def heavy_after(script: str) -> set[str]:
+    """The heavy packages that a fresh process has imported after ``script``."""
+    tell = "import json, sys\nprint(json.dumps(sorted(sys.modules)))"
+    return HEAVY & set(json.loads(output(f"{script}\n{tell}").splitlines()[-1]))
+
+
+@pytest.mark.parametrize(
+    ("script", "needs"),
+    [
+        ("import renderer", set()),
+        ("from renderer.cli import main", set()),
+        ("from renderer.cli import main\ntry: main(['render', '--help'])\nexcept SystemExit: pass", set()),
+        ("from renderer import load_mesh, Mesh", {"numpy"}),
+        ("from renderer import Octree", {"numpy", "numba"}),
+        ("from renderer import *", {"numpy", "numba", "pydantic"}),
+    ],
+)
+def test_an_import_brings_only_what_it_needs(script, needs):
+    assert heavy_after(script) == needs
+
+
+def test_a_render_of_the_command_line_loads_no_scipy_and_leaves_it_importable():
+    script = """
+import sys
+from renderer.cli import main
+sys.argv = ["octree-render", "render", "scenes/stairs.toml", "-o", "/dev/null/no.png"]
+assert main() == 2  # there is no such folder; by then all is imported
+assert "scipy" not in sys.modules and "numba.np.arraymath" in sys.modules
+import scipy.linalg
+"""
+    output(script)
+
+
+def test_the_public_names_are_there_whatever_was_imported_first():
+    script = "import renderer, renderer.scene\nfrom renderer.render import TILE\nfrom renderer import *"
+    tell = "print(callable(render), *[f'{n}:{getattr(renderer, n).__module__}' for n in renderer.__all__])"
+    is_callable, *names = output(f"{script}\n{tell}").split()
+    assert is_callable == "True" and "render:renderer.render" in names and "Mesh:renderer.mesh" in names
+    assert len(names) == len(renderer.__all__)
+
+
+def test_the_public_names_are_listed_and_others_are_errors():
+    assert set(renderer.__all__) <= set(dir(renderer))
+    assert sorted(renderer._HOMES) == sorted(renderer.__all__)
+    with pytest.raises(AttributeError, match="module 'renderer' has no attribute 'Octre'"):
+        _ = renderer.Octre
+    with pytest.raises(ImportError, match="Octre"):
+        from renderer import Octre  # noqa: F401
+
+
+def test_compiling_ahead_leaves_nothing_to_compile():
+    """A later kernel needs a compiler only for types of arguments that no kernel was compiled for."""
+    script = """
+import sys
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from renderer.warm import compile_all
+def signatures():
+    modules = [m for name, m in sys.modules.items() if name.startswith("renderer.")]
+    kernels = {id(v): v for m in modules for v in vars(m).values() if isinstance(v, Dispatcher)}
+    return {(k.py_func.__name__, str(s)) for k in kernels.values() for s in k.signatures}
+compile_all()
+before = signatures()
+from renderer import BruteForce, Octree, load_scene, render
+for name in ("three_models", "stairs", "glass"):
+    for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
+        render(load_scene(f"scenes/{name}.toml"), resolution=(3, 2), **options)
+vertices = np.random.default_rng(1).random((90, 3))
+for points in (vertices, vertices.astype(np.float32)):
+    for target in (Octree(points, np.arange(90).reshape(-1, 3)), BruteForce(points, np.arange(90).reshape(-1, 3))):
+        constant = np.broadcast_to(points[0], (9, 3))
+        for rays in (points, np.asfortranarray(points), points[::2], points.tolist(), constant):
+            target.closest_hit(rays, rays)
+            target.any_hit(rays, rays, t_min=0.5, t_max=np.full(len(rays), 9.0))
+print(len(before), *sorted(signatures() - before))
+"""
+    count, *new = output(script).splitlines()[-1].split(maxsplit=1)
+    assert int(count) >= 5 and not new
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+@pytest.mark.parametrize("seconds", [0.0, 0.5, 1.3])
+def test_control_c_while_compiling_ends_with_130_and_no_traceback(tmp_path, seconds):
+    picture = tmp_path / "a.png"
+    command = [sys.executable, "-m", "renderer.cli", "render", "scenes/three_models.toml", "-o", str(picture)]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    running = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
+    try:
+        assert "octree-render: compiling " in running.stderr.readline()
+        time.sleep(seconds)
+        running.send_signal(signal.SIGINT)
+        _, err = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 130 and "Traceback" not in err and "ignored" not in err
+    assert err.endswith("octree-render: interrupted, nothing written\n") and not picture.exists()
+
+
+def test_an_interrupt_that_a_destructor_swallows_is_sent_again(capsys, monkeypatch):
+    class Swallows:
+        def __del__(self):
+            raise KeyboardInterrupt
+
+    def command(_options):
+        Swallows()
+        end = time.monotonic() + 60.0
+        while time.monotonic() < end:
+            pass
+        raise AssertionError("the interrupt was lost")
+
+    monkeypatch.setattr("renderer.cli._info", command)
+    assert main(["info", "any.toml"]) == 130
+    assert capsys.readouterr().err == "octree-render: interrupted, nothing written\n"
+
+
+@pytest.mark.parametrize("fault", [ValueError("lost"), None])
+def test_other_faults_of_destructors_go_where_they_went(monkeypatch, fault):
+    class Faulty:
+        def __del__(self):
+            raise fault
+
+    seen = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda lost: seen.append(lost.exc_value))
+    usual = sys.unraisablehook
+    monkeypatch.setattr("renderer.cli._info", lambda _options: Faulty() if fault else None)
+    assert main(["info", "any.toml"]) == 0
+    assert sys.unraisablehook is usual and [str(e) for e in seen] == ([str(fault)] if fault else [])
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatch, quiet):
+    log = logging.getLogger("renderer.jit")
+    monkeypatch.setattr(log, "level", logging.ERROR)
+    before = logging.ERROR, list(log.handlers)
+    monkeypatch.setattr("renderer.cli._render", lambda _options: log.info("compiling %s", "it"))
+    assert main(["render", "any.toml", *(["--quiet"] if quiet else [])]) == 0
+    assert capsys.readouterr() == ("", "" if quiet else "octree-render: compiling it\n")
+    assert (log.level, log.handlers) == before
+
+
+def test_a_notice_stands_on_a_line_of_its_own_beside_a_progress_bar():
+    script = """
+import io, logging, sys
+from tqdm import tqdm
+from renderer.cli import _compile_notices
+sys.stderr = io.StringIO()
+with _compile_notices(silent=False), tqdm(total=3, file=sys.stderr, ncols=40):
+    logging.getLogger("renderer.jit").info("compiling it")
+print("\\roctree-render: compiling it\\n" in sys.stderr.getvalue().replace(" " * 2, ""))
+print(repr(sys.stderr.getvalue()))
+"""
+    assert output(script).splitlines()[0] == "True"

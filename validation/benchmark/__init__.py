@@ -1,0 +1,1 @@
+"""Speed beside other systems, and error against run time: what `make bench` measures."""

@@ -1,0 +1,118 @@
+"""``python -m validation.benchmark``: measure, write ``benchmark.json`` and ``benchmark.html``, print the ratios.
+
+Exit codes: 0 measured, 2 bad arguments or a missing mesh, 130 after Ctrl-C. Nothing is gated: speed on a shared machine
+proves nothing.
+"""
+
+import argparse
+import shlex
+import sys
+import time
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+# Rays of a family, in full and in quick runs.
+RAYS, QUICK_RAYS = 1_000_000, 200_000
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run what the arguments ask for; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        return _run(options, ("python -m validation.benchmark " + shlex.join(given)).strip())
+    except KeyboardInterrupt:
+        print("benchmark: interrupted, nothing written", file=sys.stderr)
+        return 130
+    except (ValueError, OSError, ImportError) as error:
+        print(f"benchmark: {error}", file=sys.stderr)
+        return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m validation.benchmark", description="Measure speed beside others.")
+    parser.add_argument("--quick", action="store_true", help="200,000 rays, at most 100,000 faces, small pictures")
+    parser.add_argument("--huge", action="store_true", help="a mesh of 10 million faces too")
+    parser.add_argument("--mesh", type=Path, nargs="+", default=[], metavar="PATH", help="PLY, OBJ, STL or GLB as well")
+    parser.add_argument("--output", type=Path, default=Path("reports"), metavar="DIR", help="where record and page go")
+    parser.add_argument("--page-only", action="store_true", help="draw the page again from the stored record")
+    return parser
+
+
+def _run(options: argparse.Namespace, command: str) -> int:
+    # Imported here so that --help answers at once.
+    from renderer.image import write_atomically
+    from validation.__main__ import _steps
+    from validation.benchmark import page, record
+
+    options.output.mkdir(parents=True, exist_ok=True)
+    stored, drawn = options.output / "benchmark.json", options.output / "benchmark.html"
+    if not options.page_only:
+        missing = [path for path in options.mesh if not path.is_file()]
+        if missing:
+            raise ValueError(f"--mesh: expected a file, got {str(missing[0])!r}")
+        with _steps() as step:
+            measured = measure(options.quick, options.huge, tuple(options.mesh), command, step)
+        record.write(measured, stored)
+    text = record.read(stored)
+    page_text = page.html(text)
+    write_atomically(drawn, lambda file: file.write(page_text.encode()))
+    print(page.ratios(text))
+    print(f"benchmark: {text['seconds']:.0f} s; see {drawn}")
+    return 0
+
+
+def measure(
+    quick: bool, huge: bool, paths: tuple[Path, ...], command: str, step: Callable[[str], None]
+) -> dict[str, Any]:
+    """The whole record; see ``validation.benchmark.record``."""
+    from validation.benchmark import ablation, frames, knobs, meshes, processes, record, targets
+    from validation.benchmark.queries import fits
+    from validation.benchmark.systems import available
+
+    began, date, load = time.perf_counter(), datetime.now(UTC), record.load()
+    step("contenders")
+    systems, missing = available()
+    names = {system.name for system in systems}
+    series: list[str] = []
+    rows: dict[str, list[Any]] = {"queries": [], "builds": [], "memory": []}
+    for mesh, generated in meshes.chosen(quick, huge, paths):
+        series += [mesh.name] if generated else []
+        _measure_mesh(mesh, systems, QUICK_RAYS if quick else RAYS, rows, step)
+    llvm = "mitsuba_llvm" in names
+    found: dict[str, Any] = {
+        "schema": record.SCHEMA, "command": command, "date": date.isoformat(timespec="seconds"),
+        "commit": record.commit(), "quick": quick, "environment": record.describe(_libllvm(llvm), load),
+        "systems": record.described(systems), "missing": missing, "series": series, **rows,
+        "fits": fits(rows["queries"], series),
+        "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
+        "processes": processes.measure(llvm, names, step),
+        "ablation": ablation.run(quick, step), "knobs": knobs.run(quick, step),
+    }  # fmt: skip
+    return found | {"targets": targets.judged(found), "seconds": time.perf_counter() - began}
+
+
+def _measure_mesh(
+    mesh: Any, systems: Sequence[Any], count: int, rows: dict[str, list[Any]], step: Callable[[str], None]
+) -> None:
+    """Add one mesh's rows. Memory first, while this process is small."""
+    from validation.benchmark import builds, memory, queries
+
+    grown = memory.measure(mesh, systems, step)
+    rows["memory"] += [grown] if grown is not None else []
+    rows["builds"].append(builds.measure(mesh, systems, step))
+    rows["queries"] += queries.measure(mesh, systems, count, step)
+
+
+def _libllvm(used: bool) -> str | None:
+    if not used:
+        return None
+    from validation.benchmark.mitsuba_variant import libllvm_path
+
+    return libllvm_path()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

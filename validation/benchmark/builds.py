@@ -1,0 +1,62 @@
+"""Seconds to build, and to refit where the octree can: the first answered query counts, a warm one is taken off."""
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from renderer.mesh import Mesh
+from renderer.octree import Octree
+from validation.benchmark import ours
+from validation.benchmark.contender import System
+from validation.benchmark.rounds import RUNS, interleaved, ratio
+from validation.benchmark.tradeoff import timed
+
+REFIT = "ours_refit"
+# Above this size a round of all builds takes half a minute, so there are three and not five of them.
+_LARGE, _LARGE_RUNS = 2_000_000, 3
+
+
+def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) -> dict[str, Any]:
+    """One row: builds of ``mesh`` by our split rules and every system that has a build of its own."""
+    step(f"{mesh.name}: builds")
+    peers = [s for s in systems if s.times_build and s.name != ours.OURS and s.takes(len(mesh.faces))]
+    contenders = ours.builds() + peers
+    calls = {system.name: _build_clock(system, mesh) for system in contenders}
+    if hasattr(Octree, "refit"):
+        calls[REFIT] = _refit_clock(mesh)
+    runs = _LARGE_RUNS if len(mesh.faces) > _LARGE else RUNS
+    seconds = interleaved(calls, runs)
+    own = f"{ours.OURS}_midpoint"
+    return {
+        "mesh": mesh.name,
+        "faces": len(mesh.faces),
+        "contenders": {n: {"seconds": s, "median": statistics.median(s)} for n, s in seconds.items()},
+        "ratios": {name: ratio(s, seconds[own]) for name, s in seconds.items() if name != own},
+    }
+
+
+def _build_clock(system: System, mesh: Mesh) -> Callable[[], float]:
+    def seconds() -> float:
+        build = system.load(mesh.vertices, mesh.faces)
+        with system.scope():
+            began = time.perf_counter()
+            peer = build()
+            peer.touch()
+            built = time.perf_counter()
+        # What any warm query costs is no part of the build.
+        return max(built - began - timed(peer.touch)(), 0.0)
+
+    return seconds
+
+
+def _refit_clock(mesh: Mesh) -> Callable[[], float]:
+    """An octree whose vertices move to and fro, by a power of two: float32 holds both places."""
+    octree: Any = Octree.from_mesh(mesh)
+    places = [mesh.vertices * 0.5, mesh.vertices.copy()]
+
+    def seconds() -> float:
+        places.reverse()
+        return timed(octree.refit, places[0])()
+
+    return seconds

@@ -1,0 +1,229 @@
+"""Knobs of a ray query: float32 or float64 storage, which trade error for time, and the tree's, which may not.
+
+The mesh's vertices are no float32 numbers, so that storage matters: the octree keeps them as float64, and as float32
+only where it is given rounded ones. The rays are float32 numbers, so that Embree sees the same ones. Every error is
+against exact arithmetic on the unrounded mesh: it holds what rounding the vertices did as well as the kernel's own.
+One thread throughout, because embreex allows no more.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh import Mesh
+from renderer.octree import Octree
+from renderer.query import Hits
+from renderer.shapes import icosphere
+from validation import exact
+from validation.benchmark.tradeoff import front, median_seconds, timed
+from validation.embree import Embree
+from validation.rays import RayBatch, camera_rays, float32_exact, random_rays
+
+SEED = 20
+SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
+LEAF_SIZES = (1, 2, 4, 8, 16, 32)
+DEPTHS = (1, 2, 4, 8, 16, 32)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """``level`` of the icosphere, ``rays`` timed and ``judged`` in each family, timed ``runs``."""
+
+    level: int
+    rays: int
+    judged: int
+    runs: int
+
+
+class Tree(NamedTuple):
+    """Options of an octree."""
+
+    split: Literal["midpoint", "sah"] = "midpoint"
+    leaf_size: int = 4
+    max_depth: int = 32
+
+    @property
+    def name(self) -> str:
+        """As shown."""
+        return f"{self.split}, leaf {self.leaf_size}, depth {self.max_depth}"
+
+
+class Answer(NamedTuple):
+    """What a contender says: ``t`` (n,) float64, inf on a miss, and ``face`` (n,) int64, -1 on a miss."""
+
+    t: NDArray[np.float64]
+    face: NDArray[np.int64]
+
+
+class Contender(NamedTuple):
+    """One way to answer closest hits, with what it took to build; bytes are None where nothing tells them."""
+
+    query: Callable[[NDArray[np.float64], NDArray[np.float64]], Any]
+    build_seconds: float
+    bytes: int | None
+
+
+def run(effort: Effort, step: Callable[[str], None]) -> dict[str, object]:
+    """Measure; see ``validation.benchmark.knobs`` for the record."""
+    mesh = turned_mesh(effort.level)
+    batches = (
+        camera_rays(mesh.vertices, effort.rays),
+        random_rays(mesh.triangles, effort.rays, np.random.default_rng(SEED)),
+    )
+    step("knobs: storage")
+    storage = _storage(mesh, batches, effort)
+    step("knobs: the tree's")
+    return {
+        "mesh": {"name": mesh.name, "faces": len(mesh.faces), "float32": mesh.is_float32},
+        "rays": effort.rays,
+        "judged": effort.judged,
+        "runs": effort.runs,
+        "threads": 1,
+        "seed": SEED,
+        "storage": storage,
+        "tree": tree_knobs(mesh, batches, effort.runs),
+    }
+
+
+def turned_mesh(level: int) -> Mesh:
+    """A wavy sphere scaled by pi and turned by a radian about two axes: hardly a vertex that float32 holds."""
+    ball = icosphere(level)
+    x, y, z = ball.vertices.T
+    wavy = ball.vertices * (1.0 + 0.08 * np.sin(9.0 * x) * np.sin(7.0 * y) * np.sin(8.0 * z))[:, None]
+    c, s = np.cos(1.0), np.sin(1.0)
+    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    return Mesh(np.pi * wavy @ about_z @ about_x, ball.faces, name=f"wavy icosphere {level}, turned")
+
+
+def differing_rays(a: Hits, b: Hits) -> int:
+    """Rays whose t, face, u or v differ in any bit."""
+    changed = a.face != b.face
+    for x, y in ((a.t, b.t), (a.u, b.u), (a.v, b.v)):
+        changed |= x.view(np.int64) != y.view(np.int64)
+    return int(changed.sum())
+
+
+def errors(answer: Answer, truth: list[exact.ExactHit | None]) -> dict[str, object]:
+    """Verdicts that are wrong, and the relative error of t where both hit, whatever the face.
+
+    ``wrong_face`` counts faces that do not attain the exact t; the three percentiles are None where nothing is hit.
+    """
+    hit = np.array([h is not None for h in truth])
+    found = answer.face >= 0
+    pairs = [(ray, h) for ray in np.flatnonzero(hit & found).tolist() if (h := truth[ray]) is not None]
+    relative = [float(abs(Fraction(float(answer.t[ray])) - h.t) / h.t) for ray, h in pairs]
+    p50, p99, largest = np.percentile(relative, (50, 99, 100)).tolist() if relative else (None, None, None)
+    return {
+        "missed": int((hit & ~found).sum()),
+        "false_hits": int((~hit & found).sum()),
+        "wrong_face": sum(int(answer.face[ray]) not in h.faces_at_t for ray, h in pairs),
+        "both_hit": len(pairs),
+        "p50": p50,
+        "p99": p99,
+        "max": largest,
+    }
+
+
+def tree_knobs(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dict[str, object]:
+    """Seconds, bytes and nanoseconds a ray of every tree, and how many rays it answers in other bits than the
+    default tree: none, or the option is no mere trade of time.
+    """
+    sweeps = {f"leaf_size, {split}": [Tree(split, size) for size in LEAF_SIZES] for split in SPLITS}
+    sweeps["max_depth"] = [Tree(max_depth=depth) for depth in DEPTHS]
+    trees = dict.fromkeys([Tree()] + [tree for row in sweeps.values() for tree in row])
+    builders = {tree.name: partial(_built, mesh, tree) for tree in trees}
+    build_seconds = median_seconds({name: timed(build) for name, build in builders.items()}, runs)
+    octrees = {name: build() for name, build in builders.items()}
+    costs = {b.name: _nanoseconds({k: o.closest_hit for k, o in octrees.items()}, b, runs) for b in batches}
+    differing = _differing(octrees, batches)
+    points = [
+        {"name": tree.name, **tree._asdict()}
+        | {"build_seconds": build_seconds[tree.name], "bytes": octrees[tree.name].stats.bytes}
+        | {"ns_per_ray": {family: cost[tree.name] for family, cost in costs.items()}}
+        | {"differing_rays": differing[tree.name]}
+        for tree in trees
+    ]
+    names = list(octrees)
+    return {
+        "default": Tree().name,
+        "points": points,
+        "sweeps": {name: [tree.name for tree in row] for name, row in sweeps.items()},
+        "differing_rays": sum(differing.values()),
+        "front_build_seconds_ns_per_ray": {
+            family: [names[i] for i in front([(build_seconds[name], cost[name]) for name in names])]
+            for family, cost in costs.items()
+        },
+    }
+
+
+def _differing(octrees: dict[str, Octree], batches: tuple[RayBatch, ...]) -> dict[str, int]:
+    """Rays of all families that each tree answers in other bits than the default tree."""
+    counts = dict.fromkeys(octrees, 0)
+    for batch in batches:
+        expected = octrees[Tree().name].closest_hit(batch.origins, batch.directions)
+        for name, octree in octrees.items():
+            counts[name] += differing_rays(octree.closest_hit(batch.origins, batch.directions), expected)
+    return counts
+
+
+def _storage(mesh: Mesh, batches: tuple[RayBatch, ...], effort: Effort) -> list[dict[str, object]]:
+    """One record a family of rays."""
+    contenders = _contenders(mesh, effort.runs)
+    records: list[dict[str, object]] = []
+    for batch in batches:
+        cost = _nanoseconds({name: c.query for name, c in contenders.items()}, batch, effort.runs)
+        chosen = np.sort(np.random.default_rng(SEED).choice(len(batch), min(effort.judged, len(batch)), replace=False))
+        sample = batch.select(chosen)
+        truth = exact.closest_hits(mesh.vertices, mesh.faces, sample.origins, sample.directions)
+        points: list[dict[str, Any]] = []
+        for name, contender in contenders.items():
+            judged = errors(_answer(contender.query(sample.origins, sample.directions)), truth)
+            row = {"name": name, "ns_per_ray": cost[name], "build_seconds": contender.build_seconds}
+            points.append(row | {"bytes": contender.bytes, "errors": judged})
+        fronts = {}
+        for quantity in ("p50", "p99", "max"):
+            plane = [(p["ns_per_ray"], p["errors"][quantity]) for p in points if p["errors"][quantity] is not None]
+            # All are None or none is: the truth's hits are the same, and no contender misses all of them.
+            fronts[quantity] = [points[i]["name"] for i in front(plane)] if len(plane) == len(points) else []
+        records.append({"rays": batch.name, "judged": len(sample), "points": points, "fronts": fronts})
+    return records
+
+
+def _contenders(mesh: Mesh, runs: int) -> dict[str, Contender]:
+    rounded = Mesh(float32_exact(mesh.vertices), mesh.faces)
+    builders: dict[str, Callable[[], Any]] = {
+        "float64": partial(_built, mesh, Tree()),
+        "float32": partial(_built, rounded, Tree()),
+        "embree_default": partial(Embree, mesh.vertices, mesh.faces, robust=False),
+        "embree_robust": partial(Embree, mesh.vertices, mesh.faces, robust=True),
+    }
+    seconds = median_seconds({name: timed(_ready, build) for name, build in builders.items()}, runs)
+    built = {name: build() for name, build in builders.items()}
+    return {
+        name: Contender(b.closest_hit, seconds[name], b.stats.bytes if isinstance(b, Octree) else None)
+        for name, b in built.items()
+    }
+
+
+def _built(mesh: Mesh, tree: Tree) -> Octree:
+    return Octree.from_mesh(mesh, **tree._asdict(), threads=1)
+
+
+def _ready(build: Callable[[], Any]) -> None:
+    """Build and shoot one ray: Embree builds at its first."""
+    build().closest_hit(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
+
+
+def _nanoseconds(queries: dict[str, Any], batch: RayBatch, runs: int) -> dict[str, float]:
+    calls = {name: timed(query, batch.origins, batch.directions) for name, query in queries.items()}
+    return {name: 1e9 * seconds / len(batch) for name, seconds in median_seconds(calls, runs).items()}
+
+
+def _answer(found: Hits | tuple[NDArray[np.float64], NDArray[np.int64]]) -> Answer:
+    return Answer(found.t, found.face) if isinstance(found, Hits) else Answer(*found)

@@ -1,0 +1,84 @@
+"""Memory of a built system, measured in a process of its own: ``python -m validation.benchmark.memory NAME FOLDER``.
+
+The process reads the mesh (``vertices.npy``, ``faces.npy``), imports the system, builds a small mesh once so that
+libraries and compiled kernels are there, and brings the mesh into the system's own arrays. From then on everything by
+which its resident memory grows is the system's: at rest once it is built, and at its highest while building. Linux
+only: VmRSS and VmHWM of /proc/self/status, the latter reset through /proc/self/clear_refs.
+"""
+
+import ctypes
+import gc
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from renderer.mesh import Mesh
+from validation.benchmark import ours
+from validation.benchmark.contender import System
+from validation.benchmark.meshes import displaced_spheres
+from validation.benchmark.systems import available
+
+_STATUS = Path("/proc/self/status")
+
+
+def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) -> dict[str, Any] | None:
+    """One row: bytes at rest and at peak of every system that builds; None where the kernel does not tell."""
+    if not _STATUS.exists():
+        return None
+    found: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        np.save(f"{folder}/vertices.npy", mesh.vertices)
+        np.save(f"{folder}/faces.npy", mesh.faces)
+        for system in systems:
+            if system.times_build and system.takes(len(mesh.faces)):
+                step(f"{mesh.name}: memory of {system.label}")
+                command = [sys.executable, "-m", "validation.benchmark.memory", system.name, folder]
+                answer = subprocess.run(command, capture_output=True, text=True, check=True)
+                found[system.name] = json.loads(answer.stdout.splitlines()[-1])
+    return {"mesh": mesh.name, "faces": len(mesh.faces), "systems": found}
+
+
+def grown(system: System, folder: Path) -> dict[str, int | None]:
+    """Bytes ``rest`` and ``peak`` by which this process grows, and ``own``: what our octree says of itself."""
+    vertices, faces = np.load(folder / "vertices.npy"), np.load(folder / "faces.npy")
+    # In float32 like the meshes of the series: kernels are compiled for either storage.
+    small = displaced_spheres(1_000)
+    system.loaded(small.vertices, small.faces)
+    build = system.load(vertices, faces)
+    with system.scope():
+        _trim()
+        Path("/proc/self/clear_refs").write_text("5")
+        before = _bytes("VmRSS")
+        peer = build()
+        peer.touch()
+    peak = _bytes("VmHWM") - before
+    _trim()
+    rest = _bytes("VmRSS") - before
+    return {"rest": rest, "peak": peak, "own": peer.octree.stats.bytes if isinstance(peer, ours.Ours) else None}
+
+
+def _trim() -> None:
+    """Give freed memory back to the system, so that what is left is in use."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
+
+def _bytes(field: str) -> int:
+    found = re.search(rf"^{field}:\s+(\d+) kB", _STATUS.read_text(), re.MULTILINE)
+    if found is None:
+        raise OSError(f"{_STATUS}: expected a line {field}, got none")
+    return int(found.group(1)) * 1024
+
+
+if __name__ == "__main__":
+    _name, _folder = sys.argv[1:]
+    print(json.dumps(grown(next(s for s in available()[0] if s.name == _name), Path(_folder))))

@@ -1,0 +1,67 @@
+"""Generated meshes of one shape and any size, so that cost against N compares nothing but N."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from renderer.mesh import Mesh
+from renderer.mesh_io import load_mesh
+from renderer.shapes import lattice_faces
+from validation.benchmark.contender import Floats
+from validation.rays import float32_exact
+
+QUICK = (1_000, 10_000, 100_000)
+FULL = (*QUICK, 1_000_000, 5_000_000)
+HUGE = (*FULL, 10_000_000)
+_SEED = 7
+
+
+def displaced_spheres(faces: int) -> Mesh:
+    """Eight spheres with seeded hills, at the corners of a cube and nearly touching: about ``faces`` faces, 96 n^2.
+
+    Eight, because a lone sphere hides no light from itself: here a third of the shadow and bounce rays hit something.
+    The hills are the same at every size. Vertices are exact in float32. The six n x n lattices of a sphere share no
+    vertices along their borders, where rounding may part them by an ulp.
+    """
+    n = max(1, round((faces / 96) ** 0.5))
+    sphere = _cube_sphere(n)
+    corners = 1.05 * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    points = [c + sphere * (1.0 + 0.035 * _hills(sphere + c))[:, None] for c in corners]
+    side = lattice_faces(n + 1, n + 1)
+    all_faces = np.concatenate([side + np.int32(i * (n + 1) ** 2) for i in range(6 * len(corners))])
+    return Mesh(float32_exact(np.concatenate(points)), all_faces, name=f"spheres_{_short(faces)}")
+
+
+def _cube_sphere(n: int) -> Floats:
+    """Points of the unit sphere: (n + 1) x (n + 1) of each side of a cube, row by row, outside counter-clockwise."""
+    # Equal angles rather than equal lengths: cells at the cube's corners are then nearly as large as in the middle.
+    along = np.tan(np.linspace(-np.pi / 4, np.pi / 4, n + 1))
+    x, y = (a.ravel() for a in np.meshgrid(along, along))
+    z = np.ones_like(x)
+    sides = [np.stack([np.roll((s * x, y, s * z), turn, axis=0) for turn in range(3)]) for s in (1.0, -1.0)]
+    points: Floats = np.concatenate(sides).transpose(0, 2, 1).reshape(-1, 3)
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def _hills(points: Floats) -> Floats:
+    rng = np.random.default_rng(_SEED)
+    height = np.zeros(len(points))
+    for _ in range(20):
+        wave = rng.normal(size=3)
+        wave *= rng.uniform(2.5, 18.0) / np.linalg.norm(wave)
+        height += np.sin(points @ wave + rng.uniform(0.0, 2.0 * np.pi)) / (wave @ wave) ** 0.4
+    return height
+
+
+def chosen(quick: bool, huge: bool, paths: tuple[Path, ...]) -> Iterator[tuple[Mesh, bool]]:
+    """The meshes of a run, one at a time, and whether each belongs to the generated series."""
+    for faces in QUICK if quick else HUGE if huge else FULL:
+        yield displaced_spheres(faces), True
+    for path in paths:
+        mesh = load_mesh(path)
+        yield Mesh(float32_exact(mesh.vertices), mesh.faces, name=path.stem), False
+
+
+def _short(faces: int) -> str:
+    return f"{faces // 1_000_000}m" if faces >= 1_000_000 else f"{faces // 1_000}k"

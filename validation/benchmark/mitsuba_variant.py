@@ -1,0 +1,37 @@
+"""Mitsuba's variants side by side in one process: which ones there are, and code that runs under one of them."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+
+import mitsuba as mi
+
+import validation.mitsuba_scene  # noqa: F401  # selects scalar_rgb, which the rest of the suite expects
+from validation.benchmark import libllvm
+
+SCALAR, LLVM = "scalar_rgb", "llvm_ad_rgb"
+
+
+@cache
+def libllvm_path() -> str | None:
+    """The libLLVM that ``llvm_ad_rgb`` runs on from now on, or None; found once."""
+    if LLVM not in mi.variants():
+        return None
+    path = libllvm.usable()
+    if path is not None:
+        os.environ[libllvm.VARIABLE] = path
+    return path
+
+
+@contextmanager
+def using(variant: str) -> Iterator[None]:
+    """Run under ``variant``, then under the one before again. Switching takes 0.1 s: keep it off every clock."""
+    before = mi.variant()
+    if variant != before:
+        mi.set_variant(variant)
+    try:
+        yield
+    finally:
+        if variant != before:
+            mi.set_variant(before)

@@ -1,0 +1,63 @@
+"""Our octree as a contender: float64, with all threads and with one, and once for each way to build it."""
+
+import copy
+from typing import Any
+
+import numpy as np
+
+from renderer.build import SPLITS
+from renderer.mesh import Mesh
+from renderer.octree import Octree
+from renderer.parallel import available_threads
+from validation.benchmark.contender import Faces, Family, Floats, Query, System
+
+OURS, OURS_ONE = "ours", "ours_one_thread"
+
+
+class Ours:
+    """An octree; ``threads`` None takes all."""
+
+    def __init__(self, octree: Octree) -> None:
+        self.octree = octree
+        self._origin = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
+
+    def closest(self, rays: Family) -> Query:
+        """Through ``Octree.closest_hit``, its checks of the rays included: nobody is spared them."""
+        return Query(lambda: self.octree.closest_hit(rays.origins, rays.directions, t_max=rays.t_max), lambda h: h.t)
+
+    def any(self, rays: Family) -> Query:
+        """Through ``Octree.any_hit``."""
+        return Query(lambda: self.octree.any_hit(rays.origins, rays.directions, t_max=rays.t_max), lambda hit: hit)
+
+    def touch(self) -> None:
+        """One ray."""
+        self.octree.closest_hit(*self._origin)
+
+    def one_thread(self) -> "Ours":
+        """The same octree, not a second one, traced by one thread."""
+        single = copy.copy(self.octree)
+        single.threads = 1
+        return Ours(single)
+
+
+def systems() -> list[System]:
+    """All threads, and one thread on the same octree."""
+    return [
+        System(OURS, "ours", available_threads(), "float64", lambda v, f: _builder(v, f, {})),
+        System(OURS_ONE, "ours, 1 thread", 1, "float64", lambda v, f: _builder(v, f, {"threads": 1}),
+               times_build=False),
+    ]  # fmt: skip
+
+
+def builds() -> list[System]:
+    """One contender for each split rule, for the clock of the build alone."""
+    return [
+        System(f"{OURS}_{split}", f"ours, {split}", available_threads(), "float64",
+               lambda v, f, split=split: _builder(v, f, {"split": split}))  # type: ignore[misc]
+        for split in SPLITS
+    ]  # fmt: skip
+
+
+def _builder(vertices: Floats, faces: Faces, options: dict[str, Any]) -> Any:
+    mesh = Mesh(vertices, faces)
+    return lambda: Ours(Octree.from_mesh(mesh, **options))

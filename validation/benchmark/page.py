@@ -1,0 +1,70 @@
+"""The record to one self-contained page, and to the table of ratios on the terminal. Computes nothing new."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from validation.benchmark import figures, pareto
+from validation.benchmark.ours import OURS
+from validation.report import number
+
+# Half a processor taken by others moves a two-thread contender by a quarter, more than most ratios here differ from 1.
+BUSY = 0.5
+_TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
+
+
+def html(record: Mapping[str, Any]) -> str:
+    """The page: tables and figures in light and dark."""
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.filters["number"] = number
+    plots = {
+        "query_figures": figures.query_figures(record),
+        "build_figures": figures.build_figures(record),
+        "knob_figures": pareto.figures(record["knobs"]) if record["knobs"] else [],
+    }
+    return environment.get_template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **plots)
+
+
+def ratios(record: Mapping[str, Any]) -> str:
+    """What the terminal shows: every ratio of ours to a peer, larger is faster, then the targets."""
+    return "\n".join(_lines(record))
+
+
+def _lines(record: Mapping[str, Any]) -> Iterator[str]:
+    peers = [name for name in record["systems"] if name != OURS]
+    load = record["environment"]["load"]
+    if load is not None and load > BUSY:
+        yield f"the machine was busy with other things (load {load:.2f}): no fair run"
+    yield "times as fast as the peer, ours with all threads (median of rounds)"
+    yield _row("mesh", "rays", "query", *peers)
+    for r in record["queries"]:
+        flag = "" if r["agree"] else "  contenders disagree on hits"
+        yield _row(r["mesh"], r["family"], r["query"], *(_times(r["ratios"].get(p)) for p in peers)) + flag
+    for r in record["builds"]:
+        found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in r["ratios"].items())
+        yield f"build of {r['mesh']}, peer's seconds over ours: {found}"
+    frame = record["frames"]
+    found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in frame["ratios"].items())
+    yield f"frame {frame['size']} x {frame['size']}, peer's seconds over ours: {found}"
+    for fit in record["fits"]:
+        if fit["contender"] == OURS:
+            yield (f"{fit['family']} {fit['query']}: {fit['a']:.2f} log2 N {fit['b']:+.1f} ns a ray, "
+                   f"residual {fit['residual']:.2f} ns")  # fmt: skip
+    for t in record["targets"]:
+        verdict = {None: "not measured", True: "met", False: "NOT met"}[t["met"]]
+        measured = "-" if t["measured"] is None else f"{t['measured']:.2f}"
+        yield f"target {t['subject']}: {measured} {t['unit']} ({t['better']} {t['at_least']:g}) {verdict}; {t['where']}"
+    for name, how in record["missing"].items():
+        yield f"not measured: {name}; {how}"
+
+
+def _row(*cells: str) -> str:
+    return "".join(f"{cell:<16}" for cell in cells).rstrip()
+
+
+def _times(ratio: float | None) -> str:
+    return "-" if ratio is None else f"{ratio:.2f}"

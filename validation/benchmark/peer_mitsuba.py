@@ -1,0 +1,126 @@
+"""Mitsuba 3 as two contenders: ``scalar_rgb``, ray by ray from Python, and ``llvm_ad_rgb``, whole batches.
+
+Both find hits with Embree in float32. Scenes and rays keep the variant that they were made under, so that none is
+switched while a clock runs.
+"""
+
+from functools import partial
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from renderer.parallel import available_threads
+from validation.benchmark.contender import Faces, Family, Floats, Query, System
+from validation.benchmark.mitsuba_variant import LLVM, SCALAR, libllvm_path, using
+
+
+class ScalarPeer:
+    """One ``Ray3f`` a ray, made beforehand; Python's loop over them is what driving this variant costs."""
+
+    def __init__(self, scene: Any, ray: Any) -> None:
+        self._scene, self._ray = scene, ray[0]
+
+    def closest(self, rays: Family) -> Query:
+        """``ray_intersect_preliminary``: t, u, v and face."""
+        native, intersect = _scalar_rays(rays), self._scene.ray_intersect_preliminary
+        return Query(lambda: [intersect(ray) for ray in native], lambda found: np.array([f.t for f in found], float))
+
+    def any(self, rays: Family) -> Query:
+        """``ray_test``."""
+        native, test = _scalar_rays(rays), self._scene.ray_test
+        return Query(lambda: [test(ray) for ray in native], lambda found: np.array(found, bool))
+
+    def touch(self) -> None:
+        """One ray."""
+        self._scene.ray_test(self._ray)
+
+
+class LLVMPeer:
+    """Rays as Dr.Jit arrays; every answer is evaluated and waited for while the clock runs."""
+
+    def __init__(self, scene: Any, ray: Any) -> None:
+        self._scene, self._ray = scene, ray
+
+    def closest(self, rays: Family) -> Query:
+        """``ray_intersect_preliminary``: t, u, v and face."""
+        native = _llvm_rays(rays)
+
+        def trace() -> Any:
+            found = self._scene.ray_intersect_preliminary(native)
+            dr.eval(found)
+            dr.sync_thread()
+            return found
+
+        return Query(trace, lambda found: found.t.numpy().astype(np.float64))
+
+    def any(self, rays: Family) -> Query:
+        """``ray_test``."""
+        native = _llvm_rays(rays)
+
+        def trace() -> Any:
+            found = self._scene.ray_test(native)
+            dr.eval(found)
+            dr.sync_thread()
+            return found
+
+        return Query(trace, lambda found: found.numpy())
+
+    def touch(self) -> None:
+        """One ray."""
+        dr.eval(self._scene.ray_test(self._ray))
+        dr.sync_thread()
+
+
+def systems() -> list[System]:
+    """Scalar always; llvm where a libLLVM was found that it works with."""
+    scalar = System("mitsuba_scalar", "Mitsuba scalar_rgb", 1, "float32", lambda v, f: _loader(v, f, SCALAR),
+                    most_rays=20_000, times_build=False, scope=partial(using, SCALAR))  # fmt: skip
+    llvm = System("mitsuba_llvm", "Mitsuba llvm_ad_rgb", available_threads(), "float32",
+                  lambda v, f: _loader(v, f, LLVM), scope=partial(using, LLVM))  # fmt: skip
+    return [scalar] if libllvm_path() is None else [scalar, llvm]
+
+
+def _loader(vertices: Floats, faces: Faces, variant: str) -> Any:
+    """Arrays of the variant now; the mesh object, its scene and its BVH when called."""
+    points, corners = vertices.astype(np.float32).ravel(), faces.astype(np.uint32).ravel()
+    one = Family("touch", np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
+    if variant == SCALAR:
+        return partial(_scalar, points, corners, _scalar_rays(one))
+    with using(LLVM):
+        return partial(_llvm, mi.Float(points), mi.UInt32(corners), _llvm_rays(one))
+
+
+def _scalar(points: Any, corners: Any, ray: Any) -> ScalarPeer:
+    return ScalarPeer(_scene(points, corners), ray)
+
+
+def _llvm(points: Any, corners: Any, ray: Any) -> LLVMPeer:
+    return LLVMPeer(_scene(points, corners), ray)
+
+
+def _scene(points: Any, corners: Any) -> Any:
+    mesh = mi.Mesh("mesh", len(points) // 3, len(corners) // 3)
+    arrays = mi.traverse(mesh)
+    arrays["vertex_positions"] = points
+    arrays["faces"] = corners
+    arrays.update()
+    return mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, "mesh": mesh})
+
+
+def _scalar_rays(rays: Family) -> list[Any]:
+    with using(SCALAR):
+        far = rays.t_max if np.isfinite(rays.t_max) else float(np.finfo(np.float32).max)
+        pairs = zip(rays.origins.tolist(), rays.directions.tolist(), strict=True)
+        return [mi.Ray3f(mi.Point3f(*o), mi.Vector3f(*d), far, 0.0, []) for o, d in pairs]
+
+
+def _llvm_rays(rays: Family) -> Any:
+    with using(LLVM):
+        o, d = (np.ascontiguousarray(a.T, np.float32) for a in (rays.origins, rays.directions))
+        native = mi.Ray3f(mi.Point3f(o), mi.Vector3f(d))
+        if np.isfinite(rays.t_max):
+            native.maxt = mi.Float(rays.t_max)
+        dr.eval(native)
+        return native

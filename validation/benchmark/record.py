@@ -1,0 +1,104 @@
+"""The record of a run, ``benchmark.json``: what is in it, how it is written and read. The page is drawn from it alone.
+
+schema            SCHEMA; another number is refused
+command, date, commit, quick, seconds      how the record was made; commit is null outside a git checkout
+environment       processor, processors, threads, python, platform, packages (version or null), libllvm (or null),
+                  load: processes that wanted to run in the minute before, or null; above 0 the others' share counts
+systems           by name: label, threads, precision, most_rays (null: no limit)
+missing           by name: how to get a peer that is not here
+series            names of the generated meshes, which differ in nothing but size
+queries[]         one a mesh, family and kind of query
+  mesh, faces, family, query     family: camera, shadow, random, bounce; query: closest, any
+  rays, hit_share, agree         agree: all contenders hit the same rays, but for float32's silhouettes, and some
+  contenders        by name: rays, hits, differing (hit flags unlike ours), seconds (all runs), median, mrays, ns
+  ratios            by peer: the median over the rounds of its time a ray over ours
+fits[]            family, query, contender, and a, b, residual of ns = a log2 N + b
+builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint
+memory[]          mesh, faces, systems: rest, peak (bytes by which a process grows), own (our own count or null)
+frames            scene, size, max_depth, faces, labels, contenders, ratios, rays (by contender), pictures: ssim,
+                  mean_error, pixel_share against ours
+processes         by name: command, seconds, median
+ablation, knobs   see ``ablation.run`` and ``knobs.run``; null where not run
+targets[]         see ``targets.Target``; met and aimed are null where nothing was measured
+"""
+
+import json
+import os
+import subprocess
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from renderer.image import write_atomically
+from validation import environment
+from validation.benchmark.contender import System
+
+SCHEMA = 1
+KEYS = (
+    "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series", "queries",
+    "fits", "builds", "memory", "frames", "processes", "ablation", "knobs", "targets",
+)  # fmt: skip
+_MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
+
+
+def describe(libllvm: str | None, load: float | None) -> dict[str, Any]:
+    """Where and with what: ``validation.environment`` and what only the benchmark uses."""
+    found: dict[str, Any] = environment.describe()
+    packages = {name: _version(name) for name in _MORE_PACKAGES}
+    return found | {"packages": found["packages"] | packages, "libllvm": libllvm, "load": load}
+
+
+def described(systems: Sequence[System]) -> dict[str, Any]:
+    """The contenders by name."""
+    return {
+        s.name: {"label": s.label, "threads": s.threads, "precision": s.precision, "most_rays": s.most_rays}
+        for s in systems
+    }
+
+
+def load() -> float | None:
+    """How many processes wanted a processor, on average over the last minute; None where the system does not tell."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+
+
+def commit() -> str | None:
+    """The checkout's commit, with a + where files differ from it; None without git or a checkout."""
+    folder = Path(__file__).parent
+    try:
+        head, changed = (
+            subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
+            for arguments in (["rev-parse", "HEAD"], ["status", "--porcelain"])
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return head + ("+" if changed else "")
+
+
+def write(record: Mapping[str, Any], path: Path) -> None:
+    """Whole or not at all; ``ValueError`` for NaN and infinities, which are no JSON."""
+    _expect_keys(record, "record")
+    text = json.dumps(record, indent=1, allow_nan=False)
+    write_atomically(path, lambda file: file.write(text.encode()))
+
+
+def read(path: Path) -> dict[str, Any]:
+    """What ``write`` wrote. Raises ``ValueError`` for another schema or missing parts."""
+    record = json.loads(path.read_text(encoding="utf-8"))
+    got = record.get("schema") if isinstance(record, dict) else type(record).__name__
+    if got != SCHEMA:
+        raise ValueError(f"{path}: expected a benchmark of schema {SCHEMA}, got {got!r}")
+    _expect_keys(record, str(path))
+    return dict(record)
+
+
+def _expect_keys(record: Mapping[str, Any], where: str) -> None:
+    if set(record) != set(KEYS):
+        raise ValueError(f"{where}: expected the keys {sorted(KEYS)}, got {sorted(record)}")
+
+
+def _version(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None

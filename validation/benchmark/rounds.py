@@ -1,0 +1,20 @@
+"""Contenders in turn: whatever slows the machine for a while then slows all of them alike."""
+
+import statistics
+from collections.abc import Callable, Mapping, Sequence
+
+RUNS = 5
+
+
+def interleaved(calls: Mapping[str, Callable[[], float]], runs: int = RUNS, unseen: int = 1) -> dict[str, list[float]]:
+    """Seconds of every call in each of ``runs`` rounds, after ``unseen`` rounds for caches and compilation.
+
+    Each call returns its own seconds, see ``validation.benchmark.tradeoff.timed``.
+    """
+    rounds = [{name: call() for name, call in calls.items()} for _ in range(unseen + runs)][unseen:]
+    return {name: [seconds[name] for seconds in rounds] for name in calls}
+
+
+def ratio(theirs: Sequence[float], ours: Sequence[float]) -> float:
+    """How many times faster ours is: the median of the rounds' ratios, not the ratio of the medians."""
+    return statistics.median(t / o for t, o in zip(theirs, ours, strict=True))

@@ -1,0 +1,26 @@
+"""The contenders that are installed here, and how to get those that are not."""
+
+from importlib import import_module
+
+from validation.benchmark import libllvm, ours
+from validation.benchmark.contender import System
+
+_PEERS = {
+    "embree": "pip install embreex",
+    "open3d": "pip install open3d",
+    "trimesh": "pip install trimesh rtree",
+    "mitsuba": "pip install mitsuba",
+}
+
+
+def available() -> tuple[list[System], dict[str, str]]:
+    """Ours and every peer that can be imported; and by name how to get the others."""
+    found, missing = ours.systems(), {}
+    for name, how in _PEERS.items():
+        try:
+            found += import_module(f"validation.benchmark.peer_{name}").systems()
+        except ImportError:
+            missing[name] = how
+    if not any(system.name == "mitsuba_llvm" for system in found):
+        missing["mitsuba_llvm"] = libllvm.HOW
+    return found, missing
