@@ -21,8 +21,8 @@ from renderer.subtree import Workspace, build_subtree, cut_once, new_room, new_w
 
 SPLITS = {"midpoint": MIDPOINT, "sah": SAH}
 
-# Parts of at most so many faces are subtrees: a millisecond of work, in memory that stays in a core's cache.
-_SUBTREE = 4096
+# Parts of at most so many faces are subtrees: some milliseconds of work, in memory that stays in a core's cache.
+_SUBTREE = 8192
 # Faces whose boxes are one chunk: some tenths of a millisecond.
 _BOXES = 1 << 14
 # The most parts of one cut: itself, two halves, four quarters and eight octants.

@@ -103,7 +103,7 @@ def _highest_origin(floats, axis):
 
 
 @inlined
-def _make_beam(rays):
+def make_beam(rays):
     """The beam around sixteen rays; the first one tells the axis."""
     floats = rays.floats
     w = get(rays.integers, BLOCK_ROW + 2 * WIDTH) >> 2
@@ -224,7 +224,7 @@ def trace_packet(tree, rays, stack, any_hit):
     With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns whether the packet came to its end (if
     not, it gave up) and the bits of the rays in doubt. ``stack`` is scratch as ``traverse.stack_size`` says.
     """
-    beam, floats, nodes = _make_beam(rays), rays.floats, tree.nodes
+    beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes
     limit, doubtful, top, node, left = _most(floats, LIMIT), np.int64(0), 0, np.int64(0), BUDGET
     while True:
         base = node * NODE_WORDS

@@ -118,7 +118,7 @@ def ray_at(rays, i):
 
 
 @kernel
-def _are_coherent(rays, begin):
+def are_coherent(rays, begin):
     """Whether the sixteen rays from ``begin`` on share their dominant axis, its sign and nearly their slopes."""
     d = at(rays.directions, 3 * begin)
     ax, ay, az = abs(get(d, 0)), abs(get(d, 1)), abs(get(d, 2))
@@ -268,7 +268,7 @@ def trace(tree, depth, rays, found, begin, end, scratch, any_hit):
     for first in range(begin, end, WIDTH):
         if pause > 0:
             pause -= 1
-        elif first + WIDTH <= end and _are_coherent(rays, first):
+        elif first + WIDTH <= end and are_coherent(rays, first):
             if _trace_sixteen(tree, rays, found, first, scratch, any_hit):
                 patience = _PATIENCE
                 continue

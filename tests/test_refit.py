@@ -196,6 +196,19 @@ def test_a_query_meanwhile_sees_one_mesh_or_the_other():
     assert seen == {0, 1}
 
 
+def test_mesh_and_arrays_change_at_once():
+    class Watched(Octree):
+        def __setattr__(self, name, value):
+            super().__setattr__(name, value)
+            if "seen" in self.__dict__:
+                self.seen.append((self.mesh, self.target))
+
+    octree = Watched([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    octree.__dict__["seen"] = []
+    octree.refit(octree.mesh.vertices * 2.0)
+    assert octree.seen == [(octree.mesh, octree.target)]
+
+
 @pytest.mark.parametrize("forgotten", ["_fit_leaves", "_fit_nodes"])
 def test_boxes_that_were_forgotten_are_noticed(monkeypatch, forgotten):
     vertices, faces = make_mesh("soup", 1, 300)

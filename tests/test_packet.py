@@ -1,0 +1,150 @@
+"""Rays that travel together find what each finds alone: packets of coherent rays, streams of others."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at
+from numba import njit
+
+from renderer.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
+from renderer.layout import NODE_WORDS
+from renderer.octree import BruteForce, Octree
+from renderer.packet import enter_beam, make_beam
+from renderer.prepared import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare
+from renderer.shapes import icosphere
+from renderer.simd import keep, pointer, splat8
+from renderer.traverse import Rays, are_coherent
+
+SEEDS = st.integers(0, 2**20)
+
+
+def fans(vertices, faces, seed, fans=6):
+    """Sixteens of rays that differ little, or not at all, from a ray at the mesh; some slopes are exactly 0."""
+    rng = np.random.default_rng(seed)
+    origins, directions = (np.repeat(a[:fans], WIDTH, axis=0) for a in rays_at(vertices, faces, seed))
+    size = np.abs(directions).max(axis=1, keepdims=True)
+    turn, shift = 10.0 ** rng.uniform(-9, -1, (2, len(origins), 1)) * (rng.random((2, len(origins), 1)) < 0.8)
+    directions = directions + size * turn * rng.normal(size=directions.shape)
+    directions[rng.random(directions.shape) < 0.1] *= 0.0
+    directions[~directions.any(axis=1)] = [0.0, -0.0, 1.0]
+    return origins + (np.abs(vertices).max(initial=0.0) + 1.0) * shift * rng.normal(size=origins.shape), directions
+
+
+@settings(max_examples=500)
+@given(meshes, options, SEEDS)
+def test_fans_equal_brute_force_bit_for_bit(mesh, chosen, seed):
+    octree, brute = Octree(*mesh, **chosen), BruteForce(*mesh, threads=1)
+    origins, directions = fans(*mesh, seed)
+    t_max = np.inf if seed % 2 else np.random.default_rng(seed).uniform(0, 2, len(origins))
+    expected = brute.closest_hit(origins, directions, 0.0, t_max)
+    assert_same_hits(octree.closest_hit(origins, directions, 0.0, t_max), expected)
+    np.testing.assert_array_equal(octree.any_hit(origins, directions, 0.0, t_max), expected.hit)
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"duplicates", "far_away"}))
+@pytest.mark.parametrize("split", ["midpoint", "sah"])
+def test_fans_equal_single_rays_on_thousands_of_faces(kind, split):
+    octree = Octree(*make_mesh(kind, 3, 3000), split=split)
+    origins, directions = fans(octree.mesh.vertices, octree.mesh.faces, 5, 40)
+    together = octree.closest_hit(origins, directions)
+    assert together.hit.sum() > 40
+    # Fewer than sixteen are no packet.
+    alone = [octree.closest_hit(origins[i : i + 1], directions[i : i + 1]) for i in range(len(origins))]
+    for name in ("t", "face", "u", "v"):
+        np.testing.assert_array_equal(getattr(together, name), np.concatenate([getattr(h, name) for h in alone]))
+
+
+def test_any_order_and_number_of_rays_finds_the_same():
+    """Packets, streams, a stream's refill and its end: rays in order, shuffled, and in batches of every size."""
+    octree, rng = Octree.from_mesh(icosphere(5), leaf_size=32), np.random.default_rng(1)
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-1.1, 1.1, 40), np.linspace(-1.1, 1.1, 40)))
+    origins, directions = np.column_stack([x, y, np.full(1600, 3.0)]), np.tile([0.0, 0.0, -1.0], (1600, 1))
+    hits, any_hits = octree.closest_hit(origins, directions), octree.any_hit(origins, directions)
+    assert 0.5 < hits.hit.mean() < 0.9 and np.array_equal(any_hits, hits.hit)
+    shuffled = rng.permutation(1600)
+    got = octree.closest_hit(origins[shuffled], directions[shuffled])
+    np.testing.assert_array_equal(got.t, hits.t[shuffled])
+    np.testing.assert_array_equal(got.face, hits.face[shuffled])
+    np.testing.assert_array_equal(octree.any_hit(origins[shuffled], directions[shuffled]), any_hits[shuffled])
+    for count in (1, 2, 15, 16, 17, 31, 33, 47):
+        few = shuffled[:count]
+        np.testing.assert_array_equal(octree.closest_hit(origins[few], directions[few]).t, hits.t[few])
+        np.testing.assert_array_equal(octree.any_hit(origins[few], directions[few]), any_hits[few])
+
+
+def test_a_packet_that_gives_up_is_traced_all_the_same():
+    """Parallel rays from everywhere: one beam as wide as the mesh, which no packet can finish."""
+    mesh, rng = icosphere(6), np.random.default_rng(2)
+    origins = np.column_stack([rng.uniform(-1, 1, (640, 2)), np.full(640, 2.0)])
+    directions = np.tile([0.0, 0.0, -1.0], (640, 1))
+    octree, brute = Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)
+    expected = brute.closest_hit(origins, directions)
+    assert_same_hits(octree.closest_hit(origins, directions), expected)
+    np.testing.assert_array_equal(octree.any_hit(origins, directions), expected.hit)
+
+
+@njit(error_model="numpy")
+def _coherent(origins, directions):
+    bound = np.zeros(1)
+    rays = Rays(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 0, 0, 1.0)
+    found = are_coherent(rays, 0)
+    keep(bound)
+    return found
+
+
+def test_what_is_coherent():
+    straight = np.tile([0.1, -0.2, -1.0], (WIDTH, 1))
+    assert _coherent(straight, straight)
+    for change in ([0.1, -0.2, 1.0], [0.4, -0.2, -1.0], [0.1, -2.0, -1.0], [1.0, -0.2, -1.0]):
+        for row in (0, 7, WIDTH - 1):
+            other = straight.copy()
+            other[row] = change
+            assert not _coherent(straight, other), f"{change} in row {row}"
+    assert not _coherent(straight, np.tile([1.0, 0.5, 1.0], (WIDTH, 1))), "two dominant axes"
+
+
+@njit(error_model="numpy")
+def _beam_and_rays(nodes, origins, directions, t_max):
+    """The bits of the octants that the beam of sixteen rays meets, and those that any of them meets alone."""
+    floats, doubles, integers = np.empty(FLOATS, np.float32), np.empty(DOUBLES), np.empty(INTEGERS, np.int64)
+    rays, alone, limit = Prepared(pointer(floats), pointer(doubles), pointer(integers)), 0, np.float32(0.0)
+    for r in range(WIDTH):
+        o, d = origins[r], directions[r]
+        ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
+        prepare(rays, r, ray, t_max)
+        largest = max(abs(d[0]), max(abs(d[1]), abs(d[2])))
+        farthest = box_limit(t_max, largest)
+        limit = max(limit, farthest)
+        alone |= enter_boxes(nodes, 0, make_slabs(ray, largest), splat8(round_down(0.0)), splat8(farthest))[1]
+    bits = enter_beam(pointer(nodes), 0, make_beam(rays), limit)[1]
+    keep(floats)
+    keep(doubles)
+    keep(integers)
+    return bits, alone
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_beam_meets_every_box_that_one_of_its_rays_meets(seed):
+    rng = np.random.default_rng(seed)
+    met = missed = 0
+    for _ in range(300):
+        # On a coarse lattice, rays run along faces and through corners of boxes.
+        corners = (rng.integers(-3, 4, (2, 8, 3)) / 4 if seed % 2 else rng.normal(size=(2, 8, 3))).astype(np.float32)
+        node = np.zeros(NODE_WORDS, np.float32)
+        node[:48] = np.stack([corners.min(axis=0).T, corners.max(axis=0).T], axis=1).ravel()
+        slopes = rng.normal(size=3) * (rng.random(3) < 0.7) + rng.choice([0, 1e-7, 0.05], (WIDTH, 1)) * rng.normal(
+            size=(WIDTH, 3)
+        )
+        directions = np.clip(slopes, -0.99, 0.99) * rng.choice([1e-40, 1.0, 1e30], (WIDTH, 1)) * (rng.random() < 0.9)
+        axis, sign = rng.integers(3), rng.choice([-1.0, 1.0])
+        directions[:, axis] = sign * np.maximum(np.abs(directions).max(axis=1) * 1.01, 1e-45)
+        at = np.where(rng.random(3) < 0.5, *corners[:, rng.integers(8)].astype(float))
+        origins = at - sign * rng.choice([0.0, 1.0, 50.0]) * directions / np.abs(directions[:, axis : axis + 1]) * sign
+        origins += rng.choice([0.0, 1e-9, 0.1]) * rng.normal(size=(WIDTH, 3))
+        t_max = np.inf if rng.random() < 0.5 else rng.uniform(0, 2) / np.abs(directions).max()
+        bits, alone = _beam_and_rays(node, origins, directions, t_max)
+        assert alone & ~bits == 0
+        met, missed = met + alone.bit_count(), missed + 8 - bits.bit_count()
+    # Both happen: the law is not kept by meeting nothing, nor by meeting everything.
+    assert met > 300 and missed > 300
