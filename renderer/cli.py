@@ -108,7 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
     render.add_argument("--samples", type=int, metavar="N", help="samples a pixel: 1, 4, 9, ...")
     render.add_argument("--min-weight", type=float, metavar="W", help="end rays that weigh less")
-    render.add_argument("--accelerator", choices=("octree", "brute"), default="octree")
+    render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto")
     render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help="how the octree is cut")
     render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
     render.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
@@ -134,9 +134,11 @@ def _render(options: argparse.Namespace) -> None:
     from renderer.image import check_picture_path
     from renderer.render import render
     from renderer.scene import load_scene
+    from renderer.warm import compile_in_two
 
     check_picture_path(options.output)
     scene = load_scene(options.scene)
+    compile_in_two()
     image = render(
         scene,
         resolution=options.resolution,
@@ -154,7 +156,7 @@ def _render(options: argparse.Namespace) -> None:
         rays = int(image.rays.sum())
         print(
             f"{options.output}: {width} x {height}, {rays} rays in {image.render_seconds:.2f} s "
-            f"({rays / image.render_seconds / 1e6:.1f} million a second), {options.accelerator} ready in "
+            f"({rays / image.render_seconds / 1e6:.1f} million a second), scene ready in "
             f"{image.build_seconds:.2f} s"
         )
 

@@ -108,7 +108,7 @@ def light_surfaces(target, world, bundle, surfaces, lit, offset, work):
         rays = Rays(
             at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 0, 1, 1.0
         )  # fmt: skip
-        trace(target.tree, target.depth, rays, work.found, 0, aimed, work.trace, True)
+        trace(target.tree, target.depth, rays, work.found, 0, aimed, work.trace, np.bool_(True))
         for k in range(aimed):
             i = get(lit, SIZE + k)
             pixel = get(bundle.pixels, i)

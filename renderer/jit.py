@@ -10,7 +10,7 @@ from typing import Any
 
 import llvmlite  # type: ignore[import-untyped]
 import numba
-from numba.core import event
+from numba.core import event, types
 from numba.core.caching import IndexDataCacheFile
 
 _PACKAGE = Path(__file__).parent
@@ -41,6 +41,7 @@ def _compiled(function: Callable[..., Any], forceinline: bool) -> Any:
     dispatcher = numba.njit(nogil=True, error_model="numpy", forceinline=forceinline, no_cfunc_wrapper=True)(function)
     # With NUMBA_DISABLE_JIT there is no dispatcher and no cache.
     if dispatcher is not function:
+        _see_no_literals(dispatcher)
         try:
             dispatcher.enable_caching()
         except RuntimeError:  # no folder can be written, neither ours nor the user's: compile in each process
@@ -49,6 +50,25 @@ def _compiled(function: Callable[..., Any], forceinline: bool) -> Any:
         digest = source_digest(Path(function.__code__.co_filename))
         stored._cache_file = _CacheFile(stored.cache_path, stored._impl.filename_base, digest)
     return dispatcher
+
+
+def _see_no_literals(dispatcher: Any) -> None:
+    """Let a kernel be compiled once for all constants: Numba would once for each that a caller writes as a literal."""
+    template = dispatcher.get_call_template
+
+    def plain(arguments: Any, keywords: Any) -> Any:
+        return template([types.unliteral(a) for a in arguments], {k: types.unliteral(v) for k, v in keywords.items()})
+
+    dispatcher.get_call_template = plain
+
+
+def is_on_disk(dispatcher: Any) -> bool:
+    """Whether some version of a kernel is in the cache, so that another process need not compile it.
+
+    True, too, where nothing can be cached: then no process can help another.
+    """
+    files = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    return files is None or bool(files._load_index())
 
 
 class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]

@@ -225,7 +225,7 @@ def trace_packet(tree, rays, stack, any_hit):
     not, it gave up) and the bits of the rays in doubt. ``stack`` is scratch as ``traverse.stack_size`` says.
     """
     beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes
-    limit, doubtful, top, node, left = _most(floats, LIMIT), np.int64(0), 0, np.int64(0), BUDGET
+    limit, doubtful, top, node, left = _most(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET
     while True:
         base = node * NODE_WORDS
         t0, bits = enter_beam(nodes, base, beam, limit)

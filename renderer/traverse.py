@@ -264,7 +264,7 @@ def trace(tree, depth, rays, found, begin, end, scratch, any_hit):
             ray, t_max = ray_at(rays, i)
             _write(found, i, rays.scale, search_all_blocks(tree, ray, t_max, any_hit), any_hit)
         return
-    count, pause, patience = 0, 0, _PATIENCE
+    count, pause, patience = np.int64(0), 0, _PATIENCE
     for first in range(begin, end, WIDTH):
         if pause > 0:
             pause -= 1

@@ -1,24 +1,38 @@
-"""All kernels compiled ahead, for CI and container images whose later runs then only load them."""
+"""All kernels compiled ahead, for CI and container images whose later runs then only load them; and, for the first
+picture ever, in two processes at once, because Numba compiles in one thread only.
+"""
 
+import subprocess
+import sys
 from itertools import product
+from logging import getLogger
 
 import numpy as np
 
 from renderer.camera import PerspectiveCamera
 from renderer.light import PointLight
+from renderer.jit import is_on_disk
 from renderer.material import Dielectric
 from renderer.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from renderer.parallel import available_threads
 from renderer.render import render
 from renderer.scene import Scene, SceneObject
+from renderer.shapes import icosphere
+from renderer.tile import render_tile
 
 _CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 # Vertices that float32 holds, and others: their blocks, and so the kernels that read them, are of another type.
 _SIZES = 1.0, 1.0 / 3.0
+# An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.
+_SUBDIVISIONS = 5
 
 
 def compile_all() -> None:
     """Compile every kernel that a query or a picture calls, or load it where it was compiled before."""
+    for split in ("midpoint", "sah"):
+        octree = Octree.from_mesh(icosphere(_SUBDIVISIONS), split=split)  # type: ignore[arg-type]
+        octree.refit(octree.mesh.vertices)
     for size in _SIZES:
         mesh = Mesh(size * _CORNERS, np.array([[0, 1, 2]], np.int32))
         for accelerator in (Octree.from_mesh(mesh), Octree.from_mesh(mesh, split="sah"), BruteForce.from_mesh(mesh)):
@@ -27,6 +41,29 @@ def compile_all() -> None:
                 accelerator.any_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]], t_max=t_max)
         for normals, kind, split in product(("flat", "smooth"), ("octree", "brute"), ("midpoint", "sah")):
             render(_scene(mesh, normals), resolution=(1, 1), accelerator=kind, split=split)  # type: ignore[arg-type]
+
+
+def compile_in_two() -> None:
+    """Before a first picture: compile what builds trees here and what renders in another process.
+
+    Does nothing where that was done before. Should the other process fail, its kernels are compiled here when needed.
+    """
+    if is_on_disk(render_tile) or available_threads() < 2:
+        return
+    getLogger("renderer.jit").info("compiling render_tile in another process meanwhile (once)")
+    command = [sys.executable, "-c", "from renderer.warm import compile_picture; compile_picture()"]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as other:
+        try:
+            Octree.from_mesh(icosphere(_SUBDIVISIONS))
+            other.wait()
+        finally:
+            other.terminate()
+
+
+def compile_picture() -> None:
+    """Compile what renders, for vertices that float32 holds; no tree is built for it."""
+    scene = _scene(Mesh(_CORNERS, np.array([[0, 1, 2]], np.int32)), "flat")
+    render(scene, resolution=(1, 1), accelerator="brute")
 
 
 def _scene(mesh: Mesh, normals: str) -> Scene:
