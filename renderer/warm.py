@@ -10,8 +10,8 @@ from logging import getLogger
 import numpy as np
 
 from renderer.camera import PerspectiveCamera
-from renderer.light import PointLight
 from renderer.jit import is_on_disk
+from renderer.light import PointLight
 from renderer.material import Dielectric
 from renderer.mesh import Mesh
 from renderer.octree import BruteForce, Octree
@@ -31,7 +31,7 @@ _SUBDIVISIONS = 5
 def compile_all() -> None:
     """Compile every kernel that a query or a picture calls, or load it where it was compiled before."""
     for split in ("midpoint", "sah"):
-        octree = Octree.from_mesh(icosphere(_SUBDIVISIONS), split=split)  # type: ignore[arg-type]
+        octree = Octree.from_mesh(icosphere(_SUBDIVISIONS), split=split)
         octree.refit(octree.mesh.vertices)
     for size in _SIZES:
         mesh = Mesh(size * _CORNERS, np.array([[0, 1, 2]], np.int32))

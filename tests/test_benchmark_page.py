@@ -79,7 +79,8 @@ def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: py
     assert command.main(["--page-only", "--output", str(folder)]) == 0
     text = (folder / "benchmark.html").read_text()
     assert "12.34" in text and "A &lt;made-up&gt; processor" in text and "pip install nobody" in text
-    assert text.count("<svg") == 8 + 2
+    # Memory is not drawn for meshes as small as these.
+    assert text.count("<svg") == 8 + 1
     assert "0.9987654" in text
     assert "12.34" in capsys.readouterr().out
     for outside in ("http://", "https://", "<script", "<link"):
