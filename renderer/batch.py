@@ -14,19 +14,21 @@ SHORTEST, LONGEST = 2.0**-600, 2.0**700
 
 
 @kernel
-def first_bad_ray(origins, directions, scale):
-    """Row of the first ray out of range, or -1. NaN fails every comparison, so it is out of range too.
+def _first_bad_ray(origins, directions, scale, begin, end):
+    """Row of the first ray of a range that is out of bounds, or -1. NaN fails every comparison, so it is too.
 
     In range: components of ``scale`` times the origin up to FARTHEST, the largest component of the direction from
     SHORTEST to LONGEST.
     """
-    for i in range(len(origins)):
-        far = max(abs(origins[i, 0]), max(abs(origins[i, 1]), abs(origins[i, 2]))) * scale
+    step = np.int64(len(origins) > 1)
+    for i in range(begin, end):
+        o = i * step
+        far = max(abs(origins[o, 0]), max(abs(origins[o, 1]), abs(origins[o, 2]))) * scale
         largest = max(abs(directions[i, 0]), max(abs(directions[i, 1]), abs(directions[i, 2])))
         # max drops a NaN in some places; x - x is NaN for NaN and inf and 0 otherwise.
         odd = 0.0
         for k in range(3):
-            odd += (origins[i, k] - origins[i, k]) + (directions[i, k] - directions[i, k])
+            odd += (origins[o, k] - origins[o, k]) + (directions[i, k] - directions[i, k])
         if not (odd == 0.0 and far <= FARTHEST and SHORTEST <= largest <= LONGEST):
             return i
     return -1
@@ -36,17 +38,23 @@ def first_bad_ray(origins, directions, scale):
 def trace_chunk(tree, depth, scale, rays, out, begin, end, any_hit):
     """Hits of rays[begin:end] into the arrays of ``out``: t, face, u, v, or with ``any_hit`` only the fifth, hit.
 
-    ``scale``, a power of two, is what the tree's vertices were multiplied by; ``depth`` 0 tests every block.
+    ``scale``, a power of two, is what the tree's vertices were multiplied by; ``depth`` 0 tests every block. Origins,
+    t_min and t_max have one row a ray or one for all. Returns the row of the first ray out of bounds, after which
+    nothing is traced, or -1.
     """
     origins, directions, t_min, t_max = rays
     t, face, u, v, hit = out
+    bad = _first_bad_ray(origins, directions, scale, begin, end)
+    if bad >= 0:
+        return bad
     memory = make_memory(depth, end - begin)
     source = Rays(
         pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
-        np.int64(len(t_min) > 1), np.int64(len(t_max) > 1), scale,
+        3 * np.int64(len(origins) > 1), np.int64(len(t_min) > 1), np.int64(len(t_max) > 1), scale,
     )  # fmt: skip
     found = Found(pointer(t), pointer(face), pointer(u), pointer(v), pointer(hit))
     trace(view(tree), depth, source, found, begin, end, make_scratch(memory, depth), any_hit)
     keep(memory.floats)
     keep(memory.doubles)
     keep(memory.integers)
+    return -1

@@ -106,7 +106,7 @@ def light_surfaces(target, world, bundle, surfaces, lit, offset, work):
     for light in range(world.light_count):
         aimed = _aim_all(world, surfaces, lit, count, light, offset, shadows)
         rays = Rays(
-            at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 0, 1, 1.0
+            at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0
         )  # fmt: skip
         trace(target.tree, target.depth, rays, work.found, 0, aimed, work.trace, np.bool_(True))
         for k in range(aimed):

@@ -83,7 +83,7 @@ class _Accelerator:
         threads. Raises ``ValueError`` naming argument and row.
         """
         mesh, target = self._built
-        rays = check_rays(origins, directions, t_min, t_max, target.scale)
+        rays = check_rays(origins, directions, t_min, t_max)
         return closest_hits(target, rays, mesh, self.threads)
 
     def any_hit(
@@ -91,7 +91,7 @@ class _Accelerator:
     ) -> NDArray[np.bool_]:
         """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above."""
         target = self.target
-        return any_hits(target, check_rays(origins, directions, t_min, t_max, target.scale), self.threads)
+        return any_hits(target, check_rays(origins, directions, t_min, t_max), self.threads)
 
     def refit(self, vertices: ArrayLike) -> None:
         """Move the vertices and keep the faces: ``vertices`` is (V, 3), finite, V as built.

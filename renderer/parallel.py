@@ -69,14 +69,15 @@ def for_chunks(
                 stop.set()
                 raise
 
-    workers = min(threads, -(-count // size))
-    if workers <= 1:
-        take_chunks()
-        return
-    running = [_pool(workers).submit(take_chunks) for _ in range(workers)]
+    # The caller's own thread is one of them, so the work starts without waiting for another to wake up.
+    others = min(threads, -(-count // size)) - 1
+    running = [_pool(others).submit(take_chunks) for _ in range(others)]
     try:
+        take_chunks()
         for future in running:
-            future.result()
+            # One that has not begun, in a pool that others keep busy, has nothing left to take.
+            if not future.cancel():
+                future.result()
     finally:
         stop.set()
         for future in running:

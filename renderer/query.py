@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.batch import FARTHEST, LONGEST, SHORTEST, first_bad_ray, trace_chunk
+from renderer.batch import FARTHEST, LONGEST, SHORTEST, trace_chunk
 from renderer.errors import expect
 from renderer.layout import Tree
 from renderer.mesh import Mesh, face_normals
@@ -15,6 +15,8 @@ from renderer.parallel import for_chunks
 # Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
 # taking a chunk costs nothing beside its 1 to 10 ms of tracing.
 CHUNK = 8192
+# Few rays go in smaller chunks, sixteen a thread, so that no thread has much more to do than another.
+_LEAST_CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +68,10 @@ def _array(argument: str, values: ArrayLike) -> NDArray[Any]:
     return array
 
 
-def _vectors(argument: str, values: ArrayLike) -> NDArray[np.float64]:
+def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
     array = _array(argument, values)
     expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
-    return _doubles(array)
+    return array
 
 
 def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
@@ -92,7 +94,7 @@ def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArr
 
 @dataclass(frozen=True)
 class Rays:
-    """Rays that passed the checks; build them with ``check_rays``."""
+    """Rays whose shapes and bounds passed the checks; build them with ``check_rays``. One origin may stand for all."""
 
     origins: NDArray[np.float64]
     directions: NDArray[np.float64]
@@ -100,25 +102,28 @@ class Rays:
     t_max: NDArray[np.float64]
 
 
-def check_rays(
-    origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike, scale: float = 1.0
-) -> Rays:
-    """Check a batch once, for a tree scaled by ``scale``.
+def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike) -> Rays:
+    """Check shapes, types and bounds of a batch; whether each ray is finite is seen when it is traced.
 
-    Raises ``ValueError`` naming the argument and, for a bad ray, its row.
+    Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     expect(len(origins) == len(directions), "directions", f"{len(origins)} rows as in origins", len(directions))
     low = _bound("t_min", t_min, len(origins), float(np.finfo(np.float64).max))
     high = _bound("t_max", t_max, len(origins), np.inf)
-    row = first_bad_ray(origins, directions, scale)
-    if row >= 0:
-        bad_origin = not (np.abs(origins[row]) * scale <= FARTHEST).all()
-        name, values = ("origins", origins) if bad_origin else ("directions", directions)
+    # An eye broadcast to all rays, as of a camera, need not be copied for each.
+    shared = len(origins) > 1 and origins.strides[0] == 0
+    return Rays(_doubles(origins[:1] if shared else origins), _doubles(directions), low, high)
+
+
+def _reject(rays: Rays, row: int, scale: float) -> None:
+    """Raise the error of a ray out of bounds."""
+    origin = rays.origins[row if len(rays.origins) > 1 else 0]
+    if not (np.abs(origin) * scale <= FARTHEST).all():
         near = f"finite numbers within {FARTHEST / scale:.3g}"
-        expected = near if bad_origin else f"finite, non-zero vectors, components up to {SHORTEST:.3g} to {LONGEST:.3g}"
-        expect(False, name, expected, f"{values[row].tolist()} in row {row}")
-    return Rays(origins, directions, low, high)
+        expect(False, "origins", near, f"{origin.tolist()} in row {row}")
+    expected = f"finite, non-zero vectors, components up to {SHORTEST:.3g} to {LONGEST:.3g}"
+    expect(False, "directions", expected, f"{rays.directions[row].tolist()} in row {row}")
 
 
 @dataclass(frozen=True)
@@ -134,7 +139,7 @@ class Target:
 
 def closest_hits(target: Target, rays: Rays, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
-    count = len(rays.origins)
+    count = len(rays.directions)
     out = np.empty(count), np.empty(count, np.int64), np.empty(count), np.empty(count)
     _run(target, rays, (*out, np.empty(0, np.bool_)), threads, any_hit=False)
     return Hits(*out, mesh)
@@ -142,16 +147,22 @@ def closest_hits(target: Target, rays: Rays, mesh: Mesh, threads: int) -> Hits:
 
 def any_hits(target: Target, rays: Rays, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
-    none, out = np.empty(0), np.empty(len(rays.origins), np.bool_)
+    none, out = np.empty(0), np.empty(len(rays.directions), np.bool_)
     _run(target, rays, (none, np.empty(0, np.int64), none, none, out), threads, any_hit=True)
     return out
 
 
 def _run(target: Target, rays: Rays, out: Any, threads: int, any_hit: bool) -> None:
-    arrays = (rays.origins, rays.directions, rays.t_min, rays.t_max)
-    for_chunks(
-        lambda begin, end: trace_chunk(target.tree, target.depth, target.scale, arrays, out, begin, end, any_hit),
-        len(rays.origins),
-        CHUNK,
-        threads,
-    )
+    arrays, count = (rays.origins, rays.directions, rays.t_min, rays.t_max), len(rays.directions)
+    bad: list[int] = []
+
+    def trace(begin: int, end: int) -> None:
+        # Only chunks behind a bad ray are left out, so the first bad ray is always among the found.
+        if not bad or begin < bad[0]:
+            row = trace_chunk(target.tree, target.depth, target.scale, arrays, out, begin, end, any_hit)
+            if row >= 0:
+                bad.append(row)
+
+    for_chunks(trace, count, min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads))), threads)
+    if bad:
+        _reject(rays, min(bad), target.scale)

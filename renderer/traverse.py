@@ -35,14 +35,16 @@ _MOST_PATIENCE = 64
 
 
 class Rays(NamedTuple):
-    """Pointers to (n, 3) origins and directions and to t_min and t_max, which have one value a ray or (step 0) one for
-    all. The tree's vertices were multiplied by ``scale``, a power of two, so t goes in and out of its units exactly.
+    """Pointers to rows of origins and directions, and to t_min and t_max. All but the directions have a step from one
+    ray to the next, 0 where all share one. The tree's vertices were multiplied by ``scale``, a power of two, so t goes
+    in and out of its units exactly.
     """
 
     origins: Any
     directions: Any
     t_min: Any
     t_max: Any
+    origin_step: int
     min_step: int
     max_step: int
     scale: float
@@ -108,10 +110,9 @@ def make_scratch(memory, depth):
 @inlined
 def ray_at(rays, i):
     """Ray ``i`` in the tree's units, and its t_max."""
-    k, s = 3 * i, rays.scale
-    o, d = rays.origins, rays.directions
+    o, d, s = at(rays.origins, i * rays.origin_step), at(rays.directions, 3 * i), rays.scale
     ray = Ray(
-        s * get(o, k), s * get(o, k + 1), s * get(o, k + 2), get(d, k), get(d, k + 1), get(d, k + 2),
+        s * get(o, 0), s * get(o, 1), s * get(o, 2), get(d, 0), get(d, 1), get(d, 2),
         s * get(rays.t_min, i * rays.min_step),
     )  # fmt: skip
     return ray, s * get(rays.t_max, i * rays.max_step)

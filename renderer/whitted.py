@@ -255,7 +255,7 @@ def _collect_light(world, bundle, work):
 @kernel
 def trace_bundle(target, world, settings, bundle, work):
     """Trace the rays of a bundle and light what they meet; what they leave is up to ``_bounce``."""
-    rays = Rays(bundle.origins, bundle.directions, work.zero, work.infinity, 0, 0, 1.0)
+    rays = Rays(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 0, 0, 1.0)
     trace(target.tree, target.depth, rays, work.found, 0, count_of(bundle), work.trace, np.bool_(False))
     _meet_surfaces(world, bundle, work)
     light_surfaces(target, world, bundle, work.surfaces, work.lit, settings.offset, work)

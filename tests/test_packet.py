@@ -87,7 +87,7 @@ def test_a_packet_that_gives_up_is_traced_all_the_same():
 @njit(error_model="numpy")
 def _coherent(origins, directions):
     bound = np.zeros(1)
-    rays = Rays(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 0, 0, 1.0)
+    rays = Rays(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 0, 0, 1.0)
     found = are_coherent(rays, 0)
     keep(bound)
     return found
