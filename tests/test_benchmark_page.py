@@ -139,7 +139,7 @@ def test_ctrl_c_stops_and_writes_nothing(tmp_path: Path, monkeypatch: pytest.Mon
 def test_memory_grows_with_the_mesh_and_not_with_the_library() -> None:
     if not Path("/proc/self/clear_refs").exists():
         pytest.skip("needs Linux's /proc/self/clear_refs")
-    mesh = meshes.displaced_spheres(200_000)
+    mesh = meshes.displaced_spheres(400_000)
     chosen = [system for system in systems.available()[0] if system.name in (OURS, "embree")]
     row = memory.measure(mesh, chosen, lambda _: None)
     assert row is not None and set(row["systems"]) == {OURS, "embree"}
@@ -148,5 +148,5 @@ def test_memory_grows_with_the_mesh_and_not_with_the_library() -> None:
         assert 30 < found["rest"] / len(mesh.faces) < 300
         assert found["peak"] >= found["rest"]
     ours = row["systems"][OURS]
-    # Resident memory is counted in pages and includes the octree's small objects and what the allocator keeps.
-    assert ours["rest"] == pytest.approx(ours["own"], rel=0.25)
+    # Each of the tree's three arrays may end in a huge page of 2 MB that it does not fill.
+    assert ours["rest"] == pytest.approx(ours["own"], abs=3 * 2**21)
