@@ -60,7 +60,7 @@ def render(
     kernel_settings = kernel_settings_of(wanted, chosen, _offset(offset))
     began = time.perf_counter()
     mesh, world = pack(scene, wanted)
-    target = build_target(mesh, accelerator, split, wanted)
+    target = build_target(mesh, accelerator, split, wanted, threads)
     camera, samples = scene.camera.rows(width, height), sample_offsets(chosen.samples)
     film = _film(width, height)
     ready = time.perf_counter()
@@ -77,10 +77,12 @@ def render(
     return Image(*film, build_seconds=ready - began, render_seconds=time.perf_counter() - ready)
 
 
-def build_target(mesh: Mesh, accelerator: str, split: Literal["midpoint", "sah"], needs: Needs) -> Accelerator:
+def build_target(
+    mesh: Mesh, accelerator: str, split: Literal["midpoint", "sah"], needs: Needs, threads: int | None = None
+) -> Accelerator:
     """What the rays are shot at: a tree, or the blocks alone where ``accelerator`` is "brute" or no tree is needed."""
     with_tree = needs.octree if accelerator == "auto" else accelerator == "octree"
-    built = Octree.from_mesh(mesh, split=split) if with_tree else BruteForce.from_mesh(mesh)
+    built = Octree.from_mesh(mesh, split=split, threads=threads) if with_tree else BruteForce.from_mesh(mesh)
     expect(built.target.scale == 1.0, "scene", "a largest coordinate from 2^-60 to 2^60", f"bounds {mesh.bounds}")
     tree = built.target.tree
     return Accelerator(_widened(tree) if needs.float64_vertices else tree, built.target.depth)

@@ -48,7 +48,7 @@ def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) 
 def grown(system: System, folder: Path) -> dict[str, int | None]:
     """Bytes ``rest`` and ``peak`` by which this process grows, and ``own``: what our octree says of itself."""
     vertices, faces = np.load(folder / "vertices.npy"), np.load(folder / "faces.npy")
-    # In float32 like the meshes of the series, and large enough that its tree is built in parts: this loads all kernels.
+    # In float32 like the meshes of the series, and large enough that its tree is built in parts: so all kernels load.
     small = displaced_spheres(20_000)
     system.loaded(small.vertices, small.faces)
     build = system.load(vertices, faces)
