@@ -76,7 +76,8 @@ def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
 
 def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
     with np.errstate(over="ignore", invalid="ignore"):  # infinities and NaN are rejected with their row
-        return np.ascontiguousarray(array, np.float64)
+        # Writable, because Numba would compile all kernels again for arrays that are not.
+        return np.require(array, np.float64, ("C_CONTIGUOUS", "WRITEABLE"))
 
 
 def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArray[np.float64]:
