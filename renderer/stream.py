@@ -108,6 +108,21 @@ def begin_ray(lanes, r):
 
 
 @inlined
+def wait_octant(lanes, r, entry, child):
+    """Let an octant wait on the stack of ray ``r``, above the others: the distance of ``entry``, and its child."""
+    top = get(lanes.top, r)
+    put(lanes.stacks, r * lanes.stack_size + top, ((entry >> 32) << 32) | (child & _LOW_WORD))
+    put(lanes.top, r, top + 1)
+
+
+@inlined
+def resume(tree, rays, lanes, r):
+    """Choose where ray ``r`` goes from what waits on its stack. Returns that child."""
+    stack, top = at(lanes.stacks, r * lanes.stack_size), get(lanes.top, r) - 1
+    return _go_on(tree, rays, lanes, r, stack, get(stack, top), top)
+
+
+@inlined
 def meet_nodes(tree, rays, lanes, count):
     """Compute what each of ``count`` rays meets in its node."""
     for k in range(count):
@@ -206,5 +221,4 @@ def leave_leaf(tree, rays, lanes, r):
         child -= MAX_LEAF_BLOCKS - 1
         put(lanes.child, r, child)
         return child
-    stack, top = at(lanes.stacks, r * lanes.stack_size), get(lanes.top, r) - 1
-    return _go_on(tree, rays, lanes, r, stack, get(stack, top), top)
+    return resume(tree, rays, lanes, r)

@@ -8,7 +8,7 @@ from renderer.intersect import Ray, box_limit, enter_boxes, make_shear, make_sla
 from renderer.jit import inlined, kernel
 from renderer.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.leaf import NO_FACE, nearest_carefully, search_all_blocks
-from renderer.packet import trace_packet
+from renderer.packet import child_of, meet_octant, trace_packet
 from renderer.prepared import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare
 from renderer.simd import at, get, lowest_bit, pointer, put, splat8
 from renderer.stream import (
@@ -23,15 +23,14 @@ from renderer.stream import (
     make_lanes,
     meet_leaves,
     meet_nodes,
+    resume,
     take_hits,
+    wait_octant,
 )
 
 # Rays whose slopes against their dominant axis differ by more than this from the first one's are no packet. It only
-# spares rays that point anywhere the attempt: whether a packet pays, its budget tells.
+# spares rays that point anywhere the attempt: how far a packet goes, its budget tells.
 _SPREAD = 0.125
-# After a packet that gave up, this many sixteens go without an attempt, and twice as many after each further one.
-_PATIENCE = 1
-_MOST_PATIENCE = 64
 
 
 class Rays(NamedTuple):
@@ -62,11 +61,12 @@ class Found(NamedTuple):
 
 class Scratch(NamedTuple):
     """Memory of one thread, as pointers: sixteen prepared rays and their lanes; of each whether it met a doubt and its
-    number; and the numbers of the rays that wait for a stream.
+    number; a packet's stack; and the numbers of the rays that wait for a stream.
     """
 
     prepared: Prepared
     lanes: Lanes
+    packet_stack: Any
     doubtful: Any
     number: Any
     waiting: Any
@@ -89,7 +89,7 @@ def stack_size(depth):
 @kernel
 def make_memory(depth, rays):
     """Memory for ranges of up to ``rays`` rays against a tree of ``depth`` levels."""
-    integers = INTEGERS + 2 * WIDTH + LANE_INTEGERS + WIDTH * stack_size(depth) + rays
+    integers = INTEGERS + 2 * WIDTH + LANE_INTEGERS + (WIDTH + 1) * stack_size(depth) + rays
     floats, doubles = np.empty(FLOATS + LANE_FLOATS, np.float32), np.empty(DOUBLES + LANE_DOUBLES)
     return Memory(floats, doubles, np.empty(integers, np.int64))
 
@@ -103,8 +103,9 @@ def make_scratch(memory, depth):
     lane_integers = at(number, WIDTH)
     size = stack_size(depth)
     lanes = make_lanes(lane_integers, at(floats, FLOATS), at(doubles, DOUBLES), size)
-    waiting = at(lane_integers, LANE_INTEGERS + WIDTH * size)
-    return Scratch(Prepared(floats, doubles, integers), lanes, doubtful, number, waiting)
+    packet_stack = at(lane_integers, LANE_INTEGERS + WIDTH * size)
+    waiting = at(packet_stack, size)
+    return Scratch(Prepared(floats, doubles, integers), lanes, packet_stack, doubtful, number, waiting)
 
 
 @inlined
@@ -195,25 +196,27 @@ def _load(rays, scratch, r, i):
     put(scratch.doubtful, r, 0)
 
 
+@inlined
+def _list_lane(lanes, r, child, nodes, leaves):
+    """Put lane ``r`` into the list that its next child asks for; returns the lengths of both."""
+    put(lanes.at_node, nodes, r)
+    put(lanes.at_leaf, leaves, r)
+    return nodes + np.int64(child >= 0), leaves + np.int64(child < 0)
+
+
 @kernel
-def _trace_stream(tree, rays, found, scratch, count, any_hit):
-    """Trace the ``count`` rays in ``scratch.waiting``, sixteen in turn."""
+def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_hit):
+    """Run the lanes that are listed to their ends; meanwhile the rays in ``scratch.waiting`` from ``following`` to
+    ``count`` take the places of those that end.
+    """
     prepared, lanes, waiting = scratch.prepared, scratch.lanes, scratch.waiting
-    following = min(count, WIDTH)
-    for r in range(following):
-        _load(rays, scratch, r, get(waiting, r))
-        put(lanes.at_node, r, r)
-    nodes, leaves = following, 0
     while nodes + leaves > 0:
         meet_nodes(tree, prepared, lanes, nodes)
         entered, nodes = nodes, 0
         for k in range(entered):
             r = get(lanes.at_node, k)
             child = leave_node(tree, prepared, lanes, r, any_hit)
-            put(lanes.at_node, nodes, r)
-            nodes += np.int64(child >= 0)
-            put(lanes.at_leaf, leaves, r)
-            leaves += np.int64(child < 0)
+            nodes, leaves = _list_lane(lanes, r, child, nodes, leaves)
         meet_leaves(tree, prepared, lanes, leaves)
         entered, leaves = leaves, 0
         for k in range(entered):
@@ -231,24 +234,56 @@ def _trace_stream(tree, rays, found, scratch, count, any_hit):
                 _load(rays, scratch, r, get(waiting, following))
                 following += 1
                 child = 0
-            put(lanes.at_node, nodes, r)
-            nodes += np.int64(child >= 0)
-            put(lanes.at_leaf, leaves, r)
-            leaves += np.int64(child < 0)
+            nodes, leaves = _list_lane(lanes, r, child, nodes, leaves)
+
+
+@inlined
+def _trace_stream(tree, rays, found, scratch, count, any_hit):
+    """Trace the ``count`` rays in ``scratch.waiting``, sixteen in turn."""
+    lanes, first = scratch.lanes, min(count, WIDTH)
+    for r in range(first):
+        _load(rays, scratch, r, get(scratch.waiting, r))
+        put(lanes.at_node, r, r)
+    _run_lanes(tree, rays, found, scratch, first, 0, first, count, any_hit)
+
+
+@kernel
+def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
+    """Let the rays of a packet that gave up go on as lanes: each with the octants it meets of those that wait."""
+    prepared, lanes = scratch.prepared, scratch.lanes
+    for r in range(WIDTH):
+        begin_ray(lanes, r)
+        put(scratch.number, r, first + r)
+        put(scratch.doubtful, r, (doubtful >> r) & 1)
+    for k in range(top):
+        entry = get(scratch.packet_stack, k)
+        child, at_ = child_of(tree, entry & 0xFFFFFFFF)
+        meeting = meet_octant(tree, prepared, at_)
+        while meeting != 0:
+            wait_octant(lanes, lowest_bit(meeting), entry, child)
+            meeting &= meeting - 1
+    nodes, leaves = 0, 0
+    for r in range(WIDTH):
+        if any_hit and best_of(prepared, r)[1] != NO_FACE:
+            _finish(tree, rays, found, first + r, scratch, r, False, any_hit)
+        else:
+            nodes, leaves = _list_lane(lanes, r, resume(tree, prepared, lanes, r), nodes, leaves)
+    _run_lanes(tree, rays, found, scratch, nodes, leaves, 0, 0, any_hit)
 
 
 @inlined
 def _trace_sixteen(tree, rays, found, first, scratch, any_hit):
-    """Trace the rays from ``first`` on as a packet; returns False if it gave up."""
+    """Trace the rays from ``first`` on as a packet, and each alone from where it gave up."""
     prepared = scratch.prepared
     for r in range(WIDTH):
         ray, t_max = ray_at(rays, first + r)
         prepare(prepared, r, ray, t_max)
-    complete, doubtful = trace_packet(tree, prepared, scratch.lanes.stacks, any_hit)
-    if complete:
-        for r in range(WIDTH):
-            _finish(tree, rays, found, first + r, scratch, r, (doubtful >> r) & 1 != 0, any_hit)
-    return complete
+    top, doubtful = trace_packet(tree, prepared, scratch.packet_stack, any_hit)
+    if top > 0:
+        _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit)
+        return
+    for r in range(WIDTH):
+        _finish(tree, rays, found, first + r, scratch, r, (doubtful >> r) & 1 != 0, any_hit)
 
 
 @kernel
@@ -265,15 +300,11 @@ def trace(tree, depth, rays, found, begin, end, scratch, any_hit):
             ray, t_max = ray_at(rays, i)
             _write(found, i, rays.scale, search_all_blocks(tree, ray, t_max, any_hit), any_hit)
         return
-    count, pause, patience = np.int64(0), 0, _PATIENCE
+    count = np.int64(0)
     for first in range(begin, end, WIDTH):
-        if pause > 0:
-            pause -= 1
-        elif first + WIDTH <= end and are_coherent(rays, first):
-            if _trace_sixteen(tree, rays, found, first, scratch, any_hit):
-                patience = _PATIENCE
-                continue
-            pause, patience = patience, min(2 * patience, _MOST_PATIENCE)
+        if first + WIDTH <= end and are_coherent(rays, first):
+            _trace_sixteen(tree, rays, found, first, scratch, any_hit)
+            continue
         for i in range(first, min(first + WIDTH, end)):
             put(scratch.waiting, count, i)
             count += 1
