@@ -1,0 +1,123 @@
+"""The seam of the seeded defects replaces exactly once and reaches kernels; a defect that is none is not caught."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from validation import defects, defects_list, report
+from validation.defects import Answer
+from validation.defects_list import DEFECTS, Defect
+from validation.defects_seam import Replacement, inject
+
+ROOT = Path(__file__).parent.parent
+HARMLESS = Replacement("image", '"""Linear radiance, clipped', '"""The linear radiance, clipped')
+
+
+def python(program: str, cache: Path) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    return subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, env=environment, check=False
+    )
+
+
+class TestSeam:
+    @pytest.mark.parametrize("defect", DEFECTS, ids=lambda defect: defect.name)
+    def test_each_rule_stands_once_and_the_broken_text_compiles(self, defect: Defect) -> None:
+        text = defect.replacement.text()
+        assert text != defect.replacement.path.read_text(encoding="utf-8")
+        compile(text, defect.replacement.path.name, "exec")
+
+    @pytest.mark.parametrize(("rule", "times"), [("import numpy as mp", "0"), ("np.", r"[1-9]\d*")])
+    def test_a_rule_that_does_not_stand_once_is_refused(self, rule: str, times: str) -> None:
+        with pytest.raises(ValueError, match=f"rule: expected once in image.py, got {times} times"):
+            Replacement("image", rule, "").text()
+
+    def test_a_process_that_has_the_renderer_is_refused(self) -> None:
+        import renderer.image  # noqa: F401
+
+        with pytest.raises(RuntimeError, match="expected a process without modules of renderer"):
+            inject(HARMLESS)
+
+    def test_a_module_is_altered_and_its_file_is_not(self, tmp_path: Path) -> None:
+        path = ROOT / "renderer" / "image.py"
+        before = path.read_bytes()
+        program = (
+            "from validation.defects_seam import Replacement, inject\n"
+            "inject(Replacement('image', 'encoded * 255.0', 'encoded * 100.0'))\n"
+            "from renderer.image import srgb; print(srgb([0.0, 1.0]).tolist())"
+        )
+        done = python(program, tmp_path)
+        assert done.stdout.strip() == "[0, 100]", done.stderr
+        assert path.read_bytes() == before
+
+    def test_kernels_follow_though_the_cache_holds_sound_ones(self, tmp_path: Path) -> None:
+        """The digest of ``shading`` and of what imports it changes; that of ``simd`` does not."""
+        call = (
+            "from renderer.shading import fresnel; from renderer.jit import source_digest\n"
+            "from pathlib import Path; import json\n"
+            "digests = [source_digest(Path('renderer').resolve() / f'{m}.py') for m in ('shading', 'direct', 'simd')]\n"
+            "print(json.dumps([fresnel(1.0, 1.0, 1.0, 1.5), *digests]))"
+        )
+        alter = (
+            "from validation.defects_seam import Replacement, inject\n"
+            "inject(Replacement('shading', 'return 0.5 * (s * s + p * p)', 'return 7.0'))\n"
+        )
+        sound, broken, again = (json.loads(python(p, tmp_path).stdout) for p in (call, alter + call, call))
+        assert sound[0] == pytest.approx(0.04, rel=1e-12)
+        assert broken[0] == 7.0
+        assert [a == b for a, b in zip(sound[1:], broken[1:], strict=True)] == [False, False, True]
+        assert again == sound
+
+
+def test_there_are_enough_and_no_two_are_the_same() -> None:
+    assert len(DEFECTS) >= 25
+    assert len({d.name for d in DEFECTS}) == len({d.replacement for d in DEFECTS}) == len(DEFECTS)
+
+
+def test_real_defects_are_caught_and_a_harmless_change_is_not(tmp_path: Path) -> None:
+    """The harmless one stands for a defect that no gate sees: it is told, and its gate fails. The control passes."""
+    twice = next(d for d in DEFECTS if d.name == "sRGB applied twice")
+    harmless = Defect("another word in a docstring", "pictures", HARMLESS, kernel=False)
+    record, gates = defects.run(True, lambda name: None, [twice, harmless])
+    assert record["control"]["red"] == [] and record["control"]["error"] is None
+    assert record["control"]["gates"] > 20
+    assert [(row["caught"], row["error"]) for row in record["defects"]] == [(True, None), (False, None)]
+    assert record["defects"][0]["kinds"] == ["images: 8-bit sRGB: steps from the formula"]
+    assert record["caught"] == 1
+    assert [gate.passed for gate in gates] == [True, True, False]
+    page = Environment(
+        loader=FileSystemLoader(ROOT / "validation" / "templates"), autoescape=True, undefined=StrictUndefined
+    )
+    page.filters["number"] = report.number
+    drawn = page.get_template("defects.html").render(m={"defects": json.loads(json.dumps(record))})
+    assert "1 of 2 defects" in drawn and "not caught" in drawn
+
+
+def test_an_error_is_no_verdict(tmp_path: Path) -> None:
+    """A replacement that breaks the program itself must not pass for one that was caught."""
+    nonsense = Replacement("image", "import io\n", "import io; nowhere\n")
+    answer = defects.ask(nonsense, ("pictures",), tmp_path)
+    assert answer.error == "NameError: name 'nowhere' is not defined"
+    assert answer.red == ()
+    defect = Defect("nonsense", "pictures", nonsense, kernel=False)
+    control = Answer(("images: a: b",), (), None, 1.0)
+    assert [gate.passed for gate in defects.gates([defect], control, [answer])] == [True, False]
+    assert not defects.record([defect], control, [answer])["defects"][0]["caught"]
+
+
+def test_record_tells_what_each_measure_caught_alone() -> None:
+    chosen = list(defects_list.PICTURES[:3])
+    names = ("images: a: ssim", "images: a: mean", "hits: sphere, camera rays: wrong", "hits: soup, camera rays: wrong")
+    control = Answer(names, (), None, 1.0)
+    answers = [Answer(names, names[:2], None, 1.0), Answer(names, names[2:], None, 1.0), Answer(names, (), None, 1.0)]
+    record = defects.record(chosen, control, answers)
+    found = {row["gate"]: (row["caught"], row["alone"]) for row in record["gates"]}
+    assert found == {"images: a: ssim": (1, []), "images: a: mean": (1, []), "hits: wrong": (1, [chosen[1].name])}
+    assert record["caught"] == 2
+    red = Answer(names, names[:1], None, 1.0)
+    assert not defects.gates(chosen, red, answers)[0].passed
