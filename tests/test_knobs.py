@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from renderer import Mesh, Octree, load_scene
 from validation import exact
 from validation.benchmark import knobs_hits, knobs_pictures, pareto
-from validation.benchmark.tradeoff import front, median_seconds, slope, timed
+from validation.tradeoff import front, median_seconds, slope, timed
 from validation.cases import CASES
 from validation.rays import random_rays
 

@@ -10,7 +10,7 @@ from renderer.octree import Octree
 from validation.benchmark import ours
 from validation.benchmark.contender import System
 from validation.benchmark.rounds import RUNS, interleaved, ratio
-from validation.benchmark.tradeoff import timed
+from validation.tradeoff import timed
 
 REFIT = "ours_refit"
 # Above this size a round of all builds takes half a minute, so there are three and not five of them.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from renderer.render import render
 from renderer.scene import Scene, load_scene
 from validation.benchmark.rounds import RUNS, interleaved, ratio
-from validation.benchmark.tradeoff import timed
+from validation.tradeoff import timed
 from validation.cases import SCENES
 
 OURS, OURS_BUILT, LISTS = "ours", "ours_with_build", "mitsuba_llvm_lists"

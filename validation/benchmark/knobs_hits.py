@@ -20,7 +20,7 @@ from renderer.octree import Octree
 from renderer.query import Hits
 from renderer.shapes import icosphere
 from validation import exact
-from validation.benchmark.tradeoff import front, median_seconds, timed
+from validation.tradeoff import front, median_seconds, timed
 from validation.embree import Embree
 from validation.rays import RayBatch, camera_rays, float32_exact, random_rays
 

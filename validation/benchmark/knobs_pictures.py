@@ -18,7 +18,7 @@ import numpy as np
 from renderer.image import Image
 from renderer.render import render
 from renderer.scene import Scene, load_scene
-from validation.benchmark.tradeoff import front, median_seconds, slope
+from validation.tradeoff import front, median_seconds, slope
 from validation.cases import Case
 
 Settings = dict[str, Any]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from validation.benchmark.rounds import interleaved
-from validation.benchmark.tradeoff import timed
+from validation.tradeoff import timed
 from validation.cases import SCENES
 
 _RUNS = 3

@@ -13,7 +13,7 @@ REST = 0.03
 def interleaved(calls: Mapping[str, Callable[[], float]], runs: int = RUNS, unseen: int = 1) -> dict[str, list[float]]:
     """Seconds of every call in each of ``runs`` rounds, after ``unseen`` rounds for caches and compilation.
 
-    Each call returns its own seconds, see ``validation.benchmark.tradeoff.timed``.
+    Each call returns its own seconds, see ``validation.tradeoff.timed``.
     """
     rounds = [{name: _rested(call) for name, call in calls.items()} for _ in range(unseen + runs)][unseen:]
     return {name: [seconds[name] for seconds in rounds] for name in calls}

@@ -1,0 +1,120 @@
+"""Where the gates stand, each with its reason; a TOML file of a user's project may move some of them.
+
+    [pictures.own]
+    ssim = 0.997
+    [hits]
+    near_edge = 2
+
+A key that is not named below, or a value of the wrong kind, is refused with its place.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+_Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
+_Error = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=True)]
+_Count = Annotated[int, Field(ge=0, strict=True)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class PictureLimits(_Table):
+    """One picture against a reference; shares and means over pixels, so they do not depend on the resolution."""
+
+    ssim: _Share
+    ssim_foreground: _Share
+    pixel_share: _Share
+    mean_error: _Error
+    # None: not judged, because the share above already counts every pixel that is off.
+    max_error: _Error | None = None
+
+
+# With the same offset rule only float32 against float64 is left: 1e-7 of a colour, and a pixel whose ray passes
+# within that of an edge. 0.02 % is 3 pixels of 128 x 128; a seeded gain of 1.001 already leaves a mean of 1e-4.
+_MATCHED = PictureLimits(ssim=0.9999, ssim_foreground=0.9999, pixel_share=2e-4, mean_error=2e-5)
+# With our own rule spawned rays start up to 1e-4 nearer the surface than Mitsuba's, so shadow and silhouette edges
+# of reflections move by as much: a seam of pixels, and nothing outside the fragile ones.
+_OWN = PictureLimits(ssim=0.998, ssim_foreground=0.997, pixel_share=3e-3, mean_error=3e-4, max_error=5e-3)
+
+
+class Pictures(_Table):
+    """Pictures under Mitsuba's rule for the offset of spawned rays, and under ours."""
+
+    matched: PictureLimits = _MATCHED
+    own: PictureLimits = _OWN
+    # Above this share the maximum would be judged on too little; 0.24 % was measured for the first such scene.
+    fragile_share: _Share = 0.02
+    # Mitsuba's sensors round film positions to float32, 1e-4 pixel at 1024; a shift of 0.1 pixel is a defect to catch.
+    camera_pixels: _Error = 2e-3
+
+
+class Aovs(_Table):
+    """What the primary rays meet."""
+
+    # A float32 hit errs by 3e-7 + 2e-7 / |n.d| of its distance; below an angle of 0.02 rad that passes 1e-5.
+    depth: _Error = 1e-5
+    # An interpolated float32 normal errs by a few 1e-7; 1e-4 rad would show on no picture.
+    normal: _Error = 1e-4
+    # Of the pixels: a float32 ray may flip one at an edge.
+    share: _Share = 2e-4
+
+
+class HitLimits(_Table):
+    """Rays of one family on one mesh."""
+
+    # Exact arithmetic says so, and it has no rounding to excuse.
+    wrong: _Count = 0
+    # Closest and any hit have one definition of a hit.
+    any_hit_differs: _Count = 0
+    # Rays within float64 rounding of an edge, in families that aim at none: one would be a chance of 1e-9 a ray.
+    near_edge: _Count = 0
+
+
+class Thresholds(_Table):
+    """All that can be moved; what the stability section asks for is derived from rounding and cannot."""
+
+    pictures: Pictures = Pictures()
+    aovs: Aovs = Aovs()
+    hits: HitLimits = HitLimits()
+
+
+# Why a quantity of a picture is asked for.
+REASONS = {
+    "ssim": "structure: an edge, a normal or a bounce out of place",
+    "ssim_foreground": "the same over the objects alone, which a flat background cannot raise",
+    "pixel_share": "share of pixels off by more than 1/255 in sRGB",
+    "mean_error": "brightness, which SSIM does not see; linear radiance",
+    "max_error": "one wrong pixel outside the fragile ones; sRGB",
+}
+
+
+def load_thresholds(path: str | Path) -> Thresholds:
+    """The suite's own thresholds with those of a TOML file in their places.
+
+    Raises ``ValueError`` that names the file, the key and what was expected, and ``OSError`` where it cannot be read.
+    """
+    try:
+        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except ValueError as error:  # TOML's own, or bad UTF-8
+        raise ValueError(f"{path}: expected TOML, got a syntax error: {error}") from None
+    try:
+        return Thresholds.model_validate(_merged(Thresholds().model_dump(), table))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(key) for key in first["loc"])
+        fault = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+        raise ValueError(f"{path}: {where}: {fault}, got {first['input']!r}") from None
+
+
+def _merged(base: dict[str, object], changes: dict[str, object]) -> dict[str, object]:
+    """``base`` with the values of ``changes``, table by table."""
+    merged = dict(base)
+    for key, value in changes.items():
+        below = base.get(key)
+        merged[key] = _merged(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    return merged
