@@ -103,7 +103,8 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="command")
     render = commands.add_parser("render", help="render a scene file to a picture")
     render.add_argument("scene", type=Path)
-    render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=".png, or .npy for linear radiance")
+    formats = ".png, or .exr or .npy for linear radiance"
+    render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=formats)
     render.add_argument("--resolution", type=_resolution, metavar="WxH", help="pixels, such as 512x512")
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
     render.add_argument("--samples", type=int, metavar="N", help="samples a pixel: 1, 4, 9, ...")

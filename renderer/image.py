@@ -3,7 +3,7 @@
 import io
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect
+from renderer.exr import check_exr, exr_bytes
 
 
 def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
@@ -59,11 +60,19 @@ class Image:
     render_seconds: float
 
     def save(self, path: str | Path) -> None:
-        """Write ``.png`` (8-bit sRGB) or ``.npy`` (the linear radiance, float32), whole or not at all."""
+        """Write ``.png`` (8-bit sRGB), ``.exr`` or ``.npy`` (the linear radiance, float32), whole or not at all.
+
+        An EXR file also has the depth as Z and the normal as normal.X, normal.Y and normal.Z, float32. It needs the
+        package OpenEXR.
+        """
         suffix = Path(path).suffix.lower()
         check_picture_path(path)
         if suffix == ".npy":
             write_atomically(path, lambda file: np.save(file, self.radiance))
+        elif suffix == ".exr":
+            normal = {f"normal.{axis}": self.normal[..., i].copy() for i, axis in enumerate("XYZ")}
+            with np.errstate(over="ignore"):  # a depth beyond float32 becomes inf, as a miss is
+                write_exr(path, self.radiance, {"Z": self.depth.astype(np.float32), **normal})
         else:
             write_atomically(path, lambda file: file.write(self._repr_png_()))
 
@@ -80,6 +89,18 @@ class Image:
 def check_picture_path(path: str | Path) -> None:
     """Raise ``ValueError`` unless ``save`` can write there; worth asking before a long render."""
     path = Path(path)
-    expect(path.suffix.lower() in (".png", ".npy"), "output", "a .png or .npy file", repr(str(path)))
+    expect(path.suffix.lower() in (".png", ".exr", ".npy"), "output", "a .png, .exr or .npy file", repr(str(path)))
     expect(path.parent.is_dir(), "output", "a path in an existing folder", repr(str(path)))
     expect(not path.is_dir(), "output", "a file", f"the folder {str(path)!r}")
+    if path.suffix.lower() == ".exr":
+        check_exr()
+
+
+def write_exr(path: str | Path, radiance: ArrayLike, layers: Mapping[str, NDArray[np.float32]] | None = None) -> None:
+    """Write linear ``radiance`` (h, w, 3) as R, G and B, and further ``layers`` (h, w), as float32 without loss.
+
+    Whole or not at all. Raises ``ValueError`` where the package OpenEXR is absent.
+    """
+    channels = {"RGB": np.ascontiguousarray(radiance, np.float32), **(layers or {})}
+    content = exr_bytes(channels)
+    write_atomically(path, lambda file: file.write(content))

@@ -2,6 +2,7 @@
 
 import io
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,8 @@ def image(radiance: Any = None) -> Image:
     shape = radiance.shape[:2]
     return Image(
         radiance=radiance,
-        depth=np.ones(shape),
-        normal=np.zeros((*shape, 3), np.float32),
+        depth=np.where(np.arange(np.prod(shape)).reshape(shape) % 3, 1.25, np.inf),
+        normal=np.random.default_rng(2).normal(size=(*shape, 3)).astype(np.float32),
         face=np.zeros(shape, np.int32),
         rays=np.ones(shape, np.int32),
         build_seconds=0.0,
@@ -64,6 +65,31 @@ def test_npy_holds_the_radiance(tmp_path: Path) -> None:
     picture.save(str(tmp_path / "a.NPY"))
     loaded = np.load(tmp_path / "a.NPY")
     assert loaded.dtype == np.float32 and loaded.tobytes() == picture.radiance.tobytes()
+
+
+def test_exr_holds_the_radiance_and_its_layers(tmp_path: Path) -> None:
+    """Read back by Mitsuba's reader, which is not the package that wrote it."""
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    picture = image()
+    picture.save(tmp_path / "a.exr")
+    read = mi.Bitmap(str(tmp_path / "a.exr"))
+    channels = {field.name: np.array(read)[..., i] for i, field in enumerate(read.struct_())}
+    assert all(np.array_equal(channels[name], picture.radiance[..., i]) for i, name in enumerate("RGB"))
+    assert all(np.array_equal(channels[f"normal.{name}"], picture.normal[..., i]) for i, name in enumerate("XYZ"))
+    assert np.array_equal(channels["Z"], picture.depth.astype(np.float32)) and len(channels) == 7
+    assert [p.name for p in tmp_path.iterdir()] == ["a.exr"]
+
+
+def test_exr_without_its_package_is_refused_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    for call in (check_picture_path, image().save):
+        with pytest.raises(ValueError, match=r"output: expected the package OpenEXR .*octree-renderer\[exr\]"):
+            call(tmp_path / "a.exr")
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_existing_file_is_replaced(tmp_path: Path) -> None:
@@ -136,7 +162,7 @@ def test_names_as_long_as_the_file_system_allows(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["a.jpg", "a", "a.png.txt", ".png", "png"])
 def test_unknown_suffixes(tmp_path: Path, name: str) -> None:
     for call in (check_picture_path, image().save):
-        with pytest.raises(ValueError, match=r"output: expected a \.png or \.npy file, got .*" + name):
+        with pytest.raises(ValueError, match=r"output: expected a \.png, \.exr or \.npy file, got .*" + name):
             call(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
