@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN    := .venv/bin
 STAMP  := .venv/.stamp
 
-# make validate QUICK=1 ARGS="--only hits"
+# make validate QUICK=1 ARGS="--only hits"; ARGS=--defects and ARGS=--write-baseline likewise
 QUICK  ?=
 ARGS   ?=
 

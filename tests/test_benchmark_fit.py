@@ -8,8 +8,8 @@ import pytest
 
 from validation.benchmark import frames, libllvm, processes
 from validation.benchmark.fit import log_fit
-from validation.benchmark.rounds import interleaved, ratio
 from validation.benchmark.targets import Target, judged
+from validation.tradeoff import interleaved, ratio
 
 
 def test_a_fit_finds_the_law_that_made_the_costs() -> None:

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer import Mesh, Octree, load_scene
-from validation import exact
+from validation import exact, tradeoff_hits
 from validation.benchmark import knobs_hits, knobs_pictures, pareto
-from validation.tradeoff import front, median_seconds, slope, timed
 from validation.cases import CASES
 from validation.rays import random_rays
+from validation.tradeoff import front, median_seconds, slope, timed
 
 # Few values, so that equal costs and equal errors are common.
 POINTS = st.lists(st.tuples(st.integers(0, 6).map(float), st.integers(0, 6).map(float)), max_size=20)
@@ -124,7 +124,7 @@ def test_no_option_of_the_tree_changes_a_bit(hits):
 
 
 def test_a_tree_that_answers_otherwise_is_reported(monkeypatch):
-    mesh = knobs_hits.turned_mesh(2)
+    mesh = tradeoff_hits.turned_mesh(2)
     rays = random_rays(mesh.triangles, 300, np.random.default_rng(1))
     moved = Mesh(np.nextafter(mesh.vertices, np.inf), mesh.faces)
     built = knobs_hits._built
@@ -140,7 +140,7 @@ def test_a_tree_that_answers_otherwise_is_reported(monkeypatch):
 
 @pytest.mark.parametrize("field", ["t", "face", "u", "v"])
 def test_one_changed_bit_of_any_field_is_counted(field):
-    mesh = knobs_hits.turned_mesh(2)
+    mesh = tradeoff_hits.turned_mesh(2)
     rays = random_rays(mesh.triangles, 50, np.random.default_rng(1))
     hits = Octree.from_mesh(mesh).closest_hit(rays.origins, rays.directions)
     changed = getattr(hits, field).copy()
@@ -155,13 +155,13 @@ def test_errors_count_every_kind_of_wrong_answer():
     origins = np.array([[0.2, 0.2, 1.0]] * 4 + [[2.0, 2.0, 1.0]] * 2)
     directions = np.array([[0.0, 0.0, -1.0]] * 6)
     truth = exact.closest_hits(triangle + below, [[0, 1, 2], [3, 4, 5]], origins, directions)
-    answer = knobs_hits.Answer(
+    answer = tradeoff_hits.Answer(
         np.array([1.0, 1.25, 2.0, np.inf, np.inf, 3.0]), np.array([0, 0, 1, -1, -1, 1], dtype=np.int64)
     )
-    found = knobs_hits.errors(answer, truth)
+    found = tradeoff_hits.errors(answer, truth)
     assert (found["missed"], found["false_hits"], found["wrong_face"], found["both_hit"]) == (1, 1, 1, 3)
     assert found["p50"] == 0.25 and found["max"] == 1.0
-    nothing = knobs_hits.errors(knobs_hits.Answer(np.full(6, np.inf), np.full(6, -1)), truth)
+    nothing = tradeoff_hits.errors(tradeoff_hits.Answer(np.full(6, np.inf), np.full(6, -1)), truth)
     assert nothing["max"] is None and nothing["missed"] == 4
 
 

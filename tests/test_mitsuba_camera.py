@@ -5,9 +5,10 @@ import pytest
 from numpy.typing import NDArray
 
 from renderer.camera import OrthographicCamera, PerspectiveCamera
-from validation.gates import CAMERA_PIXELS
 from validation.mitsuba_camera import largest_distance
+from validation.thresholds import Pictures
 
+CAMERA_PIXELS = Pictures().camera_pixels
 PERSPECTIVE = PerspectiveCamera(eye=(1.0, 2.0, 5.0), target=(0.2, 0.5, 0.0), fov=37.0)
 ORTHOGRAPHIC = OrthographicCamera(type="orthographic", eye=(3.0, 4.0, 5.0), target=(0.0, 1.0, 0.0), height=4.0)
 

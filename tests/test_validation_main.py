@@ -1,95 +1,261 @@
-"""The command ``python -m validation``: exit codes, what it writes, and that the page says what the metrics say."""
+"""The command ``python -m validation``: exit codes, what it writes and leaves alone, and what it prints."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 
 from validation import __main__ as command
-from validation import efficiency, hits, images
+from validation import defects, numerical, report, schema, suite
+from validation.defects_list import DEFECTS
 from validation.gates import Gate
+from validation.job import Job
+
+SCENE = Path(__file__).parent.parent / "scenes" / "stairs.toml"
+MESH = SCENE.parent / "models" / "stairs.ply"
 
 
-def good(subject: str = "subject") -> Gate:
-    return Gate("hits", subject, "errors", 0.0, "at most", 0.0, "a reason")
+class Fake:
+    """A section that answers at once with gates of zero errors; a test may change everything."""
+
+    def __init__(self, name: str) -> None:
+        self.gates = [Gate(name, "subject", "errors", 0.0, "at most", 0.0, "a reason")]
+        self.record: dict[str, Any] = {"costs": {"a reference": 1.5}, "ours_sha256": "ab"}
+        self.jobs: list[Job] = []
+        self.before: Callable[[Job], None] = lambda job: None
+
+    def steps(self, job: Job) -> int:
+        return 2
+
+    def run(self, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+        self.jobs.append(job)
+        self.before(job)
+        job.step("one")
+        job.step("two")
+        return dict(self.record), self.gates
 
 
 @pytest.fixture
-def sections(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Sections that answer at once; a test may change their gates."""
-    found: dict[str, Any] = {"hits": [good()], "images": [good()]}
-    monkeypatch.setattr(hits, "run", lambda quick, step: ({"families": [], "leaks": []}, found["hits"]))
-    monkeypatch.setattr(
-        images, "run", lambda quick, folder, step: ({"size": 8, "scenes": []}, found["images"])
-    )
-    return found
+def sections(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Fake]:
+    """Sections that answer at once; on the page each is one line."""
+    templates = tmp_path_factory.mktemp("templates")
+    (templates / "plain.html").write_text("<p>a section</p>")
+    monkeypatch.setattr(report, "_TEMPLATES", [report._TEMPLATES, templates])
+    plain = {name: (title, "plain.html") for name, (title, _) in report.PARTIALS.items()}
+    monkeypatch.setattr(report, "PARTIALS", plain)
+    fakes = {name: Fake(name) for name in report.PARTIALS}
+    modules = {"numerical": "stability"}
+    monkeypatch.setattr(suite, "import_module", lambda name: fakes[modules.get(name.split(".")[1], name.split(".")[1])])
+    return fakes
 
 
-def test_all_gates_hold(tmp_path: Path, sections: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
-    assert command.main(["--only", "hits", "--output", str(tmp_path)]) == 0
-    assert "all 1 gates hold" in capsys.readouterr().out
-    metrics = json.loads((tmp_path / "metrics.json").read_text())
-    assert metrics["gates"][0]["passed"] is True
-    assert "All 1 gates hold" in (tmp_path / "index.html").read_text()
+def metrics(folder: Path) -> dict[str, Any]:
+    return schema.read(folder / "metrics.json")
+
+
+def test_all_gates_hold(tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["--output", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line[:5] for line in lines[:-1]] == ["[1/8]", "[2/8]", "[3/8]", "[4/8]", "[5/8]", "[6/8]", "[7/8]", "[8/8]"]
+    assert lines[-1].startswith("validation: PASS, 4 of 4 gates in ")
+    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 4, "failed": 0}
+    assert ET.parse(tmp_path / "junit.xml").getroot().get("failures") == "0"
+    assert "4 of 4 gates hold" in (tmp_path / "index.html").read_text()
 
 
 def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
-    tmp_path: Path, sections: dict[str, Any], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    sections["hits"].append(Gate("hits", "torus", "leaks", 3.0, "at most", 0.0, "a closed mesh has no holes"))
+    sections["hits"].gates.append(Gate("hits", "torus", "leaks", 3.0, "at most", 0.0, "a closed mesh has no holes"))
     assert command.main(["--only", "hits", "--output", str(tmp_path)]) == 1
-    assert "FAILED torus: leaks is 3" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "FAILED hits: torus: leaks is 3, expected at most 0" in out
+    assert "validation: FAIL, 1 of 2 gates" in out
     page = (tmp_path / "index.html").read_text()
-    assert "1 of 2 gates fail" in page
-    assert "torus: leaks is 3, expected at most 0" in page
+    assert "FAIL" in page and page.index("torus: leaks") < page.index('id="checked"')
+    assert "a closed mesh has no holes" in (tmp_path / "junit.xml").read_text()
 
 
-def test_no_gate_is_no_success(tmp_path: Path, sections: dict[str, Any]) -> None:
-    sections["hits"].clear()
+def test_no_gate_is_no_success(
+    tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]
+) -> None:
+    sections["hits"].gates.clear()
     assert command.main(["--only", "hits", "--output", str(tmp_path)]) == 1
+    assert "FAIL, nothing judged" in capsys.readouterr().out
 
 
-def test_the_page_needs_nothing_from_outside(tmp_path: Path, sections: dict[str, Any]) -> None:
-    command.main(["--only", "hits", "--output", str(tmp_path)])
-    page = (tmp_path / "index.html").read_text()
-    assert "src=\"http" not in page and "href=\"http" not in page and "<script src" not in page
+def test_a_gate_counts_in_the_section_that_ran(tmp_path: Path, sections: dict[str, Fake]) -> None:
+    sections["images"].gates = [Gate("monte carlo", "glass", "errors", 1.0, "at most", 0.0, "a reason")]
+    assert command.main(["--only", "images", "--output", str(tmp_path)]) == 1
+    assert ET.parse(tmp_path / "junit.xml").find("testsuite[@name='images']/testcase/failure") is not None
 
 
-def test_unknown_sections_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+class TestUserFiles:
+    def test_only_the_sections_that_judge_them_run(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
+        assert command.main(["--scene", str(SCENE), "--output", str(tmp_path)]) == 0
+        assert sections["images"].jobs[0].scenes == (SCENE,) and not sections["images"].jobs[0].own
+        assert [name for name, fake in sections.items() if fake.jobs] == ["images"]
+        left_out = metrics(tmp_path)["left_out"]
+        assert left_out["hits"] == "no file was given by --mesh"
+        assert left_out.keys() == {"hits", "stability", "efficiency"}
+        page = (tmp_path / "index.html").read_text()
+        assert all(reason in page for reason in left_out.values())
+
+    def test_scene_and_mesh(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
+        assert command.main(["--scene", str(SCENE), "--mesh", str(MESH), "--output", str(tmp_path)]) == 0
+        assert sections["hits"].jobs[0].meshes == (MESH,)
+        assert metrics(tmp_path)["left_out"].keys() == {"stability", "efficiency"}
+
+    @pytest.mark.parametrize(
+        ("option", "text"), [("--scene", "camera = 3"), ("--mesh", "ply?"), ("--gate", "[hits]\nmagic = 1")]
+    )
+    def test_a_bad_file_is_one_line_and_exit_code_2_before_anything_runs(
+        self, option: str, text: str, tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        bad = tmp_path / ("bad.ply" if option == "--mesh" else "bad.toml")
+        bad.write_text(text)
+        assert command.main([option, str(bad), "--output", str(tmp_path / "out")]) == 2
+        error = capsys.readouterr().err
+        assert error.startswith("validation: ") and str(bad) in error and error.count("\n") == 1
+        assert not any(fake.jobs for fake in sections.values())
+        assert not (tmp_path / "out").exists()
+
+    @pytest.mark.parametrize("option", ["--scene", "--mesh", "--gate"])
+    def test_a_missing_file(self, option: str, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]) -> None:
+        assert command.main([option, "nowhere.toml"]) == 2
+        assert "nowhere.toml" in capsys.readouterr().err
+
+    def test_moved_thresholds_reach_the_sections_and_the_page(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
+        gate = tmp_path / "gate.toml"
+        gate.write_text("[pictures.own]\nssim = 0.5\n")
+        assert command.main(["--only", "hits", "--gate", str(gate), "--output", str(tmp_path)]) == 0
+        assert sections["hits"].jobs[0].thresholds.pictures.own.ssim == 0.5
+        assert "pictures.own.ssim" in (tmp_path / "index.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--only", "hits,magic"], "'magic'"),
+        (["--only", "hits", "--scene", "a.toml"], "no section is left to run"),
+        (["--defects", "--only", "hits"], "got --only too"),
+        (["--defects", "--mesh", "a.ply"], "got --mesh too"),
+        (["--write-baseline", "--gate", "a.toml"], "got --gate too"),
+    ],
+)
+def test_arguments_at_odds_are_refused(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
-        command.main(["--only", "hits,magic"])
+        command.main(arguments)
     assert stopped.value.code == 2
-    assert "'magic'" in capsys.readouterr().err
+    assert words in capsys.readouterr().err
 
 
-def test_a_missing_reference_is_exit_code_2(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_help_documents_the_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        command.main(["--help"])
+    assert "1    a gate fails, or nothing was judged" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("raised", "code"),
+    [(ModuleNotFoundError("No module named 'embreex'"), 2), (ValueError("mesh: no"), 2), (KeyboardInterrupt(), 130)],
+)
+def test_a_run_that_ends_early_leaves_the_old_report_untouched(
+    raised: BaseException, code: int, tmp_path: Path, sections: dict[str, Fake]
 ) -> None:
-    def missing(*_: Any) -> None:
-        raise ModuleNotFoundError("No module named 'embreex'", name="embreex")
+    def break_off(job: Job) -> None:
+        (job.folder / "picture.png").write_bytes(b"new")
+        if code != 0:
+            raise raised
 
-    monkeypatch.setattr(hits, "run", missing)
-    assert command.main(["--only", "hits", "--output", str(tmp_path)]) == 2
-    assert "embreex" in capsys.readouterr().err
-    assert not (tmp_path / "index.html").exists()
-
-
-def test_ctrl_c_writes_no_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: Any) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(hits, "run", interrupted)
-    assert command.main(["--only", "hits", "--output", str(tmp_path)]) == 130
-    assert not (tmp_path / "metrics.json").exists()
+    sections["hits"].before = lambda job: (job.folder / "picture.png").write_bytes(b"old") and None
+    assert command.main(["--only", "hits", "--output", str(tmp_path)]) == 0
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert tmp_path / "pictures" / "picture.png" in before
+    sections["hits"].before = break_off
+    assert command.main(["--only", "hits", "--output", str(tmp_path)]) == code
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
-def test_efficiency_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(efficiency, "RUNS", 1)
-    monkeypatch.setattr(efficiency, "_ORIGIN_ROWS", (("brute", 8, 1), ("octree", 8, 1), ("octree", 16, 2)))
-    # No gates: the exit code says that nothing was proven, the page still shows the times.
-    assert command.main(["--quick", "--only", "efficiency", "--output", str(tmp_path)]) == 1
-    page = (tmp_path / "index.html").read_text()
-    metrics = json.loads((tmp_path / "metrics.json").read_text())
-    assert metrics["efficiency"]["hits"]["families"][0]["mrays"]["ours"] > 0
-    assert "Brute force against octree" in page
+def test_a_record_that_is_no_json_names_its_section(tmp_path: Path, sections: dict[str, Fake]) -> None:
+    sections["hits"].record["value"] = float("nan")
+    with pytest.raises(RuntimeError, match="hits"):
+        command.main(["--only", "hits", "--output", str(tmp_path)])
+
+
+def test_the_baseline_is_written_read_and_named_in_the_summary(
+    tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--output", str(tmp_path)]
+    assert command.main([*arguments, "--quick"]) == 0
+    assert command.main([*arguments, "--write-baseline"]) == 2
+    assert "got a quick run" in capsys.readouterr().err
+    assert command.main(arguments) == 0
+    assert command.main([*arguments, "--write-baseline"]) == 0
+    sections["hits"].gates = [Gate("hits", "subject", "errors", 2.0, "at most", 0.0, "a reason")]
+    assert command.main(arguments) == 1
+    assert "better 0, worse 1 than baseline" in capsys.readouterr().out
+    assert "2 (fails) now" in (tmp_path / "index.html").read_text()
+
+
+class TestDefects:
+    @pytest.fixture
+    def answers(self, monkeypatch: pytest.MonkeyPatch) -> list[defects.Answer]:
+        """What each process would have said; the first is the control."""
+        answers: list[defects.Answer] = []
+
+        def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, Any], list[Gate]]:
+            chosen = list(DEFECTS[:1])
+            return defects.record(chosen, answers[0], answers[1:]), defects.gates(chosen, answers[0], answers[1:])
+
+        monkeypatch.setattr(defects, "run", run)
+        return answers
+
+    def test_the_record_is_stored_and_every_report_shows_it(
+        self, tmp_path: Path, sections: dict[str, Fake], answers: list[defects.Answer], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        output = ["--output", str(tmp_path)]
+        assert command.main(["--only", "hits", *output]) == 0
+        assert "No run is stored" in (tmp_path / "index.html").read_text()
+        gates = ("hits: a: b",)
+        answers += [defects.Answer(gates, red, None, 1.0) for red in ((), gates)]
+        assert command.main(["--defects", *output]) == 0
+        assert "The sources are the same now" in (tmp_path / "index.html").read_text()
+        assert metrics(tmp_path)["facts"][0]["value"] == 1
+        monkeypatch.setattr(suite.environment, "sources_sha256", lambda: "others")
+        assert command.main(["--only", "hits", *output]) == 0
+        assert "The sources have changed since" in (tmp_path / "index.html").read_text()
+
+    def test_one_that_is_let_through_is_exit_code_1(
+        self, tmp_path: Path, answers: list[defects.Answer], capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        answers += [defects.Answer(("hits: a: b",), (), None, 1.0)] * 2
+        assert command.main(["--defects", "--output", str(tmp_path)]) == 1
+        assert "gates turned red is 0, expected at least 1" in capsys.readouterr().out
+        assert json.loads((tmp_path / "defects.json").read_text())["caught"] == 0
+
+
+def test_stability_counts_its_steps(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    class Answer:
+        number, construct, tolerance = 1, "a case", "none"
+
+        def record(self, *_: object) -> dict[str, object]:
+            return {"holds": False}
+
+    monkeypatch.setattr(numerical, "CASES", (Answer(), Answer()))
+    few = numerical.watertight.closed_meshes()[:2]
+    monkeypatch.setattr(numerical.watertight, "closed_meshes", lambda: few)
+    for name in ("shoot", "shoot_embree"):
+        monkeypatch.setattr(numerical.watertight, name, lambda *_: [])
+    for name in ("judge", "leak_row"):
+        monkeypatch.setattr(numerical.stability, name, lambda *_: [])
+    monkeypatch.setattr(numerical.stability, "point", lambda *_: Answer())
+    taken: list[str] = []
+    job = Job(True, suite.Thresholds(), tmp_path, taken.append)
+    record, gates = numerical.run(job)
+    assert len(taken) == numerical.steps(job)
+    assert [gate.passed for gate in gates] == [False, False]
+    assert set(record) == {"cases", "watertight", "curves", "costs"}

@@ -1,128 +1,133 @@
-"""``python -m validation``: run the checks, write ``metrics.json`` and ``index.html``, exit 1 when a gate fails.
+"""``python -m validation``: judge hits and pictures, write the report, exit 1 when a gate fails.
 
-Exit codes: 0 all gates hold, 1 at least one fails, 2 bad arguments or a missing reference, 130 after Ctrl-C.
+Exit codes:
+  0    every gate holds
+  1    a gate fails, or nothing was judged
+  2    a bad argument, a bad file (scene, mesh, thresholds, baseline), or a missing reference
+  130  Ctrl-C; the report that was there before is untouched
 """
 
 import argparse
-import json
 import shlex
 import sys
-import time
-from collections.abc import Callable, Sequence
-from datetime import UTC, datetime
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-SECTIONS = ("hits", "images", "stability", "efficiency")
+from validation.sections import NAMES, choose
+
+if TYPE_CHECKING:
+    from validation.gates import Gate
+    from validation.suite import Request
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what the arguments ask for; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    """Do what the arguments ask for; returns the exit code."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    _check(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        return _run(options, "python -m validation " + shlex.join(given))
+        return _run(options, ("python -m validation " + shlex.join(given)).strip())
     except KeyboardInterrupt:
         print("validation: interrupted, no report written", file=sys.stderr)
         return 130
     except (ImportError, ValueError, OSError) as error:
         missing = "; pip install 'octree-renderer[validate]'" if isinstance(error, ImportError) else ""
-        print(f"validation: {error}{missing}", file=sys.stderr)
+        print(f"validation: {' '.join(str(error).split())}{missing}", file=sys.stderr)
         return 2
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m validation", description="Check hits and pictures.")
+    parser = argparse.ArgumentParser(
+        prog="python -m validation",
+        description="Judge hits and pictures by references that nobody here wrote; write a report.",
+        epilog=(__doc__ or "").partition("\n\n")[2],
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--quick", action="store_true", help="fewer rays and smaller pictures, under 3 minutes")
-    parser.add_argument("--only", type=_sections, default=SECTIONS, metavar="A,B", help=f"of {', '.join(SECTIONS)}")
-    parser.add_argument("--output", type=Path, default=Path("reports"), help="folder of the report")
+    parser.add_argument("--only", type=_sections, default=NAMES, metavar="A,B", help=f"of {', '.join(NAMES)}")
+    parser.add_argument("--output", type=Path, default=Path("reports"), metavar="DIR", help="folder of the report")
+    parser.add_argument("--gate", type=Path, metavar="FILE", help="TOML file that moves thresholds")
+    for name, section in (("scene", "images"), ("mesh", "hits")):
+        parser.add_argument(
+            f"--{name}", type=Path, action="append", default=[], metavar="FILE",
+            help=f"judge this {name} and not the suite's own, in the section {section}; may be given again",
+        )  # fmt: skip
+    parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about 20 minutes")
+    parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
     return parser
 
 
 def _sections(text: str) -> tuple[str, ...]:
     names = tuple(text.split(","))
-    unknown = [name for name in names if name not in SECTIONS]
+    unknown = [name for name in names if name not in NAMES]
     if unknown:
-        raise argparse.ArgumentTypeError(f"expected some of {', '.join(SECTIONS)}, got {unknown[0]!r}")
+        raise argparse.ArgumentTypeError(f"expected some of {', '.join(NAMES)}, got {unknown[0]!r}")
     return names
+
+
+def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """End with exit code 2 where arguments are at odds."""
+    kinds = {kind for kind in ("scene", "mesh") if getattr(options, kind)}
+    if options.defects or options.write_baseline:
+        alone = "--defects" if options.defects else "--write-baseline"
+        others = [f"--{kind}" for kind in sorted(kinds)] + ["--gate"] * (options.gate is not None)
+        others += ["--only"] * (options.only != NAMES)
+        others += ["--write-baseline"] * (options.defects and options.write_baseline)
+        if others:
+            parser.error(f"{alone} goes with --output alone{' and --quick' * options.defects}, got {others[0]} too")
+    chosen, left_out = choose(options.only, kinds)
+    if not chosen:
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
+        parser.error(f"no section is left to run ({reasons})")
 
 
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here so that --help and wrong arguments answer at once, and a missing reference becomes one line.
-    from renderer.image import write_atomically
-    from validation import environment, report
-    from validation.gates import Gate
+    from validation import suite
 
-    pictures = options.output / "pictures"
-    pictures.mkdir(parents=True, exist_ok=True)
-    began, started = time.perf_counter(), datetime.now(UTC)
-    metrics: dict[str, Any] = {"schema": 1, "command": command.strip(), "quick": options.quick}
-    gates: list[Gate] = []
-    with _steps() as step:
-        for section in SECTIONS:
-            if section in options.only:
-                section_began = time.perf_counter()
-                record, found = _section(section, options.quick, pictures, step)
-                metrics[section] = record | {"seconds": time.perf_counter() - section_began}
-                gates += found
-    metrics["started"] = started.isoformat(timespec="seconds")
-    metrics["seconds"] = time.perf_counter() - began
-    metrics["environment"] = environment.describe()
-    metrics["gates"] = [gate.record() for gate in gates]
-    text = json.dumps(metrics, indent=1, allow_nan=False)
-    write_atomically(options.output / "metrics.json", lambda file: file.write(text.encode()))
-    page = report.page(metrics, pictures)
-    write_atomically(options.output / "index.html", lambda file: file.write(page.encode()))
-    return _verdict(gates, options.output / "index.html", metrics["seconds"])
+    if options.write_baseline:
+        print(f"validation: wrote {suite.write_baseline(options.output)}")
+        return 0
+    asked = suite.Request(
+        command, options.quick, options.only, options.output, options.gate, tuple(options.scene), tuple(options.mesh)
+    )
+    if options.defects:
+        return _defects_verdict(suite.run_defects(asked), asked)
+    return _verdict(suite.run(asked), asked)
 
 
-def _section(
-    name: str, quick: bool, pictures: Path, step: Callable[[str], None]
-) -> tuple[dict[str, Any], list[Any]]:
-    """Run one section; the references it needs are imported with it."""
-    if name == "hits":
-        from validation import hits
-
-        return hits.run(quick, step)
-    if name == "images":
-        from validation import images
-
-        return images.run(quick, pictures, step)
-    if name == "stability":
-        from validation import numerical
-
-        return numerical.run(quick, step)
-    from validation import efficiency
-
-    return efficiency.run(quick, step), []
+def _verdict(metrics: Mapping[str, Any], asked: "Request") -> int:
+    """Print the failing gates and the summary in one line; returns the exit code."""
+    _print_failures(metrics["gates"])
+    passed, gates, failed = (metrics["verdict"][key] for key in ("passed", "gates", "failed"))
+    count = f"{gates - failed} of {gates} gates" if gates else "nothing judged"
+    against = ""
+    if "absent" not in metrics["baseline"]:
+        better, worse = (len(metrics["baseline"][key]) for key in ("better", "worse"))
+        against = f"; better {better}, worse {worse} than baseline"
+    state, page = "PASS" if passed else "FAIL", asked.output / "index.html"
+    print(f"validation: {state}, {count} in {metrics['seconds']:.0f} s{against}; see {page}")
+    return 0 if passed else 1
 
 
-class _steps:  # noqa: N801  # read as a function: with _steps() as step
-    """A progress bar on a terminal that names the step; a line a step elsewhere."""
-
-    def __enter__(self) -> Callable[[str], None]:
-        from tqdm import tqdm
-
-        self._bar = tqdm(bar_format="{n} steps, {elapsed}  {desc}", disable=not sys.stderr.isatty())
-        return self._next
-
-    def _next(self, name: str) -> None:
-        self._bar.set_description_str(name)
-        self._bar.update()
-        if self._bar.disable:
-            print(name, flush=True)
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
+def _defects_verdict(gates: Sequence["Gate"], asked: "Request") -> int:
+    """The same for a run of the seeded defects, whose gates are the defects."""
+    _print_failures([gate.record() for gate in gates])
+    held = sum(gate.passed for gate in gates)
+    state = "PASS" if gates and held == len(gates) else "FAIL"
+    stored = asked.output / "defects.json"
+    print(f"validation: {state}, {held} of {len(gates)} gates on seeded defects; see {stored}")
+    return int(state == "FAIL")
 
 
-def _verdict(gates: Sequence[Any], page: Path, seconds: float) -> int:
-    failed = [gate for gate in gates if not gate.passed]
-    for gate in failed:
-        print(f"FAILED {gate.subject}: {gate.quantity} is {gate.value:.6g}, expected {gate.bound} {gate.threshold:.6g}")
-    state = f"{len(failed)} of {len(gates)} gates failed" if failed else f"all {len(gates)} gates hold"
-    print(f"validation: {state} in {seconds:.0f} s; see {page}")
-    return 1 if failed or not gates else 0
+def _print_failures(gates: Sequence[Mapping[str, Any]]) -> None:
+    from validation import summary
+
+    for gate in gates:
+        if not gate["passed"]:
+            print(f"FAILED {gate['section']}: {gate['subject']}: {summary.failure(gate)}")
 
 
 if __name__ == "__main__":

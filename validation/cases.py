@@ -8,10 +8,11 @@ SCENES = Path(__file__).resolve().parent.parent / "scenes"
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file and what it is there to show."""
+    """A scene file, what it is there to show, and whether it has something for every rung of the ladder."""
 
     name: str
     shows: str
+    every_rung: bool = False
 
     @property
     def path(self) -> Path:
@@ -22,6 +23,7 @@ class Case:
 CASES = (
     Case("three_models", "three PLY models on a bounded floor: Phong, shadows, reflections"),
     Case("mirrors", "diffuse objects between mirrors: what a path integrator can judge without any recursion of ours"),
-    Case("glass", "dielectrics: refraction, total internal reflection, tinted glass, highlights"),
+    Case("glass", "dielectrics: refraction, total internal reflection, tinted glass, highlights", every_rung=True),
+    Case("checkered", "a diffuse, a mirroring and two glass objects on a checkered floor: what the benchmark renders"),
     Case("stairs", "flat faces under an orthographic camera, hits known by hand"),
 )

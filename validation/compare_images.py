@@ -2,7 +2,7 @@
 
 SSIM sees structure: an edge out of place, a wrong normal, a missing bounce. It is nearly blind to brightness
 (a gain of 1.10 leaves .998), so it never stands alone: the share of pixels that differ visibly, the mean
-error and the largest error go with it.
+error, the largest error and FLIP go with it. sRGB is what people see; linear radiance is what a renderer computes.
 """
 
 from collections.abc import Callable
@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
+
+from validation.flip import flip_map
 
 Picture = NDArray[np.floating[Any]]
 
@@ -41,20 +43,29 @@ class ImageComparison:
     ssim : mean structural similarity of the sRGB pictures, 1 when they are the same.
     ssim_foreground : its mean over the foreground's pixels, which a wide background cannot raise; None
         without a mask.
+    ssim_linear : the same of linear radiance clipped to [0, 1], which weighs the bright parts.
     pixel_share : share of pixels of which a channel is off by more than 1/255 in sRGB.
-    mean_error : mean absolute difference of linear radiance, not clipped.
-    max_error : largest difference in sRGB outside the fragile pixels, over all channels.
-    fragile_share : share of the pixels that ``max_error`` left out; bound it too: at 1 nothing was judged.
+    mean_error, rmse : mean absolute and root mean square difference of linear radiance, not clipped.
+    max_error, max_error_linear : largest difference in sRGB, and of linear radiance that is not clipped, outside
+        the fragile pixels, over all channels.
+    flip : mean of ``flip_map``.
+    fragile_share : share of the pixels that the largest errors left out; bound it too: at 1 nothing was judged.
     difference : (h, w) float64, largest difference in sRGB over the channels of each pixel.
+    flip_map : (h, w) float32, FLIP of the sRGB pictures, see ``flip.flip_map``.
     """
 
     ssim: float
     ssim_foreground: float | None
+    ssim_linear: float
     pixel_share: float
     mean_error: float
+    rmse: float
     max_error: float
+    max_error_linear: float
+    flip: float
     fragile_share: float
     difference: NDArray[np.float64]
+    flip_map: NDArray[np.float32]
 
 
 def srgb(linear: Picture) -> NDArray[np.float64]:
@@ -78,9 +89,32 @@ def compare(
     """
     _check(ours, reference, fragile, foreground)
     encoded, expected = srgb(ours), srgb(reference)
-    ssim, similarity = structural_similarity(
-        encoded,
-        expected,
+    similarity = _similarity(encoded, expected)
+    difference = np.abs(encoded - expected).max(axis=2)
+    error = np.abs(np.subtract(ours, reference, dtype=np.float64))
+    judged = np.ones(difference.shape, dtype=bool) if fragile is None else ~fragile
+    visible = flip_map(encoded, expected)
+    return ImageComparison(
+        ssim=_inner_mean(similarity),
+        ssim_foreground=None if foreground is None else float(similarity[foreground].mean()),
+        ssim_linear=_inner_mean(_similarity(np.clip(ours, 0.0, 1.0), np.clip(reference, 0.0, 1.0))),
+        pixel_share=float((difference > VISIBLE).mean()),
+        mean_error=float(error.mean()),
+        rmse=float(np.sqrt(np.mean(error**2))),
+        max_error=float(difference[judged].max(initial=0.0)),
+        max_error_linear=float(error[judged].max(initial=0.0)),
+        flip=float(visible.mean(dtype=np.float64)),
+        fragile_share=float((~judged).mean()),
+        difference=difference,
+        flip_map=visible,
+    )
+
+
+def _similarity(ours: Picture, reference: Picture) -> NDArray[np.float64]:
+    """SSIM around each pixel, (h, w, 3)."""
+    _, similarity = structural_similarity(
+        ours.astype(np.float64),
+        reference.astype(np.float64),
         data_range=1.0,
         channel_axis=2,
         gaussian_weights=True,
@@ -88,17 +122,13 @@ def compare(
         use_sample_covariance=False,
         full=True,
     )
-    difference = np.abs(encoded - expected).max(axis=2)
-    excused = np.zeros(difference.shape, dtype=bool) if fragile is None else fragile
-    return ImageComparison(
-        ssim=float(ssim),
-        ssim_foreground=None if foreground is None else float(similarity[foreground].mean()),
-        pixel_share=float((difference > VISIBLE).mean()),
-        mean_error=float(np.abs(np.subtract(ours, reference, dtype=np.float64)).mean()),
-        max_error=float(difference[~excused].max(initial=0.0)),
-        fragile_share=float(excused.mean()),
-        difference=difference,
-    )
+    return similarity
+
+
+def _inner_mean(similarity: NDArray[np.float64]) -> float:
+    """The published mean leaves out the rim, where the window reaches beyond the picture."""
+    rim = _WINDOW // 2
+    return float(similarity[rim:-rim, rim:-rim].mean())
 
 
 def fragile_pixels(render: Callable[[float, tuple[float, float]], Picture]) -> NDArray[np.bool_]:

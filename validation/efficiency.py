@@ -1,9 +1,10 @@
-"""Seconds: our closest hits beside Embree's in the same run, and the origin's table of brute force and octree."""
+"""The section on run time: rays a second beside Embree's, the origin's table, and error against seconds.
+
+Nothing here is gated, because speed on a shared machine proves nothing.
+"""
 
 import statistics
-import time
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -13,11 +14,14 @@ from renderer.octree import Octree
 from renderer.parallel import available_threads
 from renderer.render import render
 from renderer.scene import load_scene
+from validation import tradeoff_hits, tradeoff_pictures
 from validation.cases import SCENES
 from validation.embree import Embree
+from validation.gates import Gate
+from validation.job import Job
 from validation.rays import camera_rays, random_rays
+from validation.tradeoff import RUNS, interleaved, ratio, spending, timed
 
-RUNS = 5
 # The origin timed each of its configurations three times.
 ORIGIN_RUNS = 3
 # What the C++ program that this grew out of printed, on another machine and other models: 100 x 100, depth 3.
@@ -29,12 +33,26 @@ _ORIGIN_ROWS: tuple[tuple[Literal["octree", "brute"], int, int], ...] = (
 ORIGIN = {"brute_seconds": 205.4, "octree_seconds": 0.411}
 
 
-def run(quick: bool, step: Callable[[str], None]) -> dict[str, object]:
-    """Time hits and pictures; nothing here is gated, because speed on a shared machine proves nothing."""
-    return {"hits": _hits(200_000 if quick else 1_000_000, step), "origin": _origin(step)}
+def steps(job: Job) -> int:
+    """How often ``run`` calls ``job.step``: for two families of rays, the origin's rows, and error against run time."""
+    return 2 + len(_ORIGIN_ROWS) + 2
 
 
-def _hits(count: int, step: Callable[[str], None]) -> dict[str, object]:
+def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Time hits and pictures; returns a record for JSON and no gate."""
+    costs: dict[str, float] = {}
+    record: dict[str, Any] = {"hits": _hits(200_000 if job.quick else 1_000_000, job.step, costs)}
+    record["origin"] = _origin(job.step)
+    job.step("efficiency: error of hits against run time")
+    record["tradeoff_hits"] = tradeoff_hits.run(tradeoff_hits.QUICK if job.quick else tradeoff_hits.FULL, costs)
+    job.step("efficiency: error of pictures against run time")
+    effort = tradeoff_pictures.QUICK if job.quick else tradeoff_pictures.FULL
+    scene = load_scene(SCENES / "mirrors.toml")
+    record["tradeoff_pictures"], record["split"] = tradeoff_pictures.run(scene, "mirrors", effort, costs)
+    return record | {"costs": costs}, []
+
+
+def _hits(count: int, step: Callable[[str], None], costs: dict[str, float]) -> dict[str, object]:
     """Rays a second of ours and Embree's on one mesh and the same rays, in turn, after a warm-up."""
     mesh = load_mesh(SCENES / "models" / "displaced_sphere.ply")
     octree, embree = Octree.from_mesh(mesh), Embree(mesh.vertices, mesh.faces)
@@ -43,34 +61,22 @@ def _hits(count: int, step: Callable[[str], None]) -> dict[str, object]:
     families = []
     for rays in (camera_rays(mesh.vertices, count), random_rays(corners, count, np.random.default_rng(1))):
         step(f"efficiency: {rays.name} rays")
-        contenders: dict[str, Callable[[], Any]] = {
-            "ours": partial(octree.closest_hit, rays.origins, rays.directions),
-            "ours_one_thread": partial(single.closest_hit, rays.origins, rays.directions),
-            "embree": partial(embree.closest_hit, rays.origins, rays.directions),
+        queries: dict[str, Callable[..., Any]] = {
+            "ours": octree.closest_hit,
+            "ours_one_thread": single.closest_hit,
+            "embree": spending(costs, "Embree robust", embree.closest_hit),
         }
-        seconds = _interleaved(contenders)
-        ratios = [e / o for e, o in zip(seconds["embree"], seconds["ours"], strict=True)]
+        calls = {name: timed(query, rays.origins, rays.directions) for name, query in queries.items()}
+        seconds = interleaved(calls, RUNS)
         families.append(
             {
                 "rays": rays.name,
                 "count": len(rays),
                 "mrays": {k: len(rays) / statistics.median(v) / 1e6 for k, v in seconds.items()},
-                "ratio_to_embree": statistics.median(ratios),
+                "ratio_to_embree": ratio(seconds["embree"], seconds["ours"]),
             }
         )
     return {"mesh": "displaced_sphere", "faces": len(mesh.faces), "runs": RUNS, "families": families}
-
-
-def _interleaved(contenders: dict[str, Callable[[], Any]]) -> dict[str, list[float]]:
-    """Seconds of each contender in each of RUNS rounds; one round unseen first, for caches and compilation."""
-    seconds: dict[str, list[float]] = {name: [] for name in contenders}
-    for round_ in range(RUNS + 1):
-        for name, call in contenders.items():
-            began = time.perf_counter()
-            call()
-            if round_ > 0:
-                seconds[name].append(time.perf_counter() - began)
-    return seconds
 
 
 def _origin(step: Callable[[str], None]) -> dict[str, object]:

@@ -1,18 +1,22 @@
 """Where and with what a run was made, so that a reader can make it again."""
 
+import hashlib
 import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from renderer.parallel import available_threads
 
 PACKAGES = (
-    "octree-renderer", "numpy", "numba", "llvmlite", "embreex", "mitsuba", "drjit", "trimesh", "scikit-image",
+    "octree-renderer", "numpy", "numba", "llvmlite", "embreex", "libigl", "mitsuba", "drjit", "trimesh", "rtree",
+    "scikit-image", "flip-evaluator", "OpenEXR", "matplotlib",
 )  # fmt: skip
+_ROOT = Path(__file__).resolve().parent.parent
 
 
 def describe() -> dict[str, object]:
-    """Versions, processor and threads, ready for JSON."""
+    """Versions, processor, threads and the digest of the sources, ready for JSON."""
     return {
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -20,7 +24,17 @@ def describe() -> dict[str, object]:
         "processors": os.cpu_count(),
         "threads": available_threads(),
         "packages": {name: _version(name) for name in PACKAGES},
+        "sources": sources_sha256(),
     }
+
+
+def sources_sha256() -> str:
+    """SHA-256 over names and texts of ``renderer/*.py`` and ``validation/*.py``: changes when any of them does."""
+    digest = hashlib.sha256()
+    for path in sorted([*_ROOT.glob("renderer/*.py"), *_ROOT.glob("validation/*.py")]):
+        text = path.read_bytes()
+        digest.update(f"{path.relative_to(_ROOT).as_posix()} {len(text)}\n".encode() + text)
+    return digest.hexdigest()
 
 
 def _processor() -> str:

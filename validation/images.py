@@ -1,217 +1,250 @@
-"""Our pictures against Mitsuba's, scene by scene: AOVs first, then radiance under the same and our own offset rule."""
+"""Our pictures against Mitsuba's, scene by scene and rung by rung: first what primary rays meet, then radiance.
+
+Each rung of ``ladder`` is rendered by us under two rules for where spawned rays start, Mitsuba's ("matched") and ours
+("own"), and compared with every reference that can judge it. A rung that none can judge fails a gate.
+"""
 
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from renderer.camera import OrthographicCamera, PerspectiveCamera
-from renderer.image import Image, srgb, write_atomically
+from renderer.image import Image, srgb
 from renderer.render import render
 from renderer.scene import Scene, load_scene
-from validation import gates, mitsuba_camera, mitsuba_path, mitsuba_whitted
-from validation.cases import CASES, Case
-from validation.compare_images import ImageComparison, compare, fragile_pixels
+from validation import check_picture, compare_aovs, ladder, mitsuba_camera, mitsuba_path, mitsuba_whitted, monte_carlo
+from validation.cases import CASES
+from validation.check_picture import Pair, Rule
+from validation.compare_images import Picture, fragile_pixels
 from validation.gates import Gate
+from validation.job import Job
+from validation.ladder import Rung
+from validation.picture_files import write_png
+from validation.shifted_film import shifted
 
-Picture = NDArray[Any]
 WHITTED = "Whitted recursion over Mitsuba's scene, BSDFs and rays (scalar_rgb)"
 PATH = "Mitsuba's native path integrator (scalar_rgb)"
+AOVS = "Mitsuba's primary hits (scalar_rgb)"
+
+# SSIM's window.
+_SMALLEST = 11
+_Offset = Literal["bounded", "mitsuba"] | float
+_RULES: dict[Rule, _Offset] = {"matched": "mitsuba", "own": "bounded"}
 
 
-@dataclass(frozen=True)
-class Reference:
-    """A picture by somebody else: a short name for files, a name for people, the picture, the seconds it took."""
+class Reference(NamedTuple):
+    """Somebody else's renderer: a short name for files, a name for people, why it cannot judge a scene, its picture."""
 
     key: str
     name: str
-    radiance: Picture
-    seconds: float
+    can_judge: Callable[[Scene], str | None]
+    picture: Callable[..., Picture]
 
 
-def run(quick: bool, folder: Path, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:
-    """Check every scene; writes PNGs into ``folder`` and returns a record for JSON and the gates."""
-    size = 256 if quick else 512
-    records = []
+REFERENCES = (
+    Reference("whitted", WHITTED, lambda _: None, mitsuba_whitted.whitted),
+    Reference("path", PATH, mitsuba_path.can_judge, mitsuba_path.path),
+)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How large the pictures of a scene are: the longer side, in pixels.
+
+    size    of the scene as it is
+    lower   of the ladder's rungs below it; None leaves those out
+    paths   whether glass is judged by random paths too, in a picture of their own size
+    """
+
+    size: int
+    lower: int | None = None
+    paths: bool = True
+
+
+class _Task(NamedTuple):
+    """A rung, its picture's width and height, the references that judge it, and why the others cannot."""
+
+    rung: Rung
+    resolution: tuple[int, int]
+    references: tuple[Reference, ...]
+    left_out: dict[str, str]
+
+
+class _Plan(NamedTuple):
+    """The tasks of a scene, whether random paths judge it, why rungs are left out, and why Mitsuba cannot hold it."""
+
+    tasks: list[_Task]
+    paths: bool
+    left_out: dict[str, str]
+    fault: str | None
+
+    @property
+    def steps(self) -> int:
+        random = monte_carlo.STEPS if self.paths else 0
+        return (self.fault is None) + random + sum(1 + len(task.references) for task in self.tasks)
+
+
+def steps(job: Job) -> int:
+    """How often ``run`` calls ``job.step``: once for the main scene, the rest as the scenes' plans say."""
+    return job.own + sum(_plan(load_scene(path), effort).steps for _, _, path, effort in _scenes(job))
+
+
+def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Check every scene; writes PNGs into ``job.folder`` and returns a record for JSON and the gates."""
+    records: list[dict[str, Any]] = []
     found: list[Gate] = []
-    for case in CASES:
-        record, passed = _check_scene(case, size, folder, step)
+    for name, shows, path, effort in _scenes(job):
+        record, passed = check_scene(name, shows, load_scene(path), effort, job)
         records.append(record)
         found += passed
-    step("images: the main scene, 9 samples a pixel")
-    hero = render(load_scene(CASES[0].path), resolution=(960, 540), samples=9)
-    write_png(folder / "hero.png", srgb(hero.radiance))
-    shown = {"file": "hero.png", "seconds": hero.render_seconds, "rays": int(hero.rays.sum()), "samples": 9}
-    return {"size": size, "hero": shown, "scenes": records}, found
+    result: dict[str, Any] = {"scenes": records, "costs": _costs(records)}
+    if job.own:
+        job.step("pictures: the main scene, 9 samples a pixel")
+        result["hero"] = _hero(job)
+    return result, found
 
 
-def _check_scene(
-    case: Case, size: int, folder: Path, step: Callable[[str], None]
-) -> tuple[dict[str, object], list[Gate]]:
-    scene = load_scene(case.path)
-    step(f"images: {case.name}, ours")
-    matched = render(scene, resolution=(size, size), samples=1, offset="mitsuba")
-    own = render(scene, resolution=(size, size), samples=1)
-    fragile = fragile_pixels(
-        lambda offset, shift: render(
-            _shifted(scene, shift), resolution=(size, size), samples=1, offset=offset
-        ).radiance
-    )
-    step(f"images: {case.name}, AOVs")
-    aovs, found = _check_aovs(case, scene, matched)
-    shift = mitsuba_camera.largest_distance(scene.camera, size)
-    reason = "our primary rays are Mitsuba's; both pictures are made with ours"
-    found.append(
-        Gate("images", f"{case.name}, camera", "pixels between rays", shift, "at most", gates.CAMERA_PIXELS, reason)
-    )
-    comparisons = []
-    references, left_out = _references(scene, size, case.name, step)
-    for reference in references:
-        for rule, image in (("matched", matched), ("own", own)):
-            step(f"images: {case.name}, {reference.key}, {rule} offset")
-            result = compare(image.radiance, reference.radiance, fragile, own.face >= 0)
-            files = _write(folder, f"{case.name}-{reference.key}-{rule}", image.radiance, reference.radiance, result)
-            comparisons.append(_record(reference, rule, result, files))
-            found += _gates(case.name, reference, rule, result)
-    record: dict[str, object] = {
-        "name": case.name,
-        "shows": case.shows,
-        "size": size,
+def check_scene(name: str, shows: str, scene: Scene, effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Check one scene; returns its record for JSON and the gates.
+
+    A rung that no reference can judge fails a gate; a rung or reference that is left out stands with its reason in the
+    record. Rays are judged without a smallest weight, which no reference has, and one goes through each pixel.
+    """
+    plan = _plan(scene, effort)
+    record: dict[str, Any] = {
+        "name": name,
+        "shows": shows,
         "max_depth": scene.render.max_depth,
-        "faces": sum(len(i.mesh.faces) for i in scene.instances),
-        "rays": int(own.rays.sum()),
-        "ours_seconds": own.render_seconds,
-        "build_seconds": own.build_seconds,
-        "camera_pixels": shift,
-        "aovs": aovs,
-        "comparisons": comparisons,
-        "left_out": left_out,
+        "faces": sum(len(instance.mesh.faces) for instance in scene.instances),
+        "left_out": plan.left_out,
+        "fault": plan.fault,
     }
+    found: list[Gate] = []
+    if plan.fault is None:
+        job.step(f"pictures: {name}, AOVs")
+        record["aovs"], found = _check_aovs(name, scene, plan.tasks[-1].resolution, job)
+    record["rungs"] = []
+    for task in plan.tasks:
+        rung, passed = _check_rung(name, task, job)
+        record["rungs"].append(rung)
+        found += passed
+    if plan.paths:
+        record["paths"], passed = monte_carlo.run(scene, name, job.quick, job.step)
+        found += passed
     return record, found
 
 
-def _references(
-    scene: Scene, size: int, name: str, step: Callable[[str], None]
-) -> tuple[list[Reference], dict[str, str]]:
-    """The references that can judge a scene, and why the others cannot."""
-    depth = scene.render.max_depth
-    step(f"images: {name}, whitted reference")
+def _scenes(job: Job) -> list[tuple[str, str, Path, Effort]]:
+    """Names, what they show, files and efforts: a user's scenes, or else the suite's own."""
+    size, lower = (256, 128) if job.quick else (512, 256)
+    if not job.own:
+        stems = Counter(path.stem for path in job.scenes)
+        names = [path.stem if stems[path.stem] == 1 else str(path) for path in job.scenes]
+        return [(name, str(path), path, Effort(size, lower)) for name, path in zip(names, job.scenes, strict=True)]
+    return [(case.name, case.shows, case.path, Effort(size, lower if case.every_rung else None)) for case in CASES]
+
+
+def _plan(scene: Scene, effort: Effort) -> _Plan:
+    rungs, left_out = ladder.rungs(scene)
+    if effort.lower is None:
+        left_out = {rung.name: "climbed on another scene" for rung in rungs[:-1]} | left_out
+        rungs = rungs[-1:]
+    fault = mitsuba_whitted.can_judge(scene)
+    tasks = []
+    for rung in rungs:
+        faults = {reference.name: fault or reference.can_judge(rung.scene) for reference in REFERENCES}
+        judging = tuple(reference for reference in REFERENCES if faults[reference.name] is None)
+        size = effort.size if rung is rungs[-1] else effort.lower
+        reasons = {reference: reason for reference, reason in faults.items() if reason is not None}
+        tasks.append(_Task(rung, _resolution(scene, size or effort.size), judging, reasons))
+    chance = None if effort.paths else "not asked for"
+    chance = fault or chance or monte_carlo.can_judge(scene)
+    if chance is not None:
+        left_out |= {"random paths": chance}
+    return _Plan(tasks, chance is None, left_out, fault)
+
+
+def _resolution(scene: Scene, size: int) -> tuple[int, int]:
+    """Width and height of the scene's own shape whose longer side is ``size``."""
+    width, height = scene.render.resolution
+    scale = size / max(width, height)
+    return max(_SMALLEST, round(width * scale)), max(_SMALLEST, round(height * scale))
+
+
+def _check_aovs(name: str, scene: Scene, resolution: tuple[int, int], job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """The camera's rays against those of Mitsuba's own sensor, and what they meet."""
+    shift = mitsuba_camera.largest_distance(scene.camera, max(resolution))
+    limit, reason = job.thresholds.pictures.camera_pixels, "our primary rays are Mitsuba's; both pictures use ours"
+    camera = Gate("images", f"{name}, camera", "pixels between rays", shift, "at most", limit, reason)
     began = time.perf_counter()
-    radiance = mitsuba_whitted.whitted(scene, size, size, max_depth=depth)
-    references = [Reference("whitted", WHITTED, radiance, time.perf_counter() - began)]
-    reason = mitsuba_path.can_judge(scene)
-    if reason is not None:
-        return references, {PATH: reason}
-    step(f"images: {name}, path reference")
-    began = time.perf_counter()
-    radiance = mitsuba_path.path(scene, size, size, max_depth=depth)
-    return [*references, Reference("path", PATH, radiance, time.perf_counter() - began)], {}
+    theirs = mitsuba_whitted.aovs(scene, *resolution)
+    seconds = time.perf_counter() - began
+    ours = render(scene, resolution=resolution, samples=1, max_depth=0)
+    record, found = compare_aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
+    made = {"reference_name": AOVS, "reference_seconds": seconds, "size": list(resolution), "camera_pixels": shift}
+    return made | record, [camera, *found]
 
 
-def _check_aovs(case: Case, scene: Scene, ours: Image) -> tuple[dict[str, float], list[Gate]]:
-    """Distance and shading normal at every primary hit: geometry and camera apart from shading."""
-    height, width = ours.depth.shape
-    theirs = mitsuba_whitted.aovs(scene, width, height)
-    hit, other = ours.face >= 0, theirs.instance >= 0
-    both = hit & other
-    depth_error = np.abs(ours.depth[both] - theirs.depth[both]) / theirs.depth[both]
-    normal_error = np.linalg.norm(ours.normal[both] - theirs.shading_normal[both], axis=-1)
-    shares = {
-        "pixels that only one of us hits": float(np.mean(hit != other)),
-        "pixels whose distance is off": float(np.sum(~(depth_error <= gates.AOV_DEPTH)) / hit.size),
-        "pixels whose normal is off": float(np.sum(~(normal_error <= gates.AOV_NORMAL)) / hit.size),
-    }
-    reason = f"relative distance {gates.AOV_DEPTH}, normal {gates.AOV_NORMAL} rad; a float32 ray may flip an edge pixel"
-    found = [
-        Gate("images", f"{case.name}, AOVs", quantity, share, "at most", gates.AOV_SHARE, reason)
-        for quantity, share in shares.items()
-    ]
-    return shares | {"depth_error_max": float(depth_error.max(initial=0.0))}, found
+def _check_rung(name: str, task: _Task, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """One rung under both rules against its references."""
+    scene, size, subject = task.rung.scene, task.resolution, f"{name}, {task.rung.name}"
+    job.step(f"pictures: {subject}, ours")
+    images = {rule: _ours(scene, size, offset) for rule, offset in _RULES.items()}
+    fragile = fragile_pixels(lambda offset, shift: _ours(shifted(scene, shift), size, offset).radiance)
+    reason = "a rung that nobody judges is not passed"
+    found = [Gate("images", subject, "references that judge it", len(task.references), "at least", 1.0, reason)]
+    comparisons = []
+    for reference in task.references:
+        job.step(f"pictures: {subject}, {reference.key}")
+        began = time.perf_counter()
+        radiance = reference.picture(scene, *size, max_depth=scene.render.max_depth)
+        seconds = time.perf_counter() - began
+        made = {"reference": reference.key, "reference_name": reference.name, "reference_seconds": seconds}
+        for rule, image in images.items():
+            # The report shows what users get, beside the first reference.
+            shown = rule == "own" and reference is task.references[0]
+            against = f"{subject} against {reference.key}, {rule} offset"
+            record, passed = check_picture.check(against, Pair(image, rule, radiance, fragile), job, shown=shown)
+            comparisons.append(made | {"offset": rule} | record)
+            found += passed
+    return _rung_record(task, images["own"], comparisons), found
 
 
-def _gates(name: str, reference: Reference, rule: str, result: ImageComparison) -> list[Gate]:
-    thresholds = gates.MATCHED if rule == "matched" else gates.OWN
-    subject = f"{name} against {reference.key}, {rule} offset"
-    found = []
-    for quantity, threshold in thresholds.items():
-        value = getattr(result, quantity)
-        bound: Literal["at least", "at most"] = "at least" if quantity.startswith("ssim") else "at most"
-        found.append(Gate("images", subject, quantity, value, bound, threshold, gates.REASONS[quantity]))
-    if rule == "own":
-        reason = "the maximum is judged outside these pixels, so they must stay few"
-        found.append(
-            Gate("images", subject, "fragile_share", result.fragile_share, "at most", gates.FRAGILE_SHARE, reason)
-        )
-    return found
-
-
-def _record(reference: Reference, rule: str, result: ImageComparison, files: dict[str, str]) -> dict[str, object]:
+def _rung_record(task: _Task, own: Image, comparisons: list[dict[str, Any]]) -> dict[str, Any]:
     return {
-        "reference": reference.key,
-        "reference_name": reference.name,
-        "reference_seconds": reference.seconds,
-        "offset": rule,
-        "ssim": result.ssim,
-        "ssim_foreground": result.ssim_foreground,
-        "pixel_share": result.pixel_share,
-        "mean_error": result.mean_error,
-        "max_error": result.max_error,
-        "fragile_share": result.fragile_share,
-        "files": files,
+        "name": task.rung.name,
+        "adds": task.rung.adds,
+        "size": list(task.resolution),
+        "rays": int(own.rays.sum()),
+        "ours_seconds": own.render_seconds,
+        "build_seconds": own.build_seconds,
+        "comparisons": comparisons,
+        "left_out": task.left_out,
     }
 
 
-def _write(folder: Path, stem: str, ours: Picture, reference: Picture, result: ImageComparison) -> dict[str, str]:
-    """Ours, the reference and 16 times the difference as PNGs; returns their names in ``folder``."""
-    shown = np.repeat(np.clip(16.0 * result.difference, 0.0, 1.0)[..., None], 3, axis=2)
-    pictures = {
-        "ours": srgb(ours),
-        "reference": srgb(reference),
-        "difference": (shown * 255.0 + 0.5).astype(np.uint8),
-    }
-    files = {}
-    for kind, pixels in pictures.items():
-        files[kind] = f"{stem}-{kind}.png"
-        write_png(folder / files[kind], pixels)
-    return files
+def _ours(scene: Scene, resolution: tuple[int, int], offset: _Offset) -> Image:
+    return render(scene, resolution=resolution, samples=1, min_weight=0.0, offset=offset)
 
 
-def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """Write 8-bit pixels (h, w, 3), whole or not at all."""
-    from PIL import Image as Pillow
-
-    write_atomically(path, lambda file: Pillow.fromarray(pixels).save(file, "png"))
-
-
-class _ShiftedPerspective(PerspectiveCamera):
-    shift: tuple[float, float]
-
-    def rows(self, width: int, height: int) -> NDArray[np.float64]:
-        return _shift_rows(super().rows(width, height), self.shift)
-
-
-class _ShiftedOrthographic(OrthographicCamera):
-    shift: tuple[float, float]
-
-    def rows(self, width: int, height: int) -> NDArray[np.float64]:
-        return _shift_rows(super().rows(width, height), self.shift)
+def _costs(scenes: list[dict[str, Any]]) -> dict[str, float]:
+    """Seconds spent in each reference; one picture of it is compared under both rules."""
+    spent: dict[str, float] = {}
+    for scene in scenes:
+        made = [scene["aovs"]] if "aovs" in scene else []
+        for rung in scene["rungs"]:
+            made += [comparison for comparison in rung["comparisons"] if comparison["offset"] == "own"]
+        costs = [(one["reference_name"], one["reference_seconds"]) for one in made]
+        costs += scene.get("paths", {"costs": {}})["costs"].items()
+        for name, seconds in costs:
+            spent[name] = spent.get(name, 0.0) + seconds
+    return spent
 
 
-def _shift_rows(rows: NDArray[np.float64], shift: tuple[float, float]) -> NDArray[np.float64]:
-    moved = rows.copy()
-    moved[0] += shift[0] * rows[1] + shift[1] * rows[2]
-    moved[3] += shift[0] * rows[4] + shift[1] * rows[5]
-    return moved
-
-
-def _shifted(scene: Scene, shift: tuple[float, float]) -> Scene:
-    """The scene seen through a film moved by ``shift`` pixels."""
-    kind = _ShiftedPerspective if isinstance(scene.camera, PerspectiveCamera) else _ShiftedOrthographic
-    copy = scene.model_copy(update={"camera": kind(**scene.camera.model_dump(), shift=shift)})
-    # The meshes are the same; the copy need not load them again.
-    copy.__dict__["instances"] = scene.instances
-    return copy
+def _hero(job: Job) -> dict[str, Any]:
+    """The main scene for the head of the report."""
+    image = render(load_scene(CASES[0].path), resolution=(960, 540), samples=9)
+    write_png(job.folder / "hero.png", srgb(image.radiance))
+    return {"file": "hero.png", "seconds": image.render_seconds, "rays": int(image.rays.sum()), "samples": 9}

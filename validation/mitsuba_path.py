@@ -1,63 +1,57 @@
 """Reference A: Mitsuba's own path integrator, on scenes where a path-traced picture is the Whitted picture.
 
-Nothing of the light transport is written here, so it is independent of reference B's recursion too. Three
-things make the global illumination of the path integrator into Whitted's:
+Nothing of the light transport is written here, so it is independent of reference B's recursion too. Four things make
+the global illumination of the path integrator into Whitted's:
 
-1. Every diffuse albedo is multiplied by e and every light divided by e. Light that two diffuse surfaces
-   scatter then counts e times too little, while direct light is unchanged; with e = 1e-6 what is left is
-   below float32's rounding in a picture.
-2. Each light is rendered alone and the pictures are summed: with several, the integrator chooses one at
-   random. The background is one more such light, but not divided by e: it is seen without a diffuse bounce.
-3. Russian roulette is off, and the paths are as long as our rays: D bounces, and one more edge to the light.
+1. A surface answers the lights by diffuse + Phong but sends paths on only as a mirror or glass (``mitsuba_phong``),
+   so that no diffuse surface lights another.
+2. Each light is rendered alone and the pictures are summed: with several, the integrator chooses one at random.
+3. What is seen without being lit, the background and ambient light, has passes in which nothing is lit.
+4. Russian roulette is off, and the paths are as long as our rays: D bounces, and one more edge to the light.
+
+Without glass nothing is random. With it each path takes one branch, drawn by Fresnel's share, and the mean over many
+paths tends to the Whitted picture: ``random_paths``, which ``validation.monte_carlo`` judges.
 """
+
+from itertools import chain
+from typing import NamedTuple
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.material import Dielectric, Material, Mirror
+from renderer.material import Dielectric
 from renderer.scene import Scene
+from validation import mitsuba_ambient, mitsuba_phong
 from validation import mitsuba_scene as source
-
-# The e of the module's docstring: what is left of interreflection, relative to direct light. 1e-6 is far
-# below what a picture shows (1/255), and lights of 1 / e are far from float32's largest number.
-INTERREFLECTION = 1e-6
 
 # Longer than any path, so that none ends by chance.
 _NO_ROULETTE = 1000
 
 
+class _Pass(NamedTuple):
+    """A part of the light: a Mitsuba scene that holds no other, and the largest number of edges of a path."""
+
+    scene: mi.Scene
+    edges: int
+
+
 def can_judge(scene: Scene) -> str | None:
     """Why the path integrator's picture of ``scene`` is not Whitted's; None if it is."""
+    return _first_fault(scene, glass="a dielectric's branch is drawn at random")
+
+
+def _first_fault(scene: Scene, glass: str | None) -> str | None:
+    """What stands against a material of ``scene``; ``glass`` against a dielectric."""
     for name in sorted({instance.material for instance in scene.instances}):
-        fault = _unjudged(scene.materials[name], lit=any(scene.ambient))
+        material, fault = scene.materials[name], None
+        if isinstance(material, Dielectric):
+            fault = glass
+        elif material.passes_light:
+            fault = "Mitsuba has no surface that transmits a constant share"
         if fault is not None:
             return f"materials.{name}: {fault}"
     return None
-
-
-def _unjudged(material: Material, lit: bool) -> str | None:
-    """``lit`` says whether there is ambient light."""
-    if isinstance(material, Mirror):
-        return None
-    if isinstance(material, Dielectric):
-        return "a dielectric's branch is drawn at random"
-    if any(material.specular):
-        return "Mitsuba has no Phong highlight"
-    if any(material.transmittance):
-        return "Mitsuba has no surface that transmits a constant share"
-    if any(material.diffuse) and any(material.reflectance):
-        return "a surface both diffuse and mirroring draws its branch at random"
-    if lit and any(material.diffuse if material.ambient is None else material.ambient):
-        return "Mitsuba has no ambient light"
-    return None
-
-
-def _bsdf(material: Material) -> mi.BSDF:
-    if any(material.reflectance):
-        return source.mirror(material.reflectance)
-    albedo = (0.0, 0.0, 0.0) if isinstance(material, Mirror | Dielectric) else material.diffuse
-    return source.diffuse([INTERREFLECTION * channel for channel in albedo])
 
 
 def path(
@@ -77,26 +71,57 @@ def path(
     """
     fault = can_judge(scene)
     if fault is not None:
-        raise ValueError(f"scene: expected only diffuse surfaces and mirrors, got {fault}")
-    shapes = source.meshes(scene, [_bsdf(scene.materials[i.material]) for i in scene.instances])
-    passes = [(source.emitter(light, 1.0 / INTERREFLECTION), max_depth + 2) for light in scene.lights]
-    if any(scene.background):
-        passes.append((source.background(scene.background), max_depth + 1))
+        raise ValueError(f"scene: expected only Phong surfaces and mirrors, got {fault}")
     bundles = source.camera_rays(scene, width, height, samples) if rays is None else [rays]
-    result = np.zeros((height * width, 3))
-    for light, edges in passes:
-        lit = source.assemble(shapes, [light])
-        for bundle in bundles:
-            result += _traced(lit, bundle, edges)
+    passes = _passes(scene, max_depth)
+    result = sum(_paths(passes, bundle, 1)[0] for bundle in bundles)
     return (result / len(bundles)).reshape(height, width, 3)
 
 
-def _traced(scene: mi.Scene, rays: source.Rays, edges: int) -> NDArray[np.float64]:
-    """Radiance along each ray by paths of at most ``edges`` edges, (n, 3) float64."""
-    integrator = mi.load_dict({"type": "path", "max_depth": edges, "rr_depth": _NO_ROULETTE})
-    sampler = mi.load_dict({"type": "independent", "sample_count": 1})
-    sampler.seed(0)
-    traced = [
-        integrator.sample(scene, sampler, mi.RayDifferential3f(ray))[0] for ray in source.mitsuba_rays(rays)
-    ]
-    return np.array(traced, dtype=np.float64).reshape(-1, 3)
+def random_paths(scene: Scene, rays: source.Rays, count: int, *, max_depth: int) -> NDArray[np.float64]:
+    """Radiance along ``count`` random paths of each of the n rays, (count, n, 3) float64.
+
+    Their mean tends to the Whitted picture; rows are independent of each other, the same in every run, and a smaller
+    ``count`` gives the first of them.
+
+    Raises ``ValueError`` for a surface that transmits a constant share of light.
+    """
+    fault = _first_fault(scene, glass=None)
+    if fault is not None:
+        raise ValueError(f"scene: expected only Phong surfaces, mirrors and dielectrics, got {fault}")
+    return _paths(_passes(scene, max_depth), rays, count)
+
+
+def _passes(scene: Scene, max_depth: int) -> list[_Pass]:
+    """One for each light, and one or two for what is seen without light: their sum is the picture."""
+    materials = [scene.materials[instance.material] for instance in scene.instances]
+    passes = []
+    if scene.lights:
+        lit = source.meshes(scene, [mitsuba_phong.bsdf(material) for material in materials])
+        passes = [_Pass(source.assemble(lit, [source.emitter(light)]), max_depth + 2) for light in scene.lights]
+    sky = [source.background(scene.background)] if any(scene.background) else []
+    glows = mitsuba_ambient.has_glow(scene)
+    if sky or glows:
+        unlit = source.meshes(scene, [mitsuba_phong.unlit(material) for material in materials])
+        front = mitsuba_ambient.glowing(scene, unlit, turned=False)
+        passes.append(_Pass(source.assemble(front, sky), max_depth + 1))
+    if glows:
+        back = mitsuba_ambient.glowing(scene, unlit, turned=True)
+        passes.append(_Pass(source.assemble(back, []), max_depth + 1))
+    return passes
+
+
+def _paths(passes: list[_Pass], rays: source.Rays, count: int) -> NDArray[np.float64]:
+    """The sum of the passes along ``count`` paths of each ray, (count, n, 3) float64."""
+    traced = [mi.RayDifferential3f(ray) for ray in source.mitsuba_rays(rays)]
+    result = np.zeros((count, len(traced), 3))
+    for number, (scene, edges) in enumerate(passes):
+        integrator = mi.load_dict({"type": "path", "max_depth": edges, "rr_depth": _NO_ROULETTE})
+        sampler = mi.load_dict({"type": "independent", "sample_count": 1})
+        # From one seed a path would share its numbers with a later path's next pass; rows would not be independent.
+        sampler.seed(number)
+        for row in result:
+            colors = (integrator.sample(scene, sampler, ray)[0] for ray in traced)
+            # numpy.array asks each colour for its shape first: 2.7 us a ray, as long as the path itself; this 0.1 us.
+            row += np.fromiter(chain.from_iterable(colors), np.float64, row.size).reshape(row.shape)
+    return result

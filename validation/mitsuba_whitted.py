@@ -155,6 +155,15 @@ def _whitted(scene: Scene, max_depth: int) -> _Whitted:
     )
 
 
+def can_judge(scene: Scene) -> str | None:
+    """Why Mitsuba cannot hold ``scene``, so that neither reference can judge it; None if it can."""
+    try:
+        source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
+    except ValueError as error:
+        return str(error)
+    return None
+
+
 def whitted(
     scene: Scene,
     width: int,

@@ -1,25 +1,33 @@
 """The section on numerical stability: the table of extreme cases, the watertight sweep, the error curves."""
 
-from collections.abc import Callable
-
 from validation import extreme_hits, extreme_shading, stability, watertight
 from validation.gates import Gate
+from validation.job import Job
 
 CASES = (*extreme_hits.CASES, *extreme_shading.CASES)
 
+# Who judges here. Each is asked in the middle of a case or sweep, so that its seconds are not told apart.
+JUDGES = ("exact arithmetic", "analytic", "Embree robust", "Embree default", "brute force")
 
-def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:
+
+def steps(job: Job) -> int:
+    """How often ``run`` calls ``job.step``: for each case, closed mesh and sweep, and for the leaks."""
+    return len(CASES) + len(watertight.closed_meshes()) + len(stability.SWEEPS) + 1
+
+
+def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
     """Run everything; returns a record for JSON and the gates, one for each case among them."""
     cases = []
     gates = []
     for case in CASES:
-        step(f"extreme case {case.number}: {case.construct}")
-        record = case.record(quick)
-        cases.append(record)
         subject = f"extreme case {case.number}: {case.construct}"
+        job.step(subject)
+        record = case.record(job.quick)
+        cases.append(record)
         gates.append(
             Gate("stability", subject, "holds", float(bool(record["holds"])), "at least", 1.0, case.tolerance)
         )
-    sweep, sweep_gates = watertight.run(quick, step)
-    curves, curve_gates = stability.run(quick, step)
-    return {"cases": cases, "watertight": sweep, "curves": curves}, [*gates, *sweep_gates, *curve_gates]
+    sweep, sweep_gates = watertight.run(job.quick, job.step)
+    curves, curve_gates = stability.run(job.quick, job.step)
+    record = {"cases": cases, "watertight": sweep, "curves": curves, "costs": dict.fromkeys(JUDGES)}
+    return record, [*gates, *sweep_gates, *curve_gates]

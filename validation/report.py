@@ -1,25 +1,87 @@
 """Metrics to one self-contained HTML page. Draws what the JSON says and computes nothing new."""
 
 import base64
+import hashlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from validation import monte_carlo_figure, tradeoff_figures
 from validation.plots import stability_figures
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
+# What templates may call to draw curves from a record: figures with a title and an SVG, or the SVG alone.
+FIGURES: dict[str, Callable[..., Any]] = {
+    "figures": stability_figures,
+    "tradeoff_figures": tradeoff_figures.figures,
+    "monte_carlo_figure": monte_carlo_figure.figure,
+}
+
+# The sections in the order of the page: title and template, which reads the section's record as m.<section>.
+PARTIALS = {
+    "images": ("Pictures", "pictures.html"),
+    "hits": ("Hits", "hits.html"),
+    "stability": ("Stability", "stability.html"),
+    "efficiency": ("Efficiency", "efficiency.html"),
+}
+
 
 def page(metrics: dict[str, Any], pictures: Path) -> str:
-    """The report as HTML with every picture of ``pictures`` inside it."""
+    """The report as HTML with every picture of ``pictures`` that it shows inside it."""
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
+    shown = Pictures(pictures)
     environment.filters["number"] = number
-    environment.globals["figures"] = stability_figures
+    environment.globals |= FIGURES
     environment.globals["picture"] = lambda name: _data_uri(pictures / name)
+    environment.globals["shown"] = shown
+    environment.globals["failed_files"] = failed_files
+    environment.globals["titles"] = {name: title for name, (title, _) in PARTIALS.items()}
+    environment.globals["partials"] = {name: template for name, (_, template) in PARTIALS.items()}
     return environment.get_template("report.html").render(m=metrics)
+
+
+class Pictures:
+    """The PNGs of a folder as CSS classes, so that equal ones stand in the page once however often they are shown."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._paths: dict[str, Path] = {}
+
+    def css_class(self, name: str) -> str:
+        """The class whose background is the picture; raises ``OSError`` where there is no such file."""
+        path = self._folder / name
+        css_class = "png-" + hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+        self._paths.setdefault(css_class, path)
+        return css_class
+
+    def rules(self) -> str:
+        """A CSS rule for each picture that was asked for."""
+        return "\n".join(
+            f'.{name} {{ aspect-ratio: {_size(path)}; background-image: url("{_data_uri(path)}"); }}'
+            for name, path in self._paths.items()
+        )
+
+
+def failed_files(metrics: dict[str, Any], gate: dict[str, Any]) -> list[str]:
+    """Names, in the pictures folder, of what a failing gate left behind.
+
+    They stand in its section's record, in a table with the gate's ``subject`` and a list or table ``failed``.
+    """
+    found: dict[str, None] = {}
+    tables = [metrics[gate["section"]]]
+    while tables:
+        table = tables.pop(0)
+        below = list(table.values()) if isinstance(table, dict) else table
+        if isinstance(table, dict) and table.get("subject") == gate["subject"] and table.get("failed"):
+            files = table["failed"]
+            found |= dict.fromkeys(files.values() if isinstance(files, dict) else files)
+        tables += [value for value in below if isinstance(value, dict | list)]
+    return list(found)
 
 
 def number(value: float | int | None) -> str:
@@ -30,9 +92,17 @@ def number(value: float | int | None) -> str:
         return f"{int(value):,}"
     if 1e-3 <= abs(value) < 1e4:
         # Values just below 1 (an SSIM) keep the digits that tell them from 1.
-        return f"{value:.7f}" if 0.99 < value < 1.0 else f"{value:.4g}"
+        if 0.99 < value < 1.0:
+            return f"{value:.7f}" if 1.0 - value > 5e-8 else f"1 − {1.0 - value:.0e}"
+        return f"{value:.4g}"
     return f"{value:.2e}"
 
 
 def _data_uri(path: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
+
+
+def _size(path: Path) -> str:
+    """Width / height from the header of a PNG (its section 11.2.2)."""
+    header = path.read_bytes()[:24]
+    return f"{int.from_bytes(header[16:20], 'big')} / {int.from_bytes(header[20:24], 'big')}"

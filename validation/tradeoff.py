@@ -3,20 +3,37 @@
 import math
 import statistics
 import time
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
+T = TypeVar("T")
+
+RUNS = 5
+# Seconds between calls. Some contenders' threads go on spinning for milliseconds after their work and take a processor
+# from whoever comes next: behind Mitsuba's llvm variant, two threads of ours were as slow as one.
+REST = 0.03
+
+
+def interleaved(calls: Mapping[str, Callable[[], float]], runs: int, unseen: int = 1) -> dict[str, list[float]]:
+    """Seconds of every call in each of ``runs`` rounds, after ``unseen`` rounds; all take turns.
+
+    Each call returns its own seconds, see ``timed``. Whatever slows the machine for a while then slows every call
+    alike. The unseen rounds pay for compilation and caches: 0 where all calls were made before.
+    """
+    rounds = [{name: _rested(call) for name, call in calls.items()} for _ in range(unseen + runs)][unseen:]
+    return {name: [seconds[name] for seconds in rounds] for name in calls}
+
 
 def median_seconds(calls: Mapping[str, Callable[[], float]], runs: int, unseen: int = 1) -> dict[str, float]:
-    """Median over ``runs`` rounds of the seconds that each call returns, after ``unseen`` rounds; all take turns.
+    """The median of each call's seconds, see ``interleaved``."""
+    return {name: statistics.median(seconds) for name, seconds in interleaved(calls, runs, unseen).items()}
 
-    Whatever slows the machine for a while then slows every call alike. The unseen rounds pay for compilation and
-    caches: 0 where all calls were made before.
-    """
-    rounds = [{name: call() for name, call in calls.items()} for _ in range(unseen + runs)][unseen:]
-    return {name: statistics.median(seconds[name] for seconds in rounds) for name in calls}
+
+def ratio(theirs: Sequence[float], ours: Sequence[float]) -> float:
+    """How many times faster ours is: the median of the rounds' ratios, not the ratio of the medians."""
+    return statistics.median(t / o for t, o in zip(theirs, ours, strict=True))
 
 
 def timed(call: Callable[..., Any], *arguments: Any) -> Callable[[], float]:
@@ -28,6 +45,23 @@ def timed(call: Callable[..., Any], *arguments: Any) -> Callable[[], float]:
         return time.perf_counter() - began
 
     return seconds
+
+
+def spending(costs: MutableMapping[str, float], name: str, call: Callable[..., T]) -> Callable[..., T]:
+    """``call`` that adds the seconds it takes, from the outside, to ``costs[name]``."""
+
+    def spent(*arguments: Any) -> T:
+        began = time.perf_counter()
+        found = call(*arguments)
+        costs[name] = costs.get(name, 0.0) + time.perf_counter() - began
+        return found
+
+    return spent
+
+
+def _rested(call: Callable[[], float]) -> float:
+    time.sleep(REST)
+    return call()
 
 
 def front(points: Sequence[tuple[float, float]]) -> list[int]:

@@ -44,8 +44,8 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here so that --help answers at once.
     from renderer.image import write_atomically
-    from validation.__main__ import _steps
     from validation.benchmark import page, record
+    from validation.progress import steps
 
     options.output.mkdir(parents=True, exist_ok=True)
     stored, drawn = options.output / "benchmark.json", options.output / "benchmark.html"
@@ -53,7 +53,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
         missing = [path for path in options.mesh if not path.is_file()]
         if missing:
             raise ValueError(f"--mesh: expected a file, got {str(missing[0])!r}")
-        with _steps() as step:
+        with steps() as step:
             measured = measure(options.quick, options.huge, tuple(options.mesh), command, step)
         record.write(measured, stored)
     text = record.read(stored)

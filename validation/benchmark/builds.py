@@ -9,8 +9,7 @@ from renderer.mesh import Mesh
 from renderer.octree import Octree
 from validation.benchmark import ours
 from validation.benchmark.contender import System
-from validation.benchmark.rounds import RUNS, interleaved, ratio
-from validation.tradeoff import timed
+from validation.tradeoff import RUNS, interleaved, ratio, timed
 
 REFIT = "ours_refit"
 # Above this size a round of all builds takes half a minute, so there are three and not five of them.

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from renderer.render import render
 from renderer.scene import Scene, load_scene
-from validation.benchmark.rounds import RUNS, interleaved, ratio
-from validation.tradeoff import timed
 from validation.cases import SCENES
+from validation.tradeoff import RUNS, interleaved, ratio, timed
 
 OURS, OURS_BUILT, LISTS = "ours", "ours_with_build", "mitsuba_llvm_lists"
 SCALAR = "mitsuba_scalar_recursion"

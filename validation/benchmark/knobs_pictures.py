@@ -18,8 +18,8 @@ import numpy as np
 from renderer.image import Image
 from renderer.render import render
 from renderer.scene import Scene, load_scene
-from validation.tradeoff import front, median_seconds, slope
 from validation.cases import Case
+from validation.tradeoff import front, median_seconds, slope
 
 Settings = dict[str, Any]
 

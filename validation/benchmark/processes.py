@@ -9,9 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from validation.benchmark.rounds import interleaved
-from validation.tradeoff import timed
 from validation.cases import SCENES
+from validation.tradeoff import interleaved, timed
 
 _RUNS = 3
 WARM, FIRST, IMPORT = "render_warm", "render_first_ever", "import_renderer"

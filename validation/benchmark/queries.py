@@ -11,8 +11,7 @@ from validation.benchmark.contender import Family, Peer, Query, System
 from validation.benchmark.families import families
 from validation.benchmark.fit import log_fit
 from validation.benchmark.ours import OURS, OURS_ONE, Ours
-from validation.benchmark.rounds import RUNS, interleaved, ratio
-from validation.tradeoff import timed
+from validation.tradeoff import RUNS, interleaved, ratio, timed
 
 KINDS = ("closest", "any")
 # Between float32 and float64 only rays within about 1e-6 of a silhouette may differ; a picture of 1e6 rays has some

@@ -1,0 +1,69 @@
+"""The ladder: what each rung holds, that it differs from the one below, and what is left out and why."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from renderer.light import DirectionalLight
+from renderer.material import Phong
+from renderer.render import render
+from renderer.scene import Scene, load_scene
+from validation import ladder
+from validation.cases import SCENES
+
+GLASS = load_scene(SCENES / "glass.toml")
+
+
+def changed(scene: Scene, **update: object) -> Scene:
+    copy = scene.model_copy(update=update)
+    copy.__dict__["instances"] = scene.instances
+    return copy
+
+
+def test_each_rung_adds_something_to_the_picture() -> None:
+    found, left_out = ladder.rungs(GLASS)
+    assert ([rung.name for rung in found], left_out) == (list(ladder.NAMES), {})
+    assert found[-1].scene is GLASS
+    pictures = [render(rung.scene, resolution=(32, 32)).radiance for rung in found]
+    for below, above in pairwise(pictures):
+        assert not np.array_equal(below, above)
+    assert all(rung.scene.instances is GLASS.instances for rung in found)
+
+
+@pytest.mark.parametrize("name", ["glass", "stairs"])
+def test_the_lowest_rung_has_no_shadows(name: str) -> None:
+    """Whatever the eye sees, flat or smooth, is lit by the lamp beside it."""
+    rung = ladder.rungs(load_scene(SCENES / f"{name}.toml"))[0][0]
+    image = render(rung.scene, resolution=(48, 48))
+    hit = image.face >= 0
+    assert hit.any() and (image.radiance[hit].min(axis=-1) > 0.0).all()
+    assert all(isinstance(m, Phong) and not any(m.specular) for m in rung.scene.materials.values())
+    assert not any(rung.scene.ambient)
+
+
+def test_a_rung_that_adds_nothing_is_left_out_with_its_reason() -> None:
+    found, left_out = ladder.rungs(load_scene(SCENES / "stairs.toml"))
+    assert [rung.name for rung in found] == ["diffuse", "everything"]
+    assert left_out["glass"] == "no surface of the scene is a dielectric or has a constant transmittance"
+    assert left_out["mirrors"] == "no surface of the scene is a mirror or has a constant reflectance"
+    assert left_out["highlights"] == "no surface of the scene has highlights"
+    assert left_out["shadows"].startswith("it is the scene as it is already")
+
+
+def test_without_lights_only_what_needs_none_is_left() -> None:
+    found, left_out = ladder.rungs(changed(GLASS, lights=()))
+    assert [rung.name for rung in found] == ["mirrors", "glass", "everything"]
+    assert {left_out[name] for name in ("diffuse", "highlights", "shadows")} == {"the scene has no lights"}
+
+
+def test_unused_materials_make_no_rung() -> None:
+    stairs = load_scene(SCENES / "stairs.toml")
+    more = changed(stairs, materials=stairs.materials | GLASS.materials)
+    assert [rung.name for rung in ladder.rungs(more)[0]] == ["diffuse", "everything"]
+
+
+def test_shadows_come_with_the_scenes_own_lights() -> None:
+    sun = DirectionalLight(direction=(0.0, -1.0, 0.0))
+    names = {rung.name: rung.scene for rung in ladder.rungs(changed(GLASS, lights=(sun,)))[0]}
+    assert names["highlights"].lights != (sun,) and names["shadows"].lights == (sun,)

@@ -1,0 +1,149 @@
+"""The page: it stands alone, shows each picture once, and says what the metrics say; the schema of the metrics."""
+
+import re
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jinja2 import UndefinedError
+
+from validation import report, schema, summary
+from validation.gates import Gate
+
+
+def png(path: Path, grey: int, width: int = 2, height: int = 1) -> None:
+    """A grey picture with the least that a PNG needs."""
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    rows = (b"\x00" + bytes([grey]) * width) * height
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    chunks = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunks)
+
+
+@pytest.fixture
+def metrics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Of a run of the pictures alone, one gate of which fails; its partial shows the same pictures twice."""
+    slider = '{{ slider("a.png", "b.png", "c.png", "a scene") }}'
+    (tmp_path / "plain.html").write_text('{% from "macros.html" import slider %}' + slider * 2)
+    monkeypatch.setattr(report, "_TEMPLATES", [report._TEMPLATES, tmp_path])
+    monkeypatch.setattr(report, "PARTIALS", report.PARTIALS | {"images": ("Pictures", "plain.html")})
+    for name, grey in (("a.png", 10), ("b.png", 20), ("c.png", 10)):
+        png(tmp_path / name, grey)
+    gates = [
+        Gate("images", "glass", "ssim", 0.5, "at least", 0.998, "structure").record(),
+        Gate("images", "stairs", "ssim", 0.9999, "at least", 0.998, "structure").record(),
+    ]
+    failed = {"subject": "glass", "failed": {"ours": "failed/glass-ours.exr"}}
+    record = {"seconds": 2.0, "costs": {"Mitsuba <3>": 1.5}, "scenes": [failed]}
+    rows = summary.matrix({"images": record}, gates)
+    return {
+        "schema": 2, "command": "python -m validation --only images", "quick": False, "own": True,
+        "started": "2026-01-01T10:00:00+00:00", "seconds": 3.0, "verdict": summary.verdict(gates), "matrix": rows,
+        "facts": summary.facts(rows, gates, None), "thresholds": {"file": None, "moved": {}}, "gates": gates,
+        "left_out": {"hits": "not named by --only"}, "baseline": {"absent": "There is none."}, "images": record,
+        "environment": {"python": "3.11", "processor": "one", "threads": 2, "platform": "p", "packages": {"numpy": "2"},
+                        "sources": "0" * 64},
+    }  # fmt: skip
+
+
+def test_the_page_stands_alone_and_holds_each_picture_once(metrics: dict[str, Any], tmp_path: Path) -> None:
+    schema.check(metrics)
+    page = report.page(metrics, tmp_path)
+    assert page.count('class="slider"') == 2
+    # Three names, but two of them hold the same picture.
+    assert page.count("data:image/png;base64,") == 2 and page.count("aspect-ratio: 2 / 1") == 2
+    outside = re.findall(r'(?:src|href)="(?!#|data:|pictures/)[^"]*"|url\((?!"data:)|@import|<link', page)
+    assert outside == []
+    anchors = set(re.findall(r'href="#([^"]+)"', page))
+    assert anchors <= set(re.findall(r'id="([^"]+)"', page))
+
+
+def test_the_verdict_comes_first_and_names_what_fails(metrics: dict[str, Any], tmp_path: Path) -> None:
+    page = report.page(metrics, tmp_path)
+    assert "1 of 2 gates hold" in page
+    top = page[: page.index('id="checked"')]
+    assert "glass: ssim" in top and "stairs" not in top
+    assert 'href="pictures/failed/glass-ours.exr"' in top
+    assert "Mitsuba &lt;3&gt;" in page and "not named by --only" in page and "There is none." in page
+
+
+def test_a_missing_picture_or_key_is_an_error(metrics: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "b.png").unlink()
+    with pytest.raises(FileNotFoundError, match=r"b\.png"):
+        report.page(metrics, tmp_path)
+    png(tmp_path / "b.png", 1)
+    del metrics["environment"]["platform"]
+    with pytest.raises(UndefinedError, match="platform"):
+        report.page(metrics, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "where"),
+    [
+        ("schema", 1, "schema"),
+        ("gates", [{"section": "hits"}], "gates.0.subject"),
+        ("images", {"seconds": 1.0}, "images.costs"),
+        ("images", {"seconds": -1.0, "costs": {}}, "images.seconds"),
+        ("surprise", 1, "surprise"),
+        ("seconds", float("nan"), "seconds"),
+    ],
+)
+def test_metrics_of_another_form_are_refused_with_the_key(
+    metrics: dict[str, Any], key: str, value: Any, where: str
+) -> None:
+    with pytest.raises(ValueError, match=f"metrics: {where}: "):
+        schema.check(metrics | {key: value})
+
+
+def test_a_verdict_that_its_numbers_do_not_give_is_refused(metrics: dict[str, Any], tmp_path: Path) -> None:
+    metrics["gates"][0] |= {"passed": True}
+    with pytest.raises(ValueError, match=r"gates\.0: .*passed is True"):
+        schema.check(metrics)
+
+
+def test_metrics_are_read_as_they_were_written(metrics: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "metrics.json"
+    path.write_bytes(schema.text(metrics))
+    assert schema.read(path) == metrics
+    path.write_text(path.read_text().replace('"schema": 2', '"schema": 1'))
+    with pytest.raises(ValueError, match=r"metrics\.json: schema: .*got 1"):
+        schema.read(path)
+    path.write_text("{")
+    with pytest.raises(ValueError, match=r"metrics\.json: expected JSON"):
+        schema.read(path)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "–"),
+        (0.0, "0"),
+        (12345.0, "12,345"),
+        (0.99941, "0.9994100"),
+        (1.0 - 2**-40, "1 − 9e-13"),
+        (1.2345678, "1.235"),
+        (2e-7, "2.00e-07"),
+    ],
+)
+def test_numbers_for_people(value: float | None, text: str) -> None:
+    assert report.number(value) == text
+
+
+def test_a_failure_that_rounds_to_its_threshold_keeps_its_digits() -> None:
+    nearly = Gate("images", "glass", "ssim", 1.0 - 2**-40, "at least", 1.0, "why").record()
+    assert summary.failure(nearly) == "ssim is 0.9999999999990905, expected at least 1"
+
+
+def test_facts_count_what_the_gates_say() -> None:
+    def gate(quantity: str, value: float, bound: Any = "at most") -> dict[str, Any]:
+        return Gate("hits", "s", quantity, value, bound, 0.0, "why").record()
+
+    gates = [gate("rays on which we are wrong", 2.0), gate("of the exact sample, rays on which we are wrong", 1.0),
+             gate("leaks", float("nan")), gate("ssim", 0.9, "at least"), gate("ssim", 0.8, "at least")]  # fmt: skip
+    values = [fact["value"] for fact in summary.facts([], gates, None)]
+    assert values == [3.0, None, 0.8]

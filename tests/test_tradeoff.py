@@ -1,0 +1,115 @@
+"""Error against run time of ours and the references: what is measured is what the names say, and is drawn from JSON."""
+
+import dataclasses
+import json
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from renderer import Mesh, load_scene
+from renderer.render import render
+from validation import tradeoff_hits, tradeoff_pictures
+from validation.cases import SCENES
+from validation.mitsuba_sampling import Film, can_judge
+from validation.tradeoff import spending
+from validation.tradeoff_figures import figures
+
+HITS = tradeoff_hits.Effort(level=3, rays=2000, judged=400, leaks=5000, runs=1)
+PICTURES = tradeoff_pictures.Effort(size=32, theirs=(1, 16), truth=64, runs=1)
+
+
+@pytest.fixture(scope="module")
+def record() -> dict[str, Any]:
+    """The section's two records of error against run time, as JSON gives them back."""
+    costs: dict[str, float] = {}
+    scene = load_scene(SCENES / "mirrors.toml")
+    found: dict[str, Any] = {"tradeoff_hits": tradeoff_hits.run(HITS, costs)}
+    found["tradeoff_pictures"], found["split"] = tradeoff_pictures.run(scene, "mirrors", PICTURES, costs)
+    return dict(json.loads(json.dumps(found | {"costs": costs}, allow_nan=False)))
+
+
+def test_each_contender_errs_as_its_numbers_are_stored(record: dict[str, Any]) -> None:
+    points = {p["name"]: p for p in record["tradeoff_hits"]["points"]}
+    # Float64 rounds t by 2^-53 and enlarges it by 1 / cos; float32 rounds the vertices or t itself by 2^-24.
+    assert points["ours"]["errors"]["max"] < 1e-13
+    for name in ("ours_float32", "embree_default", "embree_robust", "igl"):
+        assert 1e-9 < points[name]["errors"]["p99"] < 1e-5
+    assert points["ours"]["leaks"] == 0 == points["ours_float32"]["leaks"]
+    assert points["embree_default"]["leaks"] > 100
+    assert points["embree_default"]["leaks"] > points["embree_robust"]["leaks"]
+
+
+def test_a_mesh_with_a_hole_leaks(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = tradeoff_hits.turned_mesh(3)
+    holed = Mesh(whole.vertices, whole.faces[::2], name="holed")
+    monkeypatch.setattr(tradeoff_hits, "turned_mesh", lambda level: holed)
+    effort = dataclasses.replace(HITS, rays=200, judged=10)
+    assert all(p["leaks"] > 1000 for p in tradeoff_hits.run(effort, {})["points"])
+
+
+def test_the_fronts_are_by_throughput() -> None:
+    def point(name: str, mrays: float, p99: float | None, leaks: int) -> dict[str, Any]:
+        return {"name": name, "mrays": mrays, "errors": {"p99": p99}, "leaks": leaks}
+
+    points = [point("slow", 1.0, 1e-9, 0), point("fast", 9.0, 1e-3, 7), point("worse", 8.0, 1e-2, 8),
+              point("blind", 20.0, None, 9)]  # fmt: skip
+    assert tradeoff_hits.fronts(points) == {"p99": ["fast", "slow"], "leaks": ["blind", "fast", "slow"]}
+
+
+@pytest.mark.parametrize("depth", [0, 1, 3])
+def test_mitsubas_film_is_whitteds_picture_at_the_same_depth(depth: int) -> None:
+    scene = load_scene(SCENES / "mirrors.toml")
+    ours = render(scene, resolution=(24, 24), samples=1, max_depth=depth, min_weight=0.0, offset="mitsuba").radiance
+    theirs = Film(scene, 24).render(1, max_depth=depth, sampler="centre")
+    # Mitsuba's own film may see another face than our ray along an edge: of 576 pixels a few.
+    assert (np.abs(ours - theirs).max(axis=2) > 1e-4).mean() < 0.01
+
+
+def test_mitsubas_film_repeats_its_bits_and_its_seeds_differ() -> None:
+    film = Film(load_scene(SCENES / "mirrors.toml"), 12)
+    first = film.render(2, max_depth=2, sampler="independent", seed=3)
+    np.testing.assert_array_equal(first, film.render(2, max_depth=2, sampler="independent", seed=3))
+    assert not np.array_equal(first, film.render(2, max_depth=2, sampler="independent", seed=4))
+
+
+@pytest.mark.parametrize(("name", "why"), [("glass", "ambient"), ("checkered", "neither"), ("stairs", "perspective")])
+def test_a_film_refuses_what_it_cannot_judge(name: str, why: str) -> None:
+    scene = load_scene(SCENES / f"{name}.toml")
+    assert why in (can_judge(scene) or "")
+    with pytest.raises(ValueError, match="expected diffuse surfaces and mirrors"):
+        Film(scene, 8)
+
+
+def test_sampling_and_truncation_fall_and_arithmetic_is_small(record: dict[str, Any]) -> None:
+    curves = {(c["who"], c["knob"]): c for c in record["tradeoff_pictures"]["curves"]}
+    for who in ("ours", "Mitsuba"):
+        errors = [p["rmse"] for p in curves[who, "samples"]["points"]]
+        # Random samples give -1/2; 256 pixels scatter about it, and what does not converge has 0.
+        assert curves[who, "samples"]["slope_value"]["rmse"] < -0.35 and errors[0] > 2 * errors[-1] > 0.0
+        depths = [p["rmse"] for p in curves[who, "max_depth"]["points"]]
+        assert depths[0] > 10 * depths[-2]
+    weights = [p["rmse"] for p in curves["ours", "min_weight"]["points"]]
+    assert weights == sorted(weights) and weights[-1] > 0.0
+    parts = {p["name"]: p for p in record["split"]["parts"]}
+    assert min(parts["sampling"]["rmse"], parts["truncation"]["rmse"]) > parts["arithmetic"]["rmse"] > 0.0
+    # Radiance of about 1 in float32, after some hundred roundings of 6e-8.
+    assert parts["arithmetic"]["rmse"] < 1e-5 and parts["sampling"]["halved"] > 1.0
+
+
+def test_the_figures_name_contenders_fronts_and_slopes(record: dict[str, Any]) -> None:
+    drawn = figures(record)
+    shown = [{text for e in ElementTree.fromstring(f["svg"]).iter() for text in e.itertext()} for f in drawn]
+    assert {p["label"] for p in record["tradeoff_hits"]["points"]} | {"Pareto front"} <= shown[0]
+    slopes = [c["slope_value"]["rmse"] for c in record["tradeoff_pictures"]["curves"] if c["knob"] == "samples"]
+    assert all(any(f"N^{s:.2f}" in text for text in shown[1]) for s in slopes)
+    assert {"RMSE, linear", "FLIP", "1 - SSIM"} <= shown[1] & shown[2]
+    assert "own film" in drawn[1]["title"] and "not correctness" in drawn[2]["title"]
+
+
+def test_a_references_seconds_add_up(record: dict[str, Any]) -> None:
+    assert set(record["costs"]) == {"Embree default", "Embree robust", "libigl", "exact arithmetic", "Mitsuba's film",
+                                    "Mitsuba path (reference A)"}  # fmt: skip
+    costs = {"a": 1.0}
+    assert spending(costs, "a", sum)([1, 2]) == 3 and costs["a"] > 1.0

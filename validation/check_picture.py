@@ -1,0 +1,95 @@
+"""One picture of ours against one reference: its gates, its record, and its files."""
+
+import hashlib
+import math
+import re
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.image import Image
+from validation import compare_images
+from validation.compare_images import ImageComparison, Picture
+from validation.gates import Gate
+from validation.job import Job
+from validation.picture_files import write_failed, write_shown
+from validation.thresholds import REASONS, Pictures
+
+# Half a step of an 8-bit picture is what rounding to whole numbers leaves; beside it float64's rounding of that half.
+_STEPS = 0.5 + 1e-9
+_MAPS = ("difference", "flip_map")
+
+Rule = Literal["matched", "own"]
+
+
+class Pair(NamedTuple):
+    """A picture of ours, made under an offset rule, and somebody else's; which pixels are fragile, (h, w) bool."""
+
+    ours: Image
+    rule: Rule
+    reference: Picture
+    fragile: NDArray[np.bool_]
+
+
+def check(subject: str, pair: Pair, job: Job, *, shown: bool) -> tuple[dict[str, Any], list[Gate]]:
+    """Compare a pair; returns the record and the gates.
+
+    shown : whether the report shows it, so that its PNGs are written even if it passes. A pair that fails leaves its
+        PNGs and EXRs in ``job.folder``/failed.
+    """
+    ours, hit = pair.ours.radiance, pair.ours.face >= 0
+    result = compare_images.compare(ours, pair.reference, pair.fragile, hit if hit.any() else None)
+    found = [*_gates(subject, pair.rule, result, job.thresholds.pictures), _encoding(subject, pair)]
+    stem = re.sub(r"\W+", "-", subject)
+    record: dict[str, Any] = {
+        "subject": subject,
+        **{name: value for name, value in vars(result).items() if name not in _MAPS},
+        "ours_sha256": hashlib.sha256(ours.tobytes()).hexdigest(),
+        "passed": all(gate.passed for gate in found),
+    }
+    if shown:
+        record["files"] = write_shown(job.folder, stem, ours, pair.reference, result)
+    if not record["passed"]:
+        record["failed"] = write_failed(job.folder, stem, ours, pair.reference, result)
+    return record, found
+
+
+def _gates(subject: str, rule: Rule, result: ImageComparison, pictures: Pictures) -> list[Gate]:
+    limits = pictures.matched if rule == "matched" else pictures.own
+    found = []
+    for quantity, limit in limits.model_dump().items():
+        if limit is None:
+            continue
+        value = getattr(result, quantity)
+        bound: Literal["at least", "at most"] = "at least" if quantity.startswith("ssim") else "at most"
+        # A picture without foreground shows nothing of the scene, and that is not passed.
+        number = math.nan if value is None else value
+        found.append(Gate("images", subject, quantity, number, bound, limit, REASONS[quantity]))
+    if limits.max_error is not None:
+        reason = "the maximum is judged outside these pixels, so they must stay few"
+        share = result.fragile_share
+        found.append(Gate("images", subject, "fragile_share", share, "at most", pictures.fragile_share, reason))
+    return found
+
+
+def _encoding(subject: str, pair: Pair) -> Gate:
+    """What ``Image.save`` makes of the reference's radiance against the formula of sRGB."""
+    radiance = pair.reference.astype(np.float32)
+    off = np.abs(_saved(replace(pair.ours, radiance=radiance)) - 255.0 * compare_images.srgb(radiance)).max()
+    reason = "a saved picture is the formula's sRGB, rounded"
+    return Gate("images", subject, "8-bit steps from the formula", float(off), "at most", _STEPS, reason)
+
+
+def _saved(image: Image) -> NDArray[np.float64]:
+    """The pixels of the PNG that ``image.save`` writes, (h, w, 3), whole numbers from 0 to 255."""
+    from PIL import Image as Pillow
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "saved.png"
+        image.save(path)
+        with Pillow.open(path) as picture:
+            return np.asarray(picture, np.float64)

@@ -1,0 +1,126 @@
+"""A scene as a ladder: each rung adds one thing that light does, so that the lowest one that fails says what is wrong.
+
+    diffuse     diffuse light alone. Its light is a lamp at the eye in place of the scene's: what the eye sees, that
+                lamp lights, so no shadow is to be seen and no renderer needs a switch for shadows. Mirrors and glass
+                are painted grey, and there is no ambient light
+    highlights  Phong's highlights, under the same lamp
+    shadows     the scene's own lights, and with them their shadows
+    mirrors     mirrors and constant reflectances
+    glass       dielectrics and constant transmittances
+    everything  the scene as it is; ambient light is what it adds
+
+Below them all are the AOVs, ``compare_aovs``: what the primary rays meet. The background stays, for a ray that misses
+must see something. A rung that adds nothing to a scene is left out.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from renderer.camera import OrthographicCamera
+from renderer.light import DirectionalLight, Light, PointLight
+from renderer.material import Dielectric, Material, Mirror, Phong
+from renderer.scene import Scene
+
+_ADDS = {
+    "diffuse": "direct diffuse light, of a lamp at the eye",
+    "highlights": "Phong highlights",
+    "shadows": "the scene's lights and their shadows",
+    "mirrors": "mirrors and constant reflectances",
+    "glass": "dielectrics and constant transmittances",
+    "everything": "the scene as it is",
+}
+NAMES = tuple(_ADDS)
+_HIGHLIGHTS, _SHADOWS, _MIRRORS, _GLASS, _EVERYTHING = range(1, len(NAMES))
+
+_BLACK = (0.0, 0.0, 0.0)
+# What mirrors and glass are painted with until their rung.
+_GREY = Phong(diffuse=(0.5, 0.5, 0.5))
+# What the lamp at the eye sheds on the camera's target: below 1, so that what is a little nearer is not clipped.
+_LAMP = 0.7
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A scene of which something is left out, by name, and what it adds to the rung below."""
+
+    name: str
+    adds: str
+    scene: Scene
+
+
+def rungs(scene: Scene) -> tuple[list[Rung], dict[str, str]]:
+    """The rungs of ``scene`` from the lowest on, the last of them ``scene`` itself; and why others are left out.
+
+    >>> from renderer.camera import PerspectiveCamera
+    >>> empty = Scene(camera=PerspectiveCamera(eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0)), materials={})
+    >>> [rung.name for rung in rungs(empty)[0]]
+    ['everything']
+    """
+    left_out = _needless(scene)
+    found = []
+    for level, name in enumerate(NAMES[:_EVERYTHING]):
+        derived = _derived(scene, level)
+        if name not in left_out and _same(derived, scene):
+            left_out[name] = "it is the scene as it is already, so it is judged as everything"
+        if name not in left_out:
+            found.append(Rung(name, _ADDS[name], derived))
+    return [*found, Rung("everything", _ADDS["everything"], scene)], left_out
+
+
+def _needless(scene: Scene) -> dict[str, str]:
+    """Rungs that add nothing, each with its reason."""
+    materials = [scene.materials[instance.material] for instance in scene.instances]
+    phong = [material for material in materials if isinstance(material, Phong)]
+    needless = {}
+    if not scene.lights:
+        needless = dict.fromkeys(("diffuse", "highlights", "shadows"), "the scene has no lights")
+    elif not any(any(material.specular) for material in phong):
+        needless["highlights"] = "no surface of the scene has highlights"
+    if not any(isinstance(m, Mirror) for m in materials) and not any(any(m.reflectance) for m in phong):
+        needless["mirrors"] = "no surface of the scene is a mirror or has a constant reflectance"
+    if not any(isinstance(m, Dielectric) for m in materials) and not any(any(m.transmittance) for m in phong):
+        needless["glass"] = "no surface of the scene is a dielectric or has a constant transmittance"
+    return needless
+
+
+def _derived(scene: Scene, level: int) -> Scene:
+    """The scene of a rung below everything; its meshes are not loaded again."""
+    lights = scene.lights if level >= _SHADOWS else (_lamp(scene),)
+    materials = {name: _reduced(material, level) for name, material in scene.materials.items()}
+    copy = scene.model_copy(update={"lights": lights, "materials": materials, "ambient": _BLACK})
+    copy.__dict__["instances"] = scene.instances
+    return copy
+
+
+def _reduced(material: Material, level: int) -> Material:
+    """What a material is on a rung."""
+    if isinstance(material, Mirror):
+        return material if level >= _MIRRORS else _GREY
+    if isinstance(material, Dielectric):
+        return material if level >= _GLASS else _GREY
+    changes: dict[str, Any] = {}
+    if level < _HIGHLIGHTS:
+        changes["specular"] = _BLACK
+    if level < _MIRRORS:
+        changes["reflectance"] = _BLACK
+    if level < _GLASS:
+        changes["transmittance"] = _BLACK
+    return material.model_copy(update=changes)
+
+
+def _lamp(scene: Scene) -> Light:
+    """A white light that shines from the eye along every primary ray."""
+    eye, target = np.asarray(scene.camera.eye), np.asarray(scene.camera.target)
+    towards = target - eye
+    if isinstance(scene.camera, OrthographicCamera):
+        return DirectionalLight(direction=tuple(towards.tolist()), irradiance=(_LAMP,) * 3)
+    return PointLight(type="point", position=scene.camera.eye, intensity=(_LAMP * float(towards @ towards),) * 3)
+
+
+def _same(derived: Scene, scene: Scene) -> bool:
+    """Whether two scenes with the same meshes show the same; ambient light shows on Phong surfaces alone."""
+    used = {instance.material for instance in scene.instances}
+    alike = all(derived.materials[name] == scene.materials[name] for name in used)
+    return alike and derived.lights == scene.lights and derived.ambient == scene.ambient

@@ -1,0 +1,56 @@
+"""Ambient light for Mitsuba's own integrators: a surface that shows k_a I_a is one that emits it.
+
+As a light it would also shine on others, so it is rendered in a pass of its own where no surface is lit: there it is
+met by rays from the eye and through mirrors and glass alone, as Whitted's model wants it. An emitter shines on the side
+of its normal and our ambient light has two, so a second pass turns the meshes over.
+"""
+
+import mitsuba as mi
+import numpy as np
+
+from renderer.material import Phong
+from renderer.scene import Scene
+from validation import mitsuba_scene as source
+
+
+def has_glow(scene: Scene) -> bool:
+    """Whether ambient light changes what is seen of ``scene``."""
+    return any(any(_glow(scene, instance.material)) for instance in scene.instances)
+
+
+def glowing(scene: Scene, shapes: dict[mi.Mesh, int], *, turned: bool) -> dict[mi.Mesh, int]:
+    """``shapes`` with an emitter of k_a I_a on each that shows ambient light, ``turned`` over or not.
+
+    Others, glass among them, stay as they are.
+    """
+    result = {}
+    for shape, index in shapes.items():
+        glow = _glow(scene, scene.instances[index].material)
+        result[_emitting(shape, glow, turned) if any(glow) else shape] = index
+    return result
+
+
+def _glow(scene: Scene, name: str) -> source.Rgb:
+    """k_a I_a of the material ``name``."""
+    material = scene.materials[name]
+    if not isinstance(material, Phong):
+        return (0.0, 0.0, 0.0)
+    ambient = material.diffuse if material.ambient is None else material.ambient
+    return [k * i for k, i in zip(ambient, scene.ambient, strict=True)]
+
+
+def _emitting(shape: mi.Mesh, radiance: source.Rgb, turned: bool) -> mi.Mesh:
+    """A copy of a mesh with an emitter; turned over, its faces run the other way and its normals point there."""
+    properties = mi.Properties()
+    properties["bsdf"] = shape.bsdf()
+    properties["emitter"] = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": list(radiance)}})
+    counts, smooth = (shape.vertex_count(), shape.face_count()), shape.has_vertex_normals()
+    result = mi.Mesh(shape.id(), *counts, has_vertex_normals=smooth, props=properties)
+    given, arrays = mi.traverse(shape), mi.traverse(result)
+    faces = np.array(given["faces"]).reshape(-1, 3)
+    arrays["vertex_positions"] = given["vertex_positions"]
+    arrays["faces"] = (faces[:, ::-1] if turned else faces).ravel()
+    if smooth:
+        arrays["vertex_normals"] = np.array(given["vertex_normals"]) * (-1.0 if turned else 1.0)
+    arrays.update()
+    return result

@@ -1,0 +1,188 @@
+"""Glass by Mitsuba's own path integrator: no recursion of ours, but a branch drawn at random at every surface.
+
+Whitted follows both branches of glass; a path takes one, by Fresnel's share. So the mean over N paths of a pixel tends
+to our picture, and two things are judged: that the error falls as 1 / sqrt(N), which an error of ours would stop, and
+that what is left of it is no more than the paths' own scatter explains.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import primary_rays
+from renderer.material import Dielectric, Phong
+from renderer.render import render
+from renderer.scene import Scene
+from validation import mitsuba_path, mitsuba_whitted
+from validation.compare_images import fragile_pixels
+from validation.gates import Gate
+from validation.shifted_film import shifted
+from validation.tradeoff import slope
+
+PATHS = "random paths of Mitsuba's native path integrator (scalar_rgb)"
+STEPS = 2
+
+# Paths a pixel; each number uses the paths of those before it.
+_COUNTS = (4, 16, 64, 256)
+_QUICK_COUNTS = _COUNTS[:3]
+# Glass pixels that are judged, spread over all that there are: the slope below needs as many. They are looked for in
+# the smallest of these pictures that has them.
+_PIXELS = 1024
+_SIZES = (128, 256, 512)
+# Least squares over 3 or 4 numbers of paths gives the slope .51 or .32 times the deviation of the RMSEs' logarithms.
+# Twenty disjoint runs of 64 paths over glass.toml had a mean of -.5007 and a deviation of .008; where paths are rarer
+# and brighter it is up to .013, and 4 of these are allowed. An ior of 1.501 for 1.5 flattens the slope by .12.
+_SLOPE = 0.05
+# Neighbouring pixels are judged by their mean, for where Fresnel's share is 4 % a pixel of 64 paths sees the rare
+# branch three times, or never: its sample variance then says nothing. 32 pixels see it 80 times, and resampling the
+# paths of glass.toml then gave uniform p-values, a little high because the channels go together; 4 pixels gave p < .001
+# in every sixth run.
+_GROUP = 32
+# How often a sound picture fails: once in 10,000 scenes. The paths are the same in every run, so it is no flicker.
+_FALSE_ALARMS = 1e-4
+# Float32 against float64 under the same offset rule, as in thresholds.py; beside it a group without scatter is judged.
+_FLOAT32 = 2e-5
+# Of the glass pixels. Edges and total reflection make glass far more fragile than a whole picture's .24 %: 4 % were
+# measured for glass.toml. At 1 nothing would be judged.
+_FRAGILE_SHARE = 0.15
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """How our picture lies among the means of random paths.
+
+    rmse : of the mean over each number of paths, over pixels and channels.
+    slope : exponent of the RMSE against the number of paths; -1/2 without bias, None where no error has a logarithm.
+    bias : root mean square of what the paths' scatter does not explain at the largest number; about 0 or noise.
+    z_max : largest deviation of a group's mean, in standard errors.
+    p_value : how probable a larger one is in a sound picture, for all groups and channels together.
+    groups : of up to 32 neighbouring pixels.
+    """
+
+    rmse: list[float]
+    slope: float | None
+    bias: float
+    z_max: float
+    p_value: float
+    groups: int
+
+
+def can_judge(scene: Scene) -> str | None:
+    """Why random paths say nothing about ``scene``; None if they do."""
+    if any(isinstance(scene.materials[i.material], Dielectric) for i in scene.instances):
+        return None
+    return "nothing is random without a dielectric; one path a ray is the picture"
+
+
+def run(scene: Scene, name: str, quick: bool, step: Callable[[str], None]) -> tuple[dict[str, Any], list[Gate]]:
+    """Judge our picture of the glass in ``scene``; returns a record for JSON and the gates, none for too little glass.
+
+    Raises ``ValueError`` if ``can_judge`` says why not.
+    """
+    fault = can_judge(scene)
+    if fault is not None:
+        raise ValueError(f"{name}: expected a scene with glass, got one where {fault}")
+    counts = _QUICK_COUNTS if quick else _COUNTS
+    step(f"monte carlo: {name}, which pixels show glass")
+    judged, left_out = _without_transmission(scene)
+    size, shown, steady = _glass(judged)
+    step(f"monte carlo: {name}, {counts[-1]} random paths a pixel")
+    record: dict[str, Any] = {"name": name, "size": size, "pixels": int(steady.sum()), "left_out": left_out}
+    if shown.sum() < _PIXELS:
+        few = f"glass is seen in {shown.sum()} pixels of {size} x {size}, and the error's slope needs {_PIXELS}"
+        return record | {"left_out": [*left_out, few], "paths": [], "seconds": 0.0, "costs": {PATHS: 0.0}}, []
+    rows = np.flatnonzero(steady)
+    rows = rows[np.linspace(0, len(rows) - 1, min(_PIXELS, len(rows))).astype(int)]
+    origins, directions = primary_rays(judged.camera, size, size)
+    depth = judged.render.max_depth
+    began = time.perf_counter()
+    paths = mitsuba_path.random_paths(judged, (origins[rows], directions[rows]), counts[-1], max_depth=depth)
+    seconds = time.perf_counter() - began
+    scatter = scatter_of(_picture(judged, size).reshape(-1, 3)[rows], paths, counts)
+    fragile = 1.0 - float(steady.sum() / shown.sum())
+    record |= {"pixels": len(rows), "fragile_share": fragile, "paths": list(counts), "seconds": seconds}
+    return record | asdict(scatter) | {"costs": {PATHS: seconds}}, _gates(name, scatter, fragile)
+
+
+def scatter_of(ours: NDArray[np.float64], paths: NDArray[np.float64], counts: tuple[int, ...]) -> Scatter:
+    """Our radiance (n, 3) among random paths (count, n, 3), pixels in an order in which neighbours follow each other.
+
+    counts : ascending numbers of paths, of which the last is all of them.
+    """
+    largest = counts[-1]
+    rmse = [float(np.sqrt(np.mean((paths[:count].mean(axis=0) - ours) ** 2))) for count in counts]
+    error = paths.mean(axis=0) - ours
+    variance = paths.var(axis=0, ddof=1) / largest
+    starts = np.arange(0, len(ours), _GROUP)
+    # A sum's variance is the sum of the variances; float32's error may be the same in all pixels of a group.
+    sizes = np.diff([*starts, len(ours)])[:, None]
+    scatter = np.add.reduceat(variance, starts) + (_FLOAT32 * sizes) ** 2
+    z_max = float(np.abs(np.add.reduceat(error, starts) / np.sqrt(scatter)).max())
+    return Scatter(
+        rmse=rmse,
+        slope=slope(counts, rmse),
+        bias=math.sqrt(max(0.0, float(np.mean(error**2 - variance)))),
+        z_max=z_max,
+        p_value=_sidak(z_max, 3 * len(starts)),
+        groups=len(starts),
+    )
+
+
+def _sidak(z: float, tests: int) -> float:
+    """Probability that of so many normal deviates one is beyond z in size: 1 - (1 - p)^tests (Sidak 1967).
+
+    Exact for independent tests; for channels, which go together, it is on the side of no alarm.
+    """
+    p = math.erfc(z / math.sqrt(2.0))
+    return -math.expm1(tests * math.log1p(-p)) if p < 1.0 else 1.0
+
+
+def _without_transmission(scene: Scene) -> tuple[Scene, list[str]]:
+    """The scene without what Mitsuba has no surface for, and what that was."""
+    black = {"transmittance": (0.0, 0.0, 0.0)}
+    opaque = {
+        name: material.model_copy(update=black)
+        for name, material in scene.materials.items()
+        if isinstance(material, Phong) and material.passes_light
+    }
+    copy = scene.model_copy(update={"materials": scene.materials | opaque})
+    copy.__dict__["instances"] = scene.instances  # the same meshes, not loaded again
+    return copy, [f"materials.{name}: transmittance" for name in sorted(opaque)]
+
+
+def _glass(scene: Scene) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
+    """The picture's size, its pixels (flat) whose primary ray meets glass, and those of them that are not fragile.
+
+    Mitsuba says which show glass, so that no error of ours can leave a pixel out.
+    """
+    glass = [i for i, of in enumerate(scene.instances) if isinstance(scene.materials[of.material], Dielectric)]
+    for size in _SIZES:
+        shown = np.isin(mitsuba_whitted.aovs(scene, size, size).instance, glass)
+        if shown.sum() >= _PIXELS:
+            break
+    fragile = fragile_pixels(lambda offset, shift: _picture(shifted(scene, shift), size, offset))
+    return size, shown.ravel(), (shown & ~fragile).ravel()
+
+
+def _picture(scene: Scene, size: int, offset: Any = "mitsuba") -> NDArray[np.float64]:
+    """Ours through the pixels' centres, (size, size, 3); paths know no smallest weight, so neither do we here."""
+    image = render(scene, resolution=(size, size), samples=1, min_weight=0.0, offset=offset)
+    return image.radiance.astype(np.float64)
+
+
+def _gates(name: str, scatter: Scatter, fragile: float) -> list[Gate]:
+    subject = f"{name} against random paths"
+    off = math.nan if scatter.slope is None else abs(scatter.slope + 0.5)
+    falls = "the error falls as 1 / sqrt(N); where we differ from the paths' mean it stops falling"
+    chance = f"a sound picture gives less once in {1.0 / _FALSE_ALARMS:,.0f} scenes; groups of {_GROUP} pixels, Sidak"
+    few = "the others are judged outside these pixels, so they must stay few"
+    return [
+        Gate("images", subject, "slope of log RMSE, off -1/2", off, "at most", _SLOPE, falls),
+        Gate("images", subject, "p-value of the largest z", scatter.p_value, "at least", _FALSE_ALARMS, chance),
+        Gate("images", subject, "fragile share of the glass", fragile, "at most", _FRAGILE_SHARE, few),
+    ]

@@ -1,0 +1,47 @@
+"""The sections of the suite: their names, the modules behind them, and which of them a run asks for."""
+
+from collections.abc import Collection
+from typing import Literal, NamedTuple
+
+
+class Section(NamedTuple):
+    """A section's module has ``steps(job) -> int`` and ``run(job) -> (record, gates)``.
+
+    ``judges`` names what of a user's it can judge, if anything: files given by ``--scene`` or by ``--mesh``.
+    """
+
+    name: str
+    module: str
+    judges: Literal["scene", "mesh"] | None = None
+
+
+# In the order of the report.
+SECTIONS = (
+    Section("images", "validation.images", "scene"),
+    Section("hits", "validation.hits", "mesh"),
+    Section("stability", "validation.numerical"),
+    Section("efficiency", "validation.efficiency"),
+)
+NAMES = tuple(section.name for section in SECTIONS)
+
+
+def choose(only: Collection[str], given: Collection[str]) -> tuple[list[Section], dict[str, str]]:
+    """The sections that run, and why each of the others does not.
+
+    ``only`` holds names of sections; ``given`` the kinds of a user's files, "scene" or "mesh", nothing where the suite
+    judges its own.
+    """
+    reasons = {section.name: _reason(section, only, given) for section in SECTIONS}
+    left_out = {name: reason for name, reason in reasons.items() if reason}
+    return [section for section in SECTIONS if section.name not in left_out], left_out
+
+
+def _reason(section: Section, only: Collection[str], given: Collection[str]) -> str | None:
+    """Why a section is left out; None where it runs."""
+    if section.name not in only:
+        return "not named by --only"
+    if not given or section.judges in given:
+        return None
+    if section.judges is None:
+        return "judges only what the suite brings along, and the run was given files of its own"
+    return f"no file was given by --{section.judges}"

@@ -1,0 +1,186 @@
+"""One run of the suite: its sections in turn, then everything that was found as metrics, page and JUnit file."""
+
+import json
+import shutil
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from renderer.image import write_atomically
+from renderer.mesh_io import load_mesh
+from renderer.scene import load_scene
+from validation import baseline, environment, junit, report, schema, summary
+from validation.gates import Gate
+from validation.job import Job
+from validation.progress import steps
+from validation.sections import Section, choose
+from validation.thresholds import Thresholds, load_thresholds
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the command line asks for; ``gate`` is a file of thresholds or None for the suite's own."""
+
+    command: str
+    quick: bool
+    only: tuple[str, ...]
+    output: Path
+    gate: Path | None = None
+    scenes: tuple[Path, ...] = ()
+    meshes: tuple[Path, ...] = ()
+
+
+def run(asked: Request) -> dict[str, Any]:
+    """Run the sections, write the report into ``asked.output`` and return the metrics.
+
+    What stood in that folder stays as it is until everything new is complete. Raises ``ValueError`` and ``OSError`` for
+    files of the user's that are no good, before any section runs, and ``ImportError`` where a reference is missing.
+    """
+    began, started = time.perf_counter(), datetime.now(UTC)
+    thresholds = Thresholds() if asked.gate is None else load_thresholds(asked.gate)
+    _open(asked)
+    given = {kind for kind, files in (("scene", asked.scenes), ("mesh", asked.meshes)) if files}
+    chosen, left_out = choose(asked.only, given)
+    stored_baseline = baseline.read(asked.output / "baseline.json")
+    asked.output.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=asked.output, prefix=".run-") as folder:
+        pictures = Path(folder) / "pictures"
+        pictures.mkdir()
+        job = Job(asked.quick, thresholds, pictures, lambda _: None, asked.scenes, asked.meshes)
+        records, gates = _sections(chosen, job)
+        metrics = {
+            "schema": schema.VERSION,
+            "command": asked.command,
+            "quick": asked.quick,
+            "own": job.own,
+            "started": started.isoformat(timespec="seconds"),
+            "thresholds": {"file": asked.gate and str(asked.gate), "moved": thresholds.moved()},
+            "left_out": left_out,
+            "environment": environment.describe(),
+            **records,
+        }
+        metrics |= _outcome(records, [gate.record() for gate in gates], stored_defects(asked.output))
+        metrics["baseline"] = baseline.compare(metrics, stored_baseline)
+        metrics["seconds"] = time.perf_counter() - began
+        write(metrics, asked.output, pictures)
+    return metrics
+
+
+def _open(asked: Request) -> None:
+    """Read every file that the user gave, so that a bad one is an error now and not minutes later."""
+    for scene in asked.scenes:
+        _ = load_scene(scene).instances
+    for mesh in asked.meshes:
+        load_mesh(mesh)
+
+
+def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, Any]], list[Gate]]:
+    """Run each section with one progress bar over all; the references that a section needs are imported with it."""
+    modules: dict[str, Any] = {section.name: import_module(section.module) for section in chosen}
+    records: dict[str, dict[str, Any]] = {}
+    gates: list[Gate] = []
+    with steps(sum(module.steps(job) for module in modules.values())) as step:
+        for name, module in modules.items():
+            began = time.perf_counter()
+            record, found = module.run(replace(job, step=step))
+            record |= {"seconds": time.perf_counter() - began}
+            # Here, because at the end of the run nobody would know which section it was.
+            try:
+                json.dumps(record, allow_nan=False)
+            except (TypeError, ValueError) as error:
+                raise RuntimeError(f"{name}: its record cannot be stored as JSON: {error}") from error
+            records[name] = record
+            gates += [replace(gate, section=name) for gate in found]
+    return records, gates
+
+
+def _outcome(
+    records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], defects: dict[str, Any] | None
+) -> dict[str, Any]:
+    rows = summary.matrix(records, gates)
+    found = {"gates": gates, "verdict": summary.verdict(gates), "matrix": rows}
+    found["facts"] = summary.facts(rows, gates, defects)
+    return found if defects is None else found | {"defects": defects}
+
+
+def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
+    """Write metrics, page and JUnit file into ``output``, and move the folder ``pictures`` there instead of the old."""
+    texts = {
+        "metrics.json": schema.text(metrics),
+        "index.html": report.page(metrics, pictures).encode(),
+        "junit.xml": junit.document(metrics),
+    }
+    kept = output / "pictures"
+    if pictures != kept:
+        shutil.rmtree(kept, ignore_errors=True)
+        pictures.replace(kept)
+    for name, text in texts.items():
+        _write(output / name, text)
+
+
+def run_defects(asked: Request) -> list[Gate]:
+    """Inject the seeded defects, store what was found as ``defects.json`` and return the gates.
+
+    A report that lies in the same folder is drawn again with it.
+    """
+    from validation import defects
+    from validation.defects_list import DEFECTS
+
+    began, started = time.perf_counter(), datetime.now(UTC)
+    sources = environment.sources_sha256()
+    chosen = [d for d in DEFECTS if not (asked.quick and d.kernel)]
+    asked.output.mkdir(parents=True, exist_ok=True)
+    with steps(len(chosen) + 1) as step:
+        record, gates = defects.run(asked.quick, step)
+    record |= {
+        "sources": sources,
+        "quick": asked.quick,
+        "command": asked.command,
+        "started": started.isoformat(timespec="seconds"),
+        "seconds": time.perf_counter() - began,
+    }
+    text = json.dumps(record, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    _write(asked.output / "defects.json", text.encode())
+    _draw_again(asked.output)
+    return gates
+
+
+def _draw_again(output: Path) -> None:
+    """Put the stored defects into the report that lies in ``output``, if one of this schema does."""
+    try:
+        metrics = schema.read(output / "metrics.json")
+    except (ValueError, OSError):
+        return
+    records = {row["section"]: metrics[row["section"]] for row in metrics["matrix"]}
+    write(metrics | _outcome(records, metrics["gates"], stored_defects(output)), output, output / "pictures")
+
+
+def stored_defects(output: Path) -> dict[str, Any] | None:
+    """The last ``defects.json`` with ``changed``, whether the sources are others since; None where there is none."""
+    try:
+        record = json.loads((output / "defects.json").read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except ValueError as error:
+        raise ValueError(f"{output / 'defects.json'}: expected JSON, got a syntax error: {error}") from None
+    if not isinstance(record, dict) or not {"sources", "caught", "defects", "gates", "control"} <= record.keys():
+        raise ValueError(f"{output / 'defects.json'}: expected a record of --defects; remove it or run --defects again")
+    return record | {"changed": record["sources"] != environment.sources_sha256()}
+
+
+def write_baseline(output: Path) -> Path:
+    """Make ``baseline.json`` from the ``metrics.json`` beside it; see ``baseline.summary`` for what is refused."""
+    text = baseline.text(schema.read(output / "metrics.json"))
+    path = output / "baseline.json"
+    _write(path, text)
+    return path
+
+
+def _write(path: Path, text: bytes) -> None:
+    """The whole file or, where that fails, what was there before."""
+    write_atomically(path, lambda file: file.write(text))

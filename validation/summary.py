@@ -1,0 +1,63 @@
+"""The outcome of a run in a few numbers: the verdict, facts for the head of the report, sections by references."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+Record = Mapping[str, Any]
+
+
+def verdict(gates: Sequence[Record]) -> dict[str, Any]:
+    """Passed, and how many gates there were and failed. Where nothing was judged nothing passed."""
+    failed = sum(not gate["passed"] for gate in gates)
+    return {"passed": bool(gates) and not failed, "gates": len(gates), "failed": failed}
+
+
+def failure(gate: Record) -> str:
+    """What a failing gate's value is and should be; as many digits as tell the two apart."""
+    value, threshold = gate["value"], f"{gate['threshold']:.6g}"
+    if value is None:
+        shown = "not a number"
+    else:
+        short = f"{value:.6g}"
+        shown = repr(value) if short == threshold else short
+    return f"{gate['quantity']} is {shown}, expected {gate['bound']} {threshold}"
+
+
+def matrix(records: Mapping[str, Record], gates: Sequence[Record]) -> list[dict[str, Any]]:
+    """A row a section that ran: its gates, its seconds, and its references with what each cost."""
+    rows = []
+    for section, record in records.items():
+        own = [gate for gate in gates if gate["section"] == section]
+        failed = sum(not gate["passed"] for gate in own)
+        rows.append({"section": section, "gates": len(own), "failed": failed, "seconds": record["seconds"],
+                     "references": dict(record["costs"])})  # fmt: skip
+    return rows
+
+
+def facts(rows: Sequence[Record], gates: Sequence[Record], defects: Record | None) -> list[dict[str, Any]]:
+    """Up to six numbers that a reader asks for first; those whose gates did not run are left out."""
+    wrong = [gate for gate in gates if "on which we are wrong" in gate["quantity"]]
+    leaks = [gate for gate in gates if gate["quantity"] == "leaks"]
+    cases = [gate for gate in gates if gate["quantity"] == "holds"]
+    similar = [gate["value"] for gate in gates if gate["quantity"] == "ssim" and gate["value"] is not None]
+    found: list[tuple[float | None, str]] = []
+    if wrong:
+        found.append((_sum(wrong), f"rays on which we are wrong, over {len(wrong)} families and samples"))
+    if leaks:
+        found.append((_sum(leaks), f"leaks through closed meshes, in {len(leaks)} sets of rays"))
+    if similar:
+        found.append((min(similar), f"lowest SSIM of {len(similar)} comparisons with a reference"))
+    if cases:
+        found.append((sum(gate["passed"] for gate in cases), f"of {len(cases)} extreme cases hold"))
+    if defects is not None:
+        found.append((defects["caught"], f"of {len(defects['defects'])} seeded defects caught"))
+    names = {name for row in rows for name in row["references"]}
+    if names:
+        found.append((len(names), "references and judges asked"))
+    return [{"value": value, "label": label} for value, label in found]
+
+
+def _sum(gates: Sequence[Record]) -> float | None:
+    """None where a value is not a number."""
+    values = [gate["value"] for gate in gates]
+    return None if None in values else sum(values)

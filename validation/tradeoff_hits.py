@@ -1,0 +1,169 @@
+"""Closest hits: throughput against the error of t, and against leaks, of ours and of every reference.
+
+The mesh's vertices are no float32 numbers, so that it shows who rounds them. The rays of the errors are float32
+numbers, so that all see the same ones. The truth is exact arithmetic on the unrounded mesh: an error holds what
+rounding the vertices did as well as the kernel's own. Ours stores t as float64 and the references as float32, so that
+no error of theirs can be far below 2^-24 = 6e-8, nor of ours below 2^-53 = 1e-16.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh import Mesh
+from renderer.octree import Octree
+from renderer.parallel import available_threads
+from renderer.query import Hits
+from renderer.shapes import icosphere
+from validation import exact
+from validation.embree import Embree
+from validation.igl import Igl
+from validation.rays import RayBatch, camera_rays, float32_exact, leak_rays
+from validation.tradeoff import front, median_seconds, spending, timed
+
+SEED = 20
+
+
+@dataclass(frozen=True)
+class Effort:
+    """``level`` of the icosphere, ``rays`` timed, ``judged`` against exact arithmetic, ``leaks``: rays at edges and as
+    many at vertices, timed ``runs``.
+    """
+
+    level: int
+    rays: int
+    judged: int
+    leaks: int
+    runs: int
+
+
+QUICK = Effort(level=4, rays=50_000, judged=1000, leaks=20_000, runs=3)
+FULL = Effort(level=5, rays=200_000, judged=5000, leaks=100_000, runs=5)
+
+
+class Answer(NamedTuple):
+    """What a contender says: ``t`` (n,) float64, inf on a miss, and ``face`` (n,) int64, -1 on a miss."""
+
+    t: NDArray[np.float64]
+    face: NDArray[np.int64]
+
+
+class Contender(NamedTuple):
+    """One way to answer closest hits: what it is called, its threads, and who answers, None for ours."""
+
+    label: str
+    threads: int
+    closest_hit: Callable[[NDArray[np.float64], NDArray[np.float64]], Any]
+    reference: str | None = None
+
+
+def run(effort: Effort, costs: dict[str, float]) -> dict[str, object]:
+    """Measure; adds to ``costs`` the seconds spent in each reference."""
+    mesh = turned_mesh(effort.level)
+    contenders = _contenders(mesh, costs)
+    rays = camera_rays(mesh.vertices, effort.rays)
+    calls = {name: timed(c.closest_hit, rays.origins, rays.directions) for name, c in contenders.items()}
+    seconds = median_seconds(calls, effort.runs)
+    chosen = np.sort(np.random.default_rng(SEED).choice(len(rays), min(effort.judged, len(rays)), replace=False))
+    judged = rays.select(chosen)
+    judge = spending(costs, "exact arithmetic", exact.closest_hits)
+    truth = judge(mesh.vertices, mesh.faces, judged.origins, judged.directions)
+    inside = leak_rays(mesh.vertices, mesh.faces, effort.leaks, SEED)
+    points = [
+        {"name": name, "label": contender.label, "threads": contender.threads, "mrays": len(rays) / seconds[name] / 1e6}
+        | {"errors": errors(answer(contender.closest_hit(judged.origins, judged.directions)), truth)}
+        | {"leaks": sum(_leaks(contender, batch) for batch in inside)}
+        for name, contender in contenders.items()
+    ]
+    return {
+        "mesh": {"name": mesh.name, "faces": len(mesh.faces)},
+        "rays": len(rays),
+        "judged": len(judged),
+        "leak_rays": sum(len(batch) for batch in inside),
+        "runs": effort.runs,
+        "points": points,
+        "fronts": fronts(points),
+    }
+
+
+def fronts(points: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Names on the Pareto fronts of seconds a ray against the p99 error and against leaks, fastest first.
+
+    A contender that never hit where the truth does has no error and stands on no front of errors.
+    """
+    known = [p for p in points if p["errors"]["p99"] is not None]
+    return {
+        "p99": [known[i]["name"] for i in front([(1.0 / p["mrays"], p["errors"]["p99"]) for p in known])],
+        "leaks": [points[i]["name"] for i in front([(1.0 / p["mrays"], p["leaks"]) for p in points])],
+    }
+
+
+def turned_mesh(level: int) -> Mesh:
+    """A wavy sphere scaled by pi and turned by a radian about two axes: hardly a vertex that float32 holds."""
+    ball = icosphere(level)
+    x, y, z = ball.vertices.T
+    wavy = ball.vertices * (1.0 + 0.08 * np.sin(9.0 * x) * np.sin(7.0 * y) * np.sin(8.0 * z))[:, None]
+    c, s = np.cos(1.0), np.sin(1.0)
+    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    return Mesh(np.pi * wavy @ about_z @ about_x, ball.faces, name=f"wavy icosphere {level}, turned")
+
+
+def errors(answer: Answer, truth: list[exact.ExactHit | None]) -> dict[str, object]:
+    """Verdicts that are wrong, and the relative error of t where both hit, whatever the face.
+
+    ``wrong_face`` counts faces that do not attain the exact t; the three percentiles are None where nothing is hit.
+    """
+    hit = np.array([h is not None for h in truth])
+    found = answer.face >= 0
+    pairs = [(ray, h) for ray in np.flatnonzero(hit & found).tolist() if (h := truth[ray]) is not None]
+    relative = [float(abs(Fraction(float(answer.t[ray])) - h.t) / h.t) for ray, h in pairs]
+    p50, p99, largest = np.percentile(relative, (50, 99, 100)).tolist() if relative else (None, None, None)
+    return {
+        "missed": int((hit & ~found).sum()),
+        "false_hits": int((~hit & found).sum()),
+        "wrong_face": sum(int(answer.face[ray]) not in h.faces_at_t for ray, h in pairs),
+        "both_hit": len(pairs),
+        "p50": p50,
+        "p99": p99,
+        "max": largest,
+    }
+
+
+def answer(found: Hits | tuple[NDArray[np.float64], NDArray[np.int64]]) -> Answer:
+    """Ours or a reference's closest hits in one form."""
+    return Answer(found.t, found.face) if isinstance(found, Hits) else Answer(*found)
+
+
+def _contenders(mesh: Mesh, costs: dict[str, float]) -> Mapping[str, Contender]:
+    """By name. Ours stores float64, or float32 where it is given rounded vertices; one thread and all are told apart,
+    because the references have one.
+    """
+    rounded = Mesh(float32_exact(mesh.vertices), mesh.faces)
+    threads = available_threads()
+    tree = partial(Octree.from_mesh, threads=1)
+    references: dict[str, tuple[str, Embree | Igl]] = {
+        "embree_default": ("Embree default", Embree(mesh.vertices, mesh.faces, robust=False)),
+        "embree_robust": ("Embree robust", Embree(mesh.vertices, mesh.faces, robust=True)),
+        "igl": ("libigl", Igl(mesh.vertices, mesh.faces)),
+    }
+    found = {
+        "ours": Contender("ours, float64, 1 thread", 1, tree(mesh).closest_hit),
+        "ours_float32": Contender("ours, float32 vertices, 1 thread", 1, tree(rounded).closest_hit),
+    }
+    if threads > 1:
+        every = Octree.from_mesh(mesh)
+        found["ours_all"] = Contender(f"ours, float64, {threads} threads", threads, every.closest_hit)
+    for name, (label, reference) in references.items():
+        found[name] = Contender(label, 1, spending(costs, label, reference.closest_hit), label)
+    return found
+
+
+def _leaks(contender: Contender, rays: RayBatch) -> int:
+    """Rays from inside the closed mesh that meet nothing."""
+    return int((answer(contender.closest_hit(rays.origins, rays.directions)).face < 0).sum())
