@@ -10,7 +10,7 @@ import pytest
 
 from renderer import Mesh, load_scene
 from renderer.render import render
-from validation import tradeoff_hits, tradeoff_pictures
+from validation import mitsuba_path, tradeoff_hits, tradeoff_pictures
 from validation.cases import SCENES
 from validation.mitsuba_sampling import Film, can_judge
 from validation.tradeoff import spending
@@ -110,6 +110,6 @@ def test_the_figures_name_contenders_fronts_and_slopes(record: dict[str, Any]) -
 
 def test_a_references_seconds_add_up(record: dict[str, Any]) -> None:
     assert set(record["costs"]) == {"Embree default", "Embree robust", "libigl", "exact arithmetic", "Mitsuba's film",
-                                    "Mitsuba path (reference A)"}  # fmt: skip
+                                    mitsuba_path.NAME}  # fmt: skip
     costs = {"a": 1.0}
     assert spending(costs, "a", sum)([1, 2]) == 3 and costs["a"] > 1.0

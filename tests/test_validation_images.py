@@ -17,7 +17,7 @@ from renderer.material import Dielectric, Mirror, Phong
 from renderer.render import render
 from renderer.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 from renderer.shapes import icosphere
-from validation import images, ladder
+from validation import images, ladder, mitsuba_path, monte_carlo
 from validation.cases import SCENES
 from validation.gates import Gate
 from validation.images import Effort, Reference
@@ -26,7 +26,7 @@ from validation.mitsuba_whitted import whitted
 from validation.shifted_film import shifted
 from validation.thresholds import Thresholds
 
-SMALL = Effort(64)
+SMALL = Effort(64, paths=False)
 
 
 @cache
@@ -93,17 +93,19 @@ def test_the_whole_ladder_passes_and_leaves_what_the_report_shows(tmp_path: Path
     judged = {rung["name"]: {c["reference"] for c in rung["comparisons"]} for rung in record["rungs"]}
     of_glass = ("glass", "everything")
     assert judged == {name: {"whitted"} if name in of_glass else {"whitted", "path"} for name in ladder.NAMES}
-    assert "dielectric" in record["rungs"][-1]["left_out"][images.PATH]
+    assert "dielectric" in record["rungs"][-1]["left_out"][mitsuba_path.NAME]
     shown = [c["files"] for rung in record["rungs"] for c in rung["comparisons"] if "files" in c]
     assert len(shown) == 6 and not (tmp_path / "failed").exists()
     assert {p.name for p in tmp_path.iterdir()} == {name for files in shown for name in files.values()}
     with Pillow.open(tmp_path / shown[0]["difference"]) as difference:
         assert difference.mode == "L"
-    assert images._costs([record])[images.WHITTED] > 0.0
+    assert record["paths"]["paths"] and any("random paths" in gate.subject for gate in gates)
+    costs = images._costs([record])
+    assert costs[images.WHITTED] > 0.0 and costs[monte_carlo.PATHS] == record["paths"]["seconds"]
 
 
 def test_a_second_run_has_the_same_bits(tmp_path: Path) -> None:
-    runs = [check(tmp_path, stairs(), Effort(24))[0]["rungs"][-1]["comparisons"] for _ in range(2)]
+    runs = [check(tmp_path, stairs(), Effort(24, paths=False))[0]["rungs"][-1]["comparisons"] for _ in range(2)]
     kept = [[{k: v for k, v in c.items() if k != "reference_seconds"} for c in run] for run in runs]
     assert kept[0] == kept[1] and len(kept[0][0]["ours_sha256"]) == 64
 
@@ -177,16 +179,16 @@ def test_srgb_applied_twice_is_seen_in_what_is_saved(tmp_path: Path, monkeypatch
 
     right = module.srgb
     monkeypatch.setattr(module, "srgb", lambda linear: right(right(linear) / 255.0))
-    _, gates = check(tmp_path, stairs(), Effort(24))
+    _, gates = check(tmp_path, stairs(), Effort(24, paths=False))
     assert {gate.quantity for gate in gates if not gate.passed} == {"8-bit steps from the formula"}
 
 
 def test_a_rung_that_nobody_judges_is_not_passed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    nobody = Reference("path", images.PATH, lambda _: "no reason", whitted)
+    nobody = Reference("path", mitsuba_path.NAME, lambda _: "no reason", whitted)
     monkeypatch.setattr(images, "REFERENCES", (nobody,))
-    record, gates = check(tmp_path, stairs(), Effort(24))
+    record, gates = check(tmp_path, stairs(), Effort(24, paths=False))
     assert failing(gates) == ["small, everything: references that judge it is 0"]
-    assert record["rungs"][0]["left_out"] == {images.PATH: "no reason"}
+    assert record["rungs"][0]["left_out"] == {mitsuba_path.NAME: "no reason"}
 
 
 def test_a_mesh_that_mitsuba_cannot_hold_is_not_passed(tmp_path: Path) -> None:

@@ -25,7 +25,6 @@ from validation.picture_files import write_png
 from validation.shifted_film import shifted
 
 WHITTED = "Whitted recursion over Mitsuba's scene, BSDFs and rays (scalar_rgb)"
-PATH = "Mitsuba's native path integrator (scalar_rgb)"
 AOVS = "Mitsuba's primary hits (scalar_rgb)"
 
 # SSIM's window.
@@ -45,7 +44,7 @@ class Reference(NamedTuple):
 
 REFERENCES = (
     Reference("whitted", WHITTED, lambda _: None, mitsuba_whitted.whitted),
-    Reference("path", PATH, mitsuba_path.can_judge, mitsuba_path.path),
+    Reference("path", mitsuba_path.NAME, mitsuba_path.can_judge, mitsuba_path.path),
 )
 
 

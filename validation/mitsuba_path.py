@@ -25,6 +25,8 @@ from renderer.scene import Scene
 from validation import mitsuba_ambient, mitsuba_phong
 from validation import mitsuba_scene as source
 
+# As reports show it.
+NAME = "Mitsuba's native path integrator (scalar_rgb)"
 # Longer than any path, so that none ends by chance.
 _NO_ROULETTE = 1000
 

@@ -26,7 +26,7 @@ Picture = NDArray[Any]
 Point = dict[str, Any]
 
 METRICS = ("rmse", "flip", "dissimilarity")
-FILM, PATH = "Mitsuba's film", "Mitsuba path (reference A)"
+FILM = "Mitsuba's film"
 
 DEEP = 16
 # Beyond six bounces the view of the mirrors that is measured shows nothing new.
@@ -173,7 +173,7 @@ def _split(bench: Bench, costs: dict[str, float]) -> dict[str, Any]:
     truncation = _costed([partial(bench.ours, max_depth=d) for d in range(SHALLOW, DEPTH + 1)], deep)
     size = bench.effort.size
     rays = mitsuba_scene.camera_rays(bench.scene, size, size, 1)[0]
-    judge = spending(costs, PATH, partial(mitsuba_path.path, max_depth=DEPTH, rays=rays))
+    judge = spending(costs, mitsuba_path.NAME, partial(mitsuba_path.path, max_depth=DEPTH, rays=rays))
     theirs = judge(bench.scene, size, size)
     return {
         "size": size,
