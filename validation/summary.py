@@ -14,7 +14,7 @@ def verdict(gates: Sequence[Record]) -> dict[str, Any]:
 
 def failure(gate: Record) -> str:
     """What a failing gate's value is and should be; as many digits as tell the two apart."""
-    value, threshold = gate["value"], f"{gate['threshold']:.6g}"
+    value, threshold = gate["value"], f"{gate['threshold']:.12g}"
     if value is None:
         shown = "not a number"
     else:
