@@ -7,19 +7,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from validation import compare_hits, exact, rays
-from validation.compare_hits import (
+from validation import exact, rays
+from validation.compare_hits import HitArrays, compare, exact_errors, judge, judge_all
+from validation.embree import Embree
+from validation.hit_errors import EXPONENTS, error_sizes, truth
+from validation.hit_verdicts import (
     BOTH_RIGHT,
     BOTH_WRONG,
+    LISTED,
     NEAR_EDGE,
     OURS_RIGHT,
+    SETTLED,
     THEIRS_RIGHT,
-    HitArrays,
-    compare,
-    exact_errors,
-    judge,
+    VERDICTS,
 )
-from validation.embree import Embree
+from validation.rounding import FLOAT64_ROUNDOFF
 
 BALL = trimesh.creation.icosphere(2)
 VERTICES = rays.float32_exact(BALL.vertices)
@@ -62,7 +64,7 @@ def test_right_hits_are_right():
     assert comparison.both_hit > 200 and comparison.both_miss > 10
     assert 1e-8 < comparison.t_error_p50 < 1e-7
     errors = exact_errors(OURS, EXACT, VERTICES, FACES, RAYS)
-    assert errors.wrong == errors.near_edge == 0 and errors.listed == ()
+    assert errors.wrong == errors.near_edge == 0 and errors.disagreements == ()
     assert errors.hits == np.count_nonzero(OURS.hit)
     assert 0 < errors.ulp_max <= 0.5
 
@@ -76,7 +78,7 @@ def test_our_shifted_t_is_found(shift):
     assert found.exact_t == OURS.t[HIT] and found.exact_faces == (OURS.face[HIT],)
     assert comparison.ours_wrong == 1
     errors = exact_errors(ours, EXACT, VERTICES, FACES, RAYS)
-    assert errors.wrong == 1 and errors.listed[0].ray == HIT
+    assert errors.wrong == 1 and errors.disagreements[0].ray == HIT
 
 
 def test_a_shift_below_float32_is_found_by_the_exact_sample():
@@ -122,6 +124,17 @@ def test_a_farther_hit_is_found():
     ours = changed(OURS, ray, t=float(second.t), face=second.face)
     assert the_one(judged(ours), ray).verdict == THEIRS_RIGHT
     assert exact_errors(ours, EXACT, VERTICES, FACES, RAYS).wrong == 1
+    theirs = changed(THEIRS, ray, t=float(second.t), face=second.face)
+    assert the_one(judged(theirs=theirs), ray).verdict == OURS_RIGHT
+
+
+def test_a_hit_behind_the_origin_is_not_right():
+    """At its t the face is exactly hit, and nothing nearer is; but hits begin at t = 0."""
+    square = np.array([[-1.0, -1, 0], [3, -1, 0], [-1, 3, 0], [-1, -1, 2], [3, -1, 2], [-1, 3, 2]])
+    faces = np.array([[0, 1, 2], [3, 4, 5]])
+    batch = one_ray([0, 0, 1], [0, 0, -1])
+    comparison = judge(compare(answer(1.0, 0), answer(-1.0, 1), square, faces, batch), square, faces)
+    assert comparison.verdicts[OURS_RIGHT] == 1
 
 
 def test_their_faults_are_theirs():
@@ -179,7 +192,7 @@ def test_a_silhouette_is_counted_apart_and_listed():
     comparison = judged(missed, answer(1.0, hits[0].face), batch)
     assert comparison.verdicts[NEAR_EDGE] == 1 and comparison.ours_wrong == 0
     errors = exact_errors(missed, hits, VERTICES, FACES, batch)
-    assert (errors.wrong, errors.near_edge, errors.near_edge_flipped, len(errors.listed)) == (0, 1, 1, 1)
+    assert (errors.wrong, errors.near_edge, errors.near_edge_flipped, len(errors.disagreements)) == (0, 1, 1, 1)
 
 
 def test_the_neighbour_at_an_edge_is_counted_apart_but_is_no_flip():
@@ -205,6 +218,76 @@ def test_what_is_not_judged_counts_as_wrong():
     comparison = judge(compare(missed, THEIRS, VERTICES, FACES, RAYS), VERTICES, FACES, most=5)
     assert comparison.unjudged == len(comparison.disagreements) - 5
     assert comparison.ours_wrong == np.count_nonzero(THEIRS.hit)
+    errors = exact_errors(missed, EXACT, VERTICES, FACES, RAYS)
+    assert errors.wrong == np.count_nonzero(OURS.hit)
+    assert sum(d.verdict is None for d in errors.disagreements) == errors.wrong - SETTLED > 0
+
+
+def test_answers_that_are_plainly_ours_are_all_judged():
+    """However many disagree: only rays on which ours is in doubt need the slow judgement that is bounded."""
+    nothing = HitArrays(np.full(len(RAYS), np.inf), np.full(len(RAYS), -1))
+    comparison = judge(compare(OURS, nothing, VERTICES, FACES, RAYS), VERTICES, FACES, most=0)
+    assert comparison.unjudged == 0 and comparison.verdicts[OURS_RIGHT] == np.count_nonzero(OURS.hit)
+
+
+def test_a_ray_is_judged_once_for_all_references():
+    ours = changed(OURS, HIT, t=np.inf, face=-1)
+    leaky = HitArrays(np.full(len(RAYS), np.inf), np.full(len(RAYS), -1))
+    both = judge_all([compare(ours, theirs, VERTICES, FACES, RAYS) for theirs in (THEIRS, leaky)], VERTICES, FACES)
+    assert [c.wrong_rays for c in both] == [{HIT}, set()]
+    alone = [judge(compare(ours, theirs, VERTICES, FACES, RAYS), VERTICES, FACES) for theirs in (THEIRS, leaky)]
+    assert alone == both
+
+
+def test_equal_rays_with_other_answers_are_judged_apart():
+    """0 and -0 in a direction are equal; a kernel that trips over one of them must not be hidden by the other."""
+    batch = RAYS.select([HIT, HIT])
+    ours, theirs = OURS.select(np.array([HIT, HIT])), HitArrays(np.full(2, np.inf), np.full(2, -1))
+    wrong = changed(ours, 1, t=ours.t[1] * 2)
+    assert judge(compare(wrong, theirs, VERTICES, FACES, batch), VERTICES, FACES).wrong_rays == {1}
+
+
+def test_theirs_is_judged_by_its_own_rounding():
+    """The same t, float32's rounding off: right for a float32 reference and wrong for a float64 one."""
+    batch = rays.grazing_rays(VERTICES[FACES], 2000, np.random.default_rng(2))
+    hits = exact.closest_hits(VERTICES, FACES, batch.origins, batch.directions)
+    ours = HitArrays(
+        np.array([np.inf if hit is None else float(hit.t) for hit in hits]),
+        np.array([-1 if hit is None else hit.face for hit in hits]),
+    )
+    theirs = HitArrays(*Embree(VERTICES, FACES).closest_hit(batch.origins, batch.directions))
+    single = judge(compare(ours, theirs, VERTICES, FACES, batch), VERTICES, FACES)
+    double = judge(compare(ours, theirs, VERTICES, FACES, batch, FLOAT64_ROUNDOFF), VERTICES, FACES)
+    assert single.verdicts[BOTH_RIGHT] > 0 and double.verdicts[BOTH_RIGHT] == 0
+    assert single.verdicts[OURS_RIGHT] < double.verdicts[OURS_RIGHT]
+
+
+def test_parts_keep_the_numbers_of_their_rays():
+    rows = np.arange(HIT, len(RAYS))
+    ours = changed(OURS, HIT, t=np.inf, face=-1).select(rows)
+    comparison = compare(ours, THEIRS.select(rows), VERTICES, FACES, RAYS.select(rows), numbers=rows)
+    assert judge(comparison, VERTICES, FACES).wrong_rays == {HIT}
+    errors = exact_errors(ours, EXACT[HIT:], VERTICES, FACES, RAYS.select(rows), numbers=rows)
+    assert [d.ray for d in errors.disagreements] == [HIT]
+
+
+def test_errors_have_their_sizes():
+    face, t = OURS.face[[HIT] * 4], OURS.t[[HIT] * 4] * np.array([1, 1 + 1.5e-9, 1 + 1.5e-3, 2.5])
+    sizes = error_sizes(t, face, truth([EXACT[HIT]] * 4))
+    assert (sizes.rays, sizes.right_face, sizes.missed, sizes.false_hits, sizes.other_face) == (4, 4, 0, 0, 0)
+    assert sizes.relative_max == pytest.approx(1.5) and sizes.ulp_max == pytest.approx(1.5 * t[0] / np.spacing(t[0]))
+    assert [sizes.histogram[1 + EXPONENTS.index(e)] for e in (-9, -3)] == [1, 1] and sizes.histogram[-1] == 1
+    assert sum(sizes.histogram) == 4 and len(sizes.histogram) == len(EXPONENTS) + 1
+
+
+def test_errors_without_a_size_are_counted():
+    """A miss, a hit of nothing, another face, and a face at the ray's origin, where no error is relative."""
+    square = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    origins = np.array([[0.5, 0.5, 1.0], [9, 9, 1], [0.5, 0.5, 1], [0.5, 0.5, 0]])
+    hits = exact.closest_hits(square, [[0, 1, 2]], origins, np.tile([0.0, 0.0, -1.0], (4, 1)))
+    sizes = error_sizes(np.array([np.inf, 1.0, 1.0, 1e-9]), np.array([-1, 0, 7, 0]), truth(hits))
+    assert (sizes.missed, sizes.false_hits, sizes.other_face, sizes.right_face) == (1, 1, 1, 1)
+    assert sizes.relative_max == sizes.ulp_max == sum(sizes.histogram) == 0
 
 
 def test_a_flat_hit_is_not_excused_by_its_tolerance():
@@ -215,13 +298,16 @@ def test_a_flat_hit_is_not_excused_by_its_tolerance():
     assert len(comparison.disagreements) == 1
 
 
-def test_records_are_json():
-    comparison = judged(changed(OURS, HIT, t=np.inf, face=-1))
+def test_records_are_json_and_begin_with_what_speaks_against_us():
+    nothing = HitArrays(np.full(len(RAYS), np.inf), np.full(len(RAYS), -1))
+    ours = changed(OURS, MISS, t=1.0, face=0)
+    comparison = judged(ours, nothing)
     record = json.loads(json.dumps(comparison.record(), allow_nan=False))
-    assert record["ours_wrong"] == 1 and record["disagreements"][0]["ray"] == HIT
-    assert set(record["verdicts"]) == set(compare_hits.VERDICTS)
-    errors = exact_errors(OURS, EXACT, VERTICES, FACES, RAYS)
-    assert json.loads(json.dumps(errors.record(), allow_nan=False))["wrong"] == 0
+    assert record["ours_wrong"] == 1 and record["listed"][0]["ray"] == MISS and len(record["listed"]) == LISTED
+    assert record["disagreements"] == np.count_nonzero(OURS.hit) + 1 and set(record["verdicts"]) == set(VERDICTS)
+    errors = exact_errors(ours, EXACT, VERTICES, FACES, RAYS)
+    record = json.loads(json.dumps(errors.record(), allow_nan=False))
+    assert record["wrong"] == 1 and record["listed"][0]["ray"] == MISS
 
 
 def test_malformed_hits_are_refused():

@@ -15,14 +15,17 @@ FAMILIES = {batch.name: batch for batch in rays.families(VERTICES, FACES, COUNT,
 
 
 def test_names():
-    assert list(FAMILIES) == ["camera", "random", "axis_parallel", "edge", "vertex", "grazing", "from_inside"]
+    assert list(FAMILIES) == [
+        "camera", "camera_squares", "random", "axis_parallel", "edge", "vertex", "grazing", "from_inside",
+        "on_surface", "far_away",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_float32_exact_finite_and_never_zero(name):
     batch = FAMILIES[name]
     for array in (batch.origins, batch.directions):
-        assert array.shape == (COUNT, 3) and array.dtype == np.float64
+        assert array.shape == (COUNT // 4 if name == "on_surface" else COUNT, 3) and array.dtype == np.float64
         assert np.array_equal(array, array.astype(np.float32).astype(np.float64))
         assert np.isfinite(array).all()
     assert batch.directions.any(axis=1).all()
@@ -34,7 +37,7 @@ def test_a_seed_is_all_that_decides():
     for batch, same, different in zip(FAMILIES.values(), again, other, strict=True):
         assert np.array_equal(batch.origins, same.origins)
         assert np.array_equal(batch.directions, same.directions)
-        if batch.name != "camera":
+        if batch.name not in ("camera", "camera_squares"):
             assert not np.array_equal(batch.origins, different.origins)
 
 
@@ -53,6 +56,42 @@ def test_camera_sees_all_of_the_mesh_line_by_line():
 
     assert height(VERTICES - eye).max() <= height(directions).max() + 7.1e-3
     assert height(VERTICES - eye).min() >= height(directions).min() - 7.1e-3
+
+
+def test_camera_squares_are_the_camera_in_packets_of_16():
+    eye = FAMILIES["camera"].origins[0]
+    whole, lines = rays.camera_square_rays(VERTICES, 40 * 40), rays.camera_rays(VERTICES, 40 * 40)
+    assert (whole.origins == eye).all()
+    assert {tuple(d) for d in whole.directions.tolist()} == {tuple(d) for d in lines.directions.tolist()}
+    squares = whole.directions.reshape(-1, 16, 3)
+    # A pixel is (2 tan asin 1/3) / 40 = 1.77e-2 wide; the corners of a square are 3 of them apart each way.
+    assert np.ptp(squares, axis=1).max() < 3 * 1.78e-2 * np.sqrt(2)
+    assert np.ptp(lines.directions.reshape(-1, 16, 3), axis=1).max() > 0.15
+
+
+def test_on_surface_rays_begin_on_a_face_and_half_run_along_it():
+    batch = FAMILIES["on_surface"]
+    at_vertex = (batch.origins[:, None] == VERTICES).all(axis=2).any(axis=1)
+    assert (np.flatnonzero(at_vertex) == np.arange(0, len(batch), 3)).all()
+    normals = np.cross(CORNERS[:, 1] - CORNERS[:, 0], CORNERS[:, 2] - CORNERS[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    above = np.abs(((batch.origins[:, None] - CORNERS[:, 0]) * normals).sum(axis=2))
+    # Half an ulp of float32 in each component, at lengths below 8.
+    assert above.min(axis=1).max() < 8 * 2.0**-24 * np.sqrt(3)
+    flat = np.abs(batch.directions @ normals.T).min(axis=1) < 1e-6
+    assert flat[1::2].all() and flat[::2].mean() < 0.1
+    hits = exact.closest_hits(VERTICES, FACES, batch.origins, batch.directions)
+    assert all(hit is not None and hit.t == 0 for hit, begins in zip(hits, at_vertex, strict=True) if begins)
+
+
+def test_far_away_rays_cross_1e3_to_1e5_radii():
+    batch = FAMILIES["far_away"]
+    middle = (VERTICES.min(axis=0) + VERTICES.max(axis=0)) / 2
+    radius = np.linalg.norm(VERTICES - middle, axis=1).max()
+    radii = np.linalg.norm(batch.origins - middle, axis=1) / radius
+    assert 0.99e3 < radii.min() < 2e3 and 5e4 < radii.max() < 1.01e5
+    # They aim within the box; float32 turns them by 2^-24, which 1e5 radii away is 6e-3 radii.
+    assert line_distance(middle, batch).max() < np.linalg.norm(np.ptp(VERTICES, axis=0)) / 2 + 1e-2 * radius
 
 
 def test_axis_parallel_has_all_directions_and_zeros_of_both_signs():
@@ -111,7 +150,7 @@ def test_every_family_hits_and_some_miss():
     for name, batch in FAMILIES.items():
         hits = [hit is not None for hit in exact.closest_hits(VERTICES, FACES, batch.origins, batch.directions)]
         assert np.mean(hits) > 0.25, name
-        assert name in ("from_inside", "edge", "vertex", "grazing") or not all(hits), name
+        assert name in ("from_inside", "edge", "vertex", "grazing", "on_surface") or not all(hits), name
 
 
 def test_select():

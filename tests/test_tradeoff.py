@@ -16,8 +16,8 @@ from validation.mitsuba_sampling import Film, can_judge
 from validation.tradeoff import spending
 from validation.tradeoff_figures import figures
 
-HITS = tradeoff_hits.Effort(level=3, rays=2000, judged=400, leaks=5000, runs=1)
-PICTURES = tradeoff_pictures.Effort(size=32, theirs=(1, 16), truth=64, runs=1)
+HITS = tradeoff_hits.Effort(level=3, rays=2000, judged=400, leaks=5000, runs=1, few=20)
+PICTURES = tradeoff_pictures.Effort(size=32, theirs=(1, 16), truth=36, runs=1)
 
 
 @pytest.fixture(scope="module")
@@ -34,11 +34,15 @@ def test_each_contender_errs_as_its_numbers_are_stored(record: dict[str, Any]) -
     points = {p["name"]: p for p in record["tradeoff_hits"]["points"]}
     # Float64 rounds t by 2^-53 and enlarges it by 1 / cos; float32 rounds the vertices or t itself by 2^-24.
     assert points["ours"]["errors"]["max"] < 1e-13
-    for name in ("ours_float32", "embree_default", "embree_robust", "igl"):
+    for name in ("ours_float32", "embree_default", "embree_robust", "igl", "mitsuba"):
         assert 1e-9 < points[name]["errors"]["p99"] < 1e-5
     assert points["ours"]["leaks"] == 0 == points["ours_float32"]["leaks"]
     assert points["embree_default"]["leaks"] > 100
     assert points["embree_default"]["leaks"] > points["embree_robust"]["leaks"]
+    # Mitsuba asks Embree in robust mode, for the same float32 rays.
+    assert points["mitsuba"]["errors"] == points["embree_robust"]["errors"]
+    assert points["mitsuba"]["leaks"] == points["embree_robust"]["leaks"]
+    assert points["trimesh"]["rays"] == 20 and "20 rays of each set" in points["trimesh"]["label"]
 
 
 def test_a_mesh_with_a_hole_leaks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -46,15 +50,17 @@ def test_a_mesh_with_a_hole_leaks(monkeypatch: pytest.MonkeyPatch) -> None:
     holed = Mesh(whole.vertices, whole.faces[::2], name="holed")
     monkeypatch.setattr(tradeoff_hits, "turned_mesh", lambda level: holed)
     effort = dataclasses.replace(HITS, rays=200, judged=10)
-    assert all(p["leaks"] > 1000 for p in tradeoff_hits.run(effort, {})["points"])
+    points = tradeoff_hits.run(effort, {})["points"]
+    # trimesh takes a hit 1e-8 beside a face, so at a rim it misses none.
+    assert all(p["leaks"] > 0.1 * p["leak_rays"] for p in points if p["name"] != "trimesh")
 
 
 def test_the_fronts_are_by_throughput() -> None:
-    def point(name: str, mrays: float, p99: float | None, leaks: int) -> dict[str, Any]:
-        return {"name": name, "mrays": mrays, "errors": {"p99": p99}, "leaks": leaks}
+    def point(name: str, mrays: float, p99: float | None, leaks: int, given: int = 10) -> dict[str, Any]:
+        return {"name": name, "mrays": mrays, "errors": {"p99": p99}, "leaks": leaks, "leak_rays": given}
 
     points = [point("slow", 1.0, 1e-9, 0), point("fast", 9.0, 1e-3, 7), point("worse", 8.0, 1e-2, 8),
-              point("blind", 20.0, None, 9)]  # fmt: skip
+              point("blind", 20.0, None, 9), point("few", 30.0, 1e-12, 0, given=2)]  # fmt: skip
     assert tradeoff_hits.fronts(points) == {"p99": ["fast", "slow"], "leaks": ["blind", "fast", "slow"]}
 
 
@@ -109,7 +115,7 @@ def test_the_figures_name_contenders_fronts_and_slopes(record: dict[str, Any]) -
 
 
 def test_a_references_seconds_add_up(record: dict[str, Any]) -> None:
-    assert set(record["costs"]) == {"Embree default", "Embree robust", "libigl", "exact arithmetic", "Mitsuba's film",
-                                    mitsuba_path.NAME}  # fmt: skip
+    casters = {"Embree default", "Embree robust", "libigl", "Mitsuba", "trimesh", "exact arithmetic"}
+    assert set(record["costs"]) == casters | {"Mitsuba's film", mitsuba_path.NAME}
     costs = {"a": 1.0}
     assert spending(costs, "a", sum)([1, 2]) == 3 and costs["a"] > 1.0

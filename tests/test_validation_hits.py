@@ -1,7 +1,11 @@
-"""The hit section on small efforts: it passes on the real octree and fails when the octree is broken."""
+"""The hit section on small efforts: it passes on the real octree and fails when octree or reference is broken."""
 
 import dataclasses
+import json
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,12 +14,15 @@ from renderer.layout import LANES
 from renderer.mesh import Mesh
 from renderer.octree import Octree
 from renderer.shapes import icosphere
-from validation import hits
-from validation.embree import Embree
+from validation import check_hits, hit_leaks, hits, report
 from validation.gates import Gate
-from validation.rays import face_rays, families, float32_exact
+from validation.hit_references import REFERENCES, HitReference
+from validation.job import Job
+from validation.rays import families, float32_exact
+from validation.thresholds import HitLimits, Thresholds
 
-EFFORT = hits.Effort(rays=300, exact=60, leaks=2_000)
+QUICK = tuple(one for one in REFERENCES if one.key in ("embree_robust", "embree_default", "igl"))
+EFFORT = hits.Effort(rays=300, exact=60, leaks=2_000, references=QUICK)
 
 
 def ball() -> Mesh:
@@ -23,25 +30,42 @@ def ball() -> Mesh:
     return Mesh(float32_exact(sphere.vertices), sphere.faces)
 
 
-def checked(octree: Octree) -> list[Gate]:
-    """All gates of all families for ``octree``, which claims to be that of the ball."""
-    mesh = ball()
-    embree = Embree(mesh.vertices, mesh.faces)
-    batches = (*families(mesh.vertices, mesh.faces, EFFORT.rays, 1), face_rays(mesh.vertices, mesh.faces))
-    return [g for rays in batches for g in hits._check("ball", mesh, octree, embree, rays, EFFORT)[1]]
+def job(**changes: Any) -> Job:
+    return Job(True, Thresholds(), Path(), lambda _: None, **changes)
 
 
-def broken(change: Callable[[Octree], None]) -> Octree:
-    octree = Octree.from_mesh(ball())
-    tree = octree.target.tree
-    copied = tree._replace(faces=tree.faces.copy(), blocks=tree.blocks.copy())
-    octree.target = dataclasses.replace(octree.target, tree=copied)
-    change(octree)
-    return octree
+def checked(mesh: Mesh, effort: hits.Effort = EFFORT) -> tuple[dict[str, Any], list[Gate]]:
+    return hits.check_mesh("ball", mesh, effort, job())
 
 
-def test_the_real_octree_passes() -> None:
-    assert all(g.passed for g in checked(Octree.from_mesh(ball())))
+def failing(gates: list[Gate]) -> set[str]:
+    return {gate.quantity for gate in gates if not gate.passed}
+
+
+def test_the_real_octree_passes_and_says_the_same_bits_again() -> None:
+    record, gates = checked(ball())
+    assert gates and all(g.passed for g in gates)
+    again, _ = checked(ball())
+    digests = [[family["ours_sha256"] for family in one["families"]] for one in (record, again)]
+    assert digests[0] == digests[1] and len(set(digests[0])) == len(digests[0])
+    for family in record["families"]:
+        for one in family["references"]:
+            assert one["both_hit"] + one["both_miss"] + one["only_ours"] + one["only_theirs"] == one["rays"]
+            assert sum(one["verdicts"].values()) + one["unjudged"] == one["disagreements"]
+
+
+def broken(monkeypatch: pytest.MonkeyPatch, change: Callable[[Octree], None]) -> None:
+    """Let the section build an octree that ``change`` has been at."""
+
+    def build(mesh: Mesh) -> Octree:
+        octree = Octree.from_mesh(mesh)
+        tree = octree.target.tree
+        copied = tree._replace(faces=tree.faces.copy(), blocks=tree.blocks.copy())
+        octree.target = dataclasses.replace(octree.target, tree=copied)
+        change(octree)
+        return octree
+
+    monkeypatch.setattr(check_hits, "Octree", type("Broken", (), {"from_mesh": staticmethod(build)}))
 
 
 def _drop_a_face(octree: Octree) -> None:
@@ -62,17 +86,157 @@ def _swap_two_faces(octree: Octree) -> None:
 
 
 @pytest.mark.parametrize("change", [_drop_a_face, _scale_vertices, _swap_two_faces])
-def test_a_broken_octree_turns_a_gate_red(change: Callable[[Octree], None]) -> None:
-    assert not all(g.passed for g in checked(broken(change)))
+def test_a_broken_octree_turns_a_gate_red(change: Callable[[Octree], None], monkeypatch: pytest.MonkeyPatch) -> None:
+    broken(monkeypatch, change)
+    assert not all(g.passed for g in checked(ball())[1])
+
+
+def test_exact_arithmetic_judges_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    alone = dataclasses.replace(EFFORT, exact=EFFORT.rays, references=())
+    assert failing(checked(ball(), alone)[1]) == set()
+    broken(monkeypatch, _drop_a_face)
+    assert failing(checked(ball(), alone)[1]) == {"of the exact sample, rays on which we are wrong"}
+
+
+def _blind(octree: Octree) -> None:
+    octree.any_hit = lambda origins, directions: np.zeros(len(origins), dtype=np.bool_)  # type: ignore[method-assign]
+
+
+def test_any_hit_that_differs_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken(monkeypatch, _blind)
+    assert failing(checked(ball())[1]) == {"any-hit differs from closest hit"}
+
+
+class _Wrong:
+    """A reference that hits face 0 at t = 1 with every ray."""
+
+    def closest_hit(self, origins: Any, directions: Any) -> Any:
+        return np.ones(len(origins)), np.zeros(len(origins), dtype=np.int64)
+
+
+def reference(**changes: Any) -> HitReference:
+    return QUICK[0]._replace(key="wrong", name="Wrong", make=lambda vertices, faces: _Wrong(), **changes)
+
+
+def test_a_reference_that_is_wrong_does_not_speak_against_us() -> None:
+    record, gates = checked(ball(), dataclasses.replace(EFFORT, references=(reference(),)))
+    assert all(g.passed for g in gates)
+    found = [family["references"][0] for family in record["families"] if family["family"] == "from_inside"]
+    assert found[0]["disagreements"] == found[0]["verdicts"]["ours right"] > 250
+    assert found[0]["sizes"]["other_face"] > 50
+
+
+def test_whoever_finds_a_wrong_ray_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken(monkeypatch, _drop_a_face)
+    for order in (1, -1):
+        asked = (QUICK[0], reference(most_rays=1))[::order]
+        assert "rays on which we are wrong" in failing(
+            checked(ball(), dataclasses.replace(EFFORT, references=asked))[1]
+        )
+
+
+def test_references_get_no_more_than_they_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    few, small, coarse = reference(most_rays=7), reference(most_faces=319), reference(precision="float32")
+    effort = dataclasses.replace(EFFORT, references=(few,))
+    record, _ = checked(ball(), effort)
+    assert {family["references"][0]["rays"] for family in record["families"]} == {7}
+    batch = families(ball().vertices, ball().faces, EFFORT.rays, check_hits.SEED)[0]
+    for one in record["families"][0]["references"][0]["listed"]:
+        assert one["origin"] == tuple(batch.origins[one["ray"]])
+        assert one["direction"] == tuple(batch.directions[one["ray"]])
+    monkeypatch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": icosphere(2)})
+    leaks, _ = hits.check_leaks(effort, job())
+    assert {one["references"][0]["rays"] for one in leaks["sets"]} == {7}
+    record, _ = checked(ball(), dataclasses.replace(EFFORT, references=(small,)))
+    assert list(record["left_out"]) == ["Wrong"] and "319 faces" in record["left_out"]["Wrong"]
+    turned = Mesh(ball().vertices * np.pi, ball().faces)
+    assert check_hits.can_judge(coarse, ball()) is None
+    assert "float32" in str(check_hits.can_judge(coarse, turned))
+    assert check_hits.can_judge(reference(precision="float64"), turned) is None
+
+
+def test_a_users_mesh_is_judged_by_those_that_can(tmp_path: Path) -> None:
+    path = tmp_path / "turned.obj"
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in (ball().vertices * np.pi).tolist()]
+    path.write_text("\n".join([*rows, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in ball().faces.tolist())]))
+    seen: list[str] = []
+    asked = dataclasses.replace(job(meshes=(path,)), step=seen.append)
+    record, gates = hits.run(asked)
+    assert len(seen) == hits.steps(asked) and all(g.passed for g in gates)
+    (mesh,) = record["meshes"]
+    assert mesh["name"] == "turned" and "Embree robust" in mesh["left_out"]
+    assert [one["key"] for one in mesh["references"]] and "leaks" not in record and record["leaks_left_out"]
+    assert all(one["precision"] == "float64" for one in mesh["references"])
+    assert set(record["costs"]) == {check_hits.EXACT, *(one["name"] for one in mesh["references"])}
+    json.dumps(record, allow_nan=False)
+
+
+def test_rays_that_begin_in_a_flat_mesh_are_undecidable() -> None:
+    """All that begins in the box of a flat mesh begins on its faces; what merely passes it stays decidable."""
+    few = dataclasses.replace(EFFORT, references=())
+    _, gates = checked(Mesh(ball().vertices * np.array([1.0, 0.0, 1.0]), ball().faces), few)
+    assert all(gate.passed for gate in gates)
+    aimed_at_nothing = {gate.subject for gate in gates if "rounding" in gate.quantity}
+    assert aimed_at_nothing == {f"ball, {name} rays" for name in ("camera", "camera_squares", "grazing", "face")}
+
+
+def test_a_mesh_beyond_float32_is_refused() -> None:
+    for scale in (1e-31, 1e31):
+        with pytest.raises(ValueError, match="expected faces whose largest coordinate is 1e-30 to 1e30, got 1e"):
+            checked(Mesh(ball().vertices * scale, ball().faces))
+
+
+def test_thresholds_decide() -> None:
+    limits = Thresholds(hits=HitLimits(wrong=3, any_hit_differs=4, near_edge=5, leaks=6))
+    asked = dataclasses.replace(job(), thresholds=limits)
+    _, gates = hits.check_mesh("ball", ball(), EFFORT, asked)
+    assert {gate.threshold for gate in gates} == {3, 4, 5}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": icosphere(2)})
+        assert {gate.threshold for gate in hits.check_leaks(EFFORT, asked)[1]} == {6}
 
 
 def test_a_hole_is_a_leak(monkeypatch: pytest.MonkeyPatch) -> None:
-    def with_hole() -> dict[str, Mesh]:
-        sphere = icosphere(2)
-        around = (sphere.faces == 0).any(axis=1)
-        return {"icosphere": dataclasses.replace(sphere, faces=sphere.faces[~around])}
-
-    monkeypatch.setattr(hits, "closed_meshes", with_hole)
-    records, found = hits._leaks(EFFORT, lambda _: None)
+    sphere = icosphere(2)
+    around = (sphere.faces == 0).any(axis=1)
+    whole, holed = partial(dict, icosphere=sphere), dataclasses.replace(sphere, faces=sphere.faces[~around])
+    monkeypatch.setattr(hit_leaks, "closed_meshes", whole)
+    assert all(g.passed for g in hits.check_leaks(EFFORT, job())[1])
+    monkeypatch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": holed})
+    record, found = hits.check_leaks(EFFORT, job())
     assert not any(g.passed for g in found)
-    assert all(r["ours"] > 0 for r in records)  # type: ignore[operator]
+    assert all(one["ours"] > 0 for one in record["sets"])
+    assert any(theirs["leaks"] for one in record["sets"] for theirs in one["references"])
+
+
+def test_a_leak_of_any_hit_alone_is_a_leak(monkeypatch: pytest.MonkeyPatch) -> None:
+    def build(mesh: Mesh) -> Octree:
+        octree = Octree.from_mesh(mesh)
+        _blind(octree)
+        return octree
+
+    monkeypatch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": icosphere(2)})
+    monkeypatch.setattr(hit_leaks, "Octree", type("Broken", (), {"from_mesh": staticmethod(build)}))
+    assert not any(g.passed for g in hits.check_leaks(dataclasses.replace(EFFORT, references=()), job())[1])
+
+
+def test_steps_count_the_suites_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hits, "meshes", lambda: {"ball": ball()})
+    monkeypatch.setattr(hits, "QUICK", EFFORT)
+    for module in (hits, hit_leaks):
+        monkeypatch.setattr(module, "closed_meshes", lambda: {"icosphere": icosphere(2)})
+    seen: list[str] = []
+    asked = dataclasses.replace(job(), step=seen.append)
+    record, _ = hits.run(asked)
+    assert len(seen) == hits.steps(asked) > 8
+    page = _page(record)
+    assert "rays of" in page and "icosphere (320 faces)" in page
+
+
+def _page(record: dict[str, Any]) -> str:
+    """The section's partial alone."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(loader=FileSystemLoader(report._TEMPLATES), autoescape=True, undefined=StrictUndefined)
+    environment.filters["number"] = report.number
+    return environment.get_template("hits.html").render(m={"hits": record})

@@ -19,7 +19,8 @@ FLOOR = 1e-17
 # a dark page; markers and strokes differ as well.
 _LOOKS = (
     ("#2f86c9", "o", "-"), ("#dd6b20", "s", "-"), ("#169b74", "^", "--"), ("#b86fa0", "D", "-."),
-    ("#3fa7b5", "v", ":"), ("#b59a1b", "P", "--"), ("#8c6bd1", "X", "-."), ("#808790", "", ":"),
+    ("#3fa7b5", "v", ":"), ("#b59a1b", "P", "--"), ("#8c6bd1", "X", "-."), ("#c2554d", "h", "--"),
+    ("#808790", "", ":"),
 )  # fmt: skip
 _GREY = "#808790"
 # Text takes the page's own colour: this one, which nothing else has, is replaced.

@@ -38,8 +38,8 @@ def float32_exact(values: ArrayLike) -> Floats:
 
 
 def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayBatch, ...]:
-    """All seven families, ``count`` rays each. Equal arguments give equal rays; each family has a seed of its
-    own.
+    """All ten families, ``count`` rays each, of "on_surface" a quarter. Equal arguments give equal rays; each family
+    has a seed of its own.
     """
     makers: tuple[Callable[[Floats, int, Generator], RayBatch], ...] = (
         random_rays,
@@ -48,30 +48,31 @@ def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayB
         vertex_rays,
         grazing_rays,
         from_inside_rays,
+        _quarter_on_surface,
+        far_away_rays,
     )
     if not len(faces):
         raise ValueError("faces: expected at least one face to aim rays at, got none")
     corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
     seeds = np.random.SeedSequence(seed).spawn(len(makers))
     seeded = (make(corners, count, np.random.default_rng(s)) for make, s in zip(makers, seeds, strict=True))
-    return (camera_rays(corners.reshape(-1, 3), count), *seeded)
+    points = corners.reshape(-1, 3)
+    return (camera_rays(points, count), camera_square_rays(points, count), *seeded)
 
 
 def camera_rays(vertices: Floats, count: int) -> RayBatch:
     """Pinhole camera that just sees all of ``vertices`` (V, 3), scanline by scanline; unit directions."""
-    centre, radius = _sphere(vertices)
-    forward = _unit(np.array([[-0.6, -0.45, -0.66]]))[0]
-    right = _unit(np.cross(forward, [0.0, 1.0, 0.0])[None])[0]
-    up = np.cross(right, forward)
+    side = max(int(np.ceil(np.sqrt(count))), 1)
+    row, column = np.divmod(np.arange(count), side)
+    return _pinhole("camera", vertices, row, column, side)
 
-    # The bounding sphere, 3 radii away, subtends a half angle of asin(1/3): the picture holds it.
-    side = int(np.ceil(np.sqrt(count)))
-    row, column = np.divmod(np.arange(count), max(side, 1))
-    half_width = np.tan(np.arcsin(1 / 3))
-    x = half_width * ((2 * column + 1) / max(side, 1) - 1)
-    y = half_width * (1 - (2 * row + 1) / max(side, 1))
-    directions = _unit(forward + x[:, None] * right + y[:, None] * up)
-    return _batch("camera", np.broadcast_to(centre - 3 * radius * forward, (count, 3)), directions)
+
+def camera_square_rays(vertices: Floats, count: int) -> RayBatch:
+    """The camera's rays in squares of 4 x 4 pixels: each 16 consecutive rays are near each other in both directions."""
+    squares = max(int(np.ceil(np.sqrt(count) / 4)), 1)  # along one side of the picture
+    square, pixel = np.divmod(np.arange(count), 16)
+    row, column = (4 * part + rest for part, rest in zip(divmod(square, squares), divmod(pixel, 4), strict=True))
+    return _pinhole("camera_squares", vertices, row, column, 4 * squares)
 
 
 def random_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
@@ -162,6 +163,43 @@ def from_inside_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
     return _batch("from_inside", _near_centre(corners, count, rng), _sphere_points(count, rng))
 
 
+def on_surface_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    """From random points of random faces, alternately in any direction and along the face; unit directions.
+
+    A third begin at a vertex, where t = 0 is exact and counts; the others as near their face as float32 can be, on
+    either side of it.
+    """
+    triangle = _pick(corners, count, rng)
+    weights = rng.dirichlet((1.0, 1.0, 1.0), count)
+    at_vertex = np.arange(count) % 3 == 0
+    weights[at_vertex] = np.eye(3)[rng.integers(0, 3, int(at_vertex.sum()))]
+    away = _sphere_points(count, rng)
+    normal = np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
+    along = _unit(np.cross(_unit(normal), away))
+    directions = np.where((np.arange(count) % 2 == 0)[:, None], away, along)
+    return _batch("on_surface", np.einsum("nk,nkj->nj", weights, triangle), directions)
+
+
+def _quarter_on_surface(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    # There a float32 reference answers every fourth ray otherwise than we, and each of them takes an exact verdict.
+    return on_surface_rays(corners, -(-count // 4), rng)
+
+
+def far_away_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+    """From 1e3 to 1e5 radii (log-uniform) of the mesh away, alternately at points of its faces and of its box; t is
+    about 1.
+    """
+    centre, radius = _sphere(corners.reshape(-1, 3))
+    distance = radius * 10.0 ** rng.uniform(3, 5, (count, 1))
+    # Round first: the direction must start at the origin that the ray will have.
+    origins = float32_exact(centre + distance * _sphere_points(count, rng))
+    weights = rng.dirichlet((1.0, 1.0, 1.0), count)
+    on_face = np.einsum("nk,nkj->nj", weights, _pick(corners, count, rng))
+    in_box = rng.uniform(*_bounds(corners), (count, 3))
+    targets = np.where((np.arange(count) % 2 == 0)[:, None], on_face, in_box)
+    return _batch("far_away", origins, targets - origins)
+
+
 def _edge_points(corners: Floats, count: int, rng: Generator) -> Floats:
     triangle = _pick(corners, count, rng)
     ray, first = np.arange(count), rng.integers(0, 3, count)
@@ -181,6 +219,21 @@ def face_rays(vertices: Floats, faces: Ints) -> RayBatch:
     side = np.where(np.arange(len(faces)) % 2 == 0, 1.0, -1.0)[:, None]
     origins = float32_exact(centre + side * size * _unit(normal))
     return _batch("face", origins, centre - origins)
+
+
+def _pinhole(name: str, vertices: Floats, row: Ints, column: Ints, side: int) -> RayBatch:
+    """Through the pixels (``row``, ``column``) of a picture, ``side`` pixels wide and high, of all ``vertices``."""
+    centre, radius = _sphere(vertices)
+    forward = _unit(np.array([[-0.6, -0.45, -0.66]]))[0]
+    right = _unit(np.cross(forward, [0.0, 1.0, 0.0])[None])[0]
+    up = np.cross(right, forward)
+
+    # The bounding sphere, 3 radii away, subtends a half angle of asin(1/3): the picture holds it.
+    half_width = np.tan(np.arcsin(1 / 3))
+    x = half_width * ((2 * column + 1) / side - 1)
+    y = half_width * (1 - (2 * row + 1) / side)
+    directions = _unit(forward + x[:, None] * right + y[:, None] * up)
+    return _batch(name, np.broadcast_to(centre - 3 * radius * forward, directions.shape), directions)
 
 
 def _aimed(name: str, corners: Floats, targets: Floats, rng: Generator) -> RayBatch:

@@ -81,6 +81,8 @@ class HitLimits(_Table):
     any_hit_differs: _Count = 0
     # Rays within float64 rounding of an edge, in families that aim at none: one would be a chance of 1e-9 a ray.
     near_edge: _Count = 0
+    # From inside a closed mesh every ray hits.
+    leaks: _Count = 0
 
 
 class Thresholds(_Table):

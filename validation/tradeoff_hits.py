@@ -6,7 +6,7 @@ rounding the vertices did as well as the kernel's own. Ours stores t as float64 
 no error of theirs can be far below 2^-24 = 6e-8, nor of ours below 2^-53 = 1e-16.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -21,8 +21,7 @@ from renderer.parallel import available_threads
 from renderer.query import Hits
 from renderer.shapes import icosphere
 from validation import exact
-from validation.embree import Embree
-from validation.igl import Igl
+from validation.hit_references import REFERENCES
 from validation.rays import RayBatch, camera_rays, float32_exact, leak_rays
 from validation.tradeoff import front, median_seconds, spending, timed
 
@@ -31,8 +30,14 @@ SEED = 20
 
 @dataclass(frozen=True)
 class Effort:
-    """``level`` of the icosphere, ``rays`` timed, ``judged`` against exact arithmetic, ``leaks``: rays at edges and as
-    many at vertices, timed ``runs``.
+    """How much to measure.
+
+    level   of the icosphere
+    rays    timed
+    judged  of these, against exact arithmetic
+    leaks   rays at edges, and as many at vertices
+    runs    of the clock
+    few     most rays of each set for trimesh, which needs up to 10 ms a ray
     """
 
     level: int
@@ -40,10 +45,13 @@ class Effort:
     judged: int
     leaks: int
     runs: int
+    few: int = 100
 
 
 QUICK = Effort(level=4, rays=50_000, judged=1000, leaks=20_000, runs=3)
 FULL = Effort(level=5, rays=200_000, judged=5000, leaks=100_000, runs=5)
+
+_COMPARED = ("embree_default", "embree_robust", "igl", "mitsuba", "trimesh")
 
 
 class Answer(NamedTuple):
@@ -54,37 +62,37 @@ class Answer(NamedTuple):
 
 
 class Contender(NamedTuple):
-    """One way to answer closest hits: what it is called, its threads, and who answers, None for ours."""
+    """One way to answer closest hits: what it is called, its threads, who answers, and its most rays of each set."""
 
     label: str
     threads: int
     closest_hit: Callable[[NDArray[np.float64], NDArray[np.float64]], Any]
-    reference: str | None = None
+    most: int
 
 
 def run(effort: Effort, costs: dict[str, float]) -> dict[str, object]:
     """Measure; adds to ``costs`` the seconds spent in each reference."""
     mesh = turned_mesh(effort.level)
-    contenders = _contenders(mesh, costs)
+    contenders = _contenders(mesh, effort, costs)
     rays = camera_rays(mesh.vertices, effort.rays)
-    calls = {name: timed(c.closest_hit, rays.origins, rays.directions) for name, c in contenders.items()}
+    given = {name: rays.select(_rows(len(rays), c.most)) for name, c in contenders.items()}
+    calls = {name: timed(c.closest_hit, given[name].origins, given[name].directions) for name, c in contenders.items()}
     seconds = median_seconds(calls, effort.runs)
-    chosen = np.sort(np.random.default_rng(SEED).choice(len(rays), min(effort.judged, len(rays)), replace=False))
-    judged = rays.select(chosen)
+    judged = rays.select(_rows(len(rays), effort.judged))
     judge = spending(costs, "exact arithmetic", exact.closest_hits)
     truth = judge(mesh.vertices, mesh.faces, judged.origins, judged.directions)
     inside = leak_rays(mesh.vertices, mesh.faces, effort.leaks, SEED)
     points = [
-        {"name": name, "label": contender.label, "threads": contender.threads, "mrays": len(rays) / seconds[name] / 1e6}
-        | {"errors": errors(answer(contender.closest_hit(judged.origins, judged.directions)), truth)}
-        | {"leaks": sum(_leaks(contender, batch) for batch in inside)}
+        {"name": name, "label": contender.label, "threads": contender.threads, "rays": len(given[name])}
+        | {"mrays": len(given[name]) / seconds[name] / 1e6}
+        | {"errors": _judged(contender, judged, truth)}
+        | _leaks(contender, inside)
         for name, contender in contenders.items()
     ]
     return {
         "mesh": {"name": mesh.name, "faces": len(mesh.faces)},
         "rays": len(rays),
         "judged": len(judged),
-        "leak_rays": sum(len(batch) for batch in inside),
         "runs": effort.runs,
         "points": points,
         "fronts": fronts(points),
@@ -94,12 +102,14 @@ def run(effort: Effort, costs: dict[str, float]) -> dict[str, object]:
 def fronts(points: list[dict[str, Any]]) -> dict[str, list[str]]:
     """Names on the Pareto fronts of seconds a ray against the p99 error and against leaks, fastest first.
 
-    A contender that never hit where the truth does has no error and stands on no front of errors.
+    A contender that never hit where the truth does has no error and stands on no front of errors; one that was given
+    fewer rays than another stands on none, for its percentile and its share say less.
     """
+    points = [p for p in points if p["leak_rays"] == max(p["leak_rays"] for p in points)]
     known = [p for p in points if p["errors"]["p99"] is not None]
     return {
         "p99": [known[i]["name"] for i in front([(1.0 / p["mrays"], p["errors"]["p99"]) for p in known])],
-        "leaks": [points[i]["name"] for i in front([(1.0 / p["mrays"], p["leaks"]) for p in points])],
+        "leaks": [points[i]["name"] for i in front([(1.0 / p["mrays"], p["leaks"] / p["leak_rays"]) for p in points])],
     }
 
 
@@ -140,30 +150,47 @@ def answer(found: Hits | tuple[NDArray[np.float64], NDArray[np.int64]]) -> Answe
     return Answer(found.t, found.face) if isinstance(found, Hits) else Answer(*found)
 
 
-def _contenders(mesh: Mesh, costs: dict[str, float]) -> Mapping[str, Contender]:
+def _contenders(mesh: Mesh, effort: Effort, costs: dict[str, float]) -> Mapping[str, Contender]:
     """By name. Ours stores float64, or float32 where it is given rounded vertices; one thread and all are told apart,
     because the references have one.
     """
     rounded = Mesh(float32_exact(mesh.vertices), mesh.faces)
-    threads = available_threads()
+    threads, every = available_threads(), effort.rays + effort.leaks
     tree = partial(Octree.from_mesh, threads=1)
-    references: dict[str, tuple[str, Embree | Igl]] = {
-        "embree_default": ("Embree default", Embree(mesh.vertices, mesh.faces, robust=False)),
-        "embree_robust": ("Embree robust", Embree(mesh.vertices, mesh.faces, robust=True)),
-        "igl": ("libigl", Igl(mesh.vertices, mesh.faces)),
-    }
     found = {
-        "ours": Contender("ours, float64, 1 thread", 1, tree(mesh).closest_hit),
-        "ours_float32": Contender("ours, float32 vertices, 1 thread", 1, tree(rounded).closest_hit),
+        "ours": Contender("ours, float64, 1 thread", 1, tree(mesh).closest_hit, every),
+        "ours_float32": Contender("ours, float32 vertices, 1 thread", 1, tree(rounded).closest_hit, every),
     }
     if threads > 1:
-        every = Octree.from_mesh(mesh)
-        found["ours_all"] = Contender(f"ours, float64, {threads} threads", threads, every.closest_hit)
-    for name, (label, reference) in references.items():
-        found[name] = Contender(label, 1, spending(costs, label, reference.closest_hit), label)
+        shared = Octree.from_mesh(mesh)
+        found["ours_all"] = Contender(f"ours, float64, {threads} threads", threads, shared.closest_hit, every)
+    references = {reference.key: reference for reference in REFERENCES}
+    for key in _COMPARED:
+        name = references[key].name
+        asked = spending(costs, name, references[key].make(mesh.vertices, mesh.faces).closest_hit)
+        found[key] = Contender(name, 1, asked, every)
+    slowest = found["trimesh"]
+    label = f"{slowest.label}, {effort.few:,} rays of each set"
+    found["trimesh"] = slowest._replace(label=label, most=effort.few)
     return found
 
 
-def _leaks(contender: Contender, rays: RayBatch) -> int:
-    """Rays from inside the closed mesh that meet nothing."""
-    return int((answer(contender.closest_hit(rays.origins, rays.directions)).face < 0).sum())
+def _rows(rays: int, most: int) -> NDArray[np.int64]:
+    """All rows of so many rays, or ``most`` of them in their order: always the same ones."""
+    if most >= rays:
+        return np.arange(rays)
+    return np.sort(np.random.default_rng(SEED).choice(rays, most, replace=False))
+
+
+def _judged(contender: Contender, rays: RayBatch, truth: list[exact.ExactHit | None]) -> dict[str, object]:
+    """The errors of a contender on as many of the rays as it is given."""
+    rows = _rows(len(rays), contender.most)
+    given = rays.select(rows)
+    return errors(answer(contender.closest_hit(given.origins, given.directions)), [truth[row] for row in rows.tolist()])
+
+
+def _leaks(contender: Contender, inside: Sequence[RayBatch]) -> dict[str, int]:
+    """Rays from inside the closed mesh that meet nothing, and of how many."""
+    given = [rays.select(_rows(len(rays), contender.most)) for rays in inside]
+    missed = sum(int((answer(contender.closest_hit(r.origins, r.directions)).face < 0).sum()) for r in given)
+    return {"leaks": missed, "leak_rays": sum(len(rays) for rays in given)}

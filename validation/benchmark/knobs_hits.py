@@ -8,7 +8,6 @@ One thread throughout, because embreex allows no more.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -18,11 +17,11 @@ from numpy.typing import NDArray
 from renderer.mesh import Mesh
 from renderer.octree import Octree
 from renderer.query import Hits
-from renderer.shapes import icosphere
 from validation import exact
-from validation.tradeoff import front, median_seconds, timed
 from validation.embree import Embree
 from validation.rays import RayBatch, camera_rays, float32_exact, random_rays
+from validation.tradeoff import front, median_seconds, timed
+from validation.tradeoff_hits import answer, errors, turned_mesh
 
 SEED = 20
 SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
@@ -51,13 +50,6 @@ class Tree(NamedTuple):
     def name(self) -> str:
         """As shown."""
         return f"{self.split}, leaf {self.leaf_size}, depth {self.max_depth}"
-
-
-class Answer(NamedTuple):
-    """What a contender says: ``t`` (n,) float64, inf on a miss, and ``face`` (n,) int64, -1 on a miss."""
-
-    t: NDArray[np.float64]
-    face: NDArray[np.int64]
 
 
 class Contender(NamedTuple):
@@ -90,44 +82,12 @@ def run(effort: Effort, step: Callable[[str], None]) -> dict[str, object]:
     }
 
 
-def turned_mesh(level: int) -> Mesh:
-    """A wavy sphere scaled by pi and turned by a radian about two axes: hardly a vertex that float32 holds."""
-    ball = icosphere(level)
-    x, y, z = ball.vertices.T
-    wavy = ball.vertices * (1.0 + 0.08 * np.sin(9.0 * x) * np.sin(7.0 * y) * np.sin(8.0 * z))[:, None]
-    c, s = np.cos(1.0), np.sin(1.0)
-    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-    return Mesh(np.pi * wavy @ about_z @ about_x, ball.faces, name=f"wavy icosphere {level}, turned")
-
-
 def differing_rays(a: Hits, b: Hits) -> int:
     """Rays whose t, face, u or v differ in any bit."""
     changed = a.face != b.face
     for x, y in ((a.t, b.t), (a.u, b.u), (a.v, b.v)):
         changed |= x.view(np.int64) != y.view(np.int64)
     return int(changed.sum())
-
-
-def errors(answer: Answer, truth: list[exact.ExactHit | None]) -> dict[str, object]:
-    """Verdicts that are wrong, and the relative error of t where both hit, whatever the face.
-
-    ``wrong_face`` counts faces that do not attain the exact t; the three percentiles are None where nothing is hit.
-    """
-    hit = np.array([h is not None for h in truth])
-    found = answer.face >= 0
-    pairs = [(ray, h) for ray in np.flatnonzero(hit & found).tolist() if (h := truth[ray]) is not None]
-    relative = [float(abs(Fraction(float(answer.t[ray])) - h.t) / h.t) for ray, h in pairs]
-    p50, p99, largest = np.percentile(relative, (50, 99, 100)).tolist() if relative else (None, None, None)
-    return {
-        "missed": int((hit & ~found).sum()),
-        "false_hits": int((~hit & found).sum()),
-        "wrong_face": sum(int(answer.face[ray]) not in h.faces_at_t for ray, h in pairs),
-        "both_hit": len(pairs),
-        "p50": p50,
-        "p99": p99,
-        "max": largest,
-    }
 
 
 def tree_knobs(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dict[str, object]:
@@ -183,7 +143,7 @@ def _storage(mesh: Mesh, batches: tuple[RayBatch, ...], effort: Effort) -> list[
         truth = exact.closest_hits(mesh.vertices, mesh.faces, sample.origins, sample.directions)
         points: list[dict[str, Any]] = []
         for name, contender in contenders.items():
-            judged = errors(_answer(contender.query(sample.origins, sample.directions)), truth)
+            judged = errors(answer(contender.query(sample.origins, sample.directions)), truth)
             row = {"name": name, "ns_per_ray": cost[name], "build_seconds": contender.build_seconds}
             points.append(row | {"bytes": contender.bytes, "errors": judged})
         fronts = {}
@@ -223,7 +183,3 @@ def _ready(build: Callable[[], Any]) -> None:
 def _nanoseconds(queries: dict[str, Any], batch: RayBatch, runs: int) -> dict[str, float]:
     calls = {name: timed(query, batch.origins, batch.directions) for name, query in queries.items()}
     return {name: 1e9 * seconds / len(batch) for name, seconds in median_seconds(calls, runs).items()}
-
-
-def _answer(found: Hits | tuple[NDArray[np.float64], NDArray[np.int64]]) -> Answer:
-    return Answer(found.t, found.face) if isinstance(found, Hits) else Answer(*found)

@@ -1,0 +1,202 @@
+"""One mesh, every family of rays: our closest hits against exact arithmetic and against each reference."""
+
+import hashlib
+import time
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh import Mesh
+from renderer.octree import Octree
+from validation import compare_hits, exact
+from validation.compare_hits import ExactErrors, HitArrays, HitComparison
+from validation.gates import Gate
+from validation.hit_errors import ErrorSizes, error_sizes, truth
+from validation.hit_references import REFERENCES, HitReference
+from validation.hit_verdicts import NEAR_EDGE
+from validation.job import Job
+from validation.rays import RayBatch, face_rays, families, float32_exact
+from validation.rounding import FLOAT32_ROUNDOFF, FLOAT64_ROUNDOFF
+from validation.thresholds import HitLimits
+from validation.tradeoff import spending
+
+Ints = NDArray[np.int64]
+
+SEED = 2026
+EXACT = "exact arithmetic"
+
+# Families whose rays are aimed at nothing in particular: there, a hit that float64 cannot decide (the ray passes an
+# edge closer than the rounding of the edge function) has a chance of 1e-9 a ray, so one would be suspicious. Rays
+# aimed at edges and vertices, that begin on a face or come from far away are undecidable by design; they are counted
+# and shown.
+UNAIMED = ("camera", "camera_squares", "random", "grazing", "from_inside", "face")
+# These begin in the box of the mesh. Where that has no thickness they begin on faces, which is undecidable as well.
+_IN_THE_BOX = ("random", "from_inside")
+# Rays begin up to 1e5 radii away, and their numbers and those of hits must be float32's, which end at 3e38 and lose
+# digits below 1e-38.
+_SMALLEST, _LARGEST = 1e-30, 1e30
+
+# Rays of a family that are not plainly right get a slow judgement, 5 ms each. The sound renderer needs it for a few
+# hundred; beyond these all count as wrong.
+_JUDGED = 1_500
+
+_ROUNDOFF = {"float32": FLOAT32_ROUNDOFF, "float64": FLOAT64_ROUNDOFF}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much to check.
+
+    rays        a family and mesh
+    exact       of these, judged by exact arithmetic whether or not a reference disagrees
+    leaks       rays of each kind from inside each closed mesh
+    references  who is asked
+    """
+
+    rays: int
+    exact: int
+    leaks: int
+    references: tuple[HitReference, ...] = REFERENCES
+
+
+class Asked(NamedTuple):
+    """A reference and what it made of the mesh; ``seconds`` holds its build and its queries."""
+
+    reference: HitReference
+    tree: Any
+    seconds: dict[str, float]
+
+    def closest_hit(self, rays: RayBatch) -> HitArrays:
+        """Its closest hits, timed."""
+        answer = spending(self.seconds, "query", self.tree.closest_hit)
+        return HitArrays(*answer(rays.origins, rays.directions))
+
+
+def ask(reference: HitReference, mesh: Mesh) -> Asked:
+    """Give the mesh to the reference, timed."""
+    began = time.perf_counter()
+    tree = reference.make(mesh.vertices, mesh.faces)
+    return Asked(reference, tree, {"build": time.perf_counter() - began, "query": 0.0})
+
+
+def can_judge(reference: HitReference, mesh: Mesh) -> str | None:
+    """Why the reference cannot judge our hits on the mesh; None where it can."""
+    if len(mesh.faces) > reference.most_faces:
+        return f"too slow beyond {reference.most_faces:,} faces, and this mesh has {len(mesh.faces):,}"
+    if reference.precision == "float32" and not np.array_equal(float32_exact(mesh.vertices), mesh.vertices):
+        return "works in float32, which does not hold the vertices of this mesh: it would judge another one"
+    return None
+
+
+class _Target(NamedTuple):
+    name: str
+    mesh: Mesh
+    octree: Octree
+    asked: tuple[Asked, ...]
+    costs: dict[str, float]
+
+
+class _Findings(NamedTuple):
+    """Of one family: our errors on the exact sample, comparisons and error sizes by reference, any-hit differences."""
+
+    errors: ExactErrors
+    comparisons: list[HitComparison]
+    sizes: list[ErrorSizes]
+    any_hit_differs: int
+
+
+def check_mesh(name: str, mesh: Mesh, effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Check all families of rays on ``mesh``; returns a record for JSON and the gates.
+
+    A reference that cannot judge the mesh stands with its reason under ``left_out``; exact arithmetic always judges.
+    Raises ``ValueError`` for a mesh without faces, or of a size for which rays cannot be float32 numbers.
+    """
+    size = float(np.abs(mesh.vertices[mesh.faces]).max(initial=0.0))
+    if not _SMALLEST <= size <= _LARGEST:
+        raise ValueError(f"{name}: expected faces whose largest coordinate is 1e-30 to 1e30, got {size:g}")
+    reasons = {reference: can_judge(reference, mesh) for reference in effort.references}
+    asked = tuple(ask(reference, mesh) for reference, reason in reasons.items() if reason is None)
+    target = _Target(name, mesh, Octree.from_mesh(mesh), asked, {EXACT: 0.0})
+    records: list[dict[str, Any]] = []
+    gates: list[Gate] = []
+    for rays in (*families(mesh.vertices, mesh.faces, effort.rays, SEED), face_rays(mesh.vertices, mesh.faces)):
+        job.step(f"hits: {name}, {rays.name}")
+        record, found = _check(target, rays, effort, job.thresholds.hits)
+        records.append(record)
+        gates += found
+    return {
+        "name": name,
+        "faces": len(mesh.faces),
+        "references": [describe(one) for one in asked],
+        "left_out": {reference.name: reason for reference, reason in reasons.items() if reason is not None},
+        "families": records,
+        "costs": target.costs | {one.reference.name: sum(one.seconds.values()) for one in asked},
+    }, gates
+
+
+def describe(asked: Asked) -> dict[str, Any]:
+    """Who was asked, for JSON."""
+    reference = asked.reference
+    named = {"key": reference.key, "name": reference.name, "version": reference.version}
+    return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in asked.seconds.items()}}
+
+
+def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
+    hits = target.octree.closest_hit(rays.origins, rays.directions)
+    ours = HitArrays(hits.t, hits.face)
+    found = _find(target, rays, ours, effort)
+    wrong = frozenset[int]().union(*(comparison.wrong_rays for comparison in found.comparisons))
+    disagreements = [*found.errors.disagreements, *(d for one in found.comparisons for d in one.disagreements)]
+    near_edge = len({d.ray for d in disagreements if d.verdict == NEAR_EDGE})
+    record = {
+        "family": rays.name,
+        "rays": len(rays),
+        "hits": int(np.count_nonzero(ours.hit)),
+        "ours_sha256": hashlib.sha256(ours.t.tobytes() + ours.face.tobytes()).hexdigest(),
+        "wrong": len(wrong),
+        "near_edge": near_edge,
+        "any_hit_differs": found.any_hit_differs,
+        "exact": found.errors.record(),
+        "references": [
+            {"key": one.reference.key} | comparison.record() | {"sizes": asdict(sizes)}
+            for one, comparison, sizes in zip(target.asked, found.comparisons, found.sizes, strict=True)
+        ],
+    }
+    judge = "exact arithmetic says so"
+    quantities = [
+        ("rays on which we are wrong", len(wrong), limits.wrong, judge),
+        ("of the exact sample, rays on which we are wrong", found.errors.wrong, limits.wrong, judge),
+        ("any-hit differs from closest hit", found.any_hit_differs, limits.any_hit_differs, "one definition of a hit"),
+    ]
+    flat = not np.ptp(target.mesh.vertices[target.mesh.faces].reshape(-1, 3), axis=0).all()
+    if rays.name in UNAIMED and not (flat and rays.name in _IN_THE_BOX):
+        reason = "nothing aims there"
+        quantities.append(("rays within float64 rounding of an edge", near_edge, limits.near_edge, reason))
+    subject = f"{target.name}, {rays.name} rays"
+    return record, [Gate("hits", subject, q, float(v), "at most", most, why) for q, v, most, why in quantities]
+
+
+def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: Effort) -> _Findings:
+    """Ask everybody. Who takes few rays gets the first of one seeded order, so that all samples lie in each other."""
+    vertices, faces = target.mesh.vertices, target.mesh.faces
+    order = np.random.default_rng(SEED).permutation(len(rays))
+    sample = np.sort(order[: effort.exact])
+    picked = rays.select(sample)
+    exactly = spending(target.costs, EXACT, exact.closest_hits)(vertices, faces, picked.origins, picked.directions)
+    judged = spending(target.costs, EXACT, compare_hits.exact_errors)
+    errors = judged(ours.select(sample), exactly, vertices, faces, picked, _JUDGED, sample)
+    known = truth(exactly)
+
+    comparisons, sizes = [], []
+    for one in target.asked:
+        rows = np.sort(order[: one.reference.most_rays])
+        asked, roundoff = rays.select(rows), _ROUNDOFF[one.reference.stored or one.reference.precision]
+        theirs = one.closest_hit(asked)
+        comparisons.append(compare_hits.compare(ours.select(rows), theirs, vertices, faces, asked, roundoff, rows))
+        _, here, there = np.intersect1d(rows, sample, assume_unique=True, return_indices=True)
+        sizes.append(error_sizes(theirs.t[here], theirs.face[here], known.select(there)))
+    comparisons = spending(target.costs, EXACT, compare_hits.judge_all)(comparisons, vertices, faces, _JUDGED)
+    occluded = target.octree.any_hit(rays.origins, rays.directions)
+    return _Findings(errors, comparisons, sizes, int(np.count_nonzero(occluded != ours.hit)))

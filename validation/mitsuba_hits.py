@@ -1,0 +1,55 @@
+"""Mitsuba's intersections as a reference for hits, ray by ray from Python.
+
+The variant ``scalar_rgb`` works in float32 and asks an Embree of its own, in robust mode: it judges how the answers
+come through Mitsuba, and is no independent judge of distances.
+"""
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import validation.mitsuba_scene as source  # selects the variant
+
+
+def version() -> str:
+    """Version of the installed Mitsuba."""
+    return str(mi.__version__)
+
+
+class MitsubaHits:
+    """A Mitsuba scene of one mesh: ``vertices`` (V, 3), ``faces`` (F, 3); copied, rounded to float32.
+
+    >>> scene = MitsubaHits([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> scene.closest_hit([[0.25, 0.25, 1], [2, 2, 1]], [[0, 0, -2], [0, 0, -2]])
+    (array([0.5, inf]), array([ 0, -1]))
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        points = np.array(vertices, dtype=np.float32).reshape(-1, 3)
+        corners = np.array(faces, dtype=np.uint32).reshape(-1, 3)
+        self._scene: Any = source.assemble({_mesh(points, corners): 0} if len(corners) else {}, [])
+
+    def closest_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Closest hits of ``origins``, ``directions`` (n, 3): (t, face), t in units of |direction|.
+
+        ``t`` is float64 that holds Mitsuba's float32, inf on a miss; ``face`` is int64, -1 on a miss.
+        """
+        o = np.asarray(origins, dtype=np.float64).reshape(-1, 3)
+        d = np.asarray(directions, dtype=np.float64).reshape(-1, 3)
+        t, face = np.full(len(o), np.inf), np.full(len(o), -1, dtype=np.int64)
+        for row, ray in enumerate(source.mitsuba_rays((o, d))):
+            found = self._scene.ray_intersect_preliminary(ray)
+            if found.is_valid():
+                t[row], face[row] = found.t, found.prim_index
+        return t, face
+
+
+def _mesh(points: NDArray[np.float32], corners: NDArray[np.uint32]) -> mi.Mesh:
+    mesh = mi.Mesh("mesh", len(points), len(corners))
+    arrays = mi.traverse(mesh)
+    arrays["vertex_positions"] = points.ravel()
+    arrays["faces"] = corners.ravel()
+    arrays.update()
+    return mesh
