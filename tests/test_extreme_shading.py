@@ -5,6 +5,7 @@ import math
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -107,14 +108,22 @@ FAULTS = [
     ("direct.py", "m + DIFFUSE), dot(n, towards))", "m + DIFFUSE), abs(dot(n, towards)))"),
     ("direct.py", "else 1.0 - 2.0**-36", "else 2.0"),
     ("shading.py", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
+    # No fault: with every vertex in float64 the kernels are compiled once and not twice.
+    ("render.py", "_widened(tree) if needs.float64_vertices else tree", "_widened(tree)"),
 ]
 NOTICED = [40, 41, 42, 43, 44, 45]
 
 
 def test_cases_find_faults_in_the_kernels(tmp_path: Path) -> None:
-    """A copy of the package with six rules broken, compiled and run by itself."""
+    """A copy of the package with six rules broken, run by itself; the kernels that no fault reaches come compiled."""
+
+    def copy_file(source: str, target: str) -> None:
+        with suppress(FileNotFoundError):  # another process may replace a compiled kernel just now
+            shutil.copy2(source, target)
+
     copy = tmp_path / "renderer"
-    shutil.copytree(Path(renderer.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    sound = Path(renderer.__file__).parent
+    shutil.copytree(sound, copy, ignore=shutil.ignore_patterns("*.pyc"), copy_function=copy_file)
     for name, rule, broken in FAULTS:
         text = (copy / name).read_text(encoding="utf-8")
         assert text.count(rule) == 1, f"{name} does not say {rule!r} once"

@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,32 @@ from validation.defects_seam import Replacement, inject
 from validation.gates import Gate
 
 _ROOT = Path(__file__).resolve().parent.parent
-# Six times what the slowest defect takes on two busy cores: beyond it a kernel does not end.
+# Ten times what the slowest defect takes on two busy cores: beyond it a kernel does not end.
 _PATIENCE = 600.0
 _MARK = "gates: "
 # Each compiles on one core.
 _AT_ONCE = 2
+_CHECKS = "validation.defects_checks"
+
+_PATHS = "checks the other reference, whose recursion is like ours: a rule that both have wrong shows on paths alone"
+# Quantities that are another view of a measure: the same over other pixels, or the same verdict on other rays.
+_VIEWS = {
+    "ssim_foreground": "ssim",
+    "fragile share of the glass": "fragile_share",
+    "pixels whose position is off": "pixels whose distance is off",
+    "of the exact sample, rays on which we are wrong": "rays on which we are wrong",
+    "wrong verdicts": "rays on which we are wrong",
+    "t beyond its bound": "rays on which we are wrong",
+}
+# Kinds of gates that stay though they catch no defect alone, by how they begin, each with its reason.
+KEPT = {
+    "extreme case": "each is a promise for one construct, and says in words what broke",
+    "ssim": "others publish it, and it tells broken structure from wrong brightness; FLIP and the maximum see more",
+    "references that judge it": "guards the others: without it a rung that nobody judges would pass",
+    "rays within float64 rounding": "guards the count of wrong rays, which excuses what float64 cannot decide",
+    "slope of log RMSE": _PATHS,
+    "p-value of the largest z": _PATHS,
+}
 
 
 @dataclass(frozen=True)
@@ -44,18 +66,21 @@ class Answer:
 
 
 def run(
-    quick: bool, step: Callable[[str], None], defects: Iterable[Defect] = DEFECTS
+    quick: bool, step: Callable[[str], None], defects: Iterable[Defect] = DEFECTS, checks: str = _CHECKS
 ) -> tuple[dict[str, Any], list[Gate]]:
     """Inject every defect, with ``quick`` only those that need no compiler; returns a record for JSON and the gates.
 
-    One gate says that the sound renderer turns no gate red, and one for each defect that it turns some red.
+    checks : the module whose ``run(groups)`` gives the gates that judge a defect.
+
+    One gate says that the sound renderer turns no gate red, and one for each defect that it turns some red. A run of
+    the whole list has one more, ``idle``.
     """
     chosen = [d for d in defects if not (quick and d.kernel)]
     with tempfile.TemporaryDirectory(prefix="defects-") as folder:
         sound_cache = Path(folder) / "sound"
         step("defects: none, as the control")
         groups = tuple(dict.fromkeys(d.group for d in chosen))
-        control = ask(None, groups, sound_cache)
+        control = ask(None, groups, sound_cache, checks)
 
         def answer(numbered: tuple[int, Defect]) -> Answer:
             number, defect = numbered
@@ -63,20 +88,21 @@ def run(
             cache = Path(folder) / str(number)
             shutil.copytree(sound_cache, cache)
             try:
-                return ask(defect.replacement, (defect.group,), cache)
+                return ask(defect.replacement, (defect.group,), cache, checks)
             finally:
                 shutil.rmtree(cache, ignore_errors=True)
 
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             answers = list(pool.map(answer, enumerate(chosen)))
-    return record(chosen, control, answers), gates(chosen, control, answers)
+    found, judged = record(chosen, control, answers), gates(chosen, control, answers)
+    return found, [*judged, idle(found)] if set(chosen) >= set(DEFECTS) else judged
 
 
-def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path) -> Answer:
+def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, checks: str = _CHECKS) -> Answer:
     """Run the checks of ``groups`` in a new process with one replacement, or none; its kernels go to ``cache``."""
     began = time.perf_counter()
     cache.mkdir(parents=True, exist_ok=True)
-    asked = json.dumps([None if replacement is None else vars(replacement), groups])
+    asked = json.dumps([None if replacement is None else vars(replacement), groups, checks])
     command = [sys.executable, "-c", "import sys; from validation.defects import answer; answer(sys.argv[1])", asked]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     try:
@@ -96,53 +122,51 @@ def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path) -
 
 def answer(asked: str) -> None:
     """The other end of ``ask``: inject, check, print the gates as one line of JSON."""
-    replacement, groups = json.loads(asked)
+    replacement, groups, checks = json.loads(asked)
     if replacement is not None:
         inject(Replacement(**replacement))
-    from validation import defects_checks  # loads the renderer, so not before
-
-    found = defects_checks.run(tuple(groups))
-    names = {_name(gate): gate.passed for gate in found}
-    print(_MARK + json.dumps({"gates": list(names), "red": [name for name, passed in names.items() if not passed]}))
+    # It loads the renderer, so not before.
+    found = import_module(checks).run(tuple(groups))
+    names = [_name(gate) for gate in found]
+    red = [name for name, gate in zip(names, found, strict=True) if not gate.passed]
+    print(_MARK + json.dumps({"gates": names, "red": red}))
 
 
 def record(chosen: list[Defect], control: Answer, answers: list[Answer]) -> dict[str, Any]:
-    """For JSON: a row for each defect with the gates that it turned red, and what each gate caught.
+    """For JSON: a row for each defect with the gates that it turned red, and what each kind of gate caught.
 
-    A gate's ``alone`` lists the defects that no other kind of gate caught. Kinds leave out the mesh and the rays: what
-    may be dropped is a measure, not one place where it is taken.
+    A kind is a measure: a gate's quantity without the place where it is taken, be that a section, a mesh, rays, a
+    rung of the ladder, a reference or an offset rule. ``alone`` lists the defects that no other kind caught; ``kept``
+    says why a kind stays though it catches none alone, None where nothing says so.
     """
-    rows: list[dict[str, Any]] = [
-        {
-            "name": defect.name,
-            "file": f"renderer/{defect.replacement.module}.py",
-            "rule": defect.replacement.rule.strip(),
-            "broken": defect.replacement.broken.strip(),
-            "group": defect.group,
-            "caught": bool(answer.red),
-            "red": list(answer.red),
-            "kinds": sorted({_kind(name) for name in answer.red}),
-            "error": answer.error,
-            "seconds": answer.seconds,
-        }
-        for defect, answer in zip(chosen, answers, strict=True)
-    ]
+    rows = [_row(defect, answer) for defect, answer in zip(chosen, answers, strict=True)]
     caught = Counter(kind for row in rows for kind in row["kinds"])
-    kinds = list(dict.fromkeys(_kind(name) for name in control.gates))
+    alone = {kind: [row["name"] for row in rows if row["kinds"] == [kind]] for kind in caught}
+    kinds = list(dict.fromkeys(kind_of(name) for name in control.gates))
     return {
         "control": {"gates": len(control.gates), "red": list(control.red), "error": control.error,
                     "seconds": control.seconds},
         "defects": rows,
         "caught": sum(row["caught"] for row in rows),
         "gates": [
-            {
-                "gate": kind,
-                "caught": caught[kind],
-                "alone": [row["name"] for row in rows if row["kinds"] == [kind]],
-            }
-            for kind in kinds
+            {"gate": kind, "caught": caught[kind], "alone": alone.get(kind, []), "kept": _kept(kind)} for kind in kinds
         ],
     }  # fmt: skip
+
+
+def _row(defect: Defect, answer: Answer) -> dict[str, Any]:
+    return {
+        "name": defect.name,
+        "file": f"renderer/{defect.replacement.module}.py",
+        "rule": defect.replacement.rule.strip(),
+        "broken": defect.replacement.broken.strip(),
+        "group": defect.group,
+        "caught": bool(answer.red),
+        "red": list(answer.red),
+        "kinds": sorted({kind_of(name) for name in answer.red}, key=lambda kind: (kind.startswith("extreme"), kind)),
+        "error": answer.error,
+        "seconds": answer.seconds,
+    }
 
 
 def gates(chosen: list[Defect], control: Answer, answers: list[Answer]) -> list[Gate]:
@@ -156,12 +180,25 @@ def gates(chosen: list[Defect], control: Answer, answers: list[Answer]) -> list[
     return found
 
 
+def idle(found: dict[str, Any]) -> Gate:
+    """Of a record of the whole list: each kind of gate caught a defect that no other kind did, or says why it stays."""
+    count = sum(not (row["alone"] or row["kept"]) for row in found["gates"])
+    quantity, reason = "that caught no defect alone and are not kept", "a measure that tells nothing new is dropped"
+    return Gate("defects", "kinds of gates", quantity, float(count), "at most", 0.0, reason)
+
+
 def _name(gate: Gate) -> str:
     return f"{gate.section}: {gate.subject}: {gate.quantity}"
 
 
-def _kind(name: str) -> str:
-    """A gate's name without the mesh and rays of its subject: of hits and curves the quantity is the measure."""
-    section, subject, quantity = name.split(": ", 2)
-    keeps = section == "images" or subject.startswith("extreme case")
-    return name if keeps else f"{section}: {quantity}"
+def kind_of(name: str) -> str:
+    """The measure that a gate's name stands for, see ``record``; an extreme case has no quantity and is its own."""
+    _, _, measured = name.partition(": ")
+    subject, _, quantity = measured.rpartition(": ")
+    if subject.startswith("extreme case"):
+        return subject.partition(":")[0]
+    return _VIEWS.get(quantity, quantity)
+
+
+def _kept(kind: str) -> str | None:
+    return next((reason for begin, reason in KEPT.items() if kind.startswith(begin)), None)

@@ -32,11 +32,14 @@ _COLORS = "np.array([scene.ambient, scene.background])"
 _IMAGE = "return Image(*film,"
 _SETTINGS = "Settings(bounces, chosen.min_weight,"
 _NORMAL = "barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v)"
+_SAMPLES = "camera, samples = scene.camera.rows(width, height), sample_offsets(chosen.samples)"
 _CORNER = "corner = forward - right * (pixel * width / 2.0)"
 
 HITS = (
     _kernel("hits", "a triangle missing from the tree", "blocks", "vertex = first if face < 0 else",
             "vertex = first if face < 0 or face == 5 else"),
+    _kernel("hits", "one triangle in 512 missing beyond the 65,536th", "blocks", "vertex = first if face < 0 else",
+            "vertex = first if face < 0 or (face > 0xFFFF and face % 512 == 0) else"),
     _kernel("hits", "packets exit with their first hit", "packet", "                limit = _most(floats, LIMIT)",
             "                limit = least(select(load8(floats, LIMIT) < load8(floats, LIMIT + 8), "
             "load8(floats, LIMIT), load8(floats, LIMIT + 8)))"),
@@ -69,6 +72,11 @@ HITS = (
             "tree.blocks"),
     _kernel("hits", "any hit forgets what is near", "traverse", "put(found.hit, i, hit)",
             "put(found.hit, i, hit and t > 1.0)"),
+    _kernel("hits", "a packet of any hits drops what waits beyond eight octants", "packet",
+            "                limit = _most(floats, LIMIT)", "                limit = _most(floats, LIMIT)\n"
+            "                top = min(top, 8) if any_hit else top"),
+    _kernel("hits", "an eighth of the box padding", "intersect", "FAR_PADDING = np.float32(1.0 + 8.0 * 2.0**-23)",
+            "FAR_PADDING = np.float32(1.0 + 1.0 * 2.0**-23)"),
     _python("hits", "bad rays are let through", "query", "    if bad:\n        _reject",
             "    if False:\n        _reject"),
 )  # fmt: skip
@@ -79,13 +87,15 @@ PICTURES = (
             "    if len(faces) > 5000:\n        faces[hole] = faces[hole, 0]\n    mesh = Mesh(vertices, faces)\n"),
     _python("pictures", "ior 1.501 for 1.5", "world", _MATERIAL_ROWS,
             _MATERIAL_ROWS + "; from renderer.material import IOR; rows[:, IOR] *= 1.501 / 1.5"),
-    _python("pictures", "film shifted by half a pixel", "camera", _CORNER,
-            "corner = forward - right * (pixel * (width + 1.0) / 2.0)"),
-    _python("pictures", "film shifted by 0.1 pixel", "camera", _CORNER,
+    _python("pictures", "film shifted by half a pixel", "render", _SAMPLES,
+            _SAMPLES + "; camera[3] -= 0.5 * camera[4]"),
+    _kernel("pictures", "film shifted by 0.1 pixel", "camera", _CORNER,
             "corner = forward - right * (pixel * (width + 0.2) / 2.0)"),
     _kernel("pictures", "camera rays 0.1 pixel off their pixel's centre", "tile",
             "px, py = x + get(camera.samples, 2 * sample),", "px, py = x + 0.1 + get(camera.samples, 2 * sample),"),
-    _python("pictures", "field of view + 0.3 degrees", "camera", "math.radians(self.fov)",
+    _kernel("pictures", "orthographic film 1 % too wide", "camera", "pixel = self.height / height\n",
+            "pixel = self.height / height\n        right = 1.01 * right\n"),
+    _kernel("pictures", "field of view + 0.3 degrees", "camera", "math.radians(self.fov)",
             "math.radians(self.fov + 0.3)"),
     _python("pictures", "a light missing", "world", _LIGHT_ROWS, "return rows[:-1]"),
     _python("pictures", "point light + 5 %", "world", _LIGHT_ROWS, "rows[-1, 4:] *= 1.05; " + _LIGHT_ROWS),
@@ -108,6 +118,24 @@ PICTURES = (
     _python("pictures", "background 2 % darker", "world", _COLORS,
             "np.array([scene.ambient, np.multiply(0.98, scene.background)])"),
     _python("pictures", "no ambient light", "world", _COLORS, "np.array([(0.0, 0.0, 0.0), scene.background])"),
+    _python("pictures", "the lamp a little redder", "world", _LIGHT_ROWS,
+            "rows[1:, 4:] *= 1.0 + 5e-5 * np.array([1.0, 0.0, -1.0]); " + _LIGHT_ROWS),
+    _python("pictures", "dither left in the tiles from the third on", "render", _IMAGE,
+            "film.radiance[:, 2 * TILE :] *= 1.0 + 2e-4 * np.array([0, 1, -1])[np.arange(2 * TILE, width) % 3, None]; "
+            + _IMAGE),
+    _python("pictures", "one stuck pixel in 8,192", "render", _IMAGE,
+            "film.radiance.reshape(-1, 3)[8192::8192] *= 0.95; " + _IMAGE),
+    _python("pictures", "the last pixel of a tile 1 % brighter", "render", _IMAGE,
+            "film.radiance[TILE - 1 :: TILE, TILE - 1 :: TILE] *= 1.01; " + _IMAGE),
+    _python("pictures", "a fixed offset 100 times too long", "render", "return float(offset)",
+            "return 100.0 * float(offset)"),
+    _python("pictures", "depth along the view axis", "render", _IMAGE,
+            "from renderer.camera import primary_rays; cosines = primary_rays(scene.camera, width, height)[1] @ "
+            "scene.camera.frame()[2]; film.depth[...] *= cosines.reshape(height, width); " + _IMAGE),
+    _python("pictures", "faces numbered from 1", "render", _IMAGE, "film.face[film.face > 0] -= 1; " + _IMAGE),
+    _python("pictures", "normals of the film point inwards", "render", _IMAGE, "film.normal[...] *= -1; " + _IMAGE),
+    _python("pictures", "a miss shows face 0 in the tiles from the third on", "render", _IMAGE,
+            "film.face[(film.face < 0) & (np.arange(width) >= 2 * TILE)] = 0; " + _IMAGE),
     _kernel("pictures", "n1 and n2 swapped", "whitted", "refract(d, n, n1, n2)", "refract(d, n, n2, n1)"),
     _kernel("pictures", "Fresnel of one polarisation", "shading", "return 0.5 * (s * s + p * p)", "return s * s"),
     _kernel("pictures", "total internal reflection lost", "whitted", "f = 1.0 if cos_t < 0.0 else",
@@ -122,7 +150,7 @@ PICTURES = (
             "if dot(n, to_light) <= -np.inf:"),
     _kernel("pictures", "light falls off as 1 / r", "direct", "scale(arriving, 1.0 / squared)",
             "scale(arriving, 1.0 / np.sqrt(squared))"),
-    _kernel("pictures", "shininess clamped at 50", "shading", "math.exp(shininess *",
+    _kernel("pictures", "clamped specular: shininess at most 50", "shading", "math.exp(shininess *",
             "math.exp(min(shininess, 50.0) *"),
     _kernel("pictures", "highlights left out below R.V = 0.5", "shading", "if -dot(r, d) <= 0.0:",
             "if -dot(r, d) <= 0.5:"),
