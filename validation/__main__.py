@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
             f"--{name}", type=Path, action="append", default=[], metavar="FILE",
             help=f"judge this {name} and not the suite's own, in the section {section}; may be given again",
         )  # fmt: skip
-    parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about 20 minutes")
+    parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about 13 minutes")
     parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
     return parser
 

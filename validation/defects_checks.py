@@ -1,7 +1,6 @@
 """What runs against a defect: the suite's own sections with a small effort, so that one defect takes seconds.
 
-The gates are the sections' gates, by their names and with the suite's thresholds. One measure is here alone, because no
-section has it: ``refitted``.
+The gates are the sections' gates, by their names and with the suite's thresholds.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -12,16 +11,16 @@ import numpy as np
 
 from renderer.mesh import Mesh
 from renderer.mesh_io import load_mesh
-from renderer.octree import Octree
 from renderer.scene import load_scene
 from renderer.shapes import icosphere
 from validation import images, numerical, stability, watertight
 from validation.cases import SCENES
 from validation.gates import Gate
 from validation.hit_references import REFERENCES
+from validation.hit_refit import check_refit
 from validation.hits import Effort, check_leaks, check_mesh
 from validation.job import Job
-from validation.rays import families, float32_exact
+from validation.rays import float32_exact
 from validation.thresholds import Thresholds
 
 SEED = 2029
@@ -83,20 +82,6 @@ def curves(job: Job) -> list[Gate]:
     return found
 
 
-def refitted(job: Job) -> Iterator[Gate]:
-    """A refitted tree against a new build, bit for bit."""
-    mesh = icosphere(3)
-    moved = mesh.vertices * np.array([2.0, 0.5, 1.0]) + np.array([3.0, 0.0, 0.0])
-    octree, anew = Octree.from_mesh(mesh), Octree(moved, mesh.faces)
-    octree.refit(moved)
-    for rays in families(moved, mesh.faces, _HITS.rays, SEED)[:2]:
-        first = octree.closest_hit(rays.origins, rays.directions)
-        second = anew.closest_hit(rays.origins, rays.directions)
-        differing = int(((first.t != second.t) | (first.face != second.face)).sum())
-        subject, reason = f"refitted sphere, {rays.name} rays", "the same vertices and faces have the same hits"
-        yield Gate("hits", subject, "differ from a new build", float(differing), "at most", 0.0, reason)
-
-
 def hits(job: Job) -> Iterator[Gate]:
     """Every family of rays on a model and on triangles in no order, and rays from inside closed meshes."""
     rng = np.random.default_rng(SEED)
@@ -105,10 +90,11 @@ def hits(job: Job) -> Iterator[Gate]:
     for name, mesh in (("teapot", load_mesh(SCENES / "models" / "teapot.ply")), ("triangle soup", soup)):
         yield from check_mesh(name, mesh, _HITS, job)[1]
     yield from check_leaks(_HITS, job)[1]
+    yield from check_refit(job)[1]
 
 
 # A defect of the picture's modules cannot change a hit, and one of a hit needs no picture to be seen.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
-    "hits": (hits, extreme(1, 32), sweep, curves, refitted),
+    "hits": (hits, extreme(1, 32), sweep, curves),
     "pictures": (pictures, extreme(33, 45)),
 }

@@ -133,6 +133,11 @@ PICTURES = (
             "from renderer.camera import primary_rays; cosines = primary_rays(scene.camera, width, height)[1] @ "
             "scene.camera.frame()[2]; film.depth[...] *= cosines.reshape(height, width); " + _IMAGE),
     _python("pictures", "faces numbered from 1", "render", _IMAGE, "film.face[film.face > 0] -= 1; " + _IMAGE),
+    _python("pictures", "objects turned the other way", "scene", "_rotation(axis, degrees) @ linear",
+            "_rotation(axis, -degrees) @ linear"),
+    _python("pictures", "objects moved 0.1 % too far", "scene", "result[:3, 3] = self.translate",
+            "result[:3, 3] = np.multiply(1.001, self.translate)"),
+    _python("pictures", "vertex normals of equal weights", "mesh", "= face_normals * angle[:, None]", "= face_normals"),
     _python("pictures", "normals of the film point inwards", "render", _IMAGE, "film.normal[...] *= -1; " + _IMAGE),
     _python("pictures", "a miss shows face 0 in the tiles from the third on", "render", _IMAGE,
             "film.face[(film.face < 0) & (np.arange(width) >= 2 * TILE)] = 0; " + _IMAGE),

@@ -13,6 +13,7 @@ from validation.check_hits import SEED, Effort, check_mesh
 from validation.gates import Gate
 from validation.hit_errors import EXPONENTS
 from validation.hit_leaks import check_leaks, closed_meshes
+from validation.hit_refit import check_refit
 from validation.hit_verdicts import LISTED
 from validation.job import Job
 from validation.rays import families, float32_exact
@@ -40,10 +41,12 @@ def meshes() -> dict[str, Mesh]:
 
 
 def steps(job: Job) -> int:
-    """How often ``run`` calls ``job.step``: once a family of rays on each mesh, twice a closed mesh of the leaks."""
+    """How often ``run`` calls ``job.step``: once a family of rays on each mesh, twice a closed mesh of the leaks, once
+    for refitted trees.
+    """
     triangle = np.eye(3), np.array([[0, 1, 2]])
     a_mesh = len(families(*triangle, 1, SEED)) + 1
-    return len(meshes()) * a_mesh + 2 * len(closed_meshes()) if job.own else len(job.meshes) * a_mesh
+    return len(meshes()) * a_mesh + 2 * len(closed_meshes()) + 1 if job.own else len(job.meshes) * a_mesh
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
@@ -60,6 +63,8 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     result["meshes"] = records
     if job.own:
         result["leaks"], found = check_leaks(effort, job)
+        gates += found
+        result["refit"], found = check_refit(job)
         gates += found
     else:
         reason = "they need a closed mesh and a place within that sees all of it, as the suite's own have"

@@ -14,7 +14,16 @@ from typing import Any, Literal, NamedTuple
 from renderer.image import Image, srgb
 from renderer.render import render
 from renderer.scene import Scene, load_scene
-from validation import check_picture, compare_aovs, ladder, mitsuba_camera, mitsuba_path, mitsuba_whitted, monte_carlo
+from validation import (
+    check_picture,
+    compare_aovs,
+    ladder,
+    mitsuba_camera,
+    mitsuba_path,
+    mitsuba_whitted,
+    monte_carlo,
+    placement,
+)
 from validation.cases import CASES
 from validation.check_picture import Pair, Rule
 from validation.compare_images import Picture, fragile_pixels
@@ -120,10 +129,11 @@ def check_scene(name: str, shows: str, scene: Scene, effort: Effort, job: Job) -
         "left_out": plan.left_out,
         "fault": plan.fault,
     }
-    found: list[Gate] = []
+    record["objects"], found = placement.check(name, scene)
     if plan.fault is None:
         job.step(f"pictures: {name}, AOVs")
-        record["aovs"], found = _check_aovs(name, scene, plan.tasks[-1].resolution, job)
+        record["aovs"], passed = _check_aovs(name, scene, plan.tasks[-1].resolution, job)
+        found += passed
     record["rungs"] = []
     for task in plan.tasks:
         rung, passed = _check_rung(name, task, job)
@@ -236,6 +246,7 @@ def _costs(scenes: list[dict[str, Any]]) -> dict[str, float]:
         for rung in scene["rungs"]:
             made += [comparison for comparison in rung["comparisons"] if comparison["offset"] == "own"]
         costs = [(one["reference_name"], one["reference_seconds"]) for one in made]
+        costs.append((placement.NAME, scene["objects"]["seconds"]))
         costs += scene.get("paths", {"costs": {}})["costs"].items()
         for name, seconds in costs:
             spent[name] = spent.get(name, 0.0) + seconds

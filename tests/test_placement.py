@@ -1,0 +1,83 @@
+"""Objects of a scene against trimesh: what is read, moved or smoothed wrongly is seen, and what is open is said."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from renderer.mesh import Mesh
+from renderer.mesh_io import save_ply
+from renderer.scene import Scene, load_scene
+from renderer.shapes import icosphere
+from validation import placement
+
+SCENE = """
+[camera]
+eye = [0, 0, 9]
+target = [0, 0, 0]
+[materials.red]
+diffuse = 0.5
+[[objects]]
+mesh = "ball.ply"
+material = "red"
+normals = "smooth"
+scale = {scale}
+rotate = [20, -30, 70]
+translate = [1, 2, -0.5]
+"""
+
+
+def scene_of(folder: Path, scale: str = "[1, 0.5, 2]", faces: Any = None) -> Scene:
+    ball = icosphere(1)
+    save_ply(ball if faces is None else Mesh(ball.vertices, faces), folder / "ball.ply")
+    (folder / "scene.toml").write_text(SCENE.format(scale=scale), encoding="utf-8")
+    return load_scene(folder / "scene.toml")
+
+
+def verdicts(scene: Scene) -> list[bool]:
+    return [gate.passed for gate in placement.check("small", scene)[1]]
+
+
+def test_a_sound_scene_passes(tmp_path: Path) -> None:
+    record, gates = placement.check("small", scene_of(tmp_path))
+    assert [gate.passed for gate in gates] == [True, True]
+    assert record["objects"] == record["smooth"] == 1 and not record["left_out"]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_an_object_turned_otherwise_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, axis: int) -> None:
+    sound = scene_of(tmp_path)
+    rotate = list(sound.objects[0].rotate)
+    rotate[axis] += 0.01
+    other = sound.objects[0].model_copy(update={"rotate": tuple(rotate)})
+    wrong = sound.model_copy(update={"objects": (other,)})
+    wrong.__dict__["instances"] = sound.instances
+    assert verdicts(wrong) == [False, False]
+
+
+def test_normals_weighted_by_area_are_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(tmp_path)
+    instance = scene.instances[0]
+    mesh, sums = instance.mesh, np.zeros_like(instance.mesh.vertices)
+    a, b, c = (mesh.triangles[:, k] for k in range(3))
+    for corner in range(3):
+        np.add.at(sums, mesh.faces[:, corner], np.cross(b - a, c - a))
+    by_area = sums / np.linalg.norm(sums, axis=1, keepdims=True)
+    monkeypatch.setattr(type(instance), "normals", by_area)
+    assert verdicts(scene) == [True, False]
+
+
+def test_what_leaves_a_choice_is_left_out_and_said(tmp_path: Path) -> None:
+    mirrored, _ = placement.check("small", scene_of(tmp_path, scale="[-1, 1, 1]"))
+    assert mirrored["left_out"] == {"objects.0, normals": "it is mirrored"}
+    flat = np.concatenate([icosphere(1).faces, [[0, 1, 0]]])
+    degenerate, gates = placement.check("small", scene_of(tmp_path, faces=flat))
+    assert degenerate["left_out"] and all(gate.passed for gate in gates)
+
+
+def test_a_mesh_from_no_file_is_left_out(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path)
+    made = scene.objects[0].model_copy(update={"mesh": icosphere(1)})
+    record, gates = placement.check("small", scene.model_copy(update={"objects": (made,)}))
+    assert gates == [] and "no file" in record["left_out"]["objects.0"]
