@@ -94,25 +94,32 @@ def _shine(world, bundle, surface, i, towards, arriving):
     put3(surface, LIGHT, add(three(surface, LIGHT), times(factor, arriving)))
 
 
+@inlined
+def _trace_shadows(target, bundle, lit, aimed, work):
+    """Find which of the ``aimed`` shadow rays meet something, and count them in their pixels."""
+    shadows = work.shadows
+    rays = Rays(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0)
+    trace(target.tree, target.depth, rays, work.found, 0, aimed, work.trace, np.bool_(True))
+    for k in range(aimed):
+        pixel = get(bundle.pixels, get(lit, SIZE + k))
+        put(work.traced, pixel, get(work.traced, pixel) + 1)
+
+
 @kernel
-def light_surfaces(target, world, bundle, surfaces, lit, offset, work):
+def light_surfaces(target, world, bundle, surfaces, lit, settings, work):
     """Direct light of the surfaces that a bundle met, into their LIGHT.
 
     ``lit`` lists, after their number, the rays whose material shows it, with room for as many again. Shadow rays are
-    counted in ``work.traced`` of their pixels.
+    counted in ``work.traced`` of their pixels; without ``settings.shadows`` there are none.
     """
     count, lit = get(lit, 0), at(lit, 1)
     shadows = work.shadows
     for light in range(world.light_count):
-        aimed = _aim_all(world, surfaces, lit, count, light, offset, shadows)
-        rays = Rays(
-            at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0
-        )  # fmt: skip
-        trace(target.tree, target.depth, rays, work.found, 0, aimed, work.trace, np.bool_(True))
+        aimed = _aim_all(world, surfaces, lit, count, light, settings.offset, shadows)
+        if settings.shadows:
+            _trace_shadows(target, bundle, lit, aimed, work)
         for k in range(aimed):
             i = get(lit, SIZE + k)
-            pixel = get(bundle.pixels, i)
-            put(work.traced, pixel, get(work.traced, pixel) + 1)
-            if not get(work.found.hit, k):
+            if not (settings.shadows and get(work.found.hit, k)):
                 towards, arriving = three(shadows, _TOWARDS + 3 * k), three(shadows, _ARRIVING + 3 * k)
                 _shine(world, bundle, at(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)

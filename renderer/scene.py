@@ -53,13 +53,15 @@ class RenderSettings(_Table):
     """Defaults of ``render``; each can be given there instead.
 
     ``max_depth`` is the number of bounces: 0 shows what the eye sees directly. ``min_weight`` ends a ray whose
-    largest weight is below it; it bounds no error when rays branch, because the cut ones may be many.
+    largest weight is below it; it bounds no error when rays branch, because the cut ones may be many. Without
+    ``shadows`` nothing hides a light from the surfaces that face it, and no shadow ray is traced.
     """
 
     resolution: tuple[_Pixels, _Pixels] = (512, 512)
     samples: Annotated[int, Field(le=65536, strict=True)] = 1
     max_depth: Annotated[int, Field(ge=0, le=64, strict=True)] = 6
     min_weight: Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] = 0.0
+    shadows: Annotated[bool, Field(strict=True)] = True
 
     @model_validator(mode="after")
     def _square_samples(self) -> "RenderSettings":

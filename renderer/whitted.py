@@ -52,14 +52,15 @@ class Accelerator(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """Bounces, the weight below which a ray ends, the offset rule of ``shading.spawn_origin``, and how many media a ray
-    remembers: ``sight.MAX_MEDIA``, or 0 where nothing refracts.
+    """Bounces, the weight below which a ray ends, the offset rule of ``shading.spawn_origin``, how many media a ray
+    remembers (``sight.MAX_MEDIA``, or 0 where nothing refracts), and whether surfaces hide lights.
     """
 
     max_depth: int
     min_weight: float
     offset: float
     media: int
+    shadows: bool
 
 
 class Work(NamedTuple):
@@ -258,7 +259,7 @@ def trace_bundle(target, world, settings, bundle, work):
     rays = Rays(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 0, 0, 1.0)
     trace(target.tree, target.depth, rays, work.found, 0, count_of(bundle), work.trace, np.bool_(False))
     _meet_surfaces(world, bundle, work)
-    light_surfaces(target, world, bundle, work.surfaces, work.lit, settings.offset, work)
+    light_surfaces(target, world, bundle, work.surfaces, work.lit, settings, work)
     _collect_light(world, bundle, work)
 
 

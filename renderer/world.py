@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.camera import Camera
 from renderer.light import LIGHT_COLUMNS
 from renderer.material import KIND, LAMBERT, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.mesh import Mesh
@@ -18,7 +19,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, World]:
     """
     needs = needs_of(scene) if needs is None else needs
     instances = scene.instances
-    rows = {name: i * MATERIAL_COLUMNS for i, name in enumerate(scene.materials)}
+    rows = _material_rows(scene)
     starts = np.cumsum([0] + [len(i.mesh.vertices) for i in instances])
     if instances:
         vertices = np.concatenate([i.mesh.vertices for i in instances])
@@ -36,7 +37,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, World]:
         materials=_materials(scene, needs),
         lights=_lights(scene, needs),
         colors=np.array([scene.ambient, scene.background]),
-        media=_media(scene, rows) if needs.refraction else np.zeros(0, np.int64),
+        media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
     )
     return mesh, world
 
@@ -62,11 +63,16 @@ def _lights(scene: Scene, needs: Needs) -> NDArray[np.float64]:
     return rows[~dark | (dark & extra)]
 
 
-def _media(scene: Scene, rows: dict[str, int]) -> NDArray[np.int64]:
-    """Materials of the closed, light-passing meshes around the eye, outermost (by volume) first."""
-    around = []
+def _material_rows(scene: Scene) -> dict[str, int]:
+    """Where each material begins in the array of materials."""
+    return {name: i * MATERIAL_COLUMNS for i, name in enumerate(scene.materials)}
+
+
+def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
+    """Materials of the closed, light-passing meshes around the camera's eye, outermost (by volume) first."""
+    rows, around = _material_rows(scene), []
     for instance in scene.instances:
-        if scene.materials[instance.material].passes_light and _winding(instance.mesh, scene.camera.eye) > 0.5:
+        if scene.materials[instance.material].passes_light and _winding(instance.mesh, camera.eye) > 0.5:
             p0, p1, p2 = instance.mesh.triangles.transpose(1, 0, 2)
             volume = abs(np.einsum("nk,nk->", p0, np.cross(p1, p2)))
             around.append((volume, rows[instance.material]))

@@ -466,6 +466,7 @@ BAD_SETTINGS: dict[str, list[Any]] = {
     "samples": [0, -1, 2, 1.0, np.inf, "1", True, [1], 10**30],
     "max_depth": [-1, 65, 1.5, np.nan, True, "3", 10**40, [3]],
     "min_weight": [-1, 1, np.nan, np.inf, "0", 1j, [0.1], -1e-300],
+    "shadows": [0, 1, "true", 1.0, [True]],
     "needs": [3, "x", {}, Needs, Needs(*[None] * 8), Needs(*[1] * 8), Needs(*[np.nan] * 8)],  # type: ignore[arg-type]
     "colour": [1],
 }

@@ -14,13 +14,13 @@ from renderer.cli import main
 from renderer.light import DirectionalLight, PointLight
 from renderer.material import KIND, PHONG, Dielectric, Mirror, Phong
 from renderer.needs import FEW_FACES, examine
-from renderer.render import build_target, kernel_settings_of
 from renderer.scene import Floor, RenderSettings, SceneObject
 from renderer.shapes import box, grid, icosphere
 from renderer.sight import MAX_MEDIA
+from renderer.stage import accelerator_of, build_octree, kernel_settings_of
 from renderer.world import pack
 
-MODULE = importlib.import_module("renderer.render")
+MODULE = importlib.import_module("renderer.stage")
 SCENES = Path(__file__).parents[1] / "scenes"
 SUN = DirectionalLight(direction=(-1, -2, -1))
 DARK = PointLight(position=(0, 5, 0), intensity=0.0)
@@ -208,10 +208,13 @@ def test_what_is_not_needed_takes_no_memory() -> None:
 def test_vertices_take_half_where_float32_holds_them() -> None:
     for what, size in ((scene(UNLIT), 4), (scene(UNLIT, FINE), 8)):
         mesh, _ = pack(what)
-        assert build_target(mesh, "auto", "midpoint", needs_of(what)).tree.blocks.itemsize == size
-        wide = build_target(mesh, "auto", "midpoint", replace(needs_of(what), float64_vertices=True)).tree.blocks
+        own, widened = needs_of(what), replace(needs_of(what), float64_vertices=True)
+        octree = build_octree(mesh, "auto", "midpoint", own)
+        assert accelerator_of(octree, own).tree.blocks.itemsize == size
+        wide = accelerator_of(octree, widened).tree.blocks
         assert wide.dtype == np.float64
-        np.testing.assert_array_equal(wide, build_target(mesh, "brute", "midpoint", needs_of(what)).tree.blocks)
+        brute = build_octree(mesh, "brute", "midpoint", own)
+        np.testing.assert_array_equal(wide, accelerator_of(brute, own).tree.blocks)
 
 
 @pytest.mark.parametrize(("mesh", "tree"), [(box(), False), (grid(4, 4), True)], ids=["few", "many"])

@@ -1,7 +1,6 @@
 """``render``: what it accepts, what it says of the rest, its progress bar and how it stops."""
 
 import dataclasses
-import importlib
 import io
 import sys
 import threading
@@ -11,15 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from renderer import stage
 from renderer.camera import PerspectiveCamera
 from renderer.light import DirectionalLight
 from renderer.material import Phong
-from renderer.render import TILE, render
-from renderer.scene import RenderSettings, Scene, SceneObject, load_scene
+from renderer.needs import needs_of
+from renderer.render import render, settings_of
+from renderer.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
+from renderer.shading import BOUNDED
 from renderer.shapes import icosphere
+from renderer.stage import TILE
 
-# ``renderer.render`` itself is the function of that name.
-MODULE = importlib.import_module("renderer.render")
 SCENES = Path(__file__).parents[1] / "scenes"
 
 
@@ -98,6 +99,7 @@ def test_every_pixel_is_written_once(resolution: tuple[int, int]) -> None:
         ("min_weight", -0.1, "-0.1"),
         ("min_weight", 1.0, "1"),
         ("min_weight", float("nan"), "nan"),
+        ("shadows", 1, "1"),
         ("speed", 3, "speed"),
         ("camera", None, "camera"),
     ],
@@ -118,7 +120,7 @@ def test_arguments_are_checked_before_anything_is_built(monkeypatch: pytest.Monk
     def built(*_: object) -> None:
         raise AssertionError("built a tree for arguments that are no good")
 
-    monkeypatch.setattr(MODULE, "pack", built)
+    monkeypatch.setattr(stage, "pack", built)
     for bad in ({"threads": 0}, {"samples": 3}, {"accelerator": "x"}, {"offset": "x"}, {"split": "x"}):
         with pytest.raises(ValueError):
             render(ball(), **bad)
@@ -148,7 +150,7 @@ def test_an_exception_in_a_tile_stops_the_rest(monkeypatch: pytest.MonkeyPatch, 
         if count == 5:
             raise error
 
-    monkeypatch.setattr(MODULE, "render_tile", interrupted)
+    monkeypatch.setattr(stage, "render_tile", interrupted)
     with pytest.raises(error):
         render(ball(), resolution=(20 * TILE, 20 * TILE), threads=threads)
     # Each other thread may have had one tile under way and have taken one more before it saw the stop.
@@ -164,7 +166,7 @@ def test_each_tile_is_rendered_once_and_they_cover_the_film(monkeypatch: pytest.
         x0, y0, x1, y1 = arguments[-1]
         covered[y0:y1, x0:x1] += 1
 
-    monkeypatch.setattr(MODULE, "render_tile", count)
+    monkeypatch.setattr(stage, "render_tile", count)
     render(ball(), resolution=covered.shape[::-1], threads=1)
     assert (covered == 1).all()
 
@@ -194,3 +196,35 @@ def test_offset_may_be_a_number() -> None:
     assert (bounded.radiance != by_name.radiance).any()
     # The rules differ by 1e-4 of the scene; only rays that pass an edge may see something else.
     assert np.median(np.abs(bounded.radiance - by_name.radiance)) < 1e-3
+
+
+def test_without_shadows_every_light_reaches_what_faces_it() -> None:
+    """A light right above a ball that stands over a floor: the floor beneath is dark with shadows, N.L without."""
+    scene = Scene(
+        camera=PerspectiveCamera(eye=(0, 1, 6), target=(0, 0, 0)),
+        materials={"m": Phong(diffuse=(0.5, 0.5, 0.5))},
+        objects=(SceneObject(mesh=icosphere(1), material="m", translate=(0.0, 1.5, 0.0)),),
+        floor=Floor(min=(-3.0, -3.0), max=(3.0, 3.0), materials=("m",)),
+        lights=(DirectionalLight(direction=(0, -1, 0)),),
+        render=RenderSettings(resolution=(40, 40)),
+    )
+    lit, hidden = render(scene, threads=1, shadows=False), render(scene, threads=1)
+    floor = np.isclose(lit.normal[..., 1], 1.0)
+    assert (lit.radiance[floor] == np.float32(0.5)).all()
+    assert (hidden.radiance[floor] == 0.0).any() and (hidden.radiance[floor] == np.float32(0.5)).any()
+    assert lit.rays.max() == 1 and hidden.rays.max() == 2
+
+
+def test_a_stage_takes_pictures_with_other_cameras_as_render_does() -> None:
+    """Also from within glass, where the media around the eye are the new camera's."""
+    scene = load_scene(SCENES / "glass.toml")
+    ready = stage.set_up(scene, needs_of(scene))
+    glass = next(i.mesh for i in scene.instances if scene.materials[i.material].passes_light)
+    inside = np.mean(glass.bounds, axis=0)
+    for eye in ((4.0, 2.0, 5.0), tuple(inside.tolist())):
+        camera = PerspectiveCamera(eye=eye, target=(0.0, 0.5, 0.0), fov=50)
+        moved = scene.model_copy(update={"camera": camera})
+        expected = render(moved, resolution=(24, 20), max_depth=4)
+        picture = ready.picture(camera, settings_of(scene, {"resolution": (24, 20), "max_depth": 4}), BOUNDED, 2)
+        assert picture.radiance.tobytes() == expected.radiance.tobytes()
+        assert picture.rays.tobytes() == expected.rays.tobytes()

@@ -70,7 +70,7 @@ import scipy.linalg
 
 
 def test_the_public_names_are_there_whatever_was_imported_first():
-    script = "import renderer, renderer.scene\nfrom renderer.render import TILE\nfrom renderer import *"
+    script = "import renderer, renderer.scene\nfrom renderer.render import settings_of\nfrom renderer import *"
     tell = "print(callable(render), *[f'{n}:{getattr(renderer, n).__module__}' for n in renderer.__all__])"
     is_callable, *names = output(f"{script}\n{tell}").split()
     assert is_callable == "True" and "render:renderer.render" in names and "Mesh:renderer.mesh" in names

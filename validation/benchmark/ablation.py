@@ -13,10 +13,10 @@ from renderer.camera import PerspectiveCamera
 from renderer.light import DirectionalLight
 from renderer.material import Mirror, Phong
 from renderer.parallel import available_threads
-from renderer.render import build_target, kernel_settings_of
 from renderer.scene import Floor, SceneObject
 from renderer.shading import BOUNDED
 from renderer.shapes import box, icosphere
+from renderer.stage import accelerator_of, build_octree, kernel_settings_of
 from renderer.tile import scratch_bytes
 from renderer.world import pack
 
@@ -106,7 +106,7 @@ def _render(scene: Scene, needs: Needs, size: int) -> Image:
 def memory(scene: Scene, needs: Needs) -> int:
     """Bytes of the arrays that a picture reads: the scene's, the tree's and the scratch of every thread."""
     mesh, world = pack(scene, needs)
-    target = build_target(mesh, "auto", "midpoint", needs)
+    target = accelerator_of(build_octree(mesh, "auto", "midpoint", needs), needs)
     tree = target.tree  # links are the nodes' memory seen as integers
     scratch = scratch_bytes(target.depth, kernel_settings_of(needs, scene.render, BOUNDED))
     arrays = [*world, tree.nodes, tree.blocks, tree.faces]

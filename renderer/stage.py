@@ -1,0 +1,138 @@
+"""A scene made ready: what its pictures share is worked out once, and each camera then costs its rays alone."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from renderer.camera import Camera, sample_offsets
+from renderer.errors import expect
+from renderer.image import Image
+from renderer.layout import Tree, cache_aligned
+from renderer.mesh import Mesh
+from renderer.needs import Needs
+from renderer.octree import BruteForce, Octree
+from renderer.parallel import for_chunks
+from renderer.scene import RenderSettings, Scene
+from renderer.sight import MAX_MEDIA, World
+from renderer.tile import Film, render_tile
+from renderer.whitted import Accelerator, Settings
+from renderer.world import media_around, pack
+
+# Pixels a side: 256 tiles share a 512 x 512 picture evenly, and neighbouring rays find their nodes in the cache.
+TILE = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What the pictures of a scene share; build one with ``set_up``.
+
+    mesh           all instances' triangles, in their order
+    octree         the tree over ``mesh``, or its ``BruteForce``
+    needs          what is ready: at least what ``needs_of`` says of the scene
+    build_seconds  what it took
+    """
+
+    scene: Scene
+    mesh: Mesh
+    octree: Octree | BruteForce
+    needs: Needs
+    world: World
+    target: Accelerator
+    build_seconds: float
+
+    def picture(
+        self,
+        camera: Camera,
+        chosen: RenderSettings,
+        offset: float,
+        threads: int,
+        finished: Callable[[int], None] | None = None,
+    ) -> Image:
+        """The picture that ``camera`` takes, by checked settings; see ``render``.
+
+        ``finished(tiles)`` is called after each tile, by one thread at a time. What it raises stops the others and is
+        raised here.
+        """
+        began = time.perf_counter()
+        width, height = chosen.resolution
+        rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
+        settings, film = kernel_settings_of(self.needs, chosen, offset), _film(width, height)
+        world = self.world
+        if self.needs.refraction and camera is not self.scene.camera:
+            world = world._replace(media=media_around(self.scene, camera))
+        across = -(-width // TILE)
+
+        def render_one(first: int, _end: int) -> None:
+            x, y = first % across * TILE, first // across * TILE
+            tile = (x, y, min(x + TILE, width), min(y + TILE, height))
+            render_tile(self.target, world, settings, rows, samples, film, tile)
+
+        for_chunks(render_one, tiles(chosen), 1, threads, finished)
+        return Image(*film, build_seconds=self.build_seconds, render_seconds=time.perf_counter() - began)
+
+
+def set_up(
+    scene: Scene,
+    needs: Needs,
+    accelerator: str = "auto",
+    split: Literal["midpoint", "sah"] = "midpoint",
+    threads: int | None = None,
+) -> Stage:
+    """Make ``scene`` ready, by checked arguments; see ``render``."""
+    began = time.perf_counter()
+    mesh, world = pack(scene, needs)
+    octree = build_octree(mesh, accelerator, split, needs, threads)
+    target = accelerator_of(octree, needs)
+    return Stage(scene, mesh, octree, needs, world, target, time.perf_counter() - began)
+
+
+def tiles(chosen: RenderSettings) -> int:
+    """How many tiles the picture has."""
+    width, height = chosen.resolution
+    return -(-width // TILE) * -(-height // TILE)
+
+
+def build_octree(
+    mesh: Mesh, accelerator: str, split: Literal["midpoint", "sah"], needs: Needs, threads: int | None = None
+) -> Octree | BruteForce:
+    """A tree, or the blocks alone where ``accelerator`` is "brute" or no tree is needed.
+
+    Raises ``ValueError`` for coordinates that would have to be rescaled, as the lights would too.
+    """
+    with_tree = needs.octree if accelerator == "auto" else accelerator == "octree"
+    built = Octree.from_mesh(mesh, split=split, threads=threads) if with_tree else BruteForce.from_mesh(mesh)
+    expect(built.target.scale == 1.0, "scene", "a largest coordinate from 2^-60 to 2^60", f"bounds {mesh.bounds}")
+    return built
+
+
+def accelerator_of(octree: Octree | BruteForce, needs: Needs) -> Accelerator:
+    """What the kernel shoots rays at."""
+    tree = octree.target.tree
+    return Accelerator(_widened(tree) if needs.float64_vertices else tree, octree.target.depth)
+
+
+def _widened(tree: Tree) -> Tree:
+    """The tree with its vertices in float64, whether they need it or not."""
+    blocks = cache_aligned(len(tree.blocks), np.float64)
+    blocks[:] = tree.blocks
+    return tree._replace(blocks=blocks)
+
+
+def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: float) -> Settings:
+    """The kernel's settings: no bounces where nothing bounces, and no media where nothing refracts."""
+    bounces = chosen.max_depth if needs.reflection or needs.refraction else 0
+    media = MAX_MEDIA if needs.refraction else 0
+    return Settings(bounces, chosen.min_weight, offset, media, chosen.shadows)
+
+
+def _film(width: int, height: int) -> Film:
+    return Film(
+        radiance=np.zeros((height, width, 3), np.float32),
+        depth=np.full((height, width), np.inf),
+        normal=np.zeros((height, width, 3), np.float32),
+        face=np.full((height, width), -1, np.int32),
+        rays=np.zeros((height, width), np.int32),
+    )
