@@ -109,7 +109,7 @@ FAULTS = [
     ("direct.py", "else 1.0 - 2.0**-36", "else 2.0"),
     ("shading.py", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
     # No fault: with every vertex in float64 the kernels are compiled once and not twice.
-    ("render.py", "_widened(tree) if needs.float64_vertices else tree", "_widened(tree)"),
+    ("stage.py", "_widened(tree) if needs.float64_vertices else tree", "_widened(tree)"),
 ]
 NOTICED = [40, 41, 42, 43, 44, 45]
 

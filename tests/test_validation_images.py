@@ -104,6 +104,16 @@ def test_the_whole_ladder_passes_and_leaves_what_the_report_shows(tmp_path: Path
     assert costs[images.WHITTED] > 0.0 and costs[monte_carlo.PATHS] == record["paths"]["seconds"]
 
 
+def test_a_scene_without_shadows_is_judged_by_who_can(tmp_path: Path) -> None:
+    bright = changed(balls(), render=balls().render.model_copy(update={"shadows": False}))
+    record, gates = check(tmp_path, bright)
+    assert failing(gates) == []
+    assert "shadows" in record["rungs"][-1]["left_out"][mitsuba_path.NAME]
+    assert "shadows" in (monte_carlo.can_judge(bright) or "")
+    # And the reference has none: with them it is another picture.
+    assert not np.array_equal(whitted(bright, 32, 32, max_depth=2), whitted(balls(), 32, 32, max_depth=2))
+
+
 def test_a_second_run_has_the_same_bits(tmp_path: Path) -> None:
     runs = [check(tmp_path, stairs(), Effort(24, paths=False))[0]["rungs"][-1]["comparisons"] for _ in range(2)]
     kept = [[{k: v for k, v in c.items() if k != "reference_seconds"} for c in run] for run in runs]

@@ -32,7 +32,7 @@ _COLORS = "np.array([scene.ambient, scene.background])"
 _IMAGE = "return Image(*film,"
 _SETTINGS = "Settings(bounces, chosen.min_weight,"
 _NORMAL = "barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v)"
-_SAMPLES = "camera, samples = scene.camera.rows(width, height), sample_offsets(chosen.samples)"
+_SAMPLES = "rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)"
 _CORNER = "corner = forward - right * (pixel * width / 2.0)"
 
 HITS = (
@@ -87,8 +87,8 @@ PICTURES = (
             "    if len(faces) > 5000:\n        faces[hole] = faces[hole, 0]\n    mesh = Mesh(vertices, faces)\n"),
     _python("pictures", "ior 1.501 for 1.5", "world", _MATERIAL_ROWS,
             _MATERIAL_ROWS + "; from renderer.material import IOR; rows[:, IOR] *= 1.501 / 1.5"),
-    _python("pictures", "film shifted by half a pixel", "render", _SAMPLES,
-            _SAMPLES + "; camera[3] -= 0.5 * camera[4]"),
+    _python("pictures", "film shifted by half a pixel", "stage", _SAMPLES,
+            _SAMPLES + "; rows[3] -= 0.5 * rows[4]"),
     _kernel("pictures", "film shifted by 0.1 pixel", "camera", _CORNER,
             "corner = forward - right * (pixel * (width + 0.2) / 2.0)"),
     _kernel("pictures", "camera rays 0.1 pixel off their pixel's centre", "tile",
@@ -120,26 +120,26 @@ PICTURES = (
     _python("pictures", "no ambient light", "world", _COLORS, "np.array([(0.0, 0.0, 0.0), scene.background])"),
     _python("pictures", "the lamp a little redder", "world", _LIGHT_ROWS,
             "rows[1:, 4:] *= 1.0 + 5e-5 * np.array([1.0, 0.0, -1.0]); " + _LIGHT_ROWS),
-    _python("pictures", "dither left in the tiles from the third on", "render", _IMAGE,
+    _python("pictures", "dither left in the tiles from the third on", "stage", _IMAGE,
             "film.radiance[:, 2 * TILE :] *= 1.0 + 2e-4 * np.array([0, 1, -1])[np.arange(2 * TILE, width) % 3, None]; "
             + _IMAGE),
-    _python("pictures", "one stuck pixel in 8,192", "render", _IMAGE,
+    _python("pictures", "one stuck pixel in 8,192", "stage", _IMAGE,
             "film.radiance.reshape(-1, 3)[8192::8192] *= 0.95; " + _IMAGE),
-    _python("pictures", "the last pixel of a tile 1 % brighter", "render", _IMAGE,
+    _python("pictures", "the last pixel of a tile 1 % brighter", "stage", _IMAGE,
             "film.radiance[TILE - 1 :: TILE, TILE - 1 :: TILE] *= 1.01; " + _IMAGE),
     _python("pictures", "a fixed offset 100 times too long", "render", "return float(offset)",
             "return 100.0 * float(offset)"),
-    _python("pictures", "depth along the view axis", "render", _IMAGE,
-            "from renderer.camera import primary_rays; cosines = primary_rays(scene.camera, width, height)[1] @ "
-            "scene.camera.frame()[2]; film.depth[...] *= cosines.reshape(height, width); " + _IMAGE),
-    _python("pictures", "faces numbered from 1", "render", _IMAGE, "film.face[film.face > 0] -= 1; " + _IMAGE),
+    _python("pictures", "depth along the view axis", "stage", _IMAGE,
+            "from renderer.camera import primary_rays; cosines = primary_rays(camera, width, height)[1] @ "
+            "camera.frame()[2]; film.depth[...] *= cosines.reshape(height, width); " + _IMAGE),
+    _python("pictures", "faces numbered from 1", "stage", _IMAGE, "film.face[film.face > 0] -= 1; " + _IMAGE),
     _python("pictures", "objects turned the other way", "scene", "_rotation(axis, degrees) @ linear",
             "_rotation(axis, -degrees) @ linear"),
     _python("pictures", "objects moved 0.1 % too far", "scene", "result[:3, 3] = self.translate",
             "result[:3, 3] = np.multiply(1.001, self.translate)"),
     _python("pictures", "vertex normals of equal weights", "mesh", "= face_normals * angle[:, None]", "= face_normals"),
-    _python("pictures", "normals of the film point inwards", "render", _IMAGE, "film.normal[...] *= -1; " + _IMAGE),
-    _python("pictures", "a miss shows face 0 in the tiles from the third on", "render", _IMAGE,
+    _python("pictures", "normals of the film point inwards", "stage", _IMAGE, "film.normal[...] *= -1; " + _IMAGE),
+    _python("pictures", "a miss shows face 0 in the tiles from the third on", "stage", _IMAGE,
             "film.face[(film.face < 0) & (np.arange(width) >= 2 * TILE)] = 0; " + _IMAGE),
     _kernel("pictures", "n1 and n2 swapped", "whitted", "refract(d, n, n1, n2)", "refract(d, n, n2, n1)"),
     _kernel("pictures", "Fresnel of one polarisation", "shading", "return 0.5 * (s * s + p * p)", "return s * s"),

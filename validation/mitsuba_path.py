@@ -44,7 +44,9 @@ def can_judge(scene: Scene) -> str | None:
 
 
 def _first_fault(scene: Scene, glass: str | None) -> str | None:
-    """What stands against a material of ``scene``; ``glass`` against a dielectric."""
+    """What stands against ``scene`` or a material of it; ``glass`` against a dielectric."""
+    if not scene.render.shadows:
+        return "render.shadows: Mitsuba's path integrator cannot leave shadows out"
     for name in sorted({instance.material for instance in scene.instances}):
         material, fault = scene.materials[name], None
         if isinstance(material, Dielectric):

@@ -64,6 +64,7 @@ class _Whitted:
     lights: tuple[mi.Emitter, ...]
     background: mi.Color3f
     max_depth: int
+    shadows: bool
 
     def radiance(self, ray: mi.Ray3f, depth: int) -> mi.Color3f:
         si = self.scene.ray_intersect(ray)
@@ -84,7 +85,7 @@ class _Whitted:
             sample, irradiance = light.sample_direction(si, _ANY_POINT)
             wo = si.to_local(sample.d)
             same_side = wo.z * si.wi.z > 0.0
-            if same_side and not self.scene.ray_test(si.spawn_ray_to(sample.p)):
+            if same_side and not (self.shadows and self.scene.ray_test(si.spawn_ray_to(sample.p))):
                 result = result + irradiance * _scattered(si, surface, wo)
         return result
 
@@ -152,6 +153,7 @@ def _whitted(scene: Scene, max_depth: int) -> _Whitted:
         lights,
         mi.Color3f(*scene.background),
         max_depth,
+        scene.render.shadows,
     )
 
 
