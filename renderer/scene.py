@@ -185,7 +185,8 @@ def _first_fault(error: ValidationError) -> str:
         tag = 3
     keys = [_shown(k) for i, k in enumerate(first["loc"]) if i != tag]
     where = ".".join(keys) + ": " if keys else ""
-    message = first["msg"].removeprefix("Value error, ")
+    # It may quote a tag of the file, line breaks and all.
+    message = " ".join(first["msg"].removeprefix("Value error, ").split())
     says_it = (first["type"] == "value_error" and ", got" in message) or isinstance(first["input"], dict)
     got = "" if says_it else f", got {_shown(first['input'])}"
     if first["type"] == "extra_forbidden":

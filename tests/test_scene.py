@@ -424,6 +424,7 @@ def mutated(draw: Any) -> str:
     FULL.replace("eye = [0, 1, 5]", "eye = [1e308, 1, 5]").replace("target = [0, 0, 0]", "target = [-1e308, 0, 0]")
 )
 @example(FULL.replace("max_depth = 3", "max_depth = " + "9" * 4400))
+@example(FULL.replace('type = "mirror"', 'type = "a\\nb"'))
 def test_any_file_is_a_scene_or_one_line(folder: Path, text: str) -> None:
     """No other exception and no warning; a scene that comes out is one that can be packed for the kernels."""
     path = folder / "fuzz.toml"
