@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect
-from renderer.image import srgb
+from renderer.image import srgb, srgb_steps
 from renderer.jit import inlined, kernel
 from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
 from renderer.material import AMBIENT, DIFFUSE, KIND, LAMBERT, PHONG, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
@@ -56,18 +56,10 @@ def _table() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Where the sRGB code changes: the least radiance of codes 1 to 255 and an infinity, (256,); and the code at the
     beginning of each of _PLACES equal parts of [0, 1], and at 1.
 
-    ``image.srgb`` takes a power for each value, three times as long as all the rest here. Its rounding is met by a
-    search: each step is the first float64 that it encodes as the next code.
+    A power for each value, as in the formula of sRGB, would take three times as long as all the rest here.
     """
-    low, high = np.zeros(255), np.ones(255)
-    codes = np.arange(1, 256)
-    # Halving the interval of bit patterns, which sort as the numbers do: 62 bits from 0 to 1.
-    for _ in range(62):
-        middle = ((low.view(np.int64) + high.view(np.int64)) // 2).view(np.float64)
-        reached = srgb(middle) >= codes
-        low, high = np.where(reached, low, middle), np.where(reached, middle, high)
     first = srgb(np.arange(_PLACES + 1) / _PLACES).astype(np.int64)
-    return np.append(high, np.inf), first
+    return np.append(srgb_steps(), np.inf), first
 
 
 def _with_stand_ins(materials: NDArray[np.float64]) -> NDArray[np.float64]:

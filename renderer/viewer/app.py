@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 from starlette.applications import Starlette
@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from renderer.viewer.exhibit import Exhibit, open_file
 from renderer.viewer.payload import boxes_bytes, description, mesh_bytes
@@ -65,11 +65,15 @@ class Viewer:
 
     async def connect(self, socket: WebSocket) -> None:
         """The WebSocket: one session, until the page leaves."""
-        await socket.accept()
-        session = Session(self, Wire(socket.send_text, socket.send_bytes), self._threads)
-        if len(self.sessions) >= MAX_CONNECTIONS:
+        with suppress(WebSocketDisconnect):  # a page may leave before its answer
+            await socket.accept()
+            session = Session(self, Wire(socket.send_text, socket.send_bytes), self._threads)
+            if len(self.sessions) < MAX_CONNECTIONS:
+                return await self._attend(socket, session)
             await session.complain(ValueError(f"connections: expected at most {MAX_CONNECTIONS}, got another"))
-            return await socket.close(_TRY_LATER)
+            await socket.close(_TRY_LATER)
+
+    async def _attend(self, socket: WebSocket, session: Session) -> None:
         self.sessions.add(session)
         running = asyncio.create_task(session.run())
         try:
@@ -116,7 +120,7 @@ def make_app(shown: Exhibit, host: str, port: int, token: str | None, ancestors:
         ],
         middleware=[
             Middleware(ResponseHeaders, ancestors=ancestors),
-            Middleware(TrustedHostMiddleware, allowed_hosts=allowed_hosts(host), www_redirect=False),
+            Middleware(TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, token), www_redirect=False),
             Middleware(SameOrigin, token_required=token is not None),
             Middleware(TokenRequired, token=token, port=port),
         ],

@@ -4,19 +4,20 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from renderer.camera import unit
 from renderer.errors import expect
-from renderer.face_phong import face_colors
-from renderer.light import DIRECTIONAL
+from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
 from renderer.material import REFLECTANCE, TRANSMITTANCE
 from renderer.needs import needs_of
 from renderer.parallel import available_threads
-from renderer.ray_path import ray_path
 from renderer.scene import RenderSettings, Scene, load_scene
 from renderer.shading import BOUNDED
 from renderer.stage import Stage, accelerator_of, build_octree, set_up
-from renderer.tree_boxes import visited
 from renderer.viewer.protocol import ViewSettings
+from renderer.warm import touch_viewing
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +62,18 @@ def prepare(scene: Scene, path: Path | None = None) -> Exhibit:
     # One bounce stands for any number of them: a panel may ask for more than the file does.
     threads = available_threads()
     stage = set_up(scene, needs_of(scene, max_depth=max(1, scene.render.max_depth)), "octree", "midpoint", threads)
+    # Mirrors and glass need no lights, and a scene of them alone has none packed; their colours a face do.
+    stage = replace(stage, world=stage.world._replace(lights=_shining(scene)))
     # The first call of a kernel loads or compiles it, which the first picture should not wait for.
     stage.picture(scene.camera, scene.render.model_copy(update={"resolution": (8, 8), "samples": 1}), BOUNDED, threads)
-    face_colors(stage.world, scene.camera.eye, threads)
-    ray_path(stage, scene.camera.eye, scene.camera.frame()[2], 1)
-    visited(stage.octree, scene.camera.eye, scene.camera.frame()[2])
+    touch_viewing(stage)
     return Exhibit(scene, path, stage, threads)
+
+
+def _shining(scene: Scene) -> NDArray[np.float64]:
+    """The rows of the lights that are not dark, as ``pack`` has them where the scene needs light."""
+    rows = np.array([light.row() for light in scene.lights]).reshape(-1, LIGHT_COLUMNS)
+    return rows[rows[:, 4:].any(axis=1)]
 
 
 def open_file(path: Path) -> Exhibit:

@@ -4,12 +4,13 @@ import io
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.face_phong import face_colors
-from renderer.false_color import false_color
+from renderer.false_color import Limits, false_color, limits_of
 from renderer.image import Image
 from renderer.shading import BOUNDED
 from renderer.stage import TILE
@@ -44,29 +45,41 @@ def passes_of(view: View) -> list[Pass]:
     if view.mode == "gl":
         return []
     longest = max(view.w, view.h)
-    coarse = [side for side in COARSE if side < longest and view.mode == "octree"]
+    coarse = [side for side in COARSE if side < longest] if view.mode == "octree" else []
+    # The first pass is shown whatever comes meanwhile, so it must not be one of many samples.
+    if view.mode == "octree" and view.settings.samples > 1 and not coarse:
+        coarse = [longest]
     sizes = [(_scaled(view.w, side, longest), _scaled(view.h, side, longest)) for side in coarse]
     first = [Pass(step, False, size, 1) for step, size in enumerate(sizes)]
     return [*first, Pass(len(sizes), True, (view.w, view.h), view.settings.samples)]
 
 
-def answer(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], None]) -> bytes:
-    """The message for one pass. ``finished(tiles)`` is called after each tile; what it raises ends the pass.
+class Answer(NamedTuple):
+    """A message for the page, and the values at the ends of its scale of colours if it has one."""
+
+    message: bytes
+    limits: Limits | None
+
+
+def answer(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], None]) -> Answer:
+    """What answers one pass. ``finished(tiles)`` is called after each tile; what it raises ends the pass.
 
     The milliseconds told are from the pass's begin to its payload, the rays a second those of tracing alone.
     """
-    began = time.perf_counter()
+    began, limits = time.perf_counter(), None
     if view.mode == "phong":
         stage = varied(shown.stage, view.settings)
         payload = face_colors(stage.world, camera_of(view.m, view.fovy).eye, shown.threads).tobytes()
         kind, pace = FACE_COLORS, 0.0
     else:
         image = picture(shown, view, wanted, finished)
-        rgb = false_color(image, view.settings.aov)
+        aov = view.settings.aov
+        limits = limits_of(image, aov) if aov in ("depth", "cost") else None
+        rgb = false_color(image, aov, limits)
         kind, payload = (JPEG, _jpeg(rgb)) if view.settings.pixels == "jpeg" else (RGBA, _rgba(rgb))
         pace = float(image.rays.sum()) / image.render_seconds / 1e6
     ms = (time.perf_counter() - began) * 1e3
-    return packed(kind, view, wanted.step, wanted.last, wanted.size, (ms, pace)) + payload
+    return Answer(packed(kind, view, wanted.step, wanted.last, wanted.size, (ms, pace)) + payload, limits)
 
 
 def picture(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], None] | None = None) -> Image:

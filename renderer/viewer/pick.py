@@ -27,7 +27,14 @@ def picked(shown: Exhibit, pick: Pick) -> dict[str, Any]:
     origin, direction = rows[0], rows[3] + (pick.x + 0.5) * rows[4] + (pick.y + 0.5) * rows[5]
     direction = direction / np.linalg.norm(direction)
     hits = stage.octree.closest_hit(origin[None], direction[None])
-    path = ray_path(stage, origin, direction, pick.settings.max_depth, shadows=pick.settings.shadows)
+    path = ray_path(
+        stage,
+        origin,
+        direction,
+        pick.settings.max_depth,
+        min_weight=shown.scene.render.min_weight,
+        shadows=pick.settings.shadows,
+    )
     nodes = visited(stage.octree, origin, direction, np.inf)
     boxes = [
         {"level": int(level), "lower": _listed(lower), "upper": _listed(upper), "leaf": bool(leaf)}

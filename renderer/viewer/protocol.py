@@ -1,9 +1,9 @@
 """What page and server say to each other on the WebSocket: the page's messages checked, the server's packed."""
 
 import struct
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator, model_validator
 
 from renderer.camera import FiniteVector, sample_offsets
 
@@ -102,6 +102,12 @@ class Pick(_Message):
     w: _Side
     h: _Side
     settings: ViewSettings = ViewSettings()
+
+    @model_validator(mode="after")
+    def _inside(self) -> Self:
+        if not (self.x < self.w and self.y < self.h):
+            raise ValueError(f"expected a pixel of a picture of {self.w} x {self.h}, got ({self.x}, {self.y})")
+        return self
 
 
 class OpenScene(_Message):

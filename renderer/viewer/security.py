@@ -8,30 +8,27 @@ only those that know the token are served.
 import hmac
 import ipaddress
 import secrets
-from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
 
 
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches ``host``."""
-    try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+def is_loopback(address: str) -> bool:
+    """Whether only this machine reaches the IP ``address``; a name may point anywhere, so it is resolved before."""
+    return ipaddress.ip_address(address).is_loopback
 
 
-def allowed_hosts(host: str) -> list[str]:
-    """Names by which a page may call a server bound to ``host``.
+def allowed_hosts(host: str, token: str | None) -> list[str]:
+    """Names by which a page may call a server asked to listen on ``host``.
 
-    Bound to other than loopback it may have any name: there the token, which no foreign page knows, is the guard.
+    With a token it may have any name: the token, which no foreign page knows, is the guard there.
     """
-    return [*LOOPBACK, host] if is_loopback(host) else ["*"]
+    return [*LOOPBACK, host] if token is None else ["*"]
 
 
 def new_token() -> str:
@@ -76,7 +73,8 @@ class SameOrigin:
         if scope["type"] == "websocket":
             headers = Headers(scope=scope)
             origin, host = headers.get("origin"), headers.get("host")
-            same = self.token_required if origin is None else _authority(origin) == host
+            # Neither names anything in "Origin: null" without a Host.
+            same = self.token_required if origin is None else host is not None and _authority(origin) == host
             if not same:
                 refusal = PlainTextResponse(f"Origin: expected {host}, got {origin}", 403)
                 return await refusal(scope, receive, send)
@@ -93,7 +91,7 @@ def _authority(origin: str) -> str | None:
 
 
 class TokenRequired:
-    """Serve only who brings the token: in the address (``?token=``), or in the cookie that the page then gets.
+    """Serve only who brings the token: in the address (``?token=``), or in the cookie that the answer then sets.
 
     The cookie is there for what the page loads by plain links. Its name has the port, because cookies of one host
     reach all its ports.
@@ -110,7 +108,7 @@ class TokenRequired:
             return await refusal(scope, receive, send)
 
         async def send_with_cookie(message: Message) -> None:
-            if message["type"] == "http.response.start" and scope["path"] == "/":
+            if message["type"] == "http.response.start":
                 value = f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
                 MutableHeaders(scope=message).append("Set-Cookie", value)
             await send(message)
@@ -118,12 +116,8 @@ class TokenRequired:
         await self.app(scope, receive, send_with_cookie)
 
     def _given(self, scope: Scope) -> list[str]:
-        query = parse_qs(scope["query_string"].decode("latin-1"))
-        try:
-            cookie = SimpleCookie(Headers(scope=scope).get("cookie", "")).get(self.cookie)
-        except CookieError:
-            cookie = None
-        return [*query.get("token", []), *([cookie.value] if cookie else [])]
+        came = HTTPConnection(scope)
+        return [*came.query_params.getlist("token"), came.cookies.get(self.cookie, "")]
 
 
 def _equal(given: str, token: str) -> bool:

@@ -1,5 +1,6 @@
 """The server in a thread of its own: where it listens, and how it ends."""
 
+import logging
 import os
 import socket
 import threading
@@ -33,8 +34,8 @@ class Viewing:
         Raises ``ValueError`` where the host is none of this machine's or the port is taken.
         """
         listening = _listen(host, port)
-        port = listening.getsockname()[1]
-        token = None if is_loopback(host) else new_token()
+        address, port = listening.getsockname()[:2]
+        token = None if is_loopback(address) else new_token()
         self.url = _address(host, port, token)
         # The notebook's server is another origin, on a port that nobody can know here.
         ancestors = "frame-ancestors 'self'" + (" http://127.0.0.1:* http://localhost:*" if framed else "")
@@ -44,15 +45,13 @@ class Viewing:
             log_level="error",  # so that a bad client fills nobody's screen
             access_log=False,
             server_header=False,
-            proxy_headers=False,
             ws_max_size=MAX_MESSAGE_BYTES,
             ws_per_message_deflate=False,  # pictures on loopback travel faster than they compress
             timeout_graceful_shutdown=_LAST_WORDS,
         )
+        logging.getLogger("uvicorn.error").addFilter(_no_mere_refusal)
         self._server = uvicorn.Server(config)
-        self._thread = threading.Thread(
-            target=self._server.run, args=([listening],), name="viewer", daemon=True
-        )
+        self._thread = threading.Thread(target=self._server.run, args=([listening],), name="viewer", daemon=True)
         self._thread.start()
 
     def wait(self) -> None:
@@ -86,8 +85,14 @@ class Viewing:
         return f'{frame}<p><a href="{self.url}" target="_blank" rel="noopener">{self.url}</a></p>'
 
 
+def _no_mere_refusal(record: logging.LogRecord) -> bool:
+    """Leaves out what uvicorn says of each WebSocket that is refused by an HTTP answer: 0.54 takes it for our fault."""
+    return record.getMessage() != "ASGI callable returned without completing handshake."
+
+
 def _listen(host: str, port: int) -> socket.socket:
     """A listening socket. A busy port is an error: another one would not be where the user looks for it."""
+    expect(isinstance(host, str), "host", "a string", type(host).__name__)
     expect(isinstance(port, int) and 0 <= port <= 65535, "port", "an integer from 0 to 65535", repr(port))
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]

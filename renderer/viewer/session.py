@@ -15,7 +15,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from renderer.viewer.exhibit import Exhibit
-from renderer.viewer.passes import Pass, answer, passes_of
+from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
 from renderer.viewer.protocol import Ack, Cancel, OpenScene, Pick, SaveCamera, View, parse
 from renderer.viewer.viewpoint import camera_of, camera_toml
@@ -26,7 +26,7 @@ _PROGRESS = 0.1
 T = TypeVar("T")
 
 
-class Superseded(Exception):
+class SupersededError(Exception):
     """Raised between the tiles of a picture that nobody waits for any more."""
 
 
@@ -134,7 +134,7 @@ class Session:
             try:
                 for wanted in passes_of(view):
                     await self._show(view, wanted)
-            except Superseded:
+            except SupersededError:
                 pass
             except Exception as error:  # where the connection itself has failed, complaining raises that again
                 await self.complain(error)
@@ -147,15 +147,17 @@ class Session:
         if view.mode == "brute" and self._leaving:
             # One such picture at a time: the tiles under way of the last one end first.
             await self._unless_newer(asyncio.wait(self._leaving))
-        message = await self._computed(view, wanted, stubborn)
+        message, limits = await self._computed(view, wanted, stubborn)
         if not stubborn:
             await self._unless_newer(self._acknowledged.wait())
         self._awaited = view.seq, wanted.step
         self._acknowledged.clear()
+        if limits is not None:
+            await self._tell(type="legend", seq=view.seq, aov=view.settings.aov, low=limits[0], high=limits[1])
         await self.wire.binary(message)
 
-    async def _computed(self, view: View, wanted: Pass, stubborn: bool) -> bytes:
-        """The pass's message. A newer view leaves the tiles under way to themselves: they end soon, the others never
+    async def _computed(self, view: View, wanted: Pass, stubborn: bool) -> Answer:
+        """The pass's answer. A newer view leaves the tiles under way to themselves: they end soon, the others never
         begin.
         """
         shown, left, done = self.hall.shown, threading.Event(), 0
@@ -164,7 +166,7 @@ class Session:
             nonlocal done
             done += tiles
             if left.is_set():
-                raise Superseded
+                raise SupersededError
 
         running = asyncio.get_running_loop().run_in_executor(self.threads, answer, shown, view, wanted, finished)
         self._leaving.add(running)
@@ -178,18 +180,18 @@ class Session:
         finally:
             left.set()
 
-    def _left(self, ended: asyncio.Future[bytes]) -> None:
+    def _left(self, ended: asyncio.Future[Answer]) -> None:
         self._leaving.discard(ended)
         if not ended.cancelled():
             ended.exception()  # asked for, so that none is reported as lost
 
     async def _unless_newer(self, awaited: Awaitable[Any]) -> None:
-        """Wait for it; raise ``Superseded`` as soon as there is a newer view."""
+        """Wait for it; raise ``SupersededError`` as soon as there is a newer view."""
         newer, wanted = asyncio.ensure_future(self.views.changed()), asyncio.ensure_future(awaited)
         try:
             await asyncio.wait({newer, wanted}, return_when=asyncio.FIRST_COMPLETED)
             if newer.done():
-                raise Superseded
+                raise SupersededError
         finally:
             newer.cancel()
             wanted.cancel()

@@ -27,8 +27,9 @@ def view(
     try:
         from renderer.viewer.server import Viewing
     except ModuleNotFoundError as error:
-        told = f"the viewer needs the package {error.name}: pip install 'octree-renderer[viewer]'"
-        raise ModuleNotFoundError(told, name=error.name) from None
+        package = str(error.name).partition(".")[0]
+        told = f"the viewer needs the package {package}: pip install 'octree-renderer[viewer]'"
+        raise ModuleNotFoundError(told, name=package) from None
     from renderer.viewer.exhibit import open_file, prepare
     from renderer.warm import compile_in_two
 

@@ -281,13 +281,14 @@ class Viewer {
     for (const old of this.sent.keys()) if (old < seq || (old === seq && last)) this.sent.delete(old);
     if (!wanted) return;
     if (this.mode === "brute") this.progress.show(null);
-    this.readings.ofPicture(picture, performance.now() - view.at, this.scene.faces);
+    this.readings.ofPicture(picture, performance.now() - view.at, this.scene.faces, view.legend);
   }
 
   told(message) {
     const acts = {
       progress: ({ seq, done }) => seq === this.seq && this.mode === "brute" && this.progress.show(done),
       pick: (pick) => this.rays.show(pick, this.scene),
+      legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
       scene: () => this.otherScene(),
       camera: ({ name, text }) => saveText(name, text),
       error: ({ message: text }) => {
