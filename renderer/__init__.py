@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from renderer.query import Hits
     from renderer.render import render
     from renderer.scene import Scene, load_scene
+    from renderer.viewer.view import view
 
 __all__ = [
     "BruteForce",
@@ -37,6 +38,7 @@ __all__ = [
     "load_scene",
     "needs_of",
     "render",
+    "view",
 ]
 
 _HOMES = {
@@ -55,6 +57,7 @@ _HOMES = {
     "load_scene": "scene",
     "needs_of": "needs",
     "render": "render",
+    "view": "viewer.view",
 }
 
 

@@ -5,7 +5,7 @@ import logging
 import sys
 from _thread import interrupt_main
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 from threading import Timer
@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("octree-render: interrupted, nothing written", file=sys.stderr)
         return 130
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, ModuleNotFoundError) as error:
         print(f"octree-render: {_one_line(error)}", file=sys.stderr)
         return 2
     return 0
@@ -118,6 +118,12 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("scene", type=Path)
     info.add_argument("--split", choices=("midpoint", "sah"), default="midpoint")
     info.set_defaults(command=_info)
+    view = commands.add_parser("view", help="show a scene in the browser, live")
+    view.add_argument("scene", type=Path)
+    view.add_argument("--host", default="127.0.0.1", help="where to listen; beyond this machine it takes a token")
+    view.add_argument("--port", type=int, default=0, help="default: 0, any free one")
+    view.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
+    view.set_defaults(command=_view)
     ahead = commands.add_parser("compile", help="compile all kernels now, for CI and container images")
     ahead.set_defaults(command=_compile)
     return parser
@@ -167,6 +173,18 @@ def _compile(_options: argparse.Namespace) -> None:
 
     compile_all()
     print("all kernels are compiled")
+
+
+def _view(options: argparse.Namespace) -> None:
+    from renderer.viewer.view import view
+
+    with view(options.scene, host=options.host, port=options.port, browser=False) as viewing:
+        print(f"{options.scene} is shown at {viewing.url} until Ctrl-C", flush=True)
+        # The usual way to end it, so no failure.
+        with suppress(KeyboardInterrupt):
+            if not options.no_browser:
+                viewing.open_browser()
+            viewing.wait()
 
 
 def _info(options: argparse.Namespace) -> None:

@@ -5,6 +5,7 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
@@ -17,9 +18,46 @@ from renderer.exr import check_exr, exr_bytes
 
 def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
     """Linear radiance, clipped to [0, 1], as 8-bit sRGB (IEC 61966-2-1)."""
+    x = np.asarray(linear)
+    if x.dtype != np.float32:
+        return _encoded(x)
+    # The same codes without a power for each value: a fifth of the time.
+    first, steps = _table()
+    code = first.take(x.view(np.uint32) >> 16)
+    return code + (x >= steps.take(code))
+
+
+def _encoded(linear: ArrayLike) -> NDArray[np.uint8]:
     x = np.clip(np.asarray(linear, np.float64), 0.0, 1.0)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)
     return (encoded * 255.0 + 0.5).astype(np.uint8)
+
+
+@cache
+def srgb_steps() -> NDArray[np.float64]:
+    """The least radiance of each of the codes 1 to 255, (255,): the first float64 that ``srgb`` encodes so."""
+    low, high = np.zeros(255), np.ones(255)
+    codes = np.arange(1, 256)
+    # Halving the interval of bit patterns, which sort as the numbers do: 62 bits from 0 to 1.
+    for _ in range(62):
+        middle = ((low.view(np.int64) + high.view(np.int64)) // 2).view(np.float64)
+        reached = _encoded(middle) >= codes
+        low, high = np.where(reached, low, middle), np.where(reached, middle, high)
+    return high
+
+
+@cache
+def _table() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """The code of the float32 with each upper half and a lower half of zeros, (65536,); and where the code after each
+    begins, (256,), which is nowhere for the last.
+
+    No two steps are in float32 numbers of one upper half: they are 0.9 % apart at 1 and further below, these 0.8 %.
+    """
+    zeros = (np.arange(1 << 16, dtype=np.uint32) << 16).view(np.float32)
+    exact = srgb_steps()
+    steps = exact.astype(np.float32)
+    steps = np.where(steps < exact, np.nextafter(steps, np.float32(np.inf)), steps)
+    return _encoded(np.nan_to_num(zeros, nan=0.0)), np.append(steps, np.float32(np.nan))
 
 
 def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:

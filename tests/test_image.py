@@ -10,7 +10,7 @@ import numpy as np
 import PIL.Image
 import pytest
 
-from renderer.image import Image, check_picture_path, srgb, write_atomically
+from renderer.image import Image, check_picture_path, srgb, srgb_steps, write_atomically
 
 
 def image(radiance: Any = None) -> Image:
@@ -188,3 +188,20 @@ def test_relative_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def test_the_smallest_picture() -> None:
     shown = PIL.Image.open(io.BytesIO(image([[[1.0, 0.0, 0.5]]])._repr_png_()))
     assert np.asarray(shown).tolist() == [[[255, 0, 188]]]
+
+
+def test_float32_gets_the_codes_that_float64_gets() -> None:
+    """Radiance takes a faster way: at every step, beside it, and at numbers of every size and sign."""
+    steps = srgb_steps().astype(np.float32)
+    bits = np.random.default_rng(3).integers(0, 1 << 32, 200_000, np.uint32)
+    special = np.array([0.0, -0.0, -1.0, 1.0, 7.0, np.inf, -np.inf, 1e-45, 0.0031308], np.float32)
+    sides = [np.nextafter(steps, np.float32(far)) for far in (-np.inf, np.inf)]
+    even = np.linspace(0.0, 1.0, 99_999, dtype=np.float32)
+    values = np.concatenate([steps, *sides, bits.view(np.float32), even, special])
+    values = values[~np.isnan(values)]
+    assert np.array_equal(srgb(values), srgb(values.astype(np.float64)))
+
+
+def test_codes_begin_at_their_steps() -> None:
+    steps = srgb_steps()
+    assert (srgb(steps) == np.arange(1, 256)).all() and (srgb(np.nextafter(steps, 0.0)) == np.arange(255)).all()

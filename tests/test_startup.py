@@ -27,6 +27,9 @@ HEAVY = {
     "matplotlib",
     "mitsuba",
     "embreex",
+    "starlette",
+    "uvicorn",
+    "websockets",
 }
 
 
@@ -99,10 +102,18 @@ def signatures():
     return {(k.py_func.__name__, str(s)) for k in kernels.values() for s in k.signatures}
 compile_all()
 before = signatures()
-from renderer import BruteForce, Octree, load_scene, render
+from renderer import BruteForce, Octree, load_scene, needs_of, render
+from renderer.face_phong import face_colors
+from renderer.ray_path import ray_path
+from renderer.stage import set_up
+from renderer.tree_boxes import visited
 for name in ("three_models", "stairs", "glass"):
     for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
         render(load_scene(f"scenes/{name}.toml"), resolution=(3, 2), **options)
+    stage = set_up(load_scene(f"scenes/{name}.toml"), needs_of(load_scene(f"scenes/{name}.toml")), "octree")
+    face_colors(stage.world, [0, 1, 5])
+    ray_path(stage, [0, 1, 5], [0, 0, -1], 2)
+    visited(stage.octree, [0, 1, 5], [0, 0, -1])
 vertices = np.random.default_rng(1).random((90, 3))
 for points in (vertices, vertices.astype(np.float32)):
     for target in (Octree(points, np.arange(90).reshape(-1, 3)), BruteForce(points, np.arange(90).reshape(-1, 3))):

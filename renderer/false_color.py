@@ -1,0 +1,97 @@
+"""What a picture knows beside its radiance, drawn as colours: depth, normal, face, and the cost of each pixel."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import expect
+from renderer.image import Image, srgb
+
+AOVS = "color", "depth", "normal", "face", "cost"
+Limits = tuple[float, float]
+
+# Every seventeenth colour of viridis (Smith and van der Walt, matplotlib 1.5, CC0), whose lightness rises evenly.
+# Straight lines between them stay within 7 of 255 of it in every channel.
+VIRIDIS = np.array([
+    [68, 1, 84], [72, 26, 108], [71, 47, 125], [65, 68, 135], [57, 86, 140], [49, 104, 142], [42, 120, 142],
+    [35, 136, 142], [31, 152, 139], [34, 168, 132], [53, 183, 121], [84, 197, 104], [122, 209, 81], [165, 219, 54],
+    [210, 226, 27], [253, 231, 37],
+], np.uint8)  # fmt: skip
+_STEPS = 256
+# The greys of the nearest and the farthest surface; black and white stay free for backgrounds.
+_NEAR, _FAR = 240, 30
+# The least value of a face's red, green and blue, so that none is near black.
+_DARKEST = 48
+
+
+def false_color(image: Image, aov: str, limits: Limits | None = None) -> NDArray[np.uint8]:
+    """Draw an AOV of a picture, (h, w, 3) uint8 sRGB.
+
+    color   the radiance itself
+    depth   grey, the nearest surface the brightest
+    normal  0.5 + 0.5 n: x, y, z of the shading normal as red, green, blue
+    face    a colour for each face, the same in every picture of the mesh
+    cost    rays traced for the pixel, all samples together, from dark blue (few) over green to yellow (many)
+
+    Where nothing was hit, all but the cost show the radiance, which is the background. The scales of depth and cost go
+    from ``limits[0]`` to ``limits[1]``, beyond which colours stay; None takes ``limits_of`` the picture. Raises
+    ``ValueError`` naming the argument.
+    """
+    expect(aov in AOVS, "aov", f"one of {list(AOVS)}", repr(aov))
+    low, high = limits_of(image, aov) if limits is None else limits
+    expect(bool(np.isfinite((low, high)).all()) and low <= high, "limits", "finite low <= high", repr(limits))
+    hit = image.face >= 0
+    if aov == "color":
+        return srgb(image.radiance)
+    if aov == "cost":
+        return _viridis(_STEPS)[_steps(image.rays, low, high)]
+    colors = np.empty((*hit.shape, 3), np.uint8)
+    colors[~hit] = srgb(image.radiance[~hit])
+    if aov == "depth":
+        greys = np.rint(np.linspace(_NEAR, _FAR, _STEPS)).astype(np.uint8)
+        colors[hit] = greys[_steps(image.depth[hit], low, high), None]
+    else:
+        colors[hit] = _face_colors(image.face[hit]) if aov == "face" else _normal_colors(image.normal[hit])
+    return colors
+
+
+def limits_of(image: Image, aov: str) -> Limits:
+    """Least and greatest depth of a surface, or least and greatest cost: what a legend says at the ends of the scale.
+
+    (0, 0) for other AOVs and where there is nothing.
+    """
+    drawn: dict[str, NDArray[Any]] = {"depth": image.depth[image.face >= 0], "cost": image.rays}
+    values = drawn.get(aov, np.empty(0))
+    return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+
+
+def _steps(values: NDArray[Any], low: float, high: float) -> NDArray[np.intp]:
+    """Where on a scale of _STEPS each value stands; the first where the scale has no length."""
+    share = (values - low) / (high - low) if high > low else np.zeros(values.shape)
+    return ((_STEPS - 1) * np.clip(share, 0.0, 1.0) + 0.5).astype(np.intp)
+
+
+def _viridis(count: int) -> NDArray[np.uint8]:
+    """``count`` colours from one end of VIRIDIS to the other, (count, 3)."""
+    places = np.linspace(0.0, len(VIRIDIS) - 1.0, count)
+    channels = [np.interp(places, np.arange(len(VIRIDIS)), VIRIDIS[:, k]) for k in range(3)]
+    return np.rint(np.stack(channels, axis=1)).astype(np.uint8)
+
+
+def _normal_colors(normals: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """(n, 3) unit vectors as colours."""
+    return (np.clip(0.5 + 0.5 * normals, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+
+def _face_colors(faces: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """(n, 3) colours of face numbers, by a hash that leaves nothing alike of neighbouring numbers.
+
+    lowbias32 of Chris Wellons, Prospecting for Hash Functions, 2018 (public domain).
+    """
+    x = faces.astype(np.uint32)
+    x = (x ^ x >> np.uint32(16)) * np.uint32(0x7FEB352D)
+    x = (x ^ x >> np.uint32(15)) * np.uint32(0x846CA68B)
+    x = x ^ x >> np.uint32(16)
+    channels = np.stack([x & 255, x >> np.uint32(8) & 255, x >> np.uint32(16) & 255], axis=-1)
+    return (_DARKEST + channels * (255 - _DARKEST) // 255).astype(np.uint8)

@@ -1,0 +1,291 @@
+"""The tree of rays that one camera ray spawns, as the Whitted kernel traces it: for looking at, not for speed.
+
+Surfaces are met and left by the kernel's own functions, so the rays are the same to the bit, and what they bring home
+adds up to the pixel.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.errors import expect
+from renderer.jit import kernel
+from renderer.light import DIRECTIONAL
+from renderer.material import (
+    AMBIENT,
+    DIELECTRIC,
+    DIFFUSE,
+    IOR,
+    KIND,
+    LAMBERT,
+    MATERIAL_COLUMNS,
+    PHONG,
+    REFLECTANCE,
+    SHININESS,
+    SPECULAR,
+    TRANSMITTANCE,
+)
+from renderer.shading import BOUNDED, fresnel, reflect, refract, spawn_origin, specular
+from renderer.sight import MAX_MEDIA, Surface, World, look_at, surface_at
+from renderer.stage import Stage
+from renderer.vec3 import add, dot, normalized, scale, sub, times
+from renderer.world import media_around
+
+Vector = tuple[float, float, float]
+Kind = Literal["camera", "reflected", "refracted", "shadow"]
+
+# A ray of depth d in glass has up to 2^d of its kind, which no one can look at and no click should wait for. This many
+# are all of them to depth 8, the shadow rays not counted, and take about a tenth of a second.
+MAX_RAYS = 511
+# As ``direct`` stops before a point light, at which a surface must not hide it.
+_SHORT_OF_LIGHT = 1.0 - 2.0**-36
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One ray, from where it starts to where it ends; vectors in scene units.
+
+    kind      "camera", "reflected", "refracted" or "shadow"
+    depth     bounces before it; a shadow ray has that of the ray whose surface it leaves
+    parent    index in the path of the ray that it continues; -1 for the camera ray
+    start     where it starts, off the surface that it leaves by a rounding error
+    end       the surface that it met; or else the point light that it reached; or else a point beyond all faces
+    hit       whether it met a surface; for a shadow ray, whether that hides the light
+    face      the face that it met, -1 for none
+    weight    the share (red, green, blue) of what comes along it that the pixel receives
+    radiance  what it adds to the pixel: the surface's ambient light or the background; a shadow ray, the light that it
+              let through
+    """
+
+    kind: Kind
+    depth: int
+    parent: int
+    start: Vector
+    end: Vector
+    hit: bool
+    face: int
+    weight: Vector
+    radiance: Vector
+
+
+class _Ray(NamedTuple):
+    """A ray that waits to be traced; media are rows of materials, outermost first."""
+
+    kind: Kind
+    depth: int
+    parent: int
+    origin: Vector
+    direction: Vector
+    weight: Vector
+    media: tuple[int, ...]
+
+
+class _Met(NamedTuple):
+    """What a ray met: the face, its surface, the normal that faces the ray, and the material's row with its columns."""
+
+    face: int
+    surface: Surface
+    n: Vector
+    inside: bool
+    row: int
+    material: NDArray[np.float64]
+
+
+class _Aim(NamedTuple):
+    """A shadow ray, where it ends if nothing hides the light, and what it then adds to the pixel."""
+
+    origin: Vector
+    direction: Vector
+    t_max: float
+    end: Vector
+    radiance: Vector
+
+
+def ray_path(
+    stage: Stage,
+    origin: ArrayLike,
+    direction: ArrayLike,
+    max_depth: int,
+    *,
+    min_weight: float = 0.0,
+    shadows: bool = True,
+) -> tuple[Segment, ...]:
+    """The rays that the camera ray from ``origin`` in ``direction`` (3,) becomes: by depth, each followed by the shadow
+    rays that leave its end.
+
+    ``max_depth``, ``min_weight`` and ``shadows`` as in ``RenderSettings``; spawned rays leave by the bounded offset. At
+    most MAX_RAYS rays, and for each as many shadow rays as ``stage.world`` has lights; of more the deepest are left
+    out. Otherwise the segments are as many as the pixel's ``Image.rays``, and their ``radiance`` sums to its colour.
+    Without ``shadows`` the ray that met a surface brings home the light that falls there. Raises ``ValueError`` naming
+    the argument.
+    """
+    counts = isinstance(max_depth, int) and not isinstance(max_depth, bool) and max_depth >= 0
+    expect(counts, "max_depth", "an integer >= 0", repr(max_depth))
+    o, d = _vector("origin", origin), _vector("direction", direction)
+    expect(any(d), "direction", "a vector of non-zero length", repr(direction))
+    bounces = max_depth if stage.needs.reflection or stage.needs.refraction else 0
+    waiting = deque([_Ray("camera", 0, -1, o, normalized(d), (1.0, 1.0, 1.0), _media_at(stage, o))])
+    path: list[Segment] = []
+    for _ in range(MAX_RAYS):
+        if not waiting:
+            break
+        ray, own = waiting.popleft(), len(path)
+        met = _meet(stage, ray)
+        path += _lit(stage, ray, met, own, shadows) if met else [_lost(stage, ray)]
+        if met and ray.depth < bounces:
+            waiting += [r for r in _bounce(stage, ray, met, own) if _goes_on(r.weight, min_weight)]
+    return tuple(path)
+
+
+def _vector(argument: str, value: ArrayLike) -> Vector:
+    array = np.asarray(value, np.float64)
+    expect(array.shape == (3,) and bool(np.isfinite(array).all()), argument, "three finite numbers", repr(value))
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def _media_at(stage: Stage, eye: Vector) -> tuple[int, ...]:
+    """The media around the eye, as ``Stage.picture`` has them for a camera there."""
+    if not stage.needs.refraction:
+        return ()
+    return tuple(media_around(stage.scene, stage.scene.camera.model_copy(update={"eye": eye})).tolist())
+
+
+def _goes_on(weight: Vector, min_weight: float) -> bool:
+    return max(weight) > 0.0 and max(weight) >= min_weight
+
+
+@kernel
+def _surface(world: World, face: int, u: float, v: float) -> Surface:
+    """``surface_at``, for Python."""
+    return surface_at(look_at(world), face, u, v)
+
+
+def _meet(stage: Stage, ray: _Ray) -> _Met | None:
+    """The nearest surface on the ray's way."""
+    hits = stage.octree.closest_hit([ray.origin], [ray.direction])
+    if not hits.hit[0]:
+        return None
+    face = int(hits.face[0])
+    surface = _surface(stage.world, face, float(hits.u[0]), float(hits.v[0]))
+    inside = dot(ray.direction, surface.n_s) > 0.0
+    n, row = scale(surface.n_s, -1.0) if inside else surface.n_s, int(surface.material)
+    return _Met(face, surface, n, inside, row, stage.world.materials[row // MATERIAL_COLUMNS])
+
+
+def _color(columns: NDArray[np.float64], first: int) -> Vector:
+    x, y, z = columns[first : first + 3].tolist()
+    return x, y, z
+
+
+def _lost(stage: Stage, ray: _Ray) -> Segment:
+    """The segment of a ray that met nothing."""
+    radiance = times(ray.weight, _color(stage.world.colors[1], 0))
+    end = _beyond(stage, ray.origin, ray.direction)
+    return Segment(ray.kind, ray.depth, ray.parent, ray.origin, end, False, -1, ray.weight, radiance)
+
+
+def _beyond(stage: Stage, origin: Vector, direction: Vector) -> Vector:
+    """The point in unit ``direction`` at which the sphere around all faces is left behind for certain."""
+    lower, upper = stage.mesh.bounds if len(stage.mesh.faces) else (np.zeros(3), np.ones(3))
+    reach = np.linalg.norm(origin - (lower + upper) / 2.0) + np.linalg.norm(upper - lower) / 2.0
+    return add(origin, scale(direction, float(reach)))
+
+
+def _lit(stage: Stage, ray: _Ray, met: _Met, own: int, shadows: bool) -> list[Segment]:
+    """The segment of a ray that met a surface, in place ``own`` of the path, and those of its shadow rays."""
+    radiance = times(ray.weight, times(_color(met.material, AMBIENT), _color(stage.world.colors[0], 0)))
+    aims, shadow_rays = _aim(stage, ray, met), []
+    for aim in aims:
+        if shadows:
+            shadow_rays.append(_shadow(stage, ray, own, aim))
+        else:
+            radiance = add(radiance, aim.radiance)
+    p = met.surface.p
+    return [Segment(ray.kind, ray.depth, ray.parent, ray.origin, p, True, met.face, ray.weight, radiance), *shadow_rays]
+
+
+def _aim(stage: Stage, ray: _Ray, met: _Met) -> list[_Aim]:
+    """The ways to the lights that the surface faces, by the rules of ``direct``."""
+    if met.material[KIND] not in (PHONG, LAMBERT):
+        return []
+    aims, (p, error, n_g, *_) = [], met.surface
+    for light in stage.world.lights:
+        place, arriving = _color(light, 1), _color(light, 4)
+        directional = light[0] == DIRECTIONAL
+        to_light = place if directional else sub(place, p)
+        if dot(met.n, to_light) <= (0.0 if directional else error):
+            continue
+        o = spawn_origin(p, error, n_g, to_light, BOUNDED)
+        if directional:
+            way, t_max, end = place, np.inf, _beyond(stage, o, place)
+        else:
+            way, t_max, end = sub(place, o), _SHORT_OF_LIGHT, place
+            arriving = scale(arriving, 1.0 / dot(to_light, to_light))
+            to_light = normalized(to_light)
+        seen = times(ray.weight, times(_phong(met, ray.direction, to_light), arriving))
+        aims.append(_Aim(o, way, t_max, end, seen))
+    return aims
+
+
+def _phong(met: _Met, d: Vector, towards: Vector) -> Vector:
+    """The share of light from the unit direction ``towards`` that the surface sends against d."""
+    factor: Vector = scale(_color(met.material, DIFFUSE), dot(met.n, towards))
+    if met.material[KIND] == PHONG:
+        highlight = specular(d, met.n, towards, float(met.material[SHININESS]))
+        factor = add(factor, scale(_color(met.material, SPECULAR), highlight))
+    return factor
+
+
+def _shadow(stage: Stage, ray: _Ray, own: int, aim: _Aim) -> Segment:
+    """The segment of a shadow ray; it ends at the nearest surface that hides the light."""
+    hits = stage.octree.closest_hit([aim.origin], [aim.direction], t_max=aim.t_max)
+    hidden = bool(hits.hit[0])
+    end = _color(hits.points[0], 0) if hidden else aim.end
+    radiance = (0.0, 0.0, 0.0) if hidden else aim.radiance
+    return Segment("shadow", ray.depth, own, aim.origin, end, hidden, int(hits.face[0]), ray.weight, radiance)
+
+
+def _bounce(stage: Stage, ray: _Ray, met: _Met, own: int) -> list[_Ray]:
+    """The rays that leave the surface: the reflected one, then the refracted one where light passes."""
+    d, m = ray.direction, met.material
+    k_r, k_t = _color(m, REFLECTANCE), _color(m, TRANSMITTANCE)
+    children = []
+    if any(k_t) or m[KIND] == DIELECTRIC:
+        limit = MAX_MEDIA if stage.needs.refraction else 0
+        beyond = _cross(ray.media, met, limit)
+        # From inside, n1 is this material even where no entry was seen: an open mesh.
+        n1 = float(m[IOR]) if met.inside else _innermost_ior(stage, ray.media)
+        n2 = _innermost_ior(stage, beyond) if met.inside else float(m[IOR])
+        cos_t, through = refract(d, met.n, n1, n2)
+        if m[KIND] == DIELECTRIC:
+            f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, met.n), cos_t, n1, n2)
+            k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
+        if cos_t >= 0.0:
+            children.append(_child("refracted", ray, met, own, through, times(ray.weight, k_t), beyond))
+    mirrored = reflect(d, met.n)
+    return [_child("reflected", ray, met, own, mirrored, times(ray.weight, k_r), ray.media), *children]
+
+
+def _child(
+    kind: Kind, ray: _Ray, met: _Met, own: int, direction: Vector, weight: Vector, media: tuple[int, ...]
+) -> _Ray:
+    w, (p, error, n_g, *_) = normalized(direction), met.surface
+    return _Ray(kind, ray.depth + 1, own, spawn_origin(p, error, n_g, w, BOUNDED), w, weight, media)
+
+
+def _cross(media: tuple[int, ...], met: _Met, limit: int) -> tuple[int, ...]:
+    """The media beyond the surface; leaving takes out the innermost entry of its material, wherever it stands."""
+    if not met.inside:
+        return (*media, met.row) if len(media) < limit else media
+    for k in reversed(range(len(media))):
+        if media[k] == met.row:
+            return media[:k] + media[k + 1 :]
+    return media
+
+
+def _innermost_ior(stage: Stage, media: tuple[int, ...]) -> float:
+    return float(stage.world.materials[media[-1] // MATERIAL_COLUMNS, IOR]) if media else 1.0

@@ -1,0 +1,128 @@
+"""The server's routes: the page, what it fetches, and the WebSocket."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from renderer.viewer.exhibit import Exhibit, open_file
+from renderer.viewer.payload import boxes_bytes, description, mesh_bytes
+from renderer.viewer.security import ResponseHeaders, SameOrigin, TokenRequired, allowed_hosts
+from renderer.viewer.session import Session, Wire
+
+PAGE = Path(__file__).parent / "page"
+# Each may keep all processors busy; beyond this many none would see its pictures move.
+MAX_CONNECTIONS = 16
+# A session's picture under way, the one before it whose last tiles end, and a click.
+_THREADS_A_SESSION = 3
+_BINARY = "application/octet-stream"
+_TRY_LATER = 1013  # RFC 6455's registry of close codes
+
+
+class Viewer:
+    """What all connections share: the scene on show, and the threads that compute."""
+
+    def __init__(self, shown: Exhibit) -> None:
+        self.shown = shown
+        self.sessions: set[Session] = set()
+        self._threads = ThreadPoolExecutor(_THREADS_A_SESSION * MAX_CONNECTIONS, "viewer")
+        self._one_opens = asyncio.Lock()
+
+    async def open(self, file: str) -> None:
+        """Show another scene file to all. Raises ``ValueError`` and changes nothing where that fails."""
+        async with self._one_opens:
+            path = self.shown.beside(file)
+            self.shown = await run_in_threadpool(open_file, path)
+        told = [session.tell_of_scene() for session in self.sessions]
+        await asyncio.gather(*told, return_exceptions=True)  # one may just be leaving
+
+    async def description(self, _request: Request) -> Response:
+        """GET /scene."""
+        return JSONResponse(await run_in_threadpool(description, self.shown))
+
+    async def mesh(self, _request: Request) -> Response:
+        """GET /mesh."""
+        return Response(await run_in_threadpool(mesh_bytes, self.shown.stage), media_type=_BINARY)
+
+    async def boxes(self, request: Request) -> Response:
+        """GET /octree?level=K."""
+        level = request.query_params.get("level", "0")
+        # No tree has levels of three digits.
+        if not (level.isascii() and level.isdigit() and len(level) < 3):
+            return PlainTextResponse(f"level: expected an integer from 0 to 99, got {level[:40]!r}", 400)
+        return Response(await run_in_threadpool(boxes_bytes, self.shown.stage, int(level)), media_type=_BINARY)
+
+    async def connect(self, socket: WebSocket) -> None:
+        """The WebSocket: one session, until the page leaves."""
+        with suppress(WebSocketDisconnect):  # a page may leave before its answer
+            await socket.accept()
+            session = Session(self, Wire(socket.send_text, socket.send_bytes), self._threads)
+            if len(self.sessions) < MAX_CONNECTIONS:
+                return await self._attend(socket, session)
+            await session.complain(ValueError(f"connections: expected at most {MAX_CONNECTIONS}, got another"))
+            await socket.close(_TRY_LATER)
+
+    async def _attend(self, socket: WebSocket, session: Session) -> None:
+        self.sessions.add(session)
+        running = asyncio.create_task(session.run())
+        try:
+            await _receive_all(socket, session)
+        finally:
+            self.sessions.discard(session)
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+
+    async def stop(self) -> None:
+        """Begin nothing more."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+
+async def _receive_all(socket: WebSocket, session: Session) -> None:
+    """Pass messages on until the page leaves."""
+    while (message := await socket.receive())["type"] == "websocket.receive":
+        if message.get("text") is not None:
+            await session.receive(message["text"])
+        else:
+            await session.complain(ValueError(f"message: expected JSON text, got {len(message['bytes'])} bytes"))
+
+
+def make_app(shown: Exhibit, host: str, port: int, token: str | None, ancestors: str) -> Starlette:
+    """The application that shows ``shown`` on ``host`` and ``port``; without ``token`` to whoever reaches it.
+
+    ``ancestors`` is the content security policy's rule about frames around the page.
+    """
+    viewer = Viewer(shown)
+
+    @asynccontextmanager
+    async def lifespan(_app: Starlette) -> AsyncIterator[None]:
+        yield
+        await viewer.stop()
+
+    return Starlette(
+        routes=[
+            Route("/", lambda _request: FileResponse(PAGE / "index.html")),
+            Route("/scene", viewer.description),
+            Route("/mesh", viewer.mesh),
+            Route("/octree", viewer.boxes),
+            WebSocketRoute("/ws", viewer.connect),
+            Mount("/static", StaticFiles(directory=PAGE)),
+        ],
+        middleware=[
+            Middleware(ResponseHeaders, ancestors=ancestors),
+            Middleware(TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, token), www_redirect=False),
+            Middleware(SameOrigin, token_required=token is not None),
+            Middleware(TokenRequired, token=token, port=port),
+        ],
+        lifespan=lifespan,
+    )

@@ -1,0 +1,112 @@
+"""A scene on show: made ready once for all who look at it, and varied by what their panels choose."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.camera import unit
+from renderer.errors import expect
+from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
+from renderer.material import REFLECTANCE, TRANSMITTANCE
+from renderer.needs import needs_of
+from renderer.parallel import available_threads
+from renderer.scene import RenderSettings, Scene, load_scene
+from renderer.shading import BOUNDED
+from renderer.stage import Stage, accelerator_of, build_octree, set_up
+from renderer.viewer.protocol import ViewSettings
+from renderer.warm import touch_viewing
+
+
+@dataclass(frozen=True, eq=False)
+class Exhibit:
+    """What the page shows.
+
+    path   the scene file, or None for a scene made in Python
+    stage  the scene over its octree, ready for any number of bounces
+    """
+
+    scene: Scene
+    path: Path | None
+    stage: Stage
+    threads: int
+
+    @property
+    def name(self) -> str:
+        """The scene file's name."""
+        return self.path.name if self.path else "scene"
+
+    @property
+    def files(self) -> list[str]:
+        """The scene files that may be opened: those beside this one."""
+        return sorted(path.name for path in self.path.parent.glob("*.toml")) if self.path else []
+
+    def beside(self, file: str) -> Path:
+        """The path of one of ``files``. Raises ``ValueError`` for any other."""
+        expect(self.path is not None and file in self.files, "scene.file", f"one of {self.files}", repr(file))
+        assert self.path is not None  # which mypy cannot tell
+        return self.path.parent / file
+
+    @cached_property
+    def brute(self) -> Stage:
+        """The same scene with every ray tested against every face."""
+        octree = build_octree(self.stage.mesh, "brute", "midpoint", self.stage.needs, self.threads)
+        return replace(self.stage, octree=octree, target=accelerator_of(octree, self.stage.needs))
+
+
+def prepare(scene: Scene, path: Path | None = None) -> Exhibit:
+    """Make ``scene`` ready and its kernels warm. Raises ``ValueError`` for a scene that cannot be shown."""
+    expect(any(len(i.mesh.faces) for i in scene.instances), "scene", "at least one face", "none")
+    # One bounce stands for any number of them: a panel may ask for more than the file does.
+    threads = available_threads()
+    stage = set_up(scene, needs_of(scene, max_depth=max(1, scene.render.max_depth)), "octree", "midpoint", threads)
+    # Mirrors and glass need no lights, and a scene of them alone has none packed; their colours a face do.
+    stage = replace(stage, world=stage.world._replace(lights=_shining(scene)))
+    # The first call of a kernel loads or compiles it, which the first picture should not wait for.
+    stage.picture(scene.camera, scene.render.model_copy(update={"resolution": (8, 8), "samples": 1}), BOUNDED, threads)
+    touch_viewing(stage)
+    return Exhibit(scene, path, stage, threads)
+
+
+def _shining(scene: Scene) -> NDArray[np.float64]:
+    """The rows of the lights that are not dark, as ``pack`` has them where the scene needs light."""
+    rows = np.array([light.row() for light in scene.lights]).reshape(-1, LIGHT_COLUMNS)
+    return rows[rows[:, 4:].any(axis=1)]
+
+
+def open_file(path: Path) -> Exhibit:
+    """Load a scene file and make it ready. Raises ``ValueError``, which ``SceneError`` is, naming file and fault."""
+    return prepare(load_scene(path), path)
+
+
+def varied(stage: Stage, settings: ViewSettings) -> Stage:
+    """``stage`` without what ``settings`` switch off and with its first directional light turned; no tree is rebuilt.
+
+    Lights that are dark do not count, and without a directional light none is turned.
+    """
+    materials, lights = stage.world.materials.copy(), stage.world.lights.copy()
+    needs, media = stage.needs, stage.world.media
+    if not settings.reflection:
+        materials[:, REFLECTANCE : REFLECTANCE + 3] = 0.0
+        needs = replace(needs, reflection=False)
+    if not settings.refraction:
+        materials[:, TRANSMITTANCE : TRANSMITTANCE + 3] = 0.0
+        needs, media = replace(needs, refraction=False), media[:0]
+    sunny = (lights[:, 0] == DIRECTIONAL).nonzero()[0]
+    if settings.light is not None and len(sunny):
+        lights[sunny[0], 1:4] = -unit(settings.light)
+    return replace(stage, needs=needs, world=stage.world._replace(materials=materials, lights=lights, media=media))
+
+
+def render_settings(scene: Scene, settings: ViewSettings, size: tuple[int, int], samples: int) -> RenderSettings:
+    """The renderer's settings for a picture of ``size`` (w, h). Depth, normal and face need no light and no bounce."""
+    seen_directly = settings.aov in ("depth", "normal", "face")
+    return RenderSettings(
+        resolution=size,
+        samples=samples,
+        max_depth=0 if seen_directly else settings.max_depth,
+        min_weight=scene.render.min_weight,
+        shadows=settings.shadows and not seen_directly,
+    )

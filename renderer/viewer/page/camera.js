@@ -1,0 +1,102 @@
+// One camera for all modes: it looks at a pivot from a distance, by yaw and pitch about the scene's vertical.
+import { add, cross, norm, scale, sub, unit, dot } from "./matrix.js";
+
+// Just short of the pole, where the horizontal would be undefined.
+const STEEPEST = (89.5 * Math.PI) / 180;
+// Of an orthographic scene's stand-in: narrow enough to look nearly parallel.
+const NARROW = (20 * Math.PI) / 180;
+
+// Around a scene that fits, a margin of a twentieth is left.
+const ROOM = 1.05;
+
+export class Camera {
+  // `scene` is what the server says of the scene: its camera and bounds.
+  constructor(scene) {
+    this.scene = scene;
+    this.radius = Math.max(norm(sub(scene.bounds[1], scene.bounds[0])) / 2, 1e-9);
+    this.reset();
+  }
+
+  reset() {
+    const { eye, target, up, fov, height, type } = this.scene.camera;
+    const vertical = unit(up ?? [0, 1, 0]);
+    const aside = Math.abs(vertical[0]) < 0.9 ? [1, 0, 0] : [0, 0, 1];
+    const depth = unit(cross(aside, vertical));
+    this.axes = [cross(vertical, depth), vertical, depth];
+    const offset = sub(eye, target);
+    const back = unit(offset);
+    this.fovy = type === "orthographic" ? NARROW : (fov * Math.PI) / 180;
+    this.distance = type === "orthographic" ? height / 2 / Math.tan(NARROW / 2) : norm(offset);
+    this.yaw = Math.atan2(dot(back, this.axes[0]), dot(back, this.axes[2]));
+    this.pitch = Math.asin(Math.max(-1, Math.min(1, dot(back, vertical))));
+    this.pivot = [...target];
+  }
+
+  // The whole scene in view, seen from the side where the camera is.
+  fit(aspect) {
+    const [lower, upper] = this.scene.bounds;
+    this.pivot = scale(add(lower, upper), 0.5);
+    const [right, up, back] = this.frame();
+    const slope = Math.tan(this.fovy / 2) / ROOM;
+    // Each corner of the bounds lies this far towards the eye, and needs so much more distance to be within the film.
+    const needed = [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => {
+      const at = sub([0, 1, 2].map((k) => ((corner >> k) & 1 ? upper : lower)[k]), this.pivot);
+      return dot(at, back) + Math.max(Math.abs(dot(at, right)) / aspect, Math.abs(dot(at, up))) / slope;
+    });
+    this.distance = Math.max(...needed, 1e-3 * this.radius);
+  }
+
+  // Right, up and back as unit vectors.
+  frame() {
+    const [x, y, z] = this.axes;
+    const [c, s] = [Math.cos(this.yaw), Math.sin(this.yaw)];
+    const right = sub(scale(x, c), scale(z, s));
+    const level = add(scale(x, s), scale(z, c));
+    const back = add(scale(level, Math.cos(this.pitch)), scale(y, Math.sin(this.pitch)));
+    return [right, cross(back, right), back];
+  }
+
+  eye() {
+    return add(this.pivot, scale(this.frame()[2], this.distance));
+  }
+
+  // Camera to world: right, up, back and eye, column by column.
+  matrix() {
+    const [right, up, back] = this.frame();
+    return [...right, 0, ...up, 0, ...back, 0, ...this.eye(), 1];
+  }
+
+  // Swing around the pivot, by radians.
+  orbit(yaw, pitch) {
+    this.yaw += yaw;
+    this.pitch = Math.max(-STEEPEST, Math.min(STEEPEST, this.pitch + pitch));
+  }
+
+  // Look around from where the eye is, by radians.
+  turn(yaw, pitch) {
+    const eye = this.eye();
+    this.orbit(yaw, pitch);
+    this.pivot = sub(eye, scale(this.frame()[2], this.distance));
+  }
+
+  // Move eye and pivot along the film, by shares of the picture's height.
+  pan(x, y) {
+    const [right, up] = this.frame();
+    const height = 2 * this.distance * Math.tan(this.fovy / 2);
+    this.pivot = add(this.pivot, add(scale(right, x * height), scale(up, y * height)));
+  }
+
+  // Change the distance to the pivot by a factor.
+  zoom(factor) {
+    // From grazing the pivot to seeing the scene as a dot.
+    const closest = 1e-3 * this.radius;
+    this.distance = Math.max(closest, Math.min(100 * this.radius, this.distance * factor));
+  }
+
+  // Walk: right, up and forward in scene units.
+  walk(x, y, z) {
+    const [right, , back] = this.frame();
+    const step = add(add(scale(right, x), scale(this.axes[1], y)), scale(back, -z));
+    this.pivot = add(this.pivot, step);
+  }
+}

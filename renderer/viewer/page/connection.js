@@ -1,0 +1,70 @@
+// The WebSocket to the renderer: messages out as JSON, pictures in as binary; it comes back when the server does.
+
+export const PICTURE_RGBA = 1;
+export const PICTURE_JPEG = 2;
+export const FACE_COLORS = 3;
+const HEADER = 32;
+// Seconds between attempts: at once after a hiccup, then slow enough not to be a load.
+const PATIENCE = [0.3, 1, 2, 5];
+
+// A path of the server as a full address, with the token that this page was opened with.
+export function address(path, query = {}) {
+  const url = new URL(path, document.baseURI);
+  const token = new URLSearchParams(location.search).get("token");
+  if (token) url.searchParams.set("token", token);
+  for (const [name, value] of Object.entries(query)) url.searchParams.set(name, value);
+  return url;
+}
+
+export async function fetchFrom(path, query) {
+  const response = await fetch(address(path, query));
+  if (!response.ok) throw new Error(`${path}: ${response.status} ${await response.text()}`);
+  return response;
+}
+
+// A picture or face colours: {kind, seq, step, last, w, h, ms, rate, bytes}; rate in million rays a second.
+export function decode(buffer) {
+  const words = new Uint32Array(buffer, 0, 6);
+  const [ms, rate] = new Float32Array(buffer, 24, 2);
+  const [kind, seq, step, last, w, h] = words;
+  return { kind, seq, step, last: last === 1, w, h, ms, rate, bytes: new Uint8ClampedArray(buffer, HEADER) };
+}
+
+export class Connection {
+  // `received(picture)`, `told(message)` and `changed(open)` are called as things arrive.
+  constructor({ received, told, changed }) {
+    Object.assign(this, { received, told, changed, attempts: 0 });
+    this.open();
+  }
+
+  open() {
+    const url = address("ws");
+    url.protocol = url.protocol.replace("http", "ws");
+    this.socket = new WebSocket(url);
+    this.socket.binaryType = "arraybuffer";
+    this.socket.addEventListener("open", () => {
+      this.attempts = 0;
+      this.changed(true);
+    });
+    this.socket.addEventListener("message", ({ data }) => {
+      if (typeof data === "string") this.told(JSON.parse(data));
+      else this.received(decode(data));
+    });
+    this.socket.addEventListener("close", () => this.closed());
+  }
+
+  closed() {
+    this.changed(false);
+    const wait = PATIENCE[Math.min(this.attempts++, PATIENCE.length - 1)];
+    setTimeout(() => this.open(), wait * 1000);
+  }
+
+  get ready() {
+    return this.socket.readyState === WebSocket.OPEN;
+  }
+
+  // Drops the message where there is no connection: only the newest view matters, and it is sent again on return.
+  send(message) {
+    if (this.ready) this.socket.send(JSON.stringify(message));
+  }
+}

@@ -1,0 +1,68 @@
+// The WebGL layer: the model and lines over it, or lines alone over a traced picture.
+import { clipMatrix, dot, norm, scale, add, sub } from "./matrix.js";
+import { DEPTH, Model } from "./model.js";
+import { Boxes } from "./boxes.js";
+import { Lines } from "./lines.js";
+
+// Beyond it a finer grid is not seen, and fragments cost their time.
+const MAX_PIXEL_RATIO = 2;
+
+// What the veil darkens towards, as sRGB.
+const NIGHT = [0.03, 0.06, 0.13];
+
+const srgb = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * Math.min(x, 1) ** (1 / 2.4) - 0.055);
+
+export class GlLayer {
+  // `lost()` is called when the browser takes the context away. Raises an error where it offers no WebGL2.
+  constructor(canvas, lost) {
+    this.canvas = canvas;
+    // Kept, so that the picture can be saved and read back at any time.
+    this.gl = canvas.getContext("webgl2", { preserveDrawingBuffer: true });
+    if (!this.gl) throw new Error("this browser offers no WebGL2");
+    canvas.addEventListener("webglcontextlost", lost, { once: true });
+    this.model = new Model(this.gl);
+    this.boxes = new Boxes(this.gl);
+    this.lines = new Lines(this.gl);
+  }
+
+  load(mesh, scene) {
+    this.scene = scene;
+    this.model.load(mesh, scene);
+  }
+
+  // `width` and `height` are those of the frame, in CSS pixels.
+  resize(width, height) {
+    const ratio = Math.min(window.devicePixelRatio || 1, MAX_PIXEL_RATIO);
+    const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (this.canvas.width !== w) this.canvas.width = w;
+    if (this.canvas.height !== h) this.canvas.height = h;
+    this.lines.film = [width, height];
+  }
+
+  // Draw for `view`; with the shading DEPTH only lines are seen, and what lies under them darkened by the share `veil`.
+  // `panes` are the boxes' faces, `layers` are {name, set, hidden, fades}.
+  draw(view, { shading, veil, direction, panes, layers }) {
+    const { gl } = this;
+    const seen = layers.filter(({ set }) => set.count);
+    gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
+    const dark = NIGHT.map((c) => c * veil);
+    const sky = this.scene.background.map((c, i) => srgb(c) * (1 - veil) + dark[i]);
+    gl.clearColor(...(shading === DEPTH ? [...dark, veil] : [...sky, 1]));
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LESS);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (shading === DEPTH && !seen.length) return;
+    const clip = clipMatrix(view, this.scene.bounds);
+    this.model.draw(shading, clip, view.m.slice(12, 15), { scene: this.scene, direction, veil: [...dark, veil] });
+    this.boxes.draw(panes, clip);
+    for (const { name, set, hidden, fades } of seen) this.lines.draw(name, set, clip, this.fade(view, fades), hidden);
+  }
+
+  // From where to where lines fade: through the scene, or nowhere near it.
+  fade(view, fades) {
+    const [lower, upper] = this.scene.bounds;
+    const radius = norm(sub(upper, lower)) / 2;
+    const distance = dot(sub(view.m.slice(12, 15), scale(add(lower, upper), 0.5)), view.m.slice(8, 11));
+    return [Math.max(distance - radius, 0.02 * radius), Math.max(distance + radius, radius) * (fades ? 1 : 1e6)];
+  }
+}

@@ -1,0 +1,39 @@
+// Keys on the stage that are commands; those that move the camera are in controls.js.
+
+import { isForStage } from "./controls.js";
+
+const MODES = ["gl", "phong", "brute", "octree"];
+
+export function bindKeys(viewer) {
+  const { stage, panel } = viewer;
+  const { fields } = panel;
+  // As if the user had clicked: fires the form's input event.
+  const click = (field) => field.click();
+  const level = (step) => {
+    if (fields.level.disabled) return;
+    fields.level.valueAsNumber += step;
+    fields.level.dispatchEvent(new Event("input", { bubbles: true }));
+  };
+  const commands = {
+    r: () => viewer.reset(),
+    f: () => viewer.fit(),
+    b: () => click(fields.boxes),
+    l: () => click(fields.walk),
+    ",": () => level(-1),
+    ".": () => level(1),
+    Escape: () => (viewer.rays.close(), viewer.cancel()),
+    Enter: () => {
+      const { left, top, width, height } = document.querySelector("#frame").getBoundingClientRect();
+      viewer.pickAt(left + width / 2, top + height / 2);
+    },
+  };
+  MODES.forEach((mode, i) => (commands[i + 1] = () => viewer.setMode(mode)));
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const own = isForStage(event, stage) || event.key === "Escape";
+    const command = commands[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!own || !command) return;
+    event.preventDefault();
+    command();
+  });
+}

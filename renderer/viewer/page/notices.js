@@ -1,0 +1,24 @@
+// Short messages over the stage, such as what the server says is wrong.
+import { element } from "./card.js";
+
+// Milliseconds: long enough to read two lines.
+const SHOWN = 8000;
+
+export class Notices {
+  constructor(list) {
+    this.list = list;
+  }
+
+  // Show `text`; one with a `name` stays until it is cleared.
+  say(text, name) {
+    if (name && this.list.querySelector(`[data-name="${name}"]`)) return;
+    const notice = element("p", { textContent: text });
+    if (name) notice.dataset.name = name;
+    else setTimeout(() => notice.remove(), SHOWN);
+    this.list.append(notice);
+  }
+
+  clear(name) {
+    this.list.querySelector(`[data-name="${name}"]`)?.remove();
+  }
+}

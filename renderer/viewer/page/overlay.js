@@ -1,0 +1,70 @@
+// What is drawn over the model: the boxes of one level of the octree, and the way of a picked ray.
+import { BoxSet } from "./boxes.js";
+import { fetchFrom } from "./connection.js";
+import { LineSet } from "./lines.js";
+
+// From the root to the leaves: violet over blue and green to yellow (viridis, lightened so that lines read on any
+// background).
+const LEVELS = [[163, 113, 247], [122, 139, 255], [79, 163, 255], [52, 190, 235], [45, 210, 190], [84, 222, 140], [160, 230, 95], [222, 228, 80]];
+const VISITED = [255, 170, 40];
+const LEAF = [255, 92, 40];
+export const KINDS = {
+  camera: [255, 226, 130],
+  reflected: [70, 214, 255],
+  refracted: [236, 110, 255],
+  shadow: [140, 236, 120],
+  blocked: [255, 82, 82],
+};
+
+export const levelColor = (level, levels) => {
+  const at = levels > 1 ? (level / (levels - 1)) * (LEVELS.length - 1) : 0;
+  const [low, share] = [Math.floor(at), at % 1];
+  const next = LEVELS[Math.min(low + 1, LEVELS.length - 1)];
+  return LEVELS[low].map((c, i) => Math.round(c + share * (next[i] - c)));
+};
+
+export const NO_BOXES = { edges: new LineSet(1), panes: new BoxSet(0), count: 0 };
+
+// The boxes of a level: {edges, panes, count}.
+export async function fetchBoxes(level) {
+  const buffer = await (await fetchFrom("octree", { level })).arrayBuffer();
+  const [count, levels] = new Uint32Array(buffer, 0, 2);
+  const corners = new Float32Array(buffer, 8, 6 * count);
+  const edges = new LineSet(Math.max(12 * count, 1));
+  const panes = new BoxSet(count);
+  // Many boxes are drawn finer and fainter, or they would cover the model.
+  const crowd = Math.min(Math.max((Math.log10(Math.max(count, 1)) - 1.2) / 2.6, 0), 1);
+  const between = (few, many) => few + (many - few) * crowd;
+  const color = levelColor(level, levels);
+  for (let i = 0; i < count; i++) {
+    const [lower, upper] = [corners.subarray(6 * i, 6 * i + 3), corners.subarray(6 * i + 3, 6 * i + 6)];
+    edges.addBox(lower, upper, [...color, between(255, 70)], between(2.2, 0.9));
+    panes.add(lower, upper, [...color, between(64, 40)]);
+  }
+  return { edges, panes, count };
+}
+
+export const segmentColor = ({ kind, hit }) => KINDS[kind === "shadow" && hit ? "blocked" : kind];
+
+// The rays of a picked pixel and the point that each of them met.
+export function pathLines(pick) {
+  const set = new LineSet();
+  for (const segment of pick.path) {
+    const shadow = segment.kind === "shadow";
+    const color = [...segmentColor(segment), shadow ? 215 : 255];
+    set.add(segment.start, segment.end, color, shadow ? 2 : 3, shadow && segment.hit ? 9 : 0);
+    if (segment.hit) set.add(segment.end, segment.end, color, shadow ? 6 : 9);
+  }
+  return set;
+}
+
+// The nodes that a picked ray opened: the deeper the stronger, leaves in another colour.
+export function visitedLines(pick) {
+  const set = new LineSet();
+  const deepest = Math.max(...pick.nodes.map((node) => node.level), 1);
+  for (const { level, lower, upper, leaf } of pick.nodes) {
+    const alpha = leaf ? 255 : 90 + Math.round((120 * level) / deepest);
+    set.addBox(lower, upper, [...(leaf ? LEAF : VISITED), alpha], leaf ? 2.2 : 1.4);
+  }
+  return set;
+}

@@ -1,0 +1,128 @@
+// The panel: its form holds the settings, the rest shows what the scene is and how fast its pictures come.
+import { element } from "./card.js";
+import { levelColor } from "./overlay.js";
+
+// A pixel; the server allows no more.
+const MAX_SAMPLES = 64;
+const DEGREE = Math.PI / 180;
+const count = (n) => n.toLocaleString("en");
+
+export class Panel {
+  // `changed(name)` is called with the name of the field that the user moved.
+  constructor(changed) {
+    this.form = document.querySelector("#settings");
+    this.fields = this.form.elements;
+    this.lightMoved = false;
+    this.form.addEventListener("submit", (event) => event.preventDefault());
+    this.form.addEventListener("input", ({ target }) => {
+      if (target.name === "azimuth" || target.name === "elevation") this.lightMoved = true;
+      this.showValues();
+      changed(target.name);
+    });
+  }
+
+  // Fill everything in from the server's /scene.
+  load(scene) {
+    this.scene = scene;
+    const { fields } = this;
+    fields.file.replaceChildren(...scene.files.map((f) => element("option", { value: f, textContent: f })));
+    fields.file.value = scene.name;
+    fields.max_depth.value = Math.min(scene.render.max_depth, fields.max_depth.max);
+    this.offerSamples(scene.render.samples);
+    fields.shadows.checked = scene.render.shadows;
+    fields.reflection.checked = fields.refraction.checked = true;
+    fields.level.max = Math.max(scene.octree.levels - 1, 0);
+    // Some hundred boxes at most: enough to see, few enough to see through.
+    fields.level.value = Math.min(3, fields.level.max);
+    this.offerBoxes(scene.octree.nodes > 0);
+    this.resetLight();
+    this.showLevels(Math.max(scene.octree.levels, 1));
+    this.showNeeds(scene.needs);
+  }
+
+  // Boxes need nodes, and WebGL.
+  offerBoxes(offered) {
+    const { boxes, level } = this.fields;
+    boxes.disabled = level.disabled = !offered || document.body.dataset.gl === "none";
+    if (boxes.disabled) boxes.checked = false;
+  }
+
+  offerSamples(own) {
+    const options = [...new Set([1, 4, 9, 16, Math.min(own, MAX_SAMPLES)])].sort((a, b) => a - b);
+    this.fields.samples.replaceChildren(...options.map((n) => element("option", { textContent: n })));
+    this.fields.samples.value = Math.min(own, MAX_SAMPLES);
+  }
+
+  // The sliders of the light back to where the scene's first directional light is.
+  resetLight() {
+    const light = this.scene.lights.find((l) => l.type === "directional");
+    const fieldset = document.querySelector("#light");
+    fieldset.disabled = !light;
+    this.lightMoved = false;
+    if (light) {
+      const [x, y, z] = light.direction.map((v) => -v);
+      this.fields.azimuth.value = Math.atan2(x, z) / DEGREE;
+      this.fields.elevation.value = Math.atan2(y, Math.hypot(x, z)) / DEGREE;
+    }
+    this.showValues();
+  }
+
+  // The direction in which the light travels, or null for the scene's own.
+  get light() {
+    if (!this.lightMoved) return null;
+    const [a, e] = [this.fields.azimuth.value * DEGREE, this.fields.elevation.value * DEGREE];
+    return [-Math.cos(e) * Math.sin(a), -Math.sin(e), -Math.cos(e) * Math.cos(a)];
+  }
+
+  // The settings of a view as the server reads them.
+  get settings() {
+    const { max_depth, samples, shadows, reflection, refraction, aov } = this.fields;
+    // Raw pixels cost nothing on this machine; through a network a tenth of them is worth the loss.
+    const local = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
+    return { max_depth: Number(max_depth.value), samples: Number(samples.value), shadows: shadows.checked,
+      reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, light: this.light,
+      pixels: local ? "rgba" : "jpeg" };
+  }
+
+  showValues() {
+    const { fields } = this;
+    fields.max_depth_shown.value = fields.max_depth.value;
+    fields.level_shown.value = fields.level.value;
+    document.querySelectorAll("#levels i").forEach((bar, i) => bar.classList.toggle("chosen", i === Number(fields.level.value)));
+    fields.azimuth_shown.value = `${Math.round(fields.azimuth.value)}°`;
+    fields.elevation_shown.value = `${Math.round(fields.elevation.value)}°`;
+    const directional = !document.querySelector("#light").disabled;
+    const note = this.lightMoved ? "Moved; Reset brings the scene's own back" : "As the scene has it";
+    document.querySelector("#light-note").textContent = directional ? note : "This scene has no directional light";
+  }
+
+  showLevels(levels) {
+    const bars = Array.from({ length: levels }, (_, level) => {
+      const bar = element("i");
+      bar.style.background = `rgb(${levelColor(level, levels).join(" ")})`;
+      return bar;
+    });
+    document.querySelector("#levels").replaceChildren(...bars);
+    this.showValues();
+  }
+
+  // How many boxes the chosen level has.
+  showBoxes(boxes) {
+    this.fields.level_shown.value = `${this.fields.level.value} · ${count(boxes)} ${boxes === 1 ? "node" : "nodes"}`;
+  }
+
+  showNeeds(needs) {
+    const left = Object.entries(needs).filter(([, [value]]) => !value);
+    const items = left.map(([name, [, reason]]) =>
+      element("li", {}, element("b", { textContent: name.replaceAll("_", " ") }), ` ${reason}`));
+    const all = element("li", { textContent: "Nothing: it needs everything that the renderer has." });
+    document.querySelector("#needs ul").replaceChildren(...(items.length ? items : [all]));
+  }
+
+  // What does not apply to the mode is disabled, and says so.
+  setMode(mode) {
+    const traced = mode === "octree" || mode === "brute";
+    document.querySelector("#traced").disabled = !traced;
+    document.querySelector("#traced-note").hidden = traced;
+  }
+}

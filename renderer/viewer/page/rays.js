@@ -1,0 +1,48 @@
+// The picked pixel: asks the renderer for its ray, and keeps its lines and its card.
+import { showCard } from "./card.js";
+import { LineSet } from "./lines.js";
+import { pathLines, visitedLines } from "./overlay.js";
+
+const NONE = new LineSet(1);
+
+export class Rays {
+  // `changed()` is called when other lines are to be drawn.
+  constructor(card, frame, changed) {
+    Object.assign(this, { card, frame, changed, seq: 0, path: NONE, nodes: NONE, showNodes: true });
+  }
+
+  get visited() {
+    return this.showNodes ? this.nodes : NONE;
+  }
+
+  // The question for the pixel of `view` under a point of the window, or null beside the picture.
+  question(view, settings, clientX, clientY) {
+    const { left, top, width, height } = this.frame.getBoundingClientRect();
+    const x = Math.floor(((clientX - left) / width) * view.w);
+    const y = Math.floor(((clientY - top) / height) * view.h);
+    if (x < 0 || y < 0 || x >= view.w || y >= view.h) return null;
+    return { type: "pick", seq: ++this.seq, x, y, ...view, settings };
+  }
+
+  // Show the renderer's answer, unless another pixel was picked since.
+  show(pick, scene) {
+    if (pick.seq !== this.seq) return;
+    this.path = pathLines(pick);
+    this.nodes = visitedLines(pick);
+    const toggle = (shown) => {
+      this.showNodes = shown;
+      this.changed();
+    };
+    showCard(this.card, pick, { scene, close: () => this.close(), toggle, shown: this.showNodes });
+    this.changed();
+  }
+
+  close() {
+    // What is still on its way is no longer asked for.
+    this.seq++;
+    if (this.card.contains(document.activeElement)) this.frame.parentElement.focus();
+    this.card.hidden = true;
+    this.path = this.nodes = NONE;
+    this.changed();
+  }
+}

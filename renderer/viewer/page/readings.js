@@ -1,0 +1,53 @@
+// The list of numbers in the panel, and the short line over the picture.
+import { element } from "./card.js";
+import { FACE_COLORS } from "./connection.js";
+
+const count = (n) => n.toLocaleString("en");
+const bytes = (n) => (n < 1e6 ? `${(n / 1e3).toFixed(0)} kB` : `${(n / 1e6).toFixed(1)} MB`);
+const seconds = (s) => (s < 1 ? `${(1e3 * s).toFixed(0)} ms` : `${s.toFixed(2)} s`);
+const milliseconds = (ms) => (ms < 10 ? `${ms.toFixed(1)} ms` : seconds(ms / 1e3));
+const scale = ({ aov, low, high }) =>
+  aov === "cost" ? `${count(low)} to ${count(high)} rays` : `${low.toPrecision(4)} to ${high.toPrecision(4)}`;
+
+export class Readings {
+  constructor(list, line) {
+    Object.assign(this, { list, line, values: {} });
+  }
+
+  // Update some of the readings by name.
+  read(values) {
+    for (const [name, value] of Object.entries(values)) {
+      if (!this.values[name]) {
+        this.values[name] = element("dd");
+        this.list.append(element("dt", { textContent: name }), this.values[name]);
+      }
+      this.values[name].textContent = value;
+    }
+  }
+
+  // What the server's /scene says of the scene and its octree.
+  ofScene({ faces, vertices, octree, threads }) {
+    this.read({ faces: count(faces), vertices: count(vertices), nodes: count(octree.nodes), leaves: count(octree.leaves),
+      levels: octree.levels, memory: bytes(octree.bytes), built: seconds(octree.build_seconds), threads });
+  }
+
+  // A picture that the page draws by itself, of {w, h}.
+  ofGl({ w, h }) {
+    this.line.textContent = `WebGL · ${w} × ${h}`;
+    this.read({ picture: `${w} × ${h}`, pass: "–", time: "–", shown: "–", speed: "–", scale: "–" });
+  }
+
+  // A picture or colours that arrived: {kind, step, last, w, h, ms, rate}, `late` milliseconds after they were asked for;
+  // `legend` has the values at the ends of a scale of colours, where the picture has one.
+  ofPicture({ kind, step, last, w, h, ms, rate }, late, faces, legend) {
+    const [time, shown] = [milliseconds(ms), `after ${milliseconds(late)}`];
+    const ends = legend ? scale(legend) : "–";
+    if (kind === FACE_COLORS) {
+      this.line.textContent = `own Phong · ${count(faces)} colours in ${time}`;
+      return this.read({ picture: `${count(faces)} colours`, pass: "–", time, shown, speed: "–", scale: ends });
+    }
+    const speed = `${rate.toFixed(rate < 10 ? 2 : 1)} M rays/s`;
+    this.line.textContent = `${w} × ${h} · ${time} · ${speed}`;
+    this.read({ picture: `${w} × ${h}`, pass: last ? "final" : `${step + 1}`, time, shown, speed, scale: ends });
+  }
+}

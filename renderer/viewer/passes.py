@@ -1,0 +1,107 @@
+"""The pictures that answer one view: small ones at once, the full one when it is done."""
+
+import io
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.face_phong import face_colors
+from renderer.false_color import Limits, false_color, limits_of
+from renderer.image import Image
+from renderer.shading import BOUNDED
+from renderer.stage import TILE
+from renderer.viewer.exhibit import Exhibit, render_settings, varied
+from renderer.viewer.protocol import FACE_COLORS, JPEG, RGBA, View, packed
+from renderer.viewer.viewpoint import camera_of
+
+# Longest sides of the first passes: a sixteenth and a quarter of the pixels of a picture of 512 x 512.
+COARSE = (128, 256)
+# Pillow's scale; above it files grow faster than what can be seen of it.
+_JPEG_QUALITY = 90
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One answer to a view: its number from 0, whether it is the last, size (w, h), samples a pixel and tiles."""
+
+    step: int
+    last: bool
+    size: tuple[int, int]
+    samples: int
+
+    @property
+    def tiles(self) -> int:
+        """How many tiles the picture has."""
+        w, h = self.size
+        return -(-w // TILE) * -(-h // TILE)
+
+
+def passes_of(view: View) -> list[Pass]:
+    """What is sent for ``view``: nothing for "gl", face colours for "phong", one picture or growing ones."""
+    if view.mode == "gl":
+        return []
+    longest = max(view.w, view.h)
+    coarse = [side for side in COARSE if side < longest] if view.mode == "octree" else []
+    # The first pass is shown whatever comes meanwhile, so it must not be one of many samples.
+    if view.mode == "octree" and view.settings.samples > 1 and not coarse:
+        coarse = [longest]
+    sizes = [(_scaled(view.w, side, longest), _scaled(view.h, side, longest)) for side in coarse]
+    first = [Pass(step, False, size, 1) for step, size in enumerate(sizes)]
+    return [*first, Pass(len(sizes), True, (view.w, view.h), view.settings.samples)]
+
+
+class Answer(NamedTuple):
+    """A message for the page, and the values at the ends of its scale of colours if it has one."""
+
+    message: bytes
+    limits: Limits | None
+
+
+def answer(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], None]) -> Answer:
+    """What answers one pass. ``finished(tiles)`` is called after each tile; what it raises ends the pass.
+
+    The milliseconds told are from the pass's begin to its payload, the rays a second those of tracing alone.
+    """
+    began, limits = time.perf_counter(), None
+    if view.mode == "phong":
+        stage = varied(shown.stage, view.settings)
+        payload = face_colors(stage.world, camera_of(view.m, view.fovy).eye, shown.threads).tobytes()
+        kind, pace = FACE_COLORS, 0.0
+    else:
+        image = picture(shown, view, wanted, finished)
+        aov = view.settings.aov
+        limits = limits_of(image, aov) if aov in ("depth", "cost") else None
+        rgb = false_color(image, aov, limits)
+        kind, payload = (JPEG, _jpeg(rgb)) if view.settings.pixels == "jpeg" else (RGBA, _rgba(rgb))
+        pace = float(image.rays.sum()) / image.render_seconds / 1e6
+    ms = (time.perf_counter() - began) * 1e3
+    return Answer(packed(kind, view, wanted.step, wanted.last, wanted.size, (ms, pace)) + payload, limits)
+
+
+def picture(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], None] | None = None) -> Image:
+    """What ``render`` gives for the view's camera and settings."""
+    stage = varied(shown.brute if view.mode == "brute" else shown.stage, view.settings)
+    settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples)
+    return stage.picture(camera_of(view.m, view.fovy), settings, BOUNDED, shown.threads, finished)
+
+
+def _scaled(side: int, longest: int, of: int) -> int:
+    return max(1, round(side * longest / of))
+
+
+def _rgba(rgb: NDArray[np.uint8]) -> bytes:
+    opaque = np.full((*rgb.shape[:2], 4), 255, np.uint8)
+    opaque[..., :3] = rgb
+    return opaque.tobytes()
+
+
+def _jpeg(rgb: NDArray[np.uint8]) -> bytes:
+    from PIL import Image as Pillow  # loopback sends no JPEG
+
+    buffer = io.BytesIO()
+    Pillow.fromarray(rgb).save(buffer, "jpeg", quality=_JPEG_QUALITY)
+    return buffer.getvalue()

@@ -1,0 +1,109 @@
+"""What the page fetches of a scene: its description as JSON, its triangles and its octree's boxes as plain arrays."""
+
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import expect
+from renderer.light import DirectionalLight, Light
+from renderer.material import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE, Material
+from renderer.needs import examine
+from renderer.stage import Stage
+from renderer.tree_boxes import boxes_at, levels
+from renderer.viewer.exhibit import Exhibit
+from renderer.viewer.protocol import MODES
+
+MAGIC = 0x4853454D
+# Materials are told apart by a uint16.
+_MAX_MATERIALS = 65536
+
+
+def description(shown: Exhibit) -> dict[str, Any]:
+    """The answer to GET /scene: numbers, strings, lists and tables that JSON has."""
+    scene, mesh = shown.scene, shown.stage.mesh
+    settings, stats = scene.render, shown.stage.octree.stats
+    return {
+        "name": shown.name,
+        "files": shown.files,
+        "camera": scene.camera.model_dump(),
+        "bounds": [corner.tolist() for corner in mesh.bounds],
+        "faces": len(mesh.faces),
+        "vertices": len(mesh.vertices),
+        "render": settings.model_dump(include={"resolution", "samples", "max_depth", "shadows"}),
+        "materials": [_material(name, material) for name, material in scene.materials.items()],
+        "lights": [_light(light) for light in scene.lights],
+        "ambient": scene.ambient,
+        "background": scene.background,
+        "needs": {feature: [value, reason] for feature, value, reason in examine(scene)},
+        "octree": {
+            "levels": levels(shown.stage.octree.target.tree),
+            "nodes": stats.nodes,
+            "leaves": stats.leaves,
+            "bytes": stats.bytes,
+            "build_seconds": shown.stage.build_seconds,
+        },
+        "threads": shown.threads,
+        "modes": MODES,
+    }
+
+
+def mesh_bytes(stage: Stage) -> bytes:
+    """The answer to GET /mesh, little-endian: uint32 MAGIC and F, then for each of F faces the corners as 9 float32 and
+    their shading normals as 9 float32, then the materials as F uint16, filled up to four bytes.
+
+    Raises ``ValueError`` where there are more materials than a uint16 counts.
+    """
+    world = stage.world
+    expect(len(world.materials) <= _MAX_MATERIALS, "materials", f"at most {_MAX_MATERIALS}", len(world.materials))
+    corners = world.vertices[world.faces]
+    normals = _normals(stage, corners)
+    material = (world.material // MATERIAL_COLUMNS).astype("<u2")
+    head = struct.pack("<2I", MAGIC, len(world.faces))
+    return b"".join(
+        (
+            head,
+            corners.astype("<f4").tobytes(),
+            normals.astype("<f4").tobytes(),
+            material.tobytes(),
+            bytes(len(material) % 2 * 2),
+        )
+    )
+
+
+def boxes_bytes(stage: Stage, level: int) -> bytes:
+    """The answer to GET /octree, little-endian: uint32 n and the number of levels, then n boxes of 6 float32: the lower
+    and the upper corner of each node of ``level``, the root's being 0.
+    """
+    boxes = np.asarray(boxes_at(stage.octree, level)).astype("<f4")
+    return struct.pack("<2I", len(boxes), levels(stage.octree.target.tree)) + boxes.tobytes()
+
+
+def _normals(stage: Stage, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The normal at each corner, (F, 3, 3): the vertex's where a face is smooth, else the face's; 0 without area."""
+    world = stage.world
+    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(crossed, axis=1, keepdims=True)
+    flat = np.divide(crossed, lengths, out=np.zeros_like(crossed), where=lengths > 0.0)
+    normals = np.repeat(flat[:, None], 3, axis=1)
+    if len(world.smooth):
+        normals[world.smooth] = world.normals[world.faces[world.smooth]]
+    return normals
+
+
+def _material(name: str, material: Material) -> dict[str, Any]:
+    row = material.row().tolist()
+    colors = {"diffuse": DIFFUSE, "specular": SPECULAR, "reflectance": REFLECTANCE, "transmittance": TRANSMITTANCE}
+    return {
+        "name": name,
+        "type": material.type,
+        **{color: row[column : column + 3] for color, column in colors.items()},
+        "shininess": row[SHININESS],
+    }
+
+
+def _light(light: Light) -> dict[str, Any]:
+    if isinstance(light, DirectionalLight):
+        return {"type": light.type, "direction": light.direction, "color": light.irradiance}
+    return {"type": light.type, "position": light.position, "color": light.intensity}

@@ -1,0 +1,78 @@
+"""The answer to a click: what the ray through a pixel meets, the rays it becomes, and the octree's nodes it opens."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.material import MATERIAL_COLUMNS
+from renderer.query import Hits
+from renderer.ray_path import Segment, ray_path
+from renderer.sight import World
+from renderer.stage import Stage
+from renderer.tree_boxes import visited
+from renderer.viewer.exhibit import Exhibit, varied
+from renderer.viewer.protocol import Pick
+from renderer.viewer.viewpoint import camera_of
+
+# Boxes told of one ray, the first that it opens: more cover each other on the screen. ``visited`` counts all.
+_MAX_BOXES = 512
+
+
+def picked(shown: Exhibit, pick: Pick) -> dict[str, Any]:
+    """The message for ``pick``: the ray through the pixel's centre; null in place of what a miss does not have."""
+    stage = varied(shown.stage, pick.settings)
+    rows = camera_of(pick.m, pick.fovy).rows(pick.w, pick.h)
+    origin, direction = rows[0], rows[3] + (pick.x + 0.5) * rows[4] + (pick.y + 0.5) * rows[5]
+    direction = direction / np.linalg.norm(direction)
+    hits = stage.octree.closest_hit(origin[None], direction[None])
+    path = ray_path(
+        stage,
+        origin,
+        direction,
+        pick.settings.max_depth,
+        min_weight=shown.scene.render.min_weight,
+        shadows=pick.settings.shadows,
+    )
+    nodes = visited(stage.octree, origin, direction, np.inf)
+    boxes = [
+        {"level": int(level), "lower": _listed(lower), "upper": _listed(upper), "leaf": bool(leaf)}
+        for level, lower, upper, leaf in nodes[:_MAX_BOXES]
+    ]
+    met = _met(shown, stage, hits)
+    return {"type": "pick", "seq": pick.seq, **met, "path": _told(path), "nodes": boxes, "visited": len(nodes)}
+
+
+def _met(shown: Exhibit, stage: Stage, hits: Hits) -> dict[str, Any]:
+    if not hits.hit[0]:
+        return {"hit": False, "t": None, "face": None, "material": None, "point": None, "normal": None}
+    face = int(hits.face[0])
+    material = list(shown.scene.materials)[int(stage.world.material[face]) // MATERIAL_COLUMNS]
+    normal = _shading_normal(stage.world, face, float(hits.u[0]), float(hits.v[0]), hits.normals[0])
+    return {
+        "hit": True,
+        "t": float(hits.t[0]),
+        "face": face,
+        "material": material,
+        "point": _listed(hits.points[0]),
+        "normal": _listed(normal),
+    }
+
+
+def _shading_normal(world: World, face: int, u: float, v: float, geometric: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not (len(world.smooth) and world.smooth[face]):
+        return geometric
+    n = np.array([1.0 - u - v, u, v]) @ world.normals[world.faces[face]]
+    return n / np.linalg.norm(n)
+
+
+def _told(path: Sequence[Segment]) -> list[dict[str, Any]]:
+    return [
+        {"kind": s.kind, "depth": s.depth, "start": _listed(s.start), "end": _listed(s.end), "hit": bool(s.hit)}
+        for s in path
+    ]
+
+
+def _listed(vector: Any) -> list[float]:
+    return [float(x) for x in vector]

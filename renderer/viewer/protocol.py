@@ -1,0 +1,149 @@
+"""What page and server say to each other on the WebSocket: the page's messages checked, the server's packed."""
+
+import struct
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator, model_validator
+
+from renderer.camera import FiniteVector, sample_offsets
+
+# Of a picture's sides: four megabytes a picture, as much as a browser draws without a hitch.
+MAX_SIDE = 1024
+# A page's largest message is a pick of under 1 kB; this leaves room for numbers of any length.
+MAX_MESSAGE_BYTES = 16384
+# An 8 x 8 grid: with 1024 x 1024 pixels as many camera rays as a person may want to wait for.
+MAX_SAMPLES = 64
+# Below a thousandth of a radian neighbouring rays differ by less than a page's float32 matrices resolve; above 3.1
+# almost all of the picture is its rim.
+MIN_FOVY, MAX_FOVY = 0.001, 3.1
+
+RGBA, JPEG, FACE_COLORS = 1, 2, 3
+# kind, seq, step, last, w, h as uint32, then milliseconds and million rays a second as float32, little-endian.
+_HEADER = struct.Struct("<6I2f")
+
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+_Sequence = Annotated[int, Field(ge=0, lt=2**32)]
+_Side = Annotated[int, Field(ge=1, le=MAX_SIDE)]
+_Matrix = Annotated[list[_Number], Field(min_length=16, max_length=16)]
+_Fovy = Annotated[float, Field(ge=MIN_FOVY, le=MAX_FOVY)]
+
+Mode = Literal["gl", "phong", "brute", "octree"]
+MODES: tuple[Mode, ...] = ("gl", "phong", "brute", "octree")
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class ViewSettings(_Message):
+    """What the panel chooses. ``light`` is the direction in which the first directional light travels, null for the
+    scene's own; ``aov`` what a pixel shows; ``pixels`` how pictures travel.
+    """
+
+    max_depth: Annotated[int, Field(ge=0, le=64)] = 6
+    samples: Annotated[int, Field(ge=1, le=MAX_SAMPLES)] = 1
+    shadows: bool = True
+    reflection: bool = True
+    refraction: bool = True
+    aov: Literal["color", "depth", "normal", "face", "cost"] = "color"
+    light: FiniteVector | None = None
+    pixels: Literal["rgba", "jpeg"] = "rgba"
+
+    @field_validator("samples")
+    @classmethod
+    def _square(cls, value: int) -> int:
+        sample_offsets(value)
+        return value
+
+    @field_validator("light")
+    @classmethod
+    def _not_zero(cls, value: FiniteVector | None) -> FiniteVector | None:
+        if value is not None and not any(value):
+            raise ValueError("expected a direction of non-zero length")
+        return value
+
+
+class View(_Message):
+    """Show this: ``m`` camera to world as in ``viewpoint``, ``fovy`` in radians, a picture of ``w`` x ``h`` pixels."""
+
+    type: Literal["view"]
+    seq: _Sequence
+    mode: Mode
+    m: _Matrix
+    fovy: _Fovy
+    w: _Side
+    h: _Side
+    settings: ViewSettings = ViewSettings()
+
+
+class Ack(_Message):
+    """The picture ``step`` of view ``seq`` is drawn: the next may come."""
+
+    type: Literal["ack"]
+    seq: _Sequence
+    step: _Sequence
+
+
+class Cancel(_Message):
+    """Stop the picture under way."""
+
+    type: Literal["cancel"]
+
+
+class Pick(_Message):
+    """Which ray goes through pixel (``x``, ``y``), counted from the top left, and what comes of it?"""
+
+    type: Literal["pick"]
+    seq: _Sequence
+    x: Annotated[int, Field(ge=0, lt=MAX_SIDE)]
+    y: Annotated[int, Field(ge=0, lt=MAX_SIDE)]
+    m: _Matrix
+    fovy: _Fovy
+    w: _Side
+    h: _Side
+    settings: ViewSettings = ViewSettings()
+
+    @model_validator(mode="after")
+    def _inside(self) -> Self:
+        if not (self.x < self.w and self.y < self.h):
+            raise ValueError(f"expected a pixel of a picture of {self.w} x {self.h}, got ({self.x}, {self.y})")
+        return self
+
+
+class OpenScene(_Message):
+    """Load another of the scene files offered."""
+
+    type: Literal["scene"]
+    file: Annotated[str, Field(max_length=255)]  # the longest file name
+
+
+class SaveCamera(_Message):
+    """Write this camera as a scene file's table. While walking there is nothing that it turns about."""
+
+    type: Literal["camera"]
+    m: _Matrix
+    fovy: _Fovy
+    walk: bool = False
+
+
+Message = View | Ack | Cancel | Pick | OpenScene | SaveCamera
+_MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
+
+
+def parse(text: str) -> Message:
+    """The message that ``text`` is. Raises ``ValueError`` with one line: where, what was expected, what came."""
+    try:
+        return _MESSAGE.validate_json(text)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        where = ".".join(str(key) for key in fault["loc"]) or "message"
+        # What came may be long and is the sender's own; forty characters tell which value it was.
+        raise ValueError(f"{where}: {fault['msg']}, got {repr(fault['input'])[:40]}") from None
+
+
+def packed(kind: int, view: View, step: int, last: bool, size: tuple[int, int], pace: tuple[float, float]) -> bytes:
+    """The header of a picture or of face colours; ``size`` is (w, h), ``pace`` milliseconds and million rays a second.
+
+    32 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 a face.
+    """
+    return _HEADER.pack(kind, view.seq, step, last, *size, *pace)

@@ -1,0 +1,116 @@
+"""The server in a thread of its own: where it listens, and how it ends."""
+
+import logging
+import os
+import socket
+import threading
+import webbrowser
+from types import TracebackType
+
+import uvicorn
+
+from renderer.errors import expect
+from renderer.viewer.app import make_app
+from renderer.viewer.exhibit import Exhibit
+from renderer.viewer.protocol import MAX_MESSAGE_BYTES
+from renderer.viewer.security import is_loopback, new_token
+
+# Seconds for connections to end; what they compute stops between tiles.
+_LAST_WORDS = 1
+# Seconds after which waiting looks up: on Windows Ctrl-C would not be heard before.
+_PATIENCE = 0.5
+
+
+class Viewing:
+    """A scene on show at ``url`` until ``close``. Notebooks show the page itself, by way of a frame.
+
+    Use as a context manager, or call ``wait`` to stay until Ctrl-C.
+    """
+
+    def __init__(self, shown: Exhibit, host: str, port: int, framed: bool) -> None:
+        """Listen on ``host`` and ``port``, 0 for a free one; ``framed`` lets pages of this machine frame this one.
+
+        On a ``host`` that other machines reach, only who knows the address as printed, with its token, is served.
+        Raises ``ValueError`` where the host is none of this machine's or the port is taken.
+        """
+        listening = _listen(host, port)
+        address, port = listening.getsockname()[:2]
+        token = None if is_loopback(address) else new_token()
+        self.url = _address(host, port, token)
+        # The notebook's server is another origin, on a port that nobody can know here.
+        ancestors = "frame-ancestors 'self'" + (" http://127.0.0.1:* http://localhost:*" if framed else "")
+        config = uvicorn.Config(
+            make_app(shown, host, port, token, ancestors),
+            log_config=None,  # the caller's logging is its own
+            log_level="error",  # so that a bad client fills nobody's screen
+            access_log=False,
+            server_header=False,
+            ws_max_size=MAX_MESSAGE_BYTES,
+            ws_per_message_deflate=False,  # pictures on loopback travel faster than they compress
+            timeout_graceful_shutdown=_LAST_WORDS,
+        )
+        logging.getLogger("uvicorn.error").addFilter(_no_mere_refusal)
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(target=self._server.run, args=([listening],), name="viewer", daemon=True)
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Return once the server has ended, as it does after ``close`` on another thread."""
+        while self._thread.is_alive():
+            self._thread.join(_PATIENCE)
+
+    def close(self) -> None:
+        """End the server; pages say that the connection is lost."""
+        self._server.should_exit = True
+        self.wait()
+
+    def open_browser(self) -> bool:
+        """Show the page in the usual browser; False where there is none."""
+        return webbrowser.open(self.url)
+
+    def __enter__(self) -> "Viewing":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<viewer at {self.url}>"
+
+    def _repr_html_(self) -> str:
+        """The page in a frame; and a link, for notebooks that show no frames of this machine's servers."""
+        frame = f'<iframe src="{self.url}" width="100%" height="640" style="border:0" allowfullscreen></iframe>'
+        return f'{frame}<p><a href="{self.url}" target="_blank" rel="noopener">{self.url}</a></p>'
+
+
+def _no_mere_refusal(record: logging.LogRecord) -> bool:
+    """Leaves out what uvicorn says of each WebSocket that is refused by an HTTP answer: 0.54 takes it for our fault."""
+    return record.getMessage() != "ASGI callable returned without completing handshake."
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """A listening socket. A busy port is an error: another one would not be where the user looks for it."""
+    expect(isinstance(host, str), "host", "a string", type(host).__name__)
+    expect(isinstance(port, int) and 0 <= port <= 65535, "port", "an integer from 0 to 65535", repr(port))
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except (OSError, UnicodeError) as error:
+        raise ValueError(f"host: expected a name or address of this machine, got {host!r} ({error})") from None
+    listening = socket.socket(family, kind, protocol)
+    try:
+        if os.name == "posix":  # where it means: even if a connection of an ended server still lingers
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen()
+    except OSError as error:
+        listening.close()
+        raise ValueError(f"host and port: expected a free port, got {host}:{port} ({error.strerror})") from None
+    return listening
+
+
+def _address(host: str, port: int, token: str | None) -> str:
+    """What to enter in a browser on this machine."""
+    name = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
+    return f"http://{name}:{port}/" + (f"?token={token}" if token else "")

@@ -1,0 +1,232 @@
+"""One page's connection: its newest view is shown pass by pass, its clicks answered, its scene changed.
+
+Messages arrive on the event loop and only leave word there; what computes runs on threads, so that nothing waits for
+it. Of what arrives faster than it can be answered only the newest counts.
+"""
+
+import asyncio
+import json
+import threading
+from collections.abc import Awaitable, Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from renderer.viewer.exhibit import Exhibit
+from renderer.viewer.passes import Answer, Pass, answer, passes_of
+from renderer.viewer.pick import picked
+from renderer.viewer.protocol import Ack, Cancel, OpenScene, Pick, SaveCamera, View, parse
+from renderer.viewer.viewpoint import camera_of, camera_toml
+
+# Seconds between words of progress: ten a second look smooth and cost nothing.
+_PROGRESS = 0.1
+
+T = TypeVar("T")
+
+
+class SupersededError(Exception):
+    """Raised between the tiles of a picture that nobody waits for any more."""
+
+
+class Newest(Generic[T]):
+    """A place for one item, where a newer one takes the place of one not yet taken."""
+
+    def __init__(self) -> None:
+        self._item: T | None = None
+        self._came = asyncio.Event()
+
+    def put(self, item: T | None) -> None:
+        """Leave ``item``; None leaves nothing, and makes what was taken before outdated all the same."""
+        self._item = item
+        self._came.set()
+
+    async def take(self) -> T:
+        """The newest item, once there is one."""
+        while self._item is None:
+            self._came.clear()
+            await self._came.wait()
+        item, self._item = self._item, None
+        self._came.clear()
+        return item
+
+    async def changed(self) -> None:
+        """Return at the next ``put``, or now if one came since the last ``take``."""
+        await self._came.wait()
+
+
+class Hall(Protocol):
+    """Where the scene is shown to all connections."""
+
+    shown: Exhibit
+
+    async def open(self, file: str) -> None:
+        """Show another scene file to all. Raises ``ValueError`` and changes nothing where that fails."""
+
+
+@dataclass
+class Wire:
+    """How messages leave."""
+
+    text: Callable[[str], Awaitable[None]]
+    binary: Callable[[bytes], Awaitable[None]]
+
+
+@dataclass(eq=False)
+class Session:
+    """One connection. ``threads`` runs what computes: a picture, one more whose last tiles end, and a click."""
+
+    hall: Hall
+    wire: Wire
+    threads: Executor
+    views: Newest[View] = field(default_factory=Newest)
+    picks: Newest[Pick] = field(default_factory=Newest)
+
+    def __post_init__(self) -> None:
+        self._awaited: tuple[int, int] | None = None
+        self._acknowledged = asyncio.Event()
+        self._acknowledged.set()
+        self._leaving: set[asyncio.Future[Any]] = set()
+        self._opening: set[asyncio.Task[None]] = set()
+
+    async def receive(self, text: str) -> None:
+        """Take one message in. What is wrong with it is told to the page."""
+        try:
+            message = parse(text)
+            if isinstance(message, View):
+                camera_of(message.m, message.fovy)
+                self.views.put(message)
+            elif isinstance(message, Ack):
+                if (message.seq, message.step) == self._awaited:
+                    self._acknowledged.set()
+            elif isinstance(message, Cancel):
+                self.views.put(None)
+            elif isinstance(message, Pick):
+                self.picks.put(message)
+            elif isinstance(message, SaveCamera):
+                await self._tell(type="camera", name="camera.toml", text=self._camera(message))
+            elif isinstance(message, OpenScene):
+                self._open(message.file)
+        except ValueError as error:
+            await self.complain(error)
+
+    async def run(self) -> None:
+        """Show views and answer clicks until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._show_views())
+            tasks.create_task(self._answer_picks())
+
+    async def complain(self, error: Exception) -> None:
+        """Tell the page what is wrong, on one line."""
+        await self._tell(type="error", message=" ".join(str(error).split()) or type(error).__name__)
+
+    async def tell_of_scene(self) -> None:
+        """Say that another scene is shown. Views of the one before are dropped."""
+        self.views.put(None)
+        await self._tell(type="scene")
+
+    async def _show_views(self) -> None:
+        while True:
+            # Its first pass is not begun before the page has drawn the last picture: by then there may be a newer view.
+            await self._acknowledged.wait()
+            view = await self.views.take()
+            try:
+                for wanted in passes_of(view):
+                    await self._show(view, wanted)
+            except SupersededError:
+                pass
+            except Exception as error:  # where the connection itself has failed, complaining raises that again
+                await self.complain(error)
+
+    async def _show(self, view: View, wanted: Pass) -> None:
+        """Compute and send one pass. The first is always shown, however fast views come, or a slow machine would show
+        none while the camera moves; brute force is not, as it takes seconds.
+        """
+        stubborn = wanted.step == 0 and view.mode != "brute"
+        if view.mode == "brute" and self._leaving:
+            # One such picture at a time: the tiles under way of the last one end first.
+            await self._unless_newer(asyncio.wait(self._leaving))
+        message, limits = await self._computed(view, wanted, stubborn)
+        if not stubborn:
+            await self._unless_newer(self._acknowledged.wait())
+        self._awaited = view.seq, wanted.step
+        self._acknowledged.clear()
+        if limits is not None:
+            await self._tell(type="legend", seq=view.seq, aov=view.settings.aov, low=limits[0], high=limits[1])
+        await self.wire.binary(message)
+
+    async def _computed(self, view: View, wanted: Pass, stubborn: bool) -> Answer:
+        """The pass's answer. A newer view leaves the tiles under way to themselves: they end soon, the others never
+        begin.
+        """
+        shown, left, done = self.hall.shown, threading.Event(), 0
+
+        def finished(tiles: int) -> None:
+            nonlocal done
+            done += tiles
+            if left.is_set():
+                raise SupersededError
+
+        running = asyncio.get_running_loop().run_in_executor(self.threads, answer, shown, view, wanted, finished)
+        self._leaving.add(running)
+        running.add_done_callback(self._left)
+        try:
+            while not stubborn and not running.done():
+                await self._unless_newer(asyncio.wait({running}, timeout=_PROGRESS))
+                if view.mode == "brute" and not running.done():
+                    await self._tell(type="progress", seq=view.seq, done=done / wanted.tiles)
+            return await asyncio.shield(running)
+        finally:
+            left.set()
+
+    def _left(self, ended: asyncio.Future[Answer]) -> None:
+        self._leaving.discard(ended)
+        if not ended.cancelled():
+            ended.exception()  # asked for, so that none is reported as lost
+
+    async def _unless_newer(self, awaited: Awaitable[Any]) -> None:
+        """Wait for it; raise ``SupersededError`` as soon as there is a newer view."""
+        newer, wanted = asyncio.ensure_future(self.views.changed()), asyncio.ensure_future(awaited)
+        try:
+            await asyncio.wait({newer, wanted}, return_when=asyncio.FIRST_COMPLETED)
+            if newer.done():
+                raise SupersededError
+        finally:
+            newer.cancel()
+            wanted.cancel()
+
+    async def _answer_picks(self) -> None:
+        while True:
+            pick = await self.picks.take()
+            try:
+                running = asyncio.get_running_loop().run_in_executor(self.threads, picked, self.hall.shown, pick)
+                await self._tell(**await running)
+            except Exception as error:  # as above
+                await self.complain(error)
+
+    def _open(self, file: str) -> None:
+        """Change the scene while messages go on."""
+
+        async def opened() -> None:
+            try:
+                await self.hall.open(file)
+            except (ValueError, OSError, MemoryError) as error:
+                await self.complain(error)
+
+        task = asyncio.create_task(opened())
+        self._opening.add(task)
+        task.add_done_callback(self._opening.discard)
+
+    def _camera(self, message: SaveCamera) -> str:
+        """The camera as TOML. Its target is where its axis passes the middle of the scene, if that lies ahead."""
+        camera = camera_of(message.m, message.fovy)
+        if not message.walk:
+            middle = np.mean(self.hall.shown.stage.mesh.bounds, axis=0)
+            ahead = float((middle - camera.eye) @ camera.frame()[2])
+            if ahead > 0.0:
+                camera = camera_of(message.m, message.fovy, ahead)
+        return camera_toml(camera)
+
+    async def _tell(self, **message: Any) -> None:
+        await self.wire.text(json.dumps(message, allow_nan=False))

@@ -1,0 +1,438 @@
+"""The viewer as a person meets it: the real server, the real page, in headless Chromium with software GL."""
+
+import re
+import tomllib
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+from viewer_page import CHROMIUM, FLAGS, PATIENCE, SCENE, Viewer, served
+
+from renderer import load_scene, render
+from renderer.camera import PerspectiveCamera
+from renderer.face_phong import face_colors
+from renderer.image import Image, srgb
+from renderer.material import MATERIAL_COLUMNS
+from renderer.needs import needs_of
+from renderer.stage import Stage, set_up
+
+playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a scene, another one and one that cannot be loaded."""
+    folder = tmp_path_factory.mktemp("scenes")
+    (folder / "blocks.toml").write_text(SCENE)
+    (folder / "other.toml").write_text(SCENE.replace("[0.45, 0.62, 0.82]", "[0.9, 0.5, 0.1]"))
+    (folder / "broken.toml").write_text(SCENE.replace("fov = 38", "fov = 400"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def url(scenes: Path) -> Iterator[str]:
+    with served(scenes / "blocks.toml") as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as engine:
+        chromium = engine.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Any, url: str) -> Iterator[Viewer]:
+    """The page that most tests share, because opening one takes a second."""
+    page = Viewer(browser, url).open()
+    yield page
+    page.context.close()
+
+
+@pytest.fixture
+def viewer(opened: Viewer) -> Viewer:
+    """The shared page as it was when it opened."""
+    opened.restart()
+    return opened
+
+
+@pytest.fixture(autouse=True)
+def no_faults() -> Iterator[None]:
+    """No page may complain on its console, nor leave this machine."""
+    Viewer.faults.clear()
+    yield
+    assert Viewer.faults == []
+
+
+def picture_of(scenes: Path, shown: dict[str, Any], **settings: Any) -> Image:
+    """The Python renderer's picture at the camera that the page reports."""
+    from renderer.viewer.viewpoint import camera_of
+
+    camera = camera_of(shown["m"], shown["fovy"])
+    scene = load_scene(scenes / "blocks.toml").model_copy(update={"camera": camera})
+    return render(scene, resolution=(shown["w"], shown["h"]), **settings)
+
+
+def stage_of(scenes: Path) -> Stage:
+    scene = load_scene(scenes / "blocks.toml")
+    return set_up(scene, needs_of(scene), "octree")
+
+
+def inside(faces: NDArray[np.int32], stage: Stage) -> NDArray[np.bool_]:
+    """The pixels whose neighbours show the same face, which is not of glass."""
+    glass = list(stage.scene.materials).index("glass")
+    opaque = np.append(stage.world.material // MATERIAL_COLUMNS != glass, False)[faces]
+    changes = np.zeros(faces.shape, bool)
+    changes[:, 1:] |= faces[:, 1:] != faces[:, :-1]
+    changes[1:] |= faces[1:] != faces[:-1]
+    return opaque & ~grown(changes, 2)
+
+
+def colors(pixels: NDArray[np.uint8]) -> int:
+    return len(np.unique(pixels.reshape(-1, 4), axis=0))
+
+
+def grown(mask: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
+    """The mask and every pixel at most ``by`` away from it along rows and columns."""
+    padded, (h, w) = np.pad(mask, by), mask.shape
+    return np.any([padded[y : y + h, x : x + w] for y in range(2 * by + 1) for x in range(2 * by + 1)], axis=0)
+
+
+@pytest.mark.parametrize("mode", ["gl", "phong", "octree"])
+def test_a_mode_renders(viewer: Viewer, mode: str) -> None:
+    viewer.choose(mode)
+    seen = viewer.pixels("picture" if mode == "octree" else "gl")
+    assert colors(seen) > 15  # flat faces under one light have few, but a blank picture has one
+    assert (seen[..., 3] == 255).all()
+
+
+def test_own_phong_shows_the_renderers_colors(viewer: Viewer, scenes: Path) -> None:
+    viewer.choose("phong")
+    viewer.drag(40, -10)
+    viewer.page.wait_for_timeout(50)
+    viewer.settled("phong")
+    seen, shown, stage = viewer.pixels("gl"), viewer.camera, stage_of(scenes)
+    faces = picture_of(scenes, shown).face
+    expected = face_colors(stage.world, shown["m"][12:15])[faces]
+    sure = inside(faces, stage)
+    assert sure.mean() > 0.15
+    assert np.array_equal(seen[sure][:, :3], expected[sure])
+
+
+def test_gl_lighting_is_phong(viewer: Viewer, scenes: Path) -> None:
+    viewer.choose("gl")
+    seen, shown, stage = viewer.pixels("gl"), viewer.camera, stage_of(scenes)
+    traced = picture_of(scenes, shown, max_depth=0, shadows=False)
+    sure = inside(traced.face, stage)
+    difference = np.abs(seen[..., :3].astype(int) - srgb(traced.radiance))[sure]
+    # WebGL's float32 may fall on the other side of where a code begins.
+    assert difference.max() <= 1
+
+
+def test_passes_grow_to_the_full_size(viewer: Viewer) -> None:
+    viewer.page.evaluate(
+        """() => {
+            const { picture } = window.viewer, { show } = picture;
+            window.widths = [];
+            picture.show = (arrived) => (window.widths.push(arrived.w), show.call(picture, arrived));
+        }"""
+    )
+    viewer.page.locator("#stage").press("ArrowLeft")
+    viewer.settled("octree")
+    assert viewer.page.evaluate("() => { delete window.viewer.picture.show; return window.widths.slice(-3); }") == [
+        128,
+        256,
+        viewer.camera["w"],
+    ]
+
+
+@pytest.mark.parametrize("size, expected", [("scene", (320, 240)), ("512x512", (512, 512)), ("0.5", None)])
+def test_the_picture_has_the_size_asked_for(viewer: Viewer, size: str, expected: tuple[int, int] | None) -> None:
+    width, height = viewer.page.evaluate("() => [window.viewer.stage.clientWidth, window.viewer.stage.clientHeight]")
+    viewer.page.select_option("[name=size]", size)
+    viewer.settled("octree")
+    frame, shown = viewer.page.locator("#frame").bounding_box(), viewer.camera
+    assert (shown["w"], shown["h"]) == (expected or (int(width / 2 + 0.5), int(height / 2 + 0.5)))
+    assert viewer.pixels("picture").shape == (shown["h"], shown["w"], 4)
+    assert frame["width"] <= width and frame["height"] <= height
+    # Sides on the screen are whole pixels.
+    assert abs(frame["width"] * shown["h"] - frame["height"] * shown["w"]) <= max(shown["w"], shown["h"])
+
+
+def test_the_panel_tells_of_the_scene(viewer: Viewer, scenes: Path) -> None:
+    stage = stage_of(scenes)
+    readings = viewer.page.inner_text("#readings")
+    for name, value in (("faces", len(stage.mesh.faces)), ("nodes", stage.octree.stats.nodes)):
+        assert re.search(rf"{name}\s+{value:,}\b", readings, re.IGNORECASE), name
+    assert "M rays/s" in readings and "final" in readings
+    viewer.page.click("#needs summary")
+    assert "every mesh is flat" in viewer.page.inner_text("#needs ul")
+
+
+def test_brute_force_shows_the_same_picture_and_can_be_cancelled(viewer: Viewer) -> None:
+    by_octree = viewer.pixels("picture")
+    viewer.choose("brute")
+    assert np.array_equal(viewer.pixels("picture"), by_octree)
+    viewer.page.select_option("[name=samples]", "16")
+    viewer.page.select_option("[name=size]", "1024x1024")
+    viewer.page.wait_for_selector("#progress:not([hidden])")
+    viewer.page.click("#cancel")
+    viewer.page.wait_for_selector("#progress[hidden]", state="attached")
+    viewer.page.select_option("[name=size]", "0.5")
+    viewer.choose("octree")
+
+
+@pytest.mark.parametrize("name", ["drag", "pan", "wheel", "ArrowLeft", "+", "w", "f"])
+def test_a_movement_changes_the_picture(viewer: Viewer, name: str) -> None:
+    before, camera = viewer.pixels("picture"), viewer.camera
+    if name == "drag":
+        viewer.drag(60, 20)
+    elif name == "pan":
+        viewer.drag(40, 10, button="right")
+    elif name == "wheel":
+        viewer.page.mouse.move(*viewer.centre())
+        viewer.page.mouse.wheel(0, -200)
+    else:
+        viewer.page.locator("#stage").press(name)
+    viewer.page.wait_for_timeout(50)
+    viewer.settled("octree")
+    assert viewer.camera["m"] != camera["m"]
+    assert not np.array_equal(viewer.pixels("picture"), before)
+    viewer.page.locator("#stage").press("r")
+    viewer.settled("octree")
+    assert viewer.camera == camera
+    assert np.array_equal(viewer.pixels("picture"), before)
+
+
+def test_walking_turns_the_head_and_moves_the_feet(viewer: Viewer) -> None:
+    viewer.page.locator("#stage").press("l")
+    start = viewer.camera["m"]
+    viewer.drag(30, 10)
+    viewer.page.wait_for_timeout(50)
+    viewer.settled("octree")
+    turned = viewer.camera["m"]
+    assert turned[8:11] != start[8:11]
+    assert np.allclose(turned[12:15], start[12:15], rtol=1e-12)  # rounding of a pivot that swings around the eye
+    viewer.page.locator("#stage").press("w")
+    viewer.settled("octree")
+    walked = viewer.camera["m"]
+    step = np.subtract(walked[12:15], turned[12:15])
+    assert walked[8:11] == turned[8:11]
+    assert np.allclose(step / np.linalg.norm(step), np.negative(turned[8:11]), atol=1e-6)  # six digits of a small step
+
+
+def test_fit_brings_all_of_the_scene_into_the_picture(viewer: Viewer, scenes: Path) -> None:
+    viewer.drag(70, 40)
+    viewer.page.locator("#stage").press("f")
+    viewer.settled("octree")
+    shown = viewer.camera
+    m = np.reshape(shown["m"], (4, 4)).T
+    corners = np.array(list(product(*np.transpose(stage_of(scenes).mesh.bounds))))
+    x, y, z, _ = np.linalg.inv(m) @ np.column_stack([corners, np.ones(8)]).T
+    slope = np.tan(shown["fovy"] / 2)
+    outmost = max(np.abs(x / z).max() * shown["h"] / shown["w"], np.abs(y / z).max()) / slope
+    assert (z < 0).all()
+    assert np.isclose(outmost, 1 / 1.05)  # a margin of a twentieth
+
+
+def test_a_drag_picks_nothing(viewer: Viewer) -> None:
+    viewer.drag(30, 0)
+    viewer.settled("octree")
+    viewer.page.wait_for_timeout(100)
+    assert viewer.page.is_hidden("#card")
+
+
+def test_every_pixel_is_the_python_renderers(viewer: Viewer, scenes: Path) -> None:
+    viewer.drag(90, -30)
+    viewer.drag(20, 15, button="right")
+    viewer.page.mouse.wheel(0, -150)
+    viewer.page.wait_for_timeout(50)
+    viewer.settled("octree")
+    seen, shown = viewer.pixels("picture"), viewer.camera
+    assert seen.shape[:2] == (shown["h"], shown["w"])
+    box = viewer.page.locator("#picture").bounding_box()
+    assert (box["width"], box["height"]) == (shown["w"], shown["h"])
+    assert np.array_equal(seen[..., :3], srgb(picture_of(scenes, shown).radiance))
+
+
+def test_the_silhouettes_of_webgl_and_of_ray_tracing_agree(viewer: Viewer, scenes: Path) -> None:
+    viewer.choose("gl")
+    viewer.drag(50, -20)
+    viewer.settled("gl")
+    seen = viewer.pixels("gl")
+    by_gl = (seen[..., :3] != seen[0, 0, :3]).any(axis=-1)
+    traced = picture_of(scenes, viewer.camera).face >= 0
+    assert 0.1 < traced.mean() < 0.9 and not traced[0, 0]
+    # Two pixels: one for another rule of what covers a pixel, one for antialiasing.
+    assert not (by_gl & ~grown(traced, 2)).any()
+    assert not (traced & ~grown(by_gl, 2)).any()
+
+
+def test_a_click_tells_of_the_ray(viewer: Viewer, scenes: Path) -> None:
+    shown = viewer.camera
+    x, y = shown["w"] // 2, shown["h"] // 2
+    left, top = (viewer.page.locator("#frame").bounding_box()[k] for k in ("x", "y"))
+    viewer.page.mouse.click(left + x + 0.5, top + y + 0.5)
+    viewer.page.wait_for_selector("#card:not([hidden])")
+    face = picture_of(scenes, shown).face[y, x]
+    assert face >= 0
+    assert re.search(rf"face\s*{face}\b", viewer.page.inner_text("#card"))
+    assert "1 camera ray" in viewer.page.inner_text("#card")
+    assert viewer.pixels("gl")[..., 3].any()  # the ray's way over the traced picture
+    viewer.page.click("#card .close")
+    assert viewer.page.is_hidden("#card")
+    viewer.settled("octree")
+    assert not viewer.pixels("gl")[..., 3].any()
+
+
+def test_boxes_are_drawn_level_by_level(viewer: Viewer, scenes: Path) -> None:
+    viewer.choose("gl")
+    bare = viewer.pixels("gl")
+    viewer.page.locator("#stage").press("b")
+    viewer.page.wait_for_function("() => /node/.test(document.querySelector('[name=level_shown]').value)")
+    viewer.settled("gl")
+    boxed = viewer.pixels("gl")
+    assert not np.array_equal(boxed, bare)
+    viewer.page.locator("[name=level]").fill("0")
+    viewer.page.wait_for_function("() => document.querySelector('[name=level_shown]').value === '0 · 1 node'")
+    viewer.settled("gl")
+    root = viewer.pixels("gl")
+    assert not np.array_equal(root, boxed) and not np.array_equal(root, bare)
+
+
+@pytest.mark.parametrize("name", ["shadows", "reflection", "refraction", "azimuth", "max_depth", "aov"])
+def test_a_setting_changes_the_picture(viewer: Viewer, name: str) -> None:
+    before = viewer.pixels("picture")
+    field = viewer.page.locator(f"[name={name}]")
+    if name == "aov":
+        field.select_option("normal")
+    elif name in ("azimuth", "max_depth"):
+        field.fill({"azimuth": "-90", "max_depth": "0"}[name])
+    else:
+        field.click()
+    viewer.settled("octree")
+    assert not np.array_equal(viewer.pixels("picture"), before)
+
+
+def test_another_scene_and_a_broken_one(viewer: Viewer) -> None:
+    before = viewer.pixels("picture")
+    viewer.page.select_option("[name=file]", "broken.toml")
+    viewer.page.wait_for_selector("#notices p")
+    assert "fov" in viewer.page.inner_text("#notices")
+    assert np.array_equal(viewer.pixels("picture"), before)
+    assert viewer.page.input_value("[name=file]") == "blocks.toml"
+    viewer.page.select_option("[name=file]", "other.toml")
+    viewer.page.wait_for_function("() => document.querySelector('#name').textContent === 'other'", timeout=PATIENCE)
+    viewer.settled("octree")
+    assert np.array_equal(viewer.pixels("picture")[0, 0, :3], srgb([0.9, 0.5, 0.1]))
+    viewer.page.select_option("[name=file]", "blocks.toml")
+    viewer.page.wait_for_function("() => document.querySelector('#name').textContent === 'blocks'", timeout=PATIENCE)
+    viewer.settled("octree")
+
+
+def test_picture_and_camera_are_saved(viewer: Viewer, tmp_path: Path) -> None:
+    with viewer.page.expect_download() as picture:
+        viewer.page.click("#save-picture")
+    picture.value.save_as(tmp_path / "seen.png")
+    assert np.array_equal(np.asarray(Pillow.open(tmp_path / "seen.png").convert("RGBA")), viewer.pixels("picture"))
+    with viewer.page.expect_download() as camera:
+        viewer.page.click("#save-camera")
+    camera.value.save_as(tmp_path / "camera.toml")
+    saved = PerspectiveCamera.model_validate(tomllib.loads((tmp_path / "camera.toml").read_text())["camera"])
+    assert np.allclose(saved.eye, viewer.camera["m"][12:15], rtol=1e-9)
+
+
+def test_a_phone_shows_everything(browser: Any, url: str) -> None:
+    phone = Viewer(browser, url, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    try:
+        phone.open()
+        assert phone.page.evaluate("() => document.documentElement.scrollWidth") == 390
+        for control in phone.page.locator("button:visible, select:visible, input:visible").all():
+            box = control.bounding_box()
+            assert box["x"] >= 0 and box["x"] + box["width"] <= 390, control.get_attribute("name")
+        before = phone.camera["m"]
+        phone.pinch()
+        phone.settled("octree")
+        middle = np.array(before[12:15])
+        assert np.linalg.norm(phone.camera["m"][12:15]) < np.linalg.norm(middle)  # closer to what is around the origin
+        phone.page.touchscreen.tap(*phone.centre())
+        phone.page.wait_for_selector("#card:not([hidden])")
+    finally:
+        phone.context.close()
+
+
+def test_all_of_it_by_keyboard(viewer: Viewer) -> None:
+    reached = set()
+    for _ in range(45):  # once around the page, and some more
+        viewer.page.keyboard.press("Tab")
+        name, outlined = viewer.page.evaluate(
+            """() => {
+                const { activeElement: on } = document;
+                const seen = on.matches(".modes input") ? on.nextElementSibling : on;
+                return [on.name || on.id || on.innerText, getComputedStyle(seen).outlineStyle !== "none"];
+            }"""
+        )
+        assert outlined or viewer.page.evaluate("() => document.activeElement === document.body"), name
+        reached.add(name)
+    assert {"mode", "stage", "boxes", "level", "file", "samples", "shadows", "reset-view", "save-camera"} <= reached
+    viewer.choose("phong")
+    viewer.page.keyboard.press("Enter")
+    viewer.page.wait_for_selector("#card:not([hidden])")
+    viewer.page.keyboard.press("Escape")
+    assert viewer.page.is_hidden("#card")
+
+
+def test_without_webgl_ray_tracing_works(browser: Any, url: str) -> None:
+    bare = Viewer(browser, url)
+    bare.page.add_init_script(
+        """const context = HTMLCanvasElement.prototype.getContext;
+        HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+            return kind.startsWith("webgl") ? null : context.call(this, kind, ...rest);
+        };"""
+    )
+    try:
+        bare.open()
+        before = bare.pixels("picture")
+        assert colors(before) > 15
+        assert "WebGL2" in bare.page.inner_text("#notices")
+        assert bare.page.is_disabled("[name=mode][value=gl]") and bare.page.is_disabled("[name=mode][value=phong]")
+        assert bare.page.is_disabled("[name=boxes]") and bare.page.is_disabled("[name=level]")
+        bare.drag(60, 20)
+        bare.page.wait_for_timeout(50)
+        bare.settled("octree")
+        assert not np.array_equal(bare.pixels("picture"), before)
+    finally:
+        bare.context.close()
+
+
+def test_the_page_comes_back_when_the_connection_does(viewer: Viewer) -> None:
+    viewer.page.evaluate("() => window.viewer.connection.socket.close()")
+    viewer.page.wait_for_selector("body[data-connected=false]")
+    viewer.page.wait_for_selector("body[data-connected=true]")
+    viewer.drag(40, 0)
+    viewer.page.wait_for_timeout(50)
+    viewer.settled("octree")
+
+
+def test_ray_tracing_goes_on_when_the_browser_takes_webgl_away(browser: Any, url: str) -> None:
+    left = Viewer(browser, url)
+    try:
+        left.open().page.keyboard.press("1")  # before anything is focused
+        left.settled("gl")
+        left.page.evaluate("() => window.viewer.layer.gl.getExtension('WEBGL_lose_context').loseContext()")
+        left.page.wait_for_selector("body[data-gl=none]", state="attached")
+        left.settled("octree")
+        assert colors(left.pixels("picture")) > 15
+        Viewer.faults[:] = [fault for fault in Viewer.faults if "CONTEXT_LOST" not in fault]  # the browser's own words
+    finally:
+        left.context.close()

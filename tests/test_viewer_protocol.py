@@ -1,0 +1,205 @@
+"""What page and server say to each other: every message's checks, and the header byte by byte."""
+
+import json
+import math
+import struct
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from renderer.viewer.protocol import (
+    JPEG,
+    MAX_FOVY,
+    MAX_MESSAGE_BYTES,
+    MAX_SIDE,
+    MIN_FOVY,
+    MODES,
+    Ack,
+    Cancel,
+    OpenScene,
+    Pick,
+    SaveCamera,
+    View,
+    ViewSettings,
+    packed,
+    parse,
+)
+
+M = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5, 1.0, 4.0, 1.0]
+SETTINGS = {
+    "max_depth": 3,
+    "samples": 4,
+    "shadows": False,
+    "reflection": True,
+    "refraction": False,
+    "aov": "depth",
+    "light": [0, -1.5, 0.25],
+    "pixels": "jpeg",
+}
+VIEW = {"type": "view", "seq": 7, "mode": "octree", "m": M, "fovy": 0.7, "w": 320, "h": 240, "settings": SETTINGS}
+PICK = {"type": "pick", "seq": 8, "x": 319, "y": 239, "m": M, "fovy": 0.7, "w": 320, "h": 240, "settings": SETTINGS}
+CAMERA = {"type": "camera", "m": M, "fovy": 0.7}
+# The keys of a message that may be left out.
+OPTIONAL = {"settings", "walk"}
+
+
+def said(message: Any) -> str:
+    return json.dumps(message)
+
+
+@pytest.mark.parametrize(
+    ("message", "kind"),
+    [
+        (VIEW, View),
+        (PICK, Pick),
+        (CAMERA | {"walk": True}, SaveCamera),
+        ({"type": "ack", "seq": 7, "step": 2}, Ack),
+        ({"type": "cancel"}, Cancel),
+        ({"type": "scene", "file": "a b.toml"}, OpenScene),
+    ],
+)
+def test_a_message_is_what_it_says(message: dict[str, Any], kind: type) -> None:
+    read = parse(said(message))
+    assert type(read) is kind
+    assert json.loads(read.model_dump_json()) == message
+    for key in message.keys() - OPTIONAL:
+        with pytest.raises(ValueError, match=f"{key}|discriminator 'type'"):
+            parse(said({name: value for name, value in message.items() if name != key}))
+    with pytest.raises(ValueError, match="surplus: Extra inputs are not permitted, got 1"):
+        parse(said(message | {"surplus": 1}))
+
+
+def test_what_is_left_out_is_as_a_scene_is_first_shown() -> None:
+    left_out = parse(said({key: value for key, value in VIEW.items() if key != "settings"}))
+    assert isinstance(left_out, View)
+    assert left_out.settings == ViewSettings(max_depth=6, samples=1, aov="color", light=None, pixels="rgba")
+    assert left_out.settings.shadows and left_out.settings.reflection and left_out.settings.refraction
+    walk = parse(said(CAMERA))
+    assert isinstance(walk, SaveCamera) and not walk.walk
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("seq", [0, 2**32 - 1]),
+        ("mode", list(MODES)),
+        ("fovy", [MIN_FOVY, 1, MAX_FOVY]),
+        ("w", [1, MAX_SIDE]),
+        ("h", [1, MAX_SIDE]),
+        ("m", [[0] * 16, [-1e308] * 16]),
+    ],
+)
+def test_a_view_reaches_to_its_limits(key: str, values: list[Any]) -> None:
+    for value in values:
+        assert getattr(parse(said(VIEW | {key: value})), key) == value
+
+
+BAD = [
+    ("seq", [-1, 2**32, 1.5, "1", True, None], "seq"),
+    ("mode", ["", "GL", "ray", 1, None, ["gl"]], "mode"),
+    ("fovy", [0, -0.7, 0.0009, 3.11, 1e999, math.nan, "0.7", None], "fovy"),
+    ("w", [0, -1, 1025, 10**30, 320.5, "320", True, None], "w"),
+    ("h", [0, -1, 1025, 10**30, 320.5, "240", True, None], "h"),
+    ("m", [M[:15], [*M, 0.0], [], None, "1" * 16, {str(i): 1 for i in range(16)}], "m"),
+    ("m", [[*M[:5], bad, *M[6:]] for bad in (math.nan, math.inf, -math.inf, "0", None, [], True)], r"m\.5"),
+]
+
+
+@pytest.mark.parametrize(
+    ("message", "key", "values", "where"),
+    [(said, *bad) for said in (VIEW, PICK, CAMERA) for bad in BAD if bad[0] in said],
+)
+def test_a_bad_value_is_refused_by_its_key(message: dict[str, Any], key: str, values: list[Any], where: str) -> None:
+    for value in values:
+        with pytest.raises(ValueError, match=rf"^{message['type']}\.{where}: .*, got "):
+            parse(said(message | {key: value}))
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("max_depth", [-1, 65, 1.5, "3", None]),
+        ("samples", [0, -4, 2, 3, 65, 100, 10**9, 4.5, None]),
+        ("shadows", [0, 1, "true", None]),
+        ("reflection", [0, 1, "true", None]),
+        ("refraction", [0, 1, "true", None]),
+        ("aov", ["", "colour", "albedo", 1, None]),
+        (
+            "light",
+            [[0, 0, 0], [-0.0, 0.0, 0], [1, 2], [1, 2, 3, 4], [1, 2, math.nan], [1e999, 0, 0], ["1", 0, 0], 1, ""],
+        ),
+        ("pixels", ["png", "", None, 1]),
+        ("surplus", [1]),
+    ],
+)
+def test_bad_settings_are_refused_by_their_key(key: str, values: list[Any]) -> None:
+    for message in (VIEW, PICK):
+        for value in values:
+            with pytest.raises(ValueError, match=rf"^{message['type']}\.settings\.{key}(\.\d)?: .*, got "):
+                parse(said(message | {"settings": SETTINGS | {key: value}}))
+
+
+@pytest.mark.parametrize("pixel", [{"x": 320}, {"y": 240}, {"x": -1}, {"y": -1}, {"x": 1.5}, {"x": 1024, "w": 1024}])
+def test_a_pick_lies_in_its_picture(pixel: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"^pick(\.[xy])?: .*, got "):
+        parse(said(PICK | pixel))
+
+
+@pytest.mark.parametrize("file", ["a" * 256, None, 1, ["a.toml"]])
+def test_a_scene_has_a_name_that_a_file_may_have(file: Any) -> None:
+    with pytest.raises(ValueError, match=r"^scene\.file: "):
+        parse(said({"type": "scene", "file": file}))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "x",
+        "{",
+        "null",
+        "[]",
+        '"view"',
+        "{}",
+        '{"type": null}',
+        '{"type": "exec"}',
+        '{"type": ["view"]}',
+        '{"type": "cancel"} {"type": "cancel"}',
+        '{"type": "\\ud800"}',
+        "[" * MAX_MESSAGE_BYTES,
+        '{"type":' * (MAX_MESSAGE_BYTES // 8),
+        "9" * MAX_MESSAGE_BYTES,
+    ],
+)
+def test_garbage_is_refused_in_few_words(text: str) -> None:
+    with pytest.raises(ValueError, match=r"^message: ") as refused:
+        parse(text)
+    assert len(str(refused.value)) < 300
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.sampled_from([*VIEW, *PICK, *SETTINGS]) | st.text(), inner),
+    max_leaves=20,
+)
+
+
+@given(
+    st.text() | JSON.map(said) | st.dictionaries(st.sampled_from([*PICK, "mode"]), JSON).map(lambda d: said(VIEW | d))
+)
+def test_whatever_comes_is_a_message_or_a_value_error(text: str) -> None:
+    try:
+        read = parse(text)
+    except ValueError:
+        return
+    assert isinstance(read, View | Pick | Ack | Cancel | OpenScene | SaveCamera)
+
+
+def test_the_header_is_32_bytes_little_endian() -> None:
+    view = View(type="view", seq=2**32 - 1, mode="octree", m=M, fovy=0.7, w=320, h=240)
+    header = packed(JPEG, view, 2, True, (128, 96), (1.5, 0.25))
+    assert header == bytes.fromhex("02000000 ffffffff 02000000 01000000 80000000 60000000 0000c03f 0000803e")
+    assert struct.unpack("<6I2f", header)[3] == 1
+    assert struct.unpack("<6I2f", packed(JPEG, view, 0, False, (1, 1), (0.0, 0.0)))[2:4] == (0, 0)

@@ -1,0 +1,374 @@
+"""Who the viewer lets in: each rule tried from outside, by a client that breaks it, on a real server."""
+
+import json
+import logging
+import re
+import socket
+import struct
+from collections.abc import Iterator
+from contextlib import ExitStack
+from http.client import HTTPConnection, HTTPResponse
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from viewer_page import SCENE
+
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+from websockets.exceptions import ConnectionClosedError
+from websockets.sync.client import connect
+
+import renderer
+from renderer.viewer.app import MAX_CONNECTIONS
+from renderer.viewer.exhibit import Exhibit, open_file
+from renderer.viewer.protocol import MAX_MESSAGE_BYTES
+from renderer.viewer.server import Viewing
+
+# Of everything that is served, one of a kind.
+PATHS = ["/", "/scene", "/mesh", "/octree?level=0", "/static/main.js", "/nowhere"]
+# RFC 6455, section 1.3.
+HANDSHAKE = {
+    "Connection": "Upgrade",
+    "Upgrade": "websocket",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Scene files, and beside their folder one more, which nobody is offered."""
+    folder = tmp_path_factory.mktemp("served") / "scenes"
+    folder.mkdir()
+    for path in (folder / "blocks.toml", folder / "other.toml", folder.parent / "secret.toml"):
+        path.write_text(SCENE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shown(folder: Path) -> Exhibit:
+    return open_file(folder / "blocks.toml")
+
+
+@pytest.fixture(scope="module")
+def port(folder: Path) -> Iterator[int]:
+    """Where ``renderer.view`` serves when nothing else is asked for."""
+    with renderer.view(folder / "blocks.toml", browser=False) as viewing:
+        yield urlsplit(viewing.url).port
+
+
+@pytest.fixture(scope="module")
+def wide(shown: Exhibit) -> Iterator[Viewing]:
+    """A server that other machines reach."""
+    with Viewing(shown, "0.0.0.0", 0, framed=False) as viewing:
+        yield viewing
+
+
+@pytest.fixture(autouse=True)
+def no_fault_of_the_server(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
+    """A bad client is refused; nothing of the server breaks on it, and it fills nobody's screen."""
+    yield
+    assert [record for record in caplog.get_records("call") if record.levelno >= logging.ERROR] == []
+
+
+def asked(
+    port: int, path: str, headers: dict[str, str] | None = None, method: str = "GET", address: str = "127.0.0.1"
+) -> HTTPResponse:
+    """The answer to exactly this path and these headers; Host is the server's own unless given."""
+    connection = HTTPConnection(address, port, timeout=30)
+    try:
+        connection.putrequest(method, path, skip_host=True)
+        for name, value in {"Host": f"127.0.0.1:{port}", **(headers or {})}.items():
+            connection.putheader(name, value)
+        connection.endheaders()
+        response = connection.getresponse()
+        if response.status != 101:  # after which no more of HTTP comes
+            response.body = response.read().decode("latin-1")
+        return response
+    finally:
+        connection.close()
+
+
+def opening(port: int, path: str = "/ws", **headers: str) -> int:
+    """The status with which a WebSocket's opening is answered; 101 lets it in."""
+    return asked(port, path, HANDSHAKE | headers).status
+
+
+def connected(port: int) -> Any:
+    return connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}", open_timeout=30)
+
+
+def told(port: int, text: str) -> dict[str, Any]:
+    with connected(port) as client:
+        client.send(text)
+        return json.loads(client.recv(30))
+
+
+def test_only_this_machine_reaches_it(port: int) -> None:
+    # All of 127/8 is this machine on Linux, so a server bound to every address answers here; elsewhere nobody does.
+    with pytest.raises(OSError):
+        socket.create_connection(("127.0.0.2", port), timeout=5)
+    socket.create_connection(("127.0.0.1", port), timeout=5).close()
+
+
+@pytest.mark.parametrize("path", [*PATHS, "/ws"])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:{}", "127.0.0.1.evil.example:{}", "127.0.0.1@evil.example", ""]
+)
+def test_a_foreign_name_that_points_here_is_refused(port: int, path: str, host: str) -> None:
+    named = host.format(port)
+    headers = {**HANDSHAKE, "Origin": f"http://{named}"} if path == "/ws" else {}
+    assert asked(port, path, headers | {"Host": named}).status == 400
+
+
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost", "[::1]"])
+def test_this_machines_own_names_are_served(port: int, name: str) -> None:
+    assert asked(port, "/", {"Host": f"{name}:{port}"}).status == 200
+    assert opening(port, Host=f"{name}:{port}", Origin=f"http://{name}:{port}") == 101
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "http://evil.example",
+        "http://127.0.0.1",
+        "http://127.0.0.1:1",
+        "http://localhost:{}",
+        "http://127.0.0.1:{}.evil.example",
+        "http://127.0.0.1:{}@evil.example",
+        "file://127.0.0.1:{}",
+        "http://[",
+        "null",
+        "",
+    ],
+)
+def test_a_foreign_pages_socket_is_refused(port: int, origin: str) -> None:
+    assert opening(port, Origin=origin.format(port)) == 403
+
+
+def test_a_program_without_origin_is_refused_where_there_is_no_token(port: int) -> None:
+    assert opening(port) == 403
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_answers_say_what_the_page_may_do(port: int, path: str) -> None:
+    foreign = asked(port, path, {"Host": "evil.example", "Origin": "http://evil.example"})
+    posted = asked(port, path, method="POST")
+    assert (foreign.status, posted.status) == (400, 404 if path == "/nowhere" else 405)
+    for answer in (asked(port, path, {"Origin": "http://evil.example"}), foreign, posted):
+        rules = dict(rule.split(" ", 1) for rule in answer.headers["Content-Security-Policy"].split("; "))
+        assert rules == {
+            "default-src": "'self'",
+            "img-src": "'self' blob: data:",
+            "base-uri": "'none'",
+            "form-action": "'none'",
+            "frame-ancestors": "'self'",
+        }
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        assert answer.headers["Cache-Control"] == "no-store"
+        assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert answer.headers["Referrer-Policy"] == "no-referrer"
+        assert "Server" not in answer.headers
+        assert not [name for name in answer.headers if name.lower().startswith("access-control")]
+
+
+def test_a_refused_socket_is_told_the_rules_too(port: int) -> None:
+    refused = asked(port, "/ws", HANDSHAKE | {"Origin": "http://evil.example"})
+    assert refused.headers["Cache-Control"] == "no-store"
+    assert "frame-ancestors" in refused.headers["Content-Security-Policy"]
+    assert refused.body == f"Origin: expected 127.0.0.1:{port}, got http://evil.example"
+
+
+def test_a_notebook_of_this_machine_may_frame_the_page(shown: Exhibit) -> None:
+    with Viewing(shown, "127.0.0.1", 0, framed=True) as viewing:
+        policy = asked(urlsplit(viewing.url).port, "/").headers["Content-Security-Policy"]
+    assert policy.endswith("; frame-ancestors 'self' http://127.0.0.1:* http://localhost:*")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/static/../app.py",
+        "/static/%2e%2e/app.py",
+        "/static/..%2fapp.py",
+        "/static/%2e%2e%2f%2e%2e%2fcli.py",
+        "/static/..\\app.py",
+        "/static//etc/passwd",
+        "/static/%2fetc%2fpasswd",
+        "/static/main.js%00.html",
+        "/static/" + "a" * 5000,
+        "/static/",
+        "/app.py",
+        "//etc/passwd",
+    ],
+)
+def test_no_file_but_the_pages_is_served(port: int, path: str) -> None:
+    assert asked(port, path).status == 404
+
+
+@pytest.mark.parametrize("level", ["", "-1", "1.5", "1e3", "100", "٣", "%00", "0&level=x", "9" * 5000])
+def test_a_level_is_a_small_integer(port: int, level: str) -> None:
+    answer = asked(port, f"/octree?level={_quoted(level)}")
+    assert answer.status == 400 and answer.body.startswith("level: expected an integer from 0 to 99, got ")
+
+
+def _quoted(text: str) -> str:
+    return "".join(c if c.isascii() else "".join(f"%{byte:02X}" for byte in c.encode()) for c in text)
+
+
+def test_a_level_that_the_tree_lacks_has_no_boxes(port: int) -> None:
+    answer = asked(port, "/octree?level=99")
+    assert answer.status == 200 and struct.unpack("<I", answer.body[:4].encode("latin-1")) == (0,)
+
+
+@pytest.mark.parametrize(
+    "file",
+    ["../secret.toml", "{0}/secret.toml", "{0}/scenes/other.toml", "./other.toml", "other", "", ".", "other.toml\0"],
+)
+def test_only_scene_files_that_were_offered_are_opened(port: int, folder: Path, file: str) -> None:
+    named = file.format(folder.parent)
+    answer = told(port, json.dumps({"type": "scene", "file": named}))
+    assert answer["type"] == "error"
+    assert answer["message"].startswith("scene.file: expected one of ['blocks.toml', 'other.toml'], got ")
+
+
+def test_a_scene_file_that_was_offered_is_opened(port: int) -> None:
+    assert told(port, json.dumps({"type": "scene", "file": "other.toml"})) == {"type": "scene"}
+
+
+def test_a_message_of_the_largest_size_is_read(port: int) -> None:
+    assert told(port, "x" * MAX_MESSAGE_BYTES)["type"] == "error"
+
+
+@pytest.mark.parametrize("kind", [str, bytes])
+@pytest.mark.parametrize("pieces", [1, 3])
+def test_a_larger_message_ends_its_connection_and_no_other(port: int, kind: type, pieces: int) -> None:
+    text = "x" * (MAX_MESSAGE_BYTES // pieces + 1)
+    piece = text if kind is str else text.encode()
+    with connected(port) as good, connected(port) as bad:
+        with pytest.raises(ConnectionClosedError) as closed:
+            bad.send(piece if pieces == 1 else [piece] * pieces)
+            bad.recv(30)
+        assert closed.value.rcvd.code == 1009  # RFC 6455: too big
+        good.send("x")
+        assert json.loads(good.recv(30))["type"] == "error"
+
+
+def test_one_connection_too_many_is_told_so_and_waits_for_another_to_leave(port: int) -> None:
+    with ExitStack() as clients:
+        first, *_ = [clients.enter_context(connected(port)) for _ in range(MAX_CONNECTIONS)]
+        with connected(port) as late:
+            message = json.loads(late.recv(30))
+            assert message == {"type": "error", "message": "connections: expected at most 16, got another"}
+            with pytest.raises(ConnectionClosedError) as closed:
+                late.recv(30)
+            assert closed.value.rcvd.code == 1013
+        first.close()
+        assert told(port, "x")["message"].startswith("message: Invalid JSON")
+
+
+def test_a_client_that_floods_reads_nothing_and_leaves_disturbs_nobody(port: int) -> None:
+    garbage = b"\x81\x81\0\0\0\0x"  # RFC 6455, section 5.2: text, of one byte, masked
+    opened = HANDSHAKE | {"Host": f"127.0.0.1:{port}", "Origin": f"http://127.0.0.1:{port}"}
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        lines = ["GET /ws HTTP/1.1", *(f"{name}: {value}" for name, value in opened.items()), "", ""]
+        client.sendall("\r\n".join(lines).encode())
+        assert client.recv(4096).startswith(b"HTTP/1.1 101")
+        client.settimeout(0.3)
+        # Every buffer on the way is full of answers, and the server stops reading.
+        with pytest.raises(TimeoutError):
+            while True:
+                client.sendall(1000 * garbage)
+        assert told(port, "x")["type"] == "error"
+        # A reset in place of a proper end.
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    assert told(port, "x")["type"] == "error"
+
+
+@pytest.mark.parametrize(
+    ("host", "needed"),
+    [("127.0.0.1", False), ("localhost", False), ("127.0.0.2", False), ("::1", False), ("0.0.0.0", True), ("::", True)],
+)
+def test_a_token_is_needed_where_other_machines_may_connect(shown: Exhibit, host: str, needed: bool) -> None:
+    try:
+        viewing = Viewing(shown, host, 0, framed=False)
+    except ValueError as error:
+        pytest.skip(f"this machine has no such address: {error}")
+    with viewing:
+        url = urlsplit(viewing.url)
+        assert bool(url.query) == needed
+        named = {"Host": url.netloc}
+        assert asked(url.port, "/scene", named, address=url.hostname).status == (403 if needed else 200)
+        assert asked(url.port, f"/scene?{url.query}", named, address=url.hostname).status == 200
+
+
+def test_two_servers_have_two_tokens_of_256_bits(shown: Exhibit, wide: Viewing) -> None:
+    with Viewing(shown, "0.0.0.0", 0, framed=False) as other:
+        tokens = [re.fullmatch(r"token=([\w-]{43})", urlsplit(viewing.url).query)[1] for viewing in (wide, other)]
+        assert asked(urlsplit(other.url).port, f"/scene?token={tokens[0]}").status == 403
+    assert tokens[0] != tokens[1]
+
+
+@pytest.mark.parametrize("path", ["/", "/scene", "/mesh", "/octree", "/static/main.js", "/nowhere", "/ws"])
+@pytest.mark.parametrize(
+    "query", ["", "?token=", "?token=wrong", "?token=%ff%00", "?Token={}", "?token={}x", "?token={}%20"]
+)
+def test_without_the_token_nothing_is_served(wide: Viewing, path: str, query: str) -> None:
+    url = urlsplit(wide.url)
+    given = query.format(url.query.removeprefix("token="))
+    headers = {**HANDSHAKE, "Origin": f"http://127.0.0.1:{url.port}"} if path == "/ws" else {}
+    answer = asked(url.port, path + given, headers)
+    assert answer.status == 403 and "Set-Cookie" not in answer.headers
+    assert answer.body == "token: expected the one in the address that octree-render printed"
+
+
+def test_the_page_gets_the_token_as_a_cookie_for_what_it_links(wide: Viewing) -> None:
+    url = urlsplit(wide.url)
+    cookie, *attributes = asked(url.port, f"/?{url.query}").headers["Set-Cookie"].split("; ")
+    assert set(attributes) == {"HttpOnly", "SameSite=Strict", "Path=/"}
+    # Cookies of other servers on this machine come along, not all of them well-formed.
+    for sent in (cookie, f"a=b; {cookie}", f'other={{"x": [1, 2]}}; {cookie}; last'):
+        assert asked(url.port, "/static/main.js", {"Cookie": sent}).status == 200
+        assert opening(url.port, Cookie=sent, Origin=f"http://127.0.0.1:{url.port}") == 101
+    name, _, value = cookie.partition("=")
+    for sent in (f"{name}=wrong", f"{name}=", f"x{name}={value}", f"{name}={value}x"):
+        assert asked(url.port, "/static/main.js", {"Cookie": sent}).status == 403
+
+
+def test_with_the_token_a_foreign_page_is_refused_and_a_program_let_in(wide: Viewing) -> None:
+    url = urlsplit(wide.url)
+    path = f"/ws?{url.query}"
+    assert opening(url.port, path) == 101
+    assert opening(url.port, path, Origin=f"http://127.0.0.1:{url.port}") == 101
+    assert opening(url.port, path, Host="any.example", Origin="http://any.example") == 101
+    for origin in ("http://evil.example", "http://127.0.0.1:1", "null"):
+        assert opening(url.port, path, Origin=origin) == 403
+
+
+def test_tokens_are_compared_in_constant_time(wide: Viewing, monkeypatch: pytest.MonkeyPatch) -> None:
+    url = urlsplit(wide.url)
+    monkeypatch.setattr("hmac.compare_digest", lambda _given, _token: False)
+    assert asked(url.port, f"/scene?{url.query}").status == 403
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "message"),
+    [
+        (None, 0, "host: expected a string, got NoneType"),
+        ("no such host", 0, "host: expected a name or address of this machine, got 'no such host'"),
+        ("192.0.2.1", 0, "host and port: expected a free port, got 192.0.2.1:0"),  # RFC 5737: nobody's
+        ("127.0.0.1", 65536, "port: expected an integer from 0 to 65535, got 65536"),
+        ("127.0.0.1", -1, "port: expected an integer from 0 to 65535, got -1"),
+        ("127.0.0.1", "80", "port: expected an integer from 0 to 65535, got '80'"),
+    ],
+)
+def test_where_it_cannot_listen_it_says_so(shown: Exhibit, host: Any, port: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(message)):
+        Viewing(shown, host, port, framed=False)
+
+
+def test_a_busy_port_is_an_error(shown: Exhibit, port: int) -> None:
+    with pytest.raises(ValueError, match=f"host and port: expected a free port, got 127.0.0.1:{port}"):
+        Viewing(shown, "127.0.0.1", port, framed=False)

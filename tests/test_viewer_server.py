@@ -1,0 +1,709 @@
+"""The viewer's server at work, seen from outside: pictures, clicks, scenes, and what a client may do to it."""
+
+import io
+import json
+import math
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from viewer_page import MODELS, SCENE
+
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+from websockets.sync.client import connect
+
+import renderer
+from renderer import load_scene, render
+from renderer.camera import PerspectiveCamera
+from renderer.cli import main
+from renderer.face_phong import face_colors
+from renderer.false_color import false_color, limits_of
+from renderer.image import srgb
+from renderer.scene import Scene
+from renderer.shading import BOUNDED
+from renderer.tree_boxes import boxes_at, visited
+from renderer.viewer import session
+from renderer.viewer.exhibit import Exhibit, open_file
+from renderer.viewer.passes import Answer
+from renderer.viewer.session import SupersededError
+from renderer.viewer.viewpoint import camera_of, camera_toml
+
+# Seconds for an answer that should come at once: what a machine with other work may take.
+PATIENCE = 30.0
+# 16,272 faces: by brute force 256 x 256 pixels take seconds, and a tile of them a tenth of one.
+HEAVY = f"""{SCENE}
+[[objects]]
+mesh = "{MODELS / "teapot.ply"}"
+material = "red"
+translate = [0.0, 0.0, -1.0]
+"""
+# What reflects and lets light through by constants, which a file can set to nothing.
+PLAIN = SCENE.replace('type = "dielectric"', "diffuse = 0.2\ntransmittance = 0.6\nior = 1.3")
+SIZE = {"w": 200, "h": 150}
+LONG = {"mode": "brute", "w": 256, "h": 256}
+
+
+@dataclass
+class Got:
+    """A binary message: its header, and its payload."""
+
+    kind: int
+    seq: int
+    step: int
+    last: int
+    w: int
+    h: int
+    ms: float
+    rate: float
+    payload: bytes
+
+    @property
+    def rgb(self) -> NDArray[np.uint8]:
+        """The picture of a message of kind 1."""
+        rgba = np.frombuffer(self.payload, np.uint8).reshape(self.h, self.w, 4)
+        assert self.kind == 1 and (rgba[..., 3] == 255).all()
+        return rgba[..., :3]
+
+
+class Client:
+    """A page, as far as the server can tell."""
+
+    def __init__(self, url: str) -> None:
+        origin = url.rstrip("/")
+        self.connection = connect(f"{origin.replace('http', 'ws')}/ws", origin=origin, max_size=None)
+        self.seq = 0
+
+    def __enter__(self) -> "Client":
+        self.socket = self.connection.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.connection.__exit__(*error)
+
+    def send(self, **message: Any) -> None:
+        self.socket.send(json.dumps(message))
+
+    def view(self, eye: tuple[float, float, float] = (0.5, 2.6, 5.5), **changes: Any) -> int:
+        self.seq += 1
+        self.send(**{"type": "view", "seq": self.seq, "mode": "octree", **looking(eye), **SIZE, **changes})
+        return self.seq
+
+    def next(self, timeout: float = PATIENCE) -> Got | dict[str, Any]:
+        message = self.socket.recv(timeout)
+        if isinstance(message, str):
+            return json.loads(message)
+        return Got(*struct.unpack("<6I2f", message[:32]), message[32:])
+
+    def acknowledge(self, got: Got) -> None:
+        self.send(type="ack", seq=got.seq, step=got.step)
+
+    def told(self, kind: str) -> dict[str, Any]:
+        """The next text message, which is of that type; pictures before it are acknowledged."""
+        while isinstance(message := self.next(), Got):
+            self.acknowledge(message)
+        assert message["type"] == kind, message
+        return message
+
+    def passes(self, seq: int) -> list[Got]:
+        """All pictures up to the last of view ``seq``, acknowledged."""
+        pictures = []
+        while not (pictures and pictures[-1].seq == seq and pictures[-1].last):
+            message = self.next()
+            if isinstance(message, Got):
+                pictures.append(message)
+                self.acknowledge(message)
+            else:
+                assert message["type"] in ("progress", "legend"), message
+        return pictures
+
+    def final(self, **changes: Any) -> Got:
+        return self.passes(self.view(**changes))[-1]
+
+
+def camera(eye: tuple[float, float, float]) -> PerspectiveCamera:
+    return PerspectiveCamera(eye=eye, target=(0.0, 0.5, 0.0), fov=38.0)
+
+
+def looking(eye: tuple[float, float, float]) -> dict[str, Any]:
+    right, up, forward = camera(eye).frame()
+    return {"m": [*right, 0.0, *up, 0.0, *-forward, 0.0, *eye, 1.0], "fovy": math.radians(38.0)}
+
+
+def rendered(scene: Scene, eye: tuple[float, float, float] = (0.5, 2.6, 5.5), **options: Any) -> Any:
+    """What ``render`` gives for the camera that ``Client.view`` sends."""
+    view = looking(eye)
+    seen = scene.model_copy(update={"camera": camera_of(view["m"], view["fovy"])})
+    return render(seen, **{"resolution": (200, 150), "max_depth": 6, **options})
+
+
+def fetched(url: str, path: str) -> bytes:
+    with urllib.request.urlopen(url + path, timeout=PATIENCE) as answer:
+        return answer.read()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scenes")
+    scenes = {
+        "blocks": SCENE,
+        "heavy": HEAVY,
+        "plain": PLAIN,
+        "typo": SCENE.replace("shininess", "shinyness"),
+        "lost": SCENE.replace("stairs.ply", "none.ply"),
+        "empty": "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n[materials]\n",
+    }
+    for name, text in scenes.items():
+        (folder / f"{name}.toml").write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def url(folder: Path) -> Iterator[str]:
+    with renderer.view(folder / "blocks.toml", browser=False) as viewing:
+        yield viewing.url
+
+
+@pytest.fixture(scope="module")
+def heavy(folder: Path) -> Iterator[str]:
+    with renderer.view(folder / "heavy.toml", browser=False) as viewing:
+        yield viewing.url
+
+
+@pytest.fixture
+def client(url: str) -> Iterator[Client]:
+    with Client(url) as client:
+        yield client
+
+
+@pytest.fixture
+def left(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The views whose pictures were given up, in order; those that are finished do not come here."""
+    seen: list[int] = []
+    answer = session.answer
+
+    def watched(shown: Exhibit, view: Any, *rest: Any) -> Answer:
+        try:
+            return answer(shown, view, *rest)
+        except SupersededError:
+            seen.append(view.seq)
+            raise
+
+    monkeypatch.setattr(session, "answer", watched)
+    return seen
+
+
+def wait_for(happened: Any, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+# Pictures
+
+
+def test_an_octree_view_grows_to_the_renderers_picture(client: Client, folder: Path) -> None:
+    scene = load_scene(folder / "blocks.toml")
+    passes = client.passes(client.view(w=400, h=300, settings={"samples": 4}))
+    assert [(p.kind, p.seq, p.step, p.last, p.w, p.h) for p in passes] == [
+        (1, 1, 0, 0, 128, 96),
+        (1, 1, 1, 0, 256, 192),
+        (1, 1, 2, 1, 400, 300),
+    ]
+    for got, samples in zip(passes, (1, 1, 4), strict=True):
+        expected = rendered(scene, resolution=(got.w, got.h), samples=samples)
+        assert np.array_equal(got.rgb, srgb(expected.radiance))
+        # The pace is that of tracing alone, which is part of the time.
+        assert got.ms > 0.0 and got.rate >= 0.999 * expected.rays.sum() / (1e3 * got.ms)
+
+
+def test_brute_force_gives_the_same_picture_in_one_pass(client: Client) -> None:
+    octree = client.final()
+    (brute,) = client.passes(client.view(mode="brute"))
+    assert (brute.step, brute.last, brute.w, brute.h) == (0, 1, 200, 150) and np.array_equal(brute.rgb, octree.rgb)
+
+
+def test_a_small_view_of_many_samples_is_first_shown_with_one(client: Client, folder: Path) -> None:
+    scene = load_scene(folder / "blocks.toml")
+    first, last = client.passes(client.view(w=40, h=30, settings={"samples": 9}))
+    for got, samples in ((first, 1), (last, 9)):
+        assert np.array_equal(got.rgb, srgb(rendered(scene, resolution=(40, 30), samples=samples).radiance))
+
+
+@pytest.mark.parametrize(
+    ("settings", "edit", "options"),
+    [
+        ({"max_depth": 1}, None, {"max_depth": 1}),
+        ({"shadows": False}, None, {"shadows": False}),
+        ({"reflection": False}, ("reflectance = 0.2", ""), {}),
+        ({"refraction": False}, ("transmittance = 0.6", ""), {}),
+        ({"light": [1.0, -1.0, 0.5]}, ("direction = [-0.6, -1.4, -0.8]", "direction = [1.0, -1.0, 0.5]"), {}),
+    ],
+)
+def test_what_a_panel_switches_is_as_if_the_file_said_so(
+    folder: Path, tmp_path: Path, settings: dict[str, Any], edit: tuple[str, str] | None, options: dict[str, Any]
+) -> None:
+    (tmp_path / "edited.toml").write_text(PLAIN.replace(*edit) if edit else PLAIN)
+    scene = load_scene(tmp_path / "edited.toml")
+    with renderer.view(folder / "plain.toml", browser=False) as viewing, Client(viewing.url) as client:
+        plain, got = client.final(), client.final(settings=settings)
+    assert np.array_equal(got.rgb, srgb(rendered(scene, **options).radiance))
+    assert not np.array_equal(got.rgb, plain.rgb)
+
+
+@pytest.mark.parametrize("aov", ["depth", "normal", "face", "cost"])
+def test_an_aov_is_drawn_and_its_scale_told(client: Client, folder: Path, aov: str) -> None:
+    client.view(w=100, h=75, settings={"aov": aov})
+    image = rendered(
+        load_scene(folder / "blocks.toml"),
+        resolution=(100, 75),
+        **({} if aov == "cost" else {"max_depth": 0, "shadows": False}),
+    )
+    if aov in ("depth", "cost"):
+        low, high = limits_of(image, aov)
+        assert client.next() == {"type": "legend", "seq": 1, "aov": aov, "low": low, "high": high}
+    got = client.next()
+    assert isinstance(got, Got) and np.array_equal(got.rgb, false_color(image, aov))
+
+
+def test_a_jpeg_looks_like_the_picture(client: Client) -> None:
+    from PIL import Image as Pillow
+
+    exact, got = client.final(), client.final(settings={"pixels": "jpeg"})
+    decoded = np.asarray(Pillow.open(io.BytesIO(got.payload)), np.float64)
+    # At quality 90 half of all values are within 2 of 255, edges apart, and a wrong row order is off by tens.
+    assert got.kind == 2 and len(got.payload) < 200 * 150 and np.abs(decoded - exact.rgb).mean() < 4.0
+
+
+def test_own_phong_is_a_colour_a_face_for_camera_and_light(client: Client, folder: Path) -> None:
+    world = open_file(folder / "blocks.toml").stage.world
+    (got,) = client.passes(client.view(mode="phong"))
+    assert (got.kind, got.step, got.last) == (3, 0, 1)
+    assert got.payload == face_colors(world, (0.5, 2.6, 5.5)).tobytes()
+    lit = client.final(mode="phong", settings={"light": [1.0, -1.0, 0.5]})
+    moved = client.final(mode="phong", eye=(-3.0, 2.0, 1.0))
+    assert len({got.payload, lit.payload, moved.payload}) == 3
+
+
+def test_own_phong_of_glass_and_mirrors_alone_is_lit(tmp_path: Path) -> None:
+    text = re.sub(r"reflectance = 0.2|diffuse = .*|specular = .*|shininess = .*", "", SCENE)
+    text = text.replace("[materials.red]", '[materials.red]\ntype = "mirror"')
+    (tmp_path / "a.toml").write_text(text.replace("[materials.stone]", '[materials.stone]\ntype = "mirror"'))
+    shown = open_file(tmp_path / "a.toml")
+    assert not shown.stage.needs.shadows
+    colors = face_colors(shown.stage.world, (0.5, 2.6, 5.5))
+    assert len(np.unique(colors, axis=0)) > 3  # ambient light alone would give each material one
+    view = looking((0.5, 2.6, 5.5))
+    seen = shown.stage.picture(camera_of(view["m"], view["fovy"]), shown.scene.render, BOUNDED, 1)
+    expected = rendered(shown.scene, resolution=(320, 240), max_depth=3)
+    assert np.array_equal(seen.rays, expected.rays)  # no ray goes to those lights
+
+
+def test_gl_is_drawn_by_the_page(client: Client) -> None:
+    client.view(mode="gl")
+    seq = client.view(mode="octree", w=64, h=64)
+    got = client.next()
+    assert isinstance(got, Got) and got.seq == seq
+
+
+def test_a_next_picture_waits_until_the_last_is_drawn(client: Client) -> None:
+    client.view()
+    first = client.next()
+    assert isinstance(first, Got) and first.step == 0
+    with pytest.raises(TimeoutError):
+        client.next(0.3)
+    client.send(type="ack", seq=first.seq, step=first.step + 1)  # of another picture
+    with pytest.raises(TimeoutError):
+        client.next(0.3)
+    client.acknowledge(first)
+    second = client.next()
+    assert isinstance(second, Got) and second.step == 1
+
+
+# The newest view
+
+
+def test_a_picture_that_waits_for_its_turn_gives_way_to_a_newer_view(client: Client) -> None:
+    client.view(w=400, h=300)
+    first = client.next()
+    assert isinstance(first, Got)
+    time.sleep(0.2)  # the second pass is done by now, or being done
+    newer = client.view(w=400, h=300)
+    time.sleep(0.1)
+    client.acknowledge(first)
+    got = client.next()
+    assert isinstance(got, Got) and (got.seq, got.step) == (newer, 0)
+
+
+def test_of_many_views_the_newest_is_shown(client: Client, folder: Path) -> None:
+    for i in range(50):
+        seq = client.view(eye=(0.5, 2.6, 5.5 + 0.01 * i))
+    passes = client.passes(seq)
+    # The first may have begun before the others came; of the rest only the newest is worth it.
+    assert len({p.seq for p in passes}) <= 10 and [p.seq for p in passes] == sorted(p.seq for p in passes)
+    expected = rendered(load_scene(folder / "blocks.toml"), eye=(0.5, 2.6, 5.5 + 0.01 * 49))
+    assert np.array_equal(passes[-1].rgb, srgb(expected.radiance))
+
+
+def test_while_views_keep_coming_first_passes_are_shown(heavy: str) -> None:
+    shown = []
+    with Client(heavy) as client:
+        end = time.monotonic() + 0.5
+        while time.monotonic() < end:
+            client.view(w=512, h=512)  # about every millisecond, of which a first pass takes several
+            with suppress(TimeoutError):
+                got = client.next(0.001)
+                assert isinstance(got, Got)
+                shown.append(got.step)
+                client.acknowledge(got)
+    assert len(shown) >= 3 and set(shown) == {0}
+
+
+def test_a_newer_view_ends_a_running_brute_force(heavy: str, left: list[int]) -> None:
+    with Client(heavy) as client:
+        old = client.view(**LONG)
+        assert client.told("progress")["seq"] == old
+        new = client.view(w=64, h=64)
+        asked = time.monotonic()
+        pictures = client.passes(new)
+        assert [p.seq for p in pictures] == [new] and time.monotonic() - asked < 5.0
+        wait_for(lambda: left == [old], 5.0)
+        with pytest.raises(TimeoutError):
+            client.next(0.3)
+
+
+def test_a_cancelled_brute_force_ends_and_says_no_more(heavy: str, left: list[int]) -> None:
+    with Client(heavy) as client:
+        seq = client.view(**LONG)
+        client.told("progress")
+        client.send(type="cancel")
+        wait_for(lambda: left == [seq], 5.0)
+        with pytest.raises(TimeoutError):
+            while True:  # what was said just before
+                assert client.next(0.3)["type"] == "progress"  # type: ignore[index]
+        assert client.final(w=64, h=64).last
+
+
+def test_while_brute_force_runs_others_see_their_pictures(heavy: str, left: list[int]) -> None:
+    with Client(heavy) as slow, Client(heavy) as quick:
+        seq = slow.view(**LONG)
+        slow.told("progress")
+        quick.seq, waits = 100, []
+        for _ in range(5):
+            asked = time.monotonic()
+            quick.view(w=512, h=512)
+            got = quick.next()
+            assert isinstance(got, Got) and got.step == 0
+            waits.append(time.monotonic() - asked)
+            quick.acknowledge(got)
+            quick.send(type="pick", x=0, y=0, **{"seq": 1, **looking((0.5, 2.6, 5.5)), **SIZE})
+            quick.told("pick")
+        assert seq not in left and slow.told("progress")["seq"] == seq  # it still runs
+        slow.send(type="cancel")
+        wait_for(lambda: seq in left, 5.0)
+    # The first pass waits for no tile of brute force, of which all together take seconds.
+    assert sorted(waits)[2] < 0.5
+
+
+def test_progress_rises_and_comes_at_most_ten_times_a_second(heavy: str) -> None:
+    with Client(heavy) as client:
+        seq = client.view(**{**LONG, "w": 128, "h": 128})
+        began, told = time.monotonic(), []
+        while not isinstance(message := client.next(), Got):
+            told.append(message)
+        lasted = time.monotonic() - began
+    assert all(m["type"] == "progress" and m["seq"] == seq for m in told)
+    shares = [m["done"] for m in told]
+    assert shares == sorted(shares) and 0.0 <= shares[0] <= shares[-1] <= 1.0
+    assert 1 <= len(shares) <= 10.0 * lasted + 1.0 and shares[-1] > 0.0
+
+
+# Bad clients and bad luck
+
+
+def test_a_connection_that_drops_ends_its_picture(heavy: str, left: list[int]) -> None:
+    with Client(heavy) as client:
+        seq = client.view(**LONG)
+        client.told("progress")
+        client.socket.socket.shutdown(socket.SHUT_RDWR)  # without a word of WebSocket's
+        wait_for(lambda: left == [seq], 5.0)
+    with Client(heavy) as other:
+        assert other.final(w=64, h=64).last
+
+
+def test_ten_clients_at_once_see_each_their_own(url: str, folder: Path) -> None:
+    scene = load_scene(folder / "blocks.toml")
+    eyes = [(0.5 + 0.3 * i, 2.6, 5.5) for i in range(10)]
+
+    def seen(eye: tuple[float, float, float]) -> NDArray[np.uint8]:
+        with Client(url) as client:
+            return client.final(eye=eye).rgb
+
+    with ThreadPoolExecutor(10) as pool:
+        pictures = list(pool.map(seen, eyes))
+    for eye, picture in zip(eyes, pictures, strict=True):
+        assert np.array_equal(picture, srgb(rendered(scene, eye=eye).radiance))
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [
+        "",
+        "nonsense",
+        "null",
+        "[" * 16000,
+        '{"a":' * 3000,
+        b"\0" * 40,
+        '{"type": "view"}',
+        '{"type": "ack", "seq": 1, "step": -1}',
+        json.dumps({"type": "view", "seq": 1, "mode": "octree", "m": [0.0] * 16, "fovy": 0.7, "w": 8, "h": 8}),
+        json.dumps({"type": "view", "seq": 1, "mode": "gl", "m": [1e308] * 15 + [1.0], "fovy": 0.7, "w": 8, "h": 8}),
+        json.dumps({"type": "pick", "seq": 1, "x": 0, "y": 0, "m": [0.0] * 16, "fovy": 0.7, "w": 8, "h": 8}),
+        json.dumps({"type": "camera", "m": [0.0] * 16, "fovy": 0.7}),
+        json.dumps({"type": "camera", "m": np.eye(4)[[0, 1, 2, 2]].ravel().tolist(), "fovy": 0.7}),  # no affine map
+    ],
+)
+def test_garbage_is_complained_of_on_one_line_and_harms_nothing(client: Client, garbage: str | bytes) -> None:
+    client.socket.send(garbage)
+    message = client.told("error")["message"]
+    assert message and "\n" not in message and len(message) < 1000
+    assert client.final(w=64, h=64).last
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e300])
+def test_a_camera_at_the_ends_of_float64_harms_nothing(client: Client, scale: float) -> None:
+    """Finite, so let in; the rays may be beyond what can be traced, and then that is said."""
+    view = looking((0.5, 2.6, 5.5))
+    view["m"] = [scale * x if i in (12, 13, 14) else x for i, x in enumerate(view["m"])]
+    client.send(**{"type": "view", "seq": 1, "mode": "octree", **view, "w": 64, "h": 64})
+    client.send(**{"type": "pick", "seq": 1, "x": 1, "y": 1, **view, "w": 64, "h": 64})
+    client.send(type="camera", **view)
+    for _ in range(3):
+        message = client.next()
+        if isinstance(message, Got):
+            client.acknowledge(message)
+        else:
+            assert message["type"] in ("pick", "camera", "error")
+    client.seq = 1
+    assert client.final(w=64, h=64).last
+
+
+@pytest.mark.parametrize(
+    ("file", "says"),
+    [("typo", "shinyness"), ("lost", "none.ply"), ("empty", "at least one face"), ("none", "scene.file")],
+)
+def test_a_scene_that_fails_to_load_leaves_the_old_one(client: Client, url: str, file: str, says: str) -> None:
+    before = client.final()
+    client.send(type="scene", file=f"{file}.toml")
+    message = client.told("error")["message"]
+    assert says in message and (file in message or file == "empty") and "\n" not in message
+    assert json.loads(fetched(url, "scene"))["name"] == "blocks.toml"
+    assert client.final().payload == before.payload
+
+
+def test_another_scene_is_shown_to_all(folder: Path) -> None:
+    with renderer.view(folder / "blocks.toml", browser=False) as viewing:
+        with Client(viewing.url) as asking, Client(viewing.url) as watching:
+            before = watching.final()
+            asking.send(type="scene", file="plain.toml")
+            assert asking.told("scene") == watching.told("scene") == {"type": "scene"}
+            expected = rendered(load_scene(folder / "plain.toml"))
+            for client in (asking, watching):
+                assert np.array_equal(client.final().rgb, srgb(expected.radiance))
+        assert not np.array_equal(before.rgb, srgb(expected.radiance))
+        assert json.loads(fetched(viewing.url, "scene"))["name"] == "plain.toml"
+
+
+# Clicks, cameras, and what is fetched
+
+
+@pytest.mark.parametrize(("x", "y"), [(100, 90), (140, 100), (3, 3)])
+def test_a_click_tells_what_the_ray_meets(client: Client, folder: Path, x: int, y: int) -> None:
+    shown = open_file(folder / "blocks.toml")
+    view = looking((0.5, 2.6, 5.5))
+    client.send(**{"type": "pick", "seq": 7, "x": x, "y": y, **view, **SIZE})
+    got = client.told("pick")
+    image = rendered(shown.scene)
+    face = int(image.face[y, x])
+    assert got["seq"] == 7 and got["hit"] == (face >= 0) and (got["face"] == face or face < 0)
+    assert len(got["path"]) == image.rays[y, x] and got["path"][0]["kind"] == "camera"
+    start, end = (np.array(got["path"][0][k]) for k in ("start", "end"))
+    opened = visited(shown.stage.octree, start, end - start)
+    assert got["visited"] == len(opened) and [n["level"] for n in got["nodes"]] == [n.level for n in opened]
+    if face < 0:
+        assert [got[k] for k in ("t", "face", "material", "point", "normal")] == [None] * 5
+        return
+    # The depth is float64 by another order of operations: a few units in the last place.
+    assert got["t"] == pytest.approx(image.depth[y, x], rel=1e-12)
+    assert np.allclose(got["point"], end, rtol=0.0, atol=1e-12)
+    assert np.allclose(got["normal"], image.normal[y, x], rtol=0.0, atol=1e-6)  # the picture's are float32
+    assert got["material"] in shown.scene.materials
+
+
+def test_a_clicked_ray_ends_where_it_weighs_less_than_the_scene_wants(folder: Path) -> None:
+    shown = open_file(folder / "blocks.toml")
+    light = shown.scene.model_copy(update={"render": shown.scene.render.model_copy(update={"min_weight": 0.5})})
+    segments = []
+    for scene in (shown.scene, light):
+        with renderer.view(scene, browser=False) as viewing, Client(viewing.url) as client:
+            view = looking((0.5, 2.6, 5.5))
+            client.send(**{"type": "pick", "seq": 1, "x": 140, "y": 100, **view, **SIZE})
+            segments.append(len(client.told("pick")["path"]))
+    assert segments[1] == rendered(light, min_weight=0.5).rays[100, 140] < segments[0]
+
+
+@pytest.mark.parametrize("walk", [False, True])
+def test_a_saved_camera_is_the_one_that_was_sent(client: Client, tmp_path: Path, walk: bool) -> None:
+    view = looking((0.3, 2.0, 4.0)) | {"fovy": 0.7}
+    client.send(type="camera", walk=walk, **view)
+    answer = client.told("camera")
+    scene = re.sub(r"\[camera\][^\[]*(\[[^\[\]]*\][^\[]*){2}", "", SCENE, count=1)
+    assert "[camera]" not in scene
+    (tmp_path / "a.toml").write_text(scene + "\n" + answer["text"])
+    loaded = load_scene(tmp_path / "a.toml").camera
+    assert isinstance(loaded, PerspectiveCamera) and answer["name"] == "camera.toml"
+    right, up, forward = loaded.frame()
+    again = [*right, 0.0, *up, 0.0, *-forward, 0.0, *loaded.eye, 1.0]
+    # The target is eye minus axis, rounded, and the frame is made from it again.
+    assert np.allclose(again, view["m"], rtol=0.0, atol=1e-14) and loaded.fov == math.degrees(view["fovy"])
+    assert camera_toml(loaded) == answer["text"]
+    distance = float(np.linalg.norm(np.subtract(loaded.target, loaded.eye)))
+    assert distance == pytest.approx(1.0) if walk else distance > 2.0
+
+
+def test_the_scene_is_described(url: str, folder: Path) -> None:
+    told, scene = json.loads(fetched(url, "scene")), load_scene(folder / "blocks.toml")
+    shown = open_file(folder / "blocks.toml")
+    assert told["files"] == sorted(path.name for path in folder.glob("*.toml"))
+    assert told["camera"] == json.loads(scene.camera.model_dump_json())
+    assert told["render"] == {"resolution": [320, 240], "samples": 1, "max_depth": 3, "shadows": True}
+    assert (told["faces"], told["vertices"]) == (len(shown.stage.mesh.faces), len(shown.stage.mesh.vertices))
+    assert told["bounds"] == np.asarray(shown.stage.mesh.bounds).tolist()
+    assert {m["name"]: m["type"] for m in told["materials"]} == {
+        "red": "phong",
+        "glass": "dielectric",
+        "stone": "phong",
+    }
+    stone = next(m for m in told["materials"] if m["name"] == "stone")
+    assert stone["diffuse"] == [0.6] * 3 and stone["reflectance"] == [0.2] * 3 and stone["transmittance"] == [0.0] * 3
+    assert told["lights"] == [{"type": "directional", "direction": [-0.6, -1.4, -0.8], "color": [0.8] * 3}]
+    assert told["octree"]["nodes"] == shown.stage.octree.stats.nodes
+    assert told["modes"] == ["gl", "phong", "brute", "octree"] and told["threads"] == shown.threads
+    assert set(told["needs"]) >= {"reflection", "refraction", "shadows"}
+
+
+def test_the_mesh_and_the_boxes_are_fetched(url: str, folder: Path) -> None:
+    shown = open_file(folder / "blocks.toml")
+    mesh, raw = shown.stage.mesh, fetched(url, "mesh")
+    magic, count = struct.unpack("<2I", raw[:8])
+    assert magic == 0x4853454D and count == len(mesh.faces)
+    assert len(raw) == 8 + 72 * count + 2 * count + count % 2 * 2
+    corners = np.frombuffer(raw, "<f4", 9 * count, 8).reshape(-1, 3, 3)
+    normals = np.frombuffer(raw, "<f4", 9 * count, 8 + 36 * count).reshape(-1, 3, 3)
+    material = np.frombuffer(raw, "<u2", count, 8 + 72 * count)
+    assert np.array_equal(corners, mesh.triangles.astype(np.float32))
+    assert np.allclose(np.linalg.norm(normals, axis=2), 1.0, atol=1e-6)  # float32
+    sizes = [len(i.mesh.faces) for i in shown.scene.instances]
+    names = [name for i, n in zip(shown.scene.instances, sizes, strict=True) for name in [i.material] * n]
+    assert [list(shown.scene.materials)[i] for i in material] == names
+    for level in (0, 2):
+        raw = fetched(url, f"octree?level={level}")
+        n, levels = struct.unpack("<2I", raw[:8])
+        boxes = np.frombuffer(raw, "<f4", offset=8).reshape(-1, 6)
+        assert np.array_equal(boxes, boxes_at(shown.stage.octree, level)) and n == len(boxes) >= 1 and levels > 2
+
+
+# How it is started and ends
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_the_command_prints_its_address_and_control_c_ends_it_in_the_middle_of_a_picture(folder: Path) -> None:
+    command = [sys.executable, "-m", "renderer.cli", "view", str(folder / "heavy.toml"), "--no-browser"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    try:
+        assert running.stdout is not None
+        line = running.stdout.readline()
+        found = re.fullmatch(r".*heavy\.toml is shown at (http://127\.0\.0\.1:\d+/) until Ctrl-C\n", line)
+        assert found, line
+        with Client(found[1]) as client:
+            client.view(**LONG)
+            client.told("progress")
+            sent = time.monotonic()
+            running.send_signal(signal.SIGINT)
+            _, err = running.communicate(timeout=30)
+        waited = time.monotonic() - sent
+    finally:
+        running.kill()
+    # A second for connections, a tile's tenth of one, and as much again for machines with other work.
+    assert running.returncode == 0 and "Traceback" not in err and waited < 4.0
+
+
+def test_a_busy_port_is_one_line(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    port = re.search(r":(\d+)/", url)[1]  # type: ignore[index]
+    assert main(["view", str(folder / "blocks.toml"), "--port", port, "--no-browser"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.splitlines()[-1].startswith(
+        f"octree-render: host and port: expected a free port, got 127.0.0.1:{port}"
+    )
+
+
+@pytest.mark.parametrize("package", ["starlette", "uvicorn"])
+def test_without_the_extra_one_line_says_how_to_install_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], package: str
+) -> None:
+    for name in list(sys.modules):
+        if name.split(".")[0] == package or name.startswith("renderer.viewer."):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    assert main(["view", str(folder / "blocks.toml")]) == 2
+    out, err = capsys.readouterr()
+    line = f"octree-render: the viewer needs the package {package}: pip install 'octree-renderer[viewer]'\n"
+    assert (out, err) == ("", line)
+
+
+def test_outside_a_notebook_the_browser_opens(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
+    viewing = renderer.view(load_scene(folder / "blocks.toml"))
+    try:
+        assert opened == [viewing.url]
+        assert json.loads(fetched(viewing.url, "scene"))["files"] == []  # made in Python: there is no folder to offer
+    finally:
+        viewing.close()
+    with pytest.raises(OSError):
+        fetched(viewing.url, "scene")
+
+
+def test_in_a_notebook_the_page_is_framed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ipython = ModuleType("IPython")
+    ipython.get_ipython = lambda: SimpleNamespace(kernel=object())  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    monkeypatch.setattr("webbrowser.open", lambda url: pytest.fail(f"a browser was opened for {url}"))
+    with renderer.view(folder / "blocks.toml") as viewing:
+        shown = viewing._repr_html_()
+        assert f'<iframe src="{viewing.url}"' in shown and f'<a href="{viewing.url}"' in shown
+        with urllib.request.urlopen(viewing.url, timeout=PATIENCE) as page:
+            assert "http://localhost:*" in page.headers["Content-Security-Policy"]
+
+
+def test_what_is_no_scene_is_refused() -> None:
+    with pytest.raises(ValueError, match="scene: expected a Scene or a path, got int"):
+        renderer.view(3)  # type: ignore[arg-type]

@@ -1,0 +1,195 @@
+"""The viewer in a browser, as its tests use it: the server's command, Chromium, and what a person does there."""
+
+import base64
+import json
+import os
+import re
+import select
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ClassVar
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+# Software GL, so that the tests need no graphics card; the last keeps Chromium from calling home.
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+MODELS = Path(__file__).parent.parent / "scenes" / "models"
+# Milliseconds. A first picture of another kind may compile its kernels.
+PATIENCE = 60_000
+
+SCENE = f"""
+ambient = 0.1
+background = [0.45, 0.62, 0.82]
+[render]
+resolution = [320, 240]
+max_depth = 3
+[camera]
+eye = [0.5, 2.6, 5.5]
+target = [0.0, 0.5, 0.0]
+fov = 38
+[materials.red]
+diffuse = [0.7, 0.1, 0.1]
+specular = 0.4
+shininess = 40
+[materials.glass]
+type = "dielectric"
+[materials.stone]
+diffuse = 0.6
+reflectance = 0.2
+[[lights]]
+type = "directional"
+direction = [-0.6, -1.4, -0.8]
+irradiance = 0.8
+[[objects]]
+mesh = "{MODELS / "stairs.ply"}"
+material = "red"
+scale = 0.5
+translate = [-0.8, 0.0, -0.3]
+[[objects]]
+mesh = "{MODELS / "block.ply"}"
+material = "glass"
+rotate = [0, 30, 0]
+translate = [0.8, 0.01, 0.6]
+[floor]
+min = [-2.0, -2.0]
+max = [2.0, 2.0]
+squares = [4, 4]
+materials = ["stone"]
+"""
+
+
+@contextmanager
+def served(scene: Path) -> Iterator[str]:
+    """Where `octree-render view` serves ``scene``, as long as the context lasts."""
+    command = [sys.executable, "-m", "renderer.cli", "view", str(scene), "--port", "0", "--no-browser"]
+    root = str(Path(__file__).parent.parent)
+    environment = {**os.environ, "PYTHONPATH": root, "PYTHONUNBUFFERED": "1"}
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment)
+    assert server.stdout is not None
+    try:
+        yield _printed_url(server)
+    finally:
+        server.terminate()
+        server.wait(10)
+        server.stdout.close()
+
+
+def _printed_url(server: "subprocess.Popen[bytes]") -> str:
+    printed, end = "", time.monotonic() + PATIENCE / 1e3
+    while time.monotonic() < end and server.poll() is None:
+        if select.select([server.stdout], [], [], 0.2)[0]:
+            printed += os.read(server.stdout.fileno(), 65536).decode()  # type: ignore[union-attr]
+            if found := re.search(r"http://\S+", printed):
+                return found[0]
+    raise AssertionError(f"the server printed no address: {printed}")
+
+
+class Viewer:
+    """One page in the browser, and what it says about itself."""
+
+    faults: ClassVar[list[str]] = []  # of all pages
+
+    def __init__(self, browser: Any, url: str, **options: Any) -> None:
+        self.context = browser.new_context(**{"viewport": {"width": 800, "height": 420}, **options})
+        self.page = self.context.new_page()
+        self.page.on("console", lambda m: self.faults.append(m.text) if m.type in ("error", "warning") else None)
+        self.page.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.page.on("request", self._check_request)
+        self.url = url
+
+    def _check_request(self, request: Any) -> None:
+        address = urlsplit(request.url)
+        if address.scheme not in ("blob", "data") and address.hostname != "127.0.0.1":
+            self.faults.append(f"a request to {request.url}")
+
+    def open(self) -> "Viewer":
+        self.page.goto(self.url)
+        self.page.wait_for_selector("body[data-ready]", timeout=PATIENCE)
+        self.settled("octree")
+        return self
+
+    def restart(self) -> None:
+        """Everything as it was when the page opened."""
+        self.page.evaluate(
+            """() => {
+                const { viewer } = window;
+                document.querySelector("#settings").reset();
+                viewer.panel.load(viewer.scene);
+                viewer.changed("boxes");
+                viewer.changed("walk");
+                viewer.rays.close();
+                viewer.camera.reset();
+                viewer.layout();
+                viewer.setMode("octree");
+            }"""
+        )
+        self.settled("octree")
+
+    def settled(self, mode: str) -> dict[str, Any]:
+        """Wait for the last picture of the newest view in ``mode``; returns the stage's data attributes."""
+        self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        shown = """(mode) => {
+            const { dataset } = document.querySelector("#stage");
+            const { viewer } = window;
+            return dataset.mode === mode && dataset.last === "1" && Number(dataset.seq) === viewer.seq && !viewer.dirty;
+        }"""
+        self.page.wait_for_function(shown, arg=mode, timeout=PATIENCE)
+        return self.page.evaluate("() => ({ ...document.querySelector('#stage').dataset })")
+
+    def choose(self, mode: str) -> None:
+        self.page.locator("#stage").press({"gl": "1", "phong": "2", "brute": "3", "octree": "4"}[mode])
+        self.settled(mode)
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        return json.loads(self.page.locator("#stage").get_attribute("data-camera"))
+
+    def pixels(self, canvas: str) -> NDArray[np.uint8]:
+        """The canvas of that id, (h, w, 4) uint8."""
+        size, values = self.page.evaluate(
+            """(id) => {
+                const source = document.getElementById(id), copy = document.createElement("canvas");
+                [copy.width, copy.height] = [source.width, source.height];
+                const context = copy.getContext("2d");
+                context.drawImage(source, 0, 0);
+                const { data } = context.getImageData(0, 0, copy.width, copy.height);
+                let text = "";
+                for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
+                return [[copy.height, copy.width], btoa(text)];
+            }""",
+            canvas,
+        )
+        return np.frombuffer(base64.b64decode(values), np.uint8).reshape(*size, 4)
+
+    def centre(self) -> tuple[float, float]:
+        box = self.page.locator("#frame").bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def drag(self, x: float, y: float, button: str = "left") -> None:
+        start = self.centre()
+        self.page.mouse.move(*start)
+        self.page.mouse.down(button=button)
+        self.page.mouse.move(start[0] + x, start[1] + y, steps=4)
+        self.page.mouse.up(button=button)
+
+    def pinch(self) -> None:
+        """Two fingers that part."""
+        wire = self.context.new_cdp_session(self.page)
+        x, y = self.centre()
+
+        def touch(kind: str, *apart: float) -> None:
+            points = [{"x": x + side * d, "y": y, "id": side} for d in apart for side in (0, 1)]
+            wire.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        touch("touchStart", 40)
+        for apart in (60, 80, 100):
+            touch("touchMove", apart)
+        touch("touchEnd")
