@@ -39,7 +39,7 @@ from renderer.image import srgb
 from renderer.scene import Scene
 from renderer.shading import BOUNDED
 from renderer.tree_boxes import boxes_at, visited
-from renderer.viewer import session
+from renderer.viewer import app, session
 from renderer.viewer.exhibit import Exhibit, open_file
 from renderer.viewer.passes import Answer
 from renderer.viewer.session import SupersededError
@@ -516,6 +516,29 @@ def test_a_scene_that_fails_to_load_leaves_the_old_one(client: Client, url: str,
     assert says in message and (file in message or file == "empty") and "\n" not in message
     assert json.loads(fetched(url, "scene"))["name"] == "blocks.toml"
     assert client.final().payload == before.payload
+
+
+def test_of_many_scenes_asked_for_the_newest_is_opened(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    open_one = app.open_file
+
+    def counting(path: Path) -> Exhibit:
+        opened.append(path.name)
+        return open_one(path)
+
+    monkeypatch.setattr(app, "open_file", counting)
+    with renderer.view(folder / "blocks.toml", browser=False) as viewing, Client(viewing.url) as client:
+        for _ in range(30):
+            client.send(type="scene", file="blocks.toml")
+        client.send(type="scene", file="plain.toml")
+        while json.loads(fetched(viewing.url, "scene"))["name"] != "plain.toml":
+            client.next()
+    assert len(opened) < 20 and opened[-1] == "plain.toml"
+
+
+def test_brute_force_takes_one_sample(client: Client) -> None:
+    one = client.final(mode="brute", w=48, h=32)
+    assert client.final(mode="brute", w=48, h=32, settings={"samples": 64}).payload == one.payload
 
 
 def test_another_scene_is_shown_to_all(folder: Path) -> None:

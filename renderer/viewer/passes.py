@@ -41,7 +41,10 @@ class Pass:
 
 
 def passes_of(view: View) -> list[Pass]:
-    """What is sent for ``view``: nothing for "gl", face colours for "phong", one picture or growing ones."""
+    """What is sent for ``view``: nothing for "gl", face colours for "phong", one picture or growing ones.
+
+    Brute force takes one sample a pixel: nothing stops a tile under way, and of many samples it would take minutes.
+    """
     if view.mode == "gl":
         return []
     longest = max(view.w, view.h)
@@ -51,7 +54,8 @@ def passes_of(view: View) -> list[Pass]:
         coarse = [longest]
     sizes = [(_scaled(view.w, side, longest), _scaled(view.h, side, longest)) for side in coarse]
     first = [Pass(step, False, size, 1) for step, size in enumerate(sizes)]
-    return [*first, Pass(len(sizes), True, (view.w, view.h), view.settings.samples)]
+    samples = view.settings.samples if view.mode == "octree" else 1
+    return [*first, Pass(len(sizes), True, (view.w, view.h), samples)]
 
 
 class Answer(NamedTuple):

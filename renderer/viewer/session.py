@@ -82,13 +82,13 @@ class Session:
     threads: Executor
     views: Newest[View] = field(default_factory=Newest)
     picks: Newest[Pick] = field(default_factory=Newest)
+    scenes: Newest[str] = field(default_factory=Newest)
 
     def __post_init__(self) -> None:
         self._awaited: tuple[int, int] | None = None
         self._acknowledged = asyncio.Event()
         self._acknowledged.set()
         self._leaving: set[asyncio.Future[Any]] = set()
-        self._opening: set[asyncio.Task[None]] = set()
 
     async def receive(self, text: str) -> None:
         """Take one message in. What is wrong with it is told to the page."""
@@ -107,15 +107,16 @@ class Session:
             elif isinstance(message, SaveCamera):
                 await self._tell(type="camera", name="camera.toml", text=self._camera(message))
             elif isinstance(message, OpenScene):
-                self._open(message.file)
+                self.scenes.put(message.file)
         except ValueError as error:
             await self.complain(error)
 
     async def run(self) -> None:
-        """Show views and answer clicks until cancelled."""
+        """Show views, answer clicks and open scenes until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._show_views())
             tasks.create_task(self._answer_picks())
+            tasks.create_task(self._open_scenes())
 
     async def complain(self, error: Exception) -> None:
         """Tell the page what is wrong, on one line."""
@@ -205,18 +206,13 @@ class Session:
             except Exception as error:  # as above
                 await self.complain(error)
 
-    def _open(self, file: str) -> None:
-        """Change the scene while messages go on."""
-
-        async def opened() -> None:
+    async def _open_scenes(self) -> None:
+        while True:
+            file = await self.scenes.take()
             try:
                 await self.hall.open(file)
-            except (ValueError, OSError, MemoryError) as error:
+            except Exception as error:  # as above
                 await self.complain(error)
-
-        task = asyncio.create_task(opened())
-        self._opening.add(task)
-        task.add_done_callback(self._opening.discard)
 
     def _camera(self, message: SaveCamera) -> str:
         """The camera as TOML. Its target is where its axis passes the middle of the scene, if that lies ahead."""

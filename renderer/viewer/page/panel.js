@@ -123,6 +123,7 @@ export class Panel {
   setMode(mode) {
     const traced = mode === "octree" || mode === "brute";
     document.querySelector("#traced").disabled = !traced;
+    this.fields.samples.disabled = mode === "brute"; // it always takes one
     document.querySelector("#traced-note").hidden = traced;
   }
 }
