@@ -327,8 +327,7 @@ def test_a_setting_changes_the_picture(viewer: Viewer, name: str) -> None:
 def test_another_scene_and_a_broken_one(viewer: Viewer) -> None:
     before = viewer.pixels("picture")
     viewer.page.select_option("[name=file]", "broken.toml")
-    viewer.page.wait_for_selector("#notices p")
-    assert "fov" in viewer.page.inner_text("#notices")
+    viewer.page.locator("#notices p", has_text="fov").wait_for(timeout=PATIENCE)
     assert np.array_equal(viewer.pixels("picture"), before)
     assert viewer.page.input_value("[name=file]") == "blocks.toml"
     viewer.page.select_option("[name=file]", "other.toml")
