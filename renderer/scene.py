@@ -150,6 +150,14 @@ class Scene(_Table):
             placed += [Instance(m, name, False) for m, name in _floor_meshes(self.floor)]
         return tuple(placed)
 
+    def altered(self, **changes: object) -> "Scene":
+        """A copy with other values of fields, by name, that shares the meshes: none is loaded or placed again.
+
+        So a change of ``objects`` or ``floor`` shows nowhere. Values are not checked as those of a scene file are.
+        """
+        _ = self.instances  # what is cached goes along
+        return self.model_copy(update=changes)
+
 
 def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file, and load its meshes. Raises ``SceneError`` or ``MeshError``."""

@@ -35,7 +35,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, World]:
         material=np.repeat(np.array([rows[i.material] for i in instances], np.int32), counts),
         smooth=np.repeat([i.smooth for i in instances], counts if needs.smooth_normals else 0).astype(np.bool_),
         materials=_materials(scene, needs),
-        lights=_lights(scene, needs),
+        lights=light_rows(scene, needs),
         colors=np.array([scene.ambient, scene.background]),
         media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
     )
@@ -53,7 +53,7 @@ def _materials(scene: Scene, needs: Needs) -> NDArray[np.float64]:
     return rows
 
 
-def _lights(scene: Scene, needs: Needs) -> NDArray[np.float64]:
+def light_rows(scene: Scene, needs: Needs) -> NDArray[np.float64]:
     """The rows of the lights that shine, and of as many others as ``needs`` asks for, in the scene's order."""
     if not needs.shadows:
         return np.zeros((0, LIGHT_COLUMNS))

@@ -144,14 +144,19 @@ def test_their_faults_are_theirs():
         assert comparison.ours_wrong == 0
 
 
-def test_what_float32_cannot_tell_is_right_on_both_sides():
+def grazing():
+    """Grazing rays, what exact arithmetic answers with t rounded to float64, and Embree's answers."""
     batch = rays.grazing_rays(VERTICES[FACES], 2000, np.random.default_rng(2))
     hits = exact.closest_hits(VERTICES, FACES, batch.origins, batch.directions)
-    ours = HitArrays(
+    exactly = HitArrays(
         np.array([np.inf if hit is None else float(hit.t) for hit in hits]),
         np.array([-1 if hit is None else hit.face for hit in hits]),
     )
-    theirs = HitArrays(*Embree(VERTICES, FACES).closest_hit(batch.origins, batch.directions))
+    return batch, exactly, HitArrays(*Embree(VERTICES, FACES).closest_hit(batch.origins, batch.directions))
+
+
+def test_what_float32_cannot_tell_is_right_on_both_sides():
+    batch, ours, theirs = grazing()
     comparison = judged(ours, theirs, batch)
     assert comparison.verdicts[BOTH_RIGHT] > 0 and comparison.ours_wrong == 0
 
@@ -249,13 +254,7 @@ def test_equal_rays_with_other_answers_are_judged_apart():
 
 def test_theirs_is_judged_by_its_own_rounding():
     """The same t, float32's rounding off: right for a float32 reference and wrong for a float64 one."""
-    batch = rays.grazing_rays(VERTICES[FACES], 2000, np.random.default_rng(2))
-    hits = exact.closest_hits(VERTICES, FACES, batch.origins, batch.directions)
-    ours = HitArrays(
-        np.array([np.inf if hit is None else float(hit.t) for hit in hits]),
-        np.array([-1 if hit is None else hit.face for hit in hits]),
-    )
-    theirs = HitArrays(*Embree(VERTICES, FACES).closest_hit(batch.origins, batch.directions))
+    batch, ours, theirs = grazing()
     single = judge(compare(ours, theirs, VERTICES, FACES, batch), VERTICES, FACES)
     double = judge(compare(ours, theirs, VERTICES, FACES, batch, FLOAT64_ROUNDOFF), VERTICES, FACES)
     assert single.verdicts[BOTH_RIGHT] > 0 and double.verdicts[BOTH_RIGHT] == 0

@@ -14,6 +14,7 @@ from renderer import Mesh, Octree, load_scene
 from validation import exact, tradeoff_hits
 from validation.benchmark import knobs_hits, knobs_pictures, pareto
 from validation.cases import CASES
+from validation.compare_hits import HitArrays
 from validation.rays import random_rays
 from validation.tradeoff import front, median_seconds, slope, timed
 
@@ -155,13 +156,13 @@ def test_errors_count_every_kind_of_wrong_answer():
     origins = np.array([[0.2, 0.2, 1.0]] * 4 + [[2.0, 2.0, 1.0]] * 2)
     directions = np.array([[0.0, 0.0, -1.0]] * 6)
     truth = exact.closest_hits(triangle + below, [[0, 1, 2], [3, 4, 5]], origins, directions)
-    answer = tradeoff_hits.Answer(
+    answer = HitArrays(
         np.array([1.0, 1.25, 2.0, np.inf, np.inf, 3.0]), np.array([0, 0, 1, -1, -1, 1], dtype=np.int64)
     )
     found = tradeoff_hits.errors(answer, truth)
     assert (found["missed"], found["false_hits"], found["wrong_face"], found["both_hit"]) == (1, 1, 1, 3)
     assert found["p50"] == 0.25 and found["max"] == 1.0
-    nothing = tradeoff_hits.errors(tradeoff_hits.Answer(np.full(6, np.inf), np.full(6, -1)), truth)
+    nothing = tradeoff_hits.errors(HitArrays(np.full(6, np.inf), np.full(6, -1)), truth)
     assert nothing["max"] is None and nothing["missed"] == 4
 
 

@@ -154,8 +154,7 @@ def test_radiance_is_not_compressed_inside_glass_and_paths_repeat() -> None:
 def test_passes_draw_their_own_branches() -> None:
     scene, ray = inside_glass()
     light = DirectionalLight(direction=(0.0, -1.0, 0.0))  # lights nothing, but its pass comes before the background's
-    second = scene.model_copy(update={"lights": (light,)})
-    second.__dict__["instances"] = scene.instances
+    second = scene.altered(lights=(light,))
     first, other = (random_paths(of, ray, 200, max_depth=1) for of in (scene, second))
     assert not np.array_equal(first, other)
 

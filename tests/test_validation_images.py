@@ -81,12 +81,6 @@ def failing(gates: list[Gate]) -> list[str]:
     return [f"{gate.subject}: {gate.quantity} is {gate.value}" for gate in gates if not gate.passed]
 
 
-def changed(scene: Scene, **update: Any) -> Scene:
-    copy = scene.model_copy(update=update)
-    copy.__dict__["instances"] = scene.instances
-    return copy
-
-
 def test_the_whole_ladder_passes_and_leaves_what_the_report_shows(tmp_path: Path) -> None:
     record, gates = check(tmp_path, balls(), Effort(64, 32))
     assert failing(gates) == []
@@ -105,7 +99,7 @@ def test_the_whole_ladder_passes_and_leaves_what_the_report_shows(tmp_path: Path
 
 
 def test_a_scene_without_shadows_is_judged_by_who_can(tmp_path: Path) -> None:
-    bright = changed(balls(), render=balls().render.model_copy(update={"shadows": False}))
+    bright = balls().altered(render=balls().render.model_copy(update={"shadows": False}))
     record, gates = check(tmp_path, bright)
     assert failing(gates) == []
     assert "shadows" in record["rungs"][-1]["left_out"][mitsuba_path.NAME]
@@ -139,12 +133,12 @@ def _moved(scene: Scene) -> Scene:
 
 def _without_highlights(scene: Scene) -> Scene:
     dull = scene.materials["red"].model_copy(update={"specular": (0.0,) * 3})
-    return changed(scene, materials=scene.materials | {"red": dull})
+    return scene.altered(materials=scene.materials | {"red": dull})
 
 
 def _swapped_ior(scene: Scene) -> Scene:
     swapped = scene.materials["glass"].model_copy(update={"ior": 1.0 / 1.5})
-    return changed(scene, materials=scene.materials | {"glass": swapped})
+    return scene.altered(materials=scene.materials | {"glass": swapped})
 
 
 def _geometry(name: str, change: Callable[[Any], Any]) -> Callable[..., Image]:
@@ -160,7 +154,7 @@ DEFECTS = {
     "gain of 1.001": _radiance(lambda r: r * 1.001),
     "half a pixel": _scene(_moved),
     "n1 and n2 swapped": _scene(_swapped_ior),
-    "a light missing": _scene(lambda s: changed(s, lights=s.lights[:1])),
+    "a light missing": _scene(lambda s: s.altered(lights=s.lights[:1])),
     "no highlights": _scene(_without_highlights),
     "depth 2 for 6": lambda scene, **o: render(scene, **o | {"max_depth": 2}),
     "one pixel black": _radiance(lambda r: np.where(np.arange(r.size).reshape(r.shape) // 3 == 2400, 0, r)),
@@ -211,12 +205,12 @@ def test_a_mesh_that_mitsuba_cannot_hold_is_not_passed(tmp_path: Path) -> None:
 
 def test_a_picture_of_nothing_is_not_passed(tmp_path: Path) -> None:
     up = stairs().camera.model_copy(update={"eye": (6.0, 70.0, 8.0), "target": (6.0, 80.0, 0.0)})
-    away = changed(stairs(), camera=up)
+    away = stairs().altered(camera=up)
     assert any("ssim_foreground is nan" in line for line in failing(check(tmp_path, away)[1]))
 
 
 def test_a_users_scene_keeps_its_shape_and_climbs_the_ladder(tmp_path: Path) -> None:
-    wide = changed(stairs(), render=stairs().render.model_copy(update={"resolution": (1000, 500)}))
+    wide = stairs().altered(render=stairs().render.model_copy(update={"resolution": (1000, 500)}))
     record, gates = check(tmp_path, wide, Effort(64, 32))
     assert failing(gates) == []
     sizes = {rung["name"]: rung["size"] for rung in record["rungs"]}

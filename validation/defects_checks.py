@@ -57,9 +57,7 @@ def extreme(first: int, last: int) -> Callable[[Job], Iterator[Gate]]:
     def check(job: Job) -> Iterator[Gate]:
         for case in numerical.CASES:
             if first <= case.number <= last and case.number != _LARGE:
-                subject = f"extreme case {case.number}: {case.construct}"
-                holds = float(bool(case.record(job.quick)["holds"]))
-                yield Gate("stability", subject, "holds", holds, "at least", 1.0, case.tolerance)
+                yield numerical.check_case(case, job)[1]
 
     return check
 

@@ -7,6 +7,7 @@ import numpy as np
 from renderer.mesh import Mesh
 from renderer.octree import Octree
 from renderer.shapes import icosphere, torus
+from validation import watertight
 from validation.check_hits import SEED, Asked, Effort, ask
 from validation.gates import Gate
 from validation.job import Job
@@ -33,9 +34,7 @@ def check_leaks(effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
         for rays in leak_rays(mesh.vertices, mesh.faces, effort.leaks, SEED):
             job.step(f"leaks: {name}, {rays.name}")
             inside = _from_ring_core(rays) if name == "torus" else rays
-            missed = ~octree.closest_hit(inside.origins, inside.directions).hit
-            missed |= ~octree.any_hit(inside.origins, inside.directions)
-            leaks, limit = int(np.count_nonzero(missed)), job.thresholds.hits.leaks
+            leaks, limit = watertight.leaks(octree, inside), job.thresholds.hits.leaks
             theirs = [_leaks(one, inside) for one in asked]
             sets.append({"mesh": subject, "kind": rays.name, "rays": len(rays), "ours": leaks, "references": theirs})
             where, reason = f"{subject}, {rays.name} rays from inside", "a closed mesh has no holes"

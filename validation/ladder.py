@@ -89,9 +89,7 @@ def _derived(scene: Scene, level: int) -> Scene:
     """The scene of a rung below everything; its meshes are not loaded again."""
     lights = scene.lights if level >= _SHADOWS else (_lamp(scene),)
     materials = {name: _reduced(material, level) for name, material in scene.materials.items()}
-    copy = scene.model_copy(update={"lights": lights, "materials": materials, "ambient": _BLACK})
-    copy.__dict__["instances"] = scene.instances
-    return copy
+    return scene.altered(lights=lights, materials=materials, ambient=_BLACK)
 
 
 def _reduced(material: Material, level: int) -> Material:

@@ -46,11 +46,7 @@ def _emitting(shape: mi.Mesh, radiance: source.Rgb, turned: bool) -> mi.Mesh:
     properties["emitter"] = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": list(radiance)}})
     counts, smooth = (shape.vertex_count(), shape.face_count()), shape.has_vertex_normals()
     result = mi.Mesh(shape.id(), *counts, has_vertex_normals=smooth, props=properties)
-    given, arrays = mi.traverse(shape), mi.traverse(result)
+    given = mi.traverse(shape)
     faces = np.array(given["faces"]).reshape(-1, 3)
-    arrays["vertex_positions"] = given["vertex_positions"]
-    arrays["faces"] = (faces[:, ::-1] if turned else faces).ravel()
-    if smooth:
-        arrays["vertex_normals"] = np.array(given["vertex_normals"]) * (-1.0 if turned else 1.0)
-    arrays.update()
-    return result
+    normals = np.array(given["vertex_normals"]) * (-1.0 if turned else 1.0) if smooth else None
+    return source.fill(result, np.array(given["vertex_positions"]), faces[:, ::-1] if turned else faces, normals)

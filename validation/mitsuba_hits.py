@@ -29,7 +29,8 @@ class MitsubaHits:
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         points = np.array(vertices, dtype=np.float32).reshape(-1, 3)
         corners = np.array(faces, dtype=np.uint32).reshape(-1, 3)
-        self._scene: Any = source.assemble({_mesh(points, corners): 0} if len(corners) else {}, [])
+        shape = source.fill(mi.Mesh("mesh", len(points), len(corners)), points, corners)
+        self._scene: Any = source.assemble({shape: 0} if len(corners) else {}, [])
 
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest hits of ``origins``, ``directions`` (n, 3): (t, face), t in units of |direction|.
@@ -45,11 +46,3 @@ class MitsubaHits:
                 t[row], face[row] = found.t, found.prim_index
         return t, face
 
-
-def _mesh(points: NDArray[np.float32], corners: NDArray[np.uint32]) -> mi.Mesh:
-    mesh = mi.Mesh("mesh", len(points), len(corners))
-    arrays = mi.traverse(mesh)
-    arrays["vertex_positions"] = points.ravel()
-    arrays["faces"] = corners.ravel()
-    arrays.update()
-    return mesh

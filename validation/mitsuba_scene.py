@@ -144,11 +144,17 @@ def _mesh(index: int, instance: Instance, bsdf: mi.BSDF) -> mi.Mesh:
     properties["bsdf"] = bsdf
     name, counts = f"instance{index}", (len(vertices), len(mesh.faces))
     result = mi.Mesh(name, *counts, has_vertex_normals=instance.smooth, props=properties)
-    arrays = mi.traverse(result)
-    arrays["vertex_positions"] = vertices.ravel()
-    arrays["faces"] = mesh.faces.astype(np.uint32).ravel()
-    if instance.smooth:
-        normals = mesh.vertex_normals() if mesh.normals is None else mesh.normals
-        arrays["vertex_normals"] = normals.astype(np.float32).ravel()
+    return fill(result, vertices, mesh.faces, instance.normals if instance.smooth else None)
+
+
+def fill(
+    mesh: mi.Mesh, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None = None
+) -> mi.Mesh:
+    """``mesh`` with these arrays, float32 and uint32 there: vertices and their normals (V, 3), faces (F, 3)."""
+    arrays = mi.traverse(mesh)
+    arrays["vertex_positions"] = np.asarray(vertices, np.float32).ravel()
+    arrays["faces"] = np.asarray(faces, np.uint32).ravel()
+    if normals is not None:
+        arrays["vertex_normals"] = np.asarray(normals, np.float32).ravel()
     arrays.update()
-    return result
+    return mesh

@@ -152,9 +152,8 @@ def _without_transmission(scene: Scene) -> tuple[Scene, list[str]]:
         for name, material in scene.materials.items()
         if isinstance(material, Phong) and material.passes_light
     }
-    copy = scene.model_copy(update={"materials": scene.materials | opaque})
-    copy.__dict__["instances"] = scene.instances  # the same meshes, not loaded again
-    return copy, [f"materials.{name}: transmittance" for name in sorted(opaque)]
+    left_out = [f"materials.{name}: transmittance" for name in sorted(opaque)]
+    return scene.altered(materials=scene.materials | opaque), left_out
 
 
 def _glass(scene: Scene) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:

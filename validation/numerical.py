@@ -1,6 +1,7 @@
 """The section on numerical stability: the table of extreme cases, the watertight sweep, the error curves."""
 
 from validation import extreme_hits, extreme_shading, stability, watertight
+from validation.extreme import ExtremeCase
 from validation.gates import Gate
 from validation.job import Job
 
@@ -20,14 +21,18 @@ def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
     cases = []
     gates = []
     for case in CASES:
-        subject = f"extreme case {case.number}: {case.construct}"
-        job.step(subject)
-        record = case.record(job.quick)
+        record, gate = check_case(case, job)
         cases.append(record)
-        gates.append(
-            Gate("stability", subject, "holds", float(bool(record["holds"])), "at least", 1.0, case.tolerance)
-        )
+        gates.append(gate)
     sweep, sweep_gates = watertight.run(job.quick, job.step)
     curves, curve_gates = stability.run(job.quick, job.step)
     record = {"cases": cases, "watertight": sweep, "curves": curves, "costs": dict.fromkeys(JUDGES)}
     return record, [*gates, *sweep_gates, *curve_gates]
+
+
+def check_case(case: ExtremeCase, job: Job) -> tuple[dict[str, object], Gate]:
+    """Run one case; returns its record for JSON and its gate."""
+    subject = f"extreme case {case.number}: {case.construct}"
+    job.step(subject)
+    record = case.record(job.quick)
+    return record, Gate("stability", subject, "holds", float(bool(record["holds"])), "at least", 1.0, case.tolerance)

@@ -33,6 +33,4 @@ def _shift_rows(rows: NDArray[np.float64], shift: Shift) -> NDArray[np.float64]:
 def shifted(scene: Scene, shift: Shift) -> Scene:
     """The scene with its film moved by ``shift`` pixels in x and y; the meshes are not loaded again."""
     kind = _ShiftedPerspective if isinstance(scene.camera, PerspectiveCamera) else _ShiftedOrthographic
-    copy = scene.model_copy(update={"camera": kind(**scene.camera.model_dump(), shift=shift)})
-    copy.__dict__["instances"] = scene.instances
-    return copy
+    return scene.altered(camera=kind(**scene.camera.model_dump(), shift=shift))

@@ -21,6 +21,7 @@ from renderer.parallel import available_threads
 from renderer.query import Hits
 from renderer.shapes import icosphere
 from validation import exact
+from validation.compare_hits import HitArrays
 from validation.hit_references import REFERENCES
 from validation.rays import RayBatch, camera_rays, float32_exact, leak_rays
 from validation.tradeoff import front, median_seconds, spending, timed
@@ -52,13 +53,6 @@ QUICK = Effort(level=4, rays=50_000, judged=1000, leaks=20_000, runs=3)
 FULL = Effort(level=5, rays=200_000, judged=5000, leaks=100_000, runs=5)
 
 _COMPARED = ("embree_default", "embree_robust", "igl", "mitsuba", "trimesh")
-
-
-class Answer(NamedTuple):
-    """What a contender says: ``t`` (n,) float64, inf on a miss, and ``face`` (n,) int64, -1 on a miss."""
-
-    t: NDArray[np.float64]
-    face: NDArray[np.int64]
 
 
 class Contender(NamedTuple):
@@ -124,20 +118,19 @@ def turned_mesh(level: int) -> Mesh:
     return Mesh(np.pi * wavy @ about_z @ about_x, ball.faces, name=f"wavy icosphere {level}, turned")
 
 
-def errors(answer: Answer, truth: list[exact.ExactHit | None]) -> dict[str, object]:
+def errors(found: HitArrays, truth: list[exact.ExactHit | None]) -> dict[str, object]:
     """Verdicts that are wrong, and the relative error of t where both hit, whatever the face.
 
     ``wrong_face`` counts faces that do not attain the exact t; the three percentiles are None where nothing is hit.
     """
     hit = np.array([h is not None for h in truth])
-    found = answer.face >= 0
-    pairs = [(ray, h) for ray in np.flatnonzero(hit & found).tolist() if (h := truth[ray]) is not None]
-    relative = [float(abs(Fraction(float(answer.t[ray])) - h.t) / h.t) for ray, h in pairs]
+    pairs = [(ray, h) for ray in np.flatnonzero(hit & found.hit).tolist() if (h := truth[ray]) is not None]
+    relative = [float(abs(Fraction(float(found.t[ray])) - h.t) / h.t) for ray, h in pairs]
     p50, p99, largest = np.percentile(relative, (50, 99, 100)).tolist() if relative else (None, None, None)
     return {
-        "missed": int((hit & ~found).sum()),
-        "false_hits": int((~hit & found).sum()),
-        "wrong_face": sum(int(answer.face[ray]) not in h.faces_at_t for ray, h in pairs),
+        "missed": int((hit & ~found.hit).sum()),
+        "false_hits": int((~hit & found.hit).sum()),
+        "wrong_face": sum(int(found.face[ray]) not in h.faces_at_t for ray, h in pairs),
         "both_hit": len(pairs),
         "p50": p50,
         "p99": p99,
@@ -145,9 +138,9 @@ def errors(answer: Answer, truth: list[exact.ExactHit | None]) -> dict[str, obje
     }
 
 
-def answer(found: Hits | tuple[NDArray[np.float64], NDArray[np.int64]]) -> Answer:
+def answer(found: Hits | tuple[NDArray[np.float64], NDArray[np.int64]]) -> HitArrays:
     """Ours or a reference's closest hits in one form."""
-    return Answer(found.t, found.face) if isinstance(found, Hits) else Answer(*found)
+    return HitArrays(found.t, found.face) if isinstance(found, Hits) else HitArrays(*found)
 
 
 def _contenders(mesh: Mesh, effort: Effort, costs: dict[str, float]) -> Mapping[str, Contender]:
@@ -192,5 +185,5 @@ def _judged(contender: Contender, rays: RayBatch, truth: list[exact.ExactHit | N
 def _leaks(contender: Contender, inside: Sequence[RayBatch]) -> dict[str, int]:
     """Rays from inside the closed mesh that meet nothing, and of how many."""
     given = [rays.select(_rows(len(rays), contender.most)) for rays in inside]
-    missed = sum(int((answer(contender.closest_hit(r.origins, r.directions)).face < 0).sum()) for r in given)
+    missed = sum(int((~answer(contender.closest_hit(r.origins, r.directions)).hit).sum()) for r in given)
     return {"leaks": missed, "leak_rays": sum(len(rays) for rays in given)}

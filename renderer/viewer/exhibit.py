@@ -4,12 +4,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from renderer.camera import unit
 from renderer.errors import expect
-from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
+from renderer.light import DIRECTIONAL
 from renderer.material import REFLECTANCE, TRANSMITTANCE
 from renderer.needs import needs_of
 from renderer.parallel import available_threads
@@ -18,6 +15,7 @@ from renderer.shading import BOUNDED
 from renderer.stage import Stage, accelerator_of, build_octree, set_up
 from renderer.viewer.protocol import ViewSettings
 from renderer.warm import touch_viewing
+from renderer.world import light_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +61,11 @@ def prepare(scene: Scene, path: Path | None = None) -> Exhibit:
     threads = available_threads()
     stage = set_up(scene, needs_of(scene, max_depth=max(1, scene.render.max_depth)), "octree", "midpoint", threads)
     # Mirrors and glass need no lights, and a scene of them alone has none packed; their colours a face do.
-    stage = replace(stage, world=stage.world._replace(lights=_shining(scene)))
+    stage = replace(stage, world=stage.world._replace(lights=light_rows(scene, replace(stage.needs, shadows=True))))
     # The first call of a kernel loads or compiles it, which the first picture should not wait for.
     stage.picture(scene.camera, scene.render.model_copy(update={"resolution": (8, 8), "samples": 1}), BOUNDED, threads)
     touch_viewing(stage)
     return Exhibit(scene, path, stage, threads)
-
-
-def _shining(scene: Scene) -> NDArray[np.float64]:
-    """The rows of the lights that are not dark, as ``pack`` has them where the scene needs light."""
-    rows = np.array([light.row() for light in scene.lights]).reshape(-1, LIGHT_COLUMNS)
-    return rows[rows[:, 4:].any(axis=1)]
 
 
 def open_file(path: Path) -> Exhibit:
