@@ -8,8 +8,9 @@ import numpy as np
 from renderer.bundle import SIZE
 from renderer.jit import inlined, kernel
 from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
-from renderer.material import DIELECTRIC, DIFFUSE, KIND, MIRROR, PHONG, SHININESS, SPECULAR, UNLIT
-from renderer.shading import spawn_origin, specular
+from renderer.material import DIELECTRIC, KIND, MIRROR, UNLIT
+from renderer.shading import spawn_origin
+from renderer.sight import phong
 from renderer.simd import at, get, put
 from renderer.traverse import Rays, trace
 from renderer.vec3 import add, dot, normalized, row3, scale, sub, three, times
@@ -20,6 +21,10 @@ SURFACE_DOUBLES = 15
 # A shadow ray: where it starts, where it goes, how far, the unit direction to the light and what arrives from there.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 _TOWARDS, _ARRIVING, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE
+
+# A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
+# covers angles down to 2^-12.
+SHORT_OF_LIGHT = 1.0 - 2.0**-36
 
 
 @inlined
@@ -58,9 +63,8 @@ def _aim(world, surface, light, offset):
     if dot(n, to_light) <= error:
         return False, p, to_light, 0.0, to_light, arriving
     o = spawn_origin(p, error, n_g, to_light, offset)
-    # A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
-    # covers angles down to 2^-12. Mitsuba stops ten of its epsilons short.
-    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else 1.0 - 2.0**-36
+    # Mitsuba stops ten of its epsilons short.
+    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else SHORT_OF_LIGHT
     return True, o, sub(towards, o), t_max, normalized(to_light), scale(arriving, 1.0 / squared)
 
 
@@ -86,11 +90,7 @@ def _aim_all(world, surfaces, lit, count, light, offset, shadows):
 def _shine(world, bundle, surface, i, towards, arriving):
     """Add what ray ``i`` sees of a light that reaches its surface."""
     m, n, d = np.int64(get(surface, MATERIAL)), three(surface, NORMAL), row3(bundle.directions, i)
-    materials = world.materials
-    factor = scale(three(materials, m + DIFFUSE), dot(n, towards))
-    if get(materials, m + KIND) == PHONG:
-        shininess = get(materials, m + SHININESS)
-        factor = add(factor, scale(three(materials, m + SPECULAR), specular(d, n, towards, shininess)))
+    factor = phong(world, m, n, d, towards)
     put3(surface, LIGHT, add(three(surface, LIGHT), times(factor, arriving)))
 
 

@@ -12,10 +12,9 @@ from renderer.errors import expect
 from renderer.image import srgb, srgb_steps
 from renderer.jit import inlined, kernel
 from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
-from renderer.material import AMBIENT, DIFFUSE, KIND, LAMBERT, PHONG, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
+from renderer.material import AMBIENT, DIFFUSE, KIND, LAMBERT, REFLECTANCE, TRANSMITTANCE
 from renderer.parallel import checked_threads, for_chunks
-from renderer.shading import specular
-from renderer.sight import World, look_at
+from renderer.sight import World, look_at, phong
 from renderer.simd import get, pointer
 from renderer.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
 
@@ -86,11 +85,7 @@ def _shine(world, light, p, n, d, m):
     if not directional:
         arriving = scale(arriving, 1.0 / dot(towards, towards))
         towards = normalized(towards)
-    factor = scale(three(world.materials, m + DIFFUSE), dot(n, towards))
-    if get(world.materials, m + KIND) == PHONG:
-        shininess = get(world.materials, m + SHININESS)
-        factor = add(factor, scale(three(world.materials, m + SPECULAR), specular(d, n, towards, shininess)))
-    return times(factor, arriving)
+    return times(phong(world, m, n, d, towards), arriving)
 
 
 @inlined

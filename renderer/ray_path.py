@@ -11,25 +11,23 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.direct import SHORT_OF_LIGHT
 from renderer.errors import expect
 from renderer.jit import kernel
 from renderer.light import DIRECTIONAL
 from renderer.material import (
     AMBIENT,
     DIELECTRIC,
-    DIFFUSE,
     IOR,
     KIND,
     LAMBERT,
     MATERIAL_COLUMNS,
     PHONG,
     REFLECTANCE,
-    SHININESS,
-    SPECULAR,
     TRANSMITTANCE,
 )
-from renderer.shading import BOUNDED, fresnel, reflect, refract, spawn_origin, specular
-from renderer.sight import MAX_MEDIA, Surface, World, look_at, surface_at
+from renderer.shading import BOUNDED, fresnel, reflect, refract, spawn_origin
+from renderer.sight import MAX_MEDIA, Surface, World, look_at, phong, surface_at
 from renderer.stage import Stage
 from renderer.vec3 import add, dot, normalized, scale, sub, times
 from renderer.world import media_around
@@ -40,8 +38,6 @@ Kind = Literal["camera", "reflected", "refracted", "shadow"]
 # A ray of depth d in glass has up to 2^d of its kind, which no one can look at and no click should wait for. This many
 # are all of them to depth 8, the shadow rays not counted, and take about a tenth of a second.
 MAX_RAYS = 511
-# As ``direct`` stops before a point light, at which a surface must not hide it.
-_SHORT_OF_LIGHT = 1.0 - 2.0**-36
 
 
 @dataclass(frozen=True)
@@ -159,7 +155,7 @@ def _goes_on(weight: Vector, min_weight: float) -> bool:
 
 
 @kernel
-def _surface(world: World, face: int, u: float, v: float) -> Surface:
+def surface_of(world: World, face: int, u: float, v: float) -> Surface:
     """``surface_at``, for Python."""
     return surface_at(look_at(world), face, u, v)
 
@@ -170,7 +166,7 @@ def _meet(stage: Stage, ray: _Ray) -> _Met | None:
     if not hits.hit[0]:
         return None
     face = int(hits.face[0])
-    surface = _surface(stage.world, face, float(hits.u[0]), float(hits.v[0]))
+    surface = surface_of(stage.world, face, float(hits.u[0]), float(hits.v[0]))
     inside = dot(ray.direction, surface.n_s) > 0.0
     n, row = scale(surface.n_s, -1.0) if inside else surface.n_s, int(surface.material)
     return _Met(face, surface, n, inside, row, stage.world.materials[row // MATERIAL_COLUMNS])
@@ -223,21 +219,18 @@ def _aim(stage: Stage, ray: _Ray, met: _Met) -> list[_Aim]:
         if directional:
             way, t_max, end = place, np.inf, _beyond(stage, o, place)
         else:
-            way, t_max, end = sub(place, o), _SHORT_OF_LIGHT, place
+            way, t_max, end = sub(place, o), SHORT_OF_LIGHT, place
             arriving = scale(arriving, 1.0 / dot(to_light, to_light))
             to_light = normalized(to_light)
-        seen = times(ray.weight, times(_phong(met, ray.direction, to_light), arriving))
+        seen = times(ray.weight, times(_phong(stage.world, met.row, met.n, ray.direction, to_light), arriving))
         aims.append(_Aim(o, way, t_max, end, seen))
     return aims
 
 
-def _phong(met: _Met, d: Vector, towards: Vector) -> Vector:
-    """The share of light from the unit direction ``towards`` that the surface sends against d."""
-    factor: Vector = scale(_color(met.material, DIFFUSE), dot(met.n, towards))
-    if met.material[KIND] == PHONG:
-        highlight = specular(d, met.n, towards, float(met.material[SHININESS]))
-        factor = add(factor, scale(_color(met.material, SPECULAR), highlight))
-    return factor
+@kernel
+def _phong(world: World, m: int, n: Vector, d: Vector, towards: Vector) -> Vector:
+    """``phong``, for Python."""
+    return phong(look_at(world), m, n, d, towards)
 
 
 def _shadow(stage: Stage, ray: _Ray, own: int, aim: _Aim) -> Segment:

@@ -1,4 +1,4 @@
-"""What kernels see of a scene: its arrays, and the surface where a ray met it."""
+"""What kernels see of a scene: its arrays, the surface where a ray met it, and what that sends on of a light."""
 
 from typing import Any, NamedTuple
 
@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit import inlined
-from renderer.shading import offset_distance
+from renderer.material import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
+from renderer.shading import offset_distance, specular
 from renderer.simd import get, pointer
-from renderer.vec3 import barycentric, cross, normalized, row3, sub
+from renderer.vec3 import add, barycentric, cross, dot, normalized, row3, scale, sub, three
 
 # Media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8
@@ -94,3 +95,15 @@ def surface_at(world, face, u, v):
         n_s = normalized(barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v))
     error = offset_distance(p, p0, p1, p2, u, v, n_g)
     return Surface(p, error, n_g, n_s, get(world.material, face))
+
+
+@inlined
+def phong(world, m, n, d, towards):
+    """The share of light from the unit direction ``towards`` that the material in row ``m`` sends against d:
+    k_d N.L + k_s (R.V)^n, for N.L >= 0.
+    """
+    factor = scale(three(world.materials, m + DIFFUSE), dot(n, towards))
+    if get(world.materials, m + KIND) == PHONG:
+        shininess = get(world.materials, m + SHININESS)
+        factor = add(factor, scale(three(world.materials, m + SPECULAR), specular(d, n, towards, shininess)))
+    return factor

@@ -13,7 +13,7 @@ from renderer.camera import PerspectiveCamera
 from renderer.face_phong import face_colors
 from renderer.jit import is_on_disk
 from renderer.light import PointLight
-from renderer.material import Dielectric
+from renderer.material import Dielectric, Material, Phong
 from renderer.mesh import Mesh
 from renderer.needs import needs_of
 from renderer.octree import BruteForce, Octree
@@ -31,6 +31,7 @@ _CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _SIZES = 1.0, 1.0 / 3.0
 # An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.
 _SUBDIVISIONS = 5
+_GLASS = Dielectric(type="dielectric", ior=1.5)
 
 
 def compile_all() -> None:
@@ -46,8 +47,9 @@ def compile_all() -> None:
                 accelerator.any_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]], t_max=t_max)
         for normals, kind, split in product(("flat", "smooth"), ("octree", "brute"), ("midpoint", "sah")):
             render(_scene(mesh, normals), resolution=(1, 1), accelerator=kind, split=split)  # type: ignore[arg-type]
-        scene = _scene(mesh, "flat")
-        touch_viewing(set_up(scene, needs_of(scene), "octree"))
+        for material in (_GLASS, Phong()):
+            scene = _scene(mesh, "flat", material)
+            touch_viewing(set_up(scene, needs_of(scene), "octree"))
 
 
 def touch_viewing(stage: Stage) -> None:
@@ -81,11 +83,11 @@ def compile_picture() -> None:
     render(scene, resolution=(1, 1), accelerator="brute")
 
 
-def _scene(mesh: Mesh, normals: str) -> Scene:
-    """One triangle of glass before the eye: every kind of ray may come up."""
+def _scene(mesh: Mesh, normals: str, material: Material = _GLASS) -> Scene:
+    """One triangle before the eye; of glass, every kind of ray may come up."""
     return Scene(
         camera=PerspectiveCamera(type="perspective", eye=(0.1, 0.1, 1.0), target=(0.1, 0.1, 0.0)),
-        materials={"glass": Dielectric(type="dielectric", ior=1.5)},
+        materials={"its": material},
         lights=(PointLight(type="point", position=(0.0, 0.0, 2.0), intensity=(1.0, 1.0, 1.0)),),
-        objects=(SceneObject(mesh=mesh, material="glass", normals=normals),),
+        objects=(SceneObject(mesh=mesh, material="its", normals=normals),),
     )

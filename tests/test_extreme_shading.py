@@ -105,8 +105,8 @@ FAULTS = [
     ("whitted.py", "return get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "return 1.0"),
     ("whitted.py", "return largest > 0.0 and largest >= min_weight", "return largest > 0.02"),
     ("direct.py", "if dot(n, to_light) <= error:", "if dot(n, to_light) < -1e-3:"),
-    ("direct.py", "m + DIFFUSE), dot(n, towards))", "m + DIFFUSE), abs(dot(n, towards)))"),
-    ("direct.py", "else 1.0 - 2.0**-36", "else 2.0"),
+    ("sight.py", "m + DIFFUSE), dot(n, towards))", "m + DIFFUSE), abs(dot(n, towards)))"),
+    ("direct.py", "else SHORT_OF_LIGHT", "else 2.0"),
     ("shading.py", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
     # No fault: with every vertex in float64 the kernels are compiled once and not twice.
     ("stage.py", "_widened(tree) if needs.float64_vertices else tree", "_widened(tree)"),

@@ -150,7 +150,7 @@ PICTURES = (
     _kernel("pictures", "refraction by the textbook's formula", "shading", "    if s2 < 0.5:\n",
             "    if True:\n        cos2 = 1.0 - eta * eta * (1.0 - dn * dn)\n    elif s2 < 0.5:\n"),
     _kernel("pictures", "no shadows", "direct", "if not (settings.shadows and get(work.found.hit, k)):", "if True:"),
-    _kernel("pictures", "shadow rays pass the light", "direct", "else 1.0 - 2.0**-36", "else 2.0"),
+    _kernel("pictures", "shadow rays pass the light", "direct", "else SHORT_OF_LIGHT", "else 2.0"),
     _kernel("pictures", "lights shine through from behind", "direct", "if dot(n, to_light) <= error:",
             "if dot(n, to_light) <= -np.inf:"),
     _kernel("pictures", "light falls off as 1 / r", "direct", "scale(arriving, 1.0 / squared)",

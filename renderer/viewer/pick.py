@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from renderer.material import MATERIAL_COLUMNS
 from renderer.query import Hits
-from renderer.ray_path import Segment, ray_path
-from renderer.sight import World
+from renderer.ray_path import Segment, ray_path, surface_of
 from renderer.stage import Stage
 from renderer.tree_boxes import visited
 from renderer.viewer.exhibit import Exhibit, varied
@@ -49,22 +47,15 @@ def _met(shown: Exhibit, stage: Stage, hits: Hits) -> dict[str, Any]:
         return {"hit": False, "t": None, "face": None, "material": None, "point": None, "normal": None}
     face = int(hits.face[0])
     material = list(shown.scene.materials)[int(stage.world.material[face]) // MATERIAL_COLUMNS]
-    normal = _shading_normal(stage.world, face, float(hits.u[0]), float(hits.v[0]), hits.normals[0])
+    surface = surface_of(stage.world, face, float(hits.u[0]), float(hits.v[0]))
     return {
         "hit": True,
         "t": float(hits.t[0]),
         "face": face,
         "material": material,
         "point": _listed(hits.points[0]),
-        "normal": _listed(normal),
+        "normal": _listed(surface.n_s),
     }
-
-
-def _shading_normal(world: World, face: int, u: float, v: float, geometric: NDArray[np.float64]) -> NDArray[np.float64]:
-    if not (len(world.smooth) and world.smooth[face]):
-        return geometric
-    n = np.array([1.0 - u - v, u, v]) @ world.normals[world.faces[face]]
-    return n / np.linalg.norm(n)
 
 
 def _told(path: Sequence[Segment]) -> list[dict[str, Any]]:
