@@ -3,27 +3,29 @@
 import argparse
 import logging
 import sys
-from _thread import interrupt_main
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
-from threading import Timer
 
 from renderer.errors import expect
+from renderer.interrupt import INTERRUPTED, ends_while_compiling
+
+_FAREWELL = "octree-render: interrupted, nothing written"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``octree-render``; returns the exit code: 0, 2 for bad input, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    if arguments is None:
-        _hide_scipy_from_numba()
+    own_process = arguments is None
     try:
-        with _interrupts_kept(), _compile_notices(silent=getattr(options, "quiet", False)):
+        with ends_while_compiling(_FAREWELL, own_process), _compile_notices(getattr(options, "quiet", False)):
+            if own_process:
+                _hide_scipy_from_numba()
             options.command(options)
     except KeyboardInterrupt:
-        print("octree-render: interrupted, nothing written", file=sys.stderr)
-        return 130
+        print(_FAREWELL, file=sys.stderr)
+        return INTERRUPTED
     except (ValueError, OSError, ModuleNotFoundError) as error:
         print(f"octree-render: {_one_line(error)}", file=sys.stderr)
         return 2
@@ -37,27 +39,6 @@ def _hide_scipy_from_numba() -> None:
         import numba.np.arraymath  # noqa: F401
 
         del sys.modules["scipy"]
-
-
-@contextmanager
-def _interrupts_kept() -> Iterator[None]:
-    """Send Ctrl-C once more where a destructor or callback, of which compiling calls many, swallowed it."""
-    usual = sys.unraisablehook
-
-    def resend(lost: "sys.UnraisableHookArgs") -> None:
-        if lost.exc_type is not KeyboardInterrupt:
-            usual(lost)
-            return
-        # Later and from aside: sent from here it would be raised, and lost again, in this very function.
-        timer = Timer(0.01, interrupt_main)
-        timer.daemon = True
-        timer.start()
-
-    sys.unraisablehook = resend
-    try:
-        yield
-    finally:
-        sys.unraisablehook = usual
 
 
 @contextmanager

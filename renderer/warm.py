@@ -2,10 +2,12 @@
 picture ever, in two processes at once, because Numba compiles in one thread only.
 """
 
+import os
 import subprocess
 import sys
 from itertools import product
 from logging import getLogger
+from threading import Thread
 
 import numpy as np
 
@@ -69,7 +71,7 @@ def compile_in_two() -> None:
         return
     getLogger("renderer.jit").info("compiling render_tile in another process meanwhile (once)")
     command = [sys.executable, "-c", "from renderer.warm import compile_picture; compile_picture()"]
-    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as other:
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL) as other:
         try:
             Octree.from_mesh(icosphere(_SUBDIVISIONS))
             other.wait()
@@ -78,9 +80,19 @@ def compile_in_two() -> None:
 
 
 def compile_picture() -> None:
-    """Compile what renders, for vertices that float32 holds; no tree is built for it."""
+    """Compile what renders, for vertices that float32 holds; no tree is built for it.
+
+    Of use in a process of its own only, which it ends when standard input does, as it does when the parent is gone.
+    """
+    Thread(target=_end_with_input, daemon=True).start()
     scene = _scene(Mesh(_CORNERS, np.array([[0, 1, 2]], np.int32)), "flat")
     render(scene, resolution=(1, 1), accelerator="brute")
+
+
+def _end_with_input() -> None:
+    # Not by sys.stdin, whose lock a thread may not hold while the interpreter shuts down.
+    os.read(0, 1)
+    os._exit(1)
 
 
 def _scene(mesh: Mesh, normals: str, material: Material = _GLASS) -> Scene:

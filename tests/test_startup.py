@@ -145,37 +145,6 @@ def test_control_c_while_compiling_ends_with_130_and_no_traceback(tmp_path, seco
     assert err.endswith("octree-render: interrupted, nothing written\n") and not picture.exists()
 
 
-def test_an_interrupt_that_a_destructor_swallows_is_sent_again(capsys, monkeypatch):
-    class Swallows:
-        def __del__(self):
-            raise KeyboardInterrupt
-
-    def command(_options):
-        Swallows()
-        end = time.monotonic() + 60.0
-        while time.monotonic() < end:
-            pass
-        raise AssertionError("the interrupt was lost")
-
-    monkeypatch.setattr("renderer.cli._info", command)
-    assert main(["info", "any.toml"]) == 130
-    assert capsys.readouterr().err == "octree-render: interrupted, nothing written\n"
-
-
-@pytest.mark.parametrize("fault", [ValueError("lost"), None])
-def test_other_faults_of_destructors_go_where_they_went(monkeypatch, fault):
-    class Faulty:
-        def __del__(self):
-            raise fault
-
-    seen = []
-    monkeypatch.setattr(sys, "unraisablehook", lambda lost: seen.append(lost.exc_value))
-    usual = sys.unraisablehook
-    monkeypatch.setattr("renderer.cli._info", lambda _options: Faulty() if fault else None)
-    assert main(["info", "any.toml"]) == 0
-    assert sys.unraisablehook is usual and [str(e) for e in seen] == ([str(fault)] if fault else [])
-
-
 @pytest.mark.parametrize("quiet", [False, True])
 def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatch, quiet):
     log = logging.getLogger("renderer.jit")

@@ -14,11 +14,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from renderer.interrupt import INTERRUPTED, ends_while_compiling
 from validation.sections import NAMES, choose
 
 if TYPE_CHECKING:
     from validation.gates import Gate
     from validation.suite import Request
+
+_FAREWELL = "validation: interrupted, no report written"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -28,10 +31,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _check(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        return _run(options, ("python -m validation " + shlex.join(given)).strip())
+        with ends_while_compiling(_FAREWELL, own_process=arguments is None):
+            return _run(options, ("python -m validation " + shlex.join(given)).strip())
     except KeyboardInterrupt:
-        print("validation: interrupted, no report written", file=sys.stderr)
-        return 130
+        print(_FAREWELL, file=sys.stderr)
+        return INTERRUPTED
     except (ImportError, ValueError, OSError) as error:
         missing = "; pip install 'octree-renderer[validate]'" if isinstance(error, ImportError) else ""
         print(f"validation: {' '.join(str(error).split())}{missing}", file=sys.stderr)

@@ -13,8 +13,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from renderer.interrupt import INTERRUPTED, ends_while_compiling
+
 # Rays of a family, in full and in quick runs.
 RAYS, QUICK_RAYS = 1_000_000, 200_000
+
+_FAREWELL = "benchmark: interrupted, nothing written"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,10 +26,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        return _run(options, ("python -m validation.benchmark " + shlex.join(given)).strip())
+        with ends_while_compiling(_FAREWELL, own_process=arguments is None):
+            return _run(options, ("python -m validation.benchmark " + shlex.join(given)).strip())
     except KeyboardInterrupt:
-        print("benchmark: interrupted, nothing written", file=sys.stderr)
-        return 130
+        print(_FAREWELL, file=sys.stderr)
+        return INTERRUPTED
     except (ValueError, OSError, ImportError) as error:
         print(f"benchmark: {error}", file=sys.stderr)
         return 2
