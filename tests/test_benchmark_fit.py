@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from validation import tradeoff
 from validation.benchmark import frames, libllvm, processes
 from validation.benchmark.fit import log_fit
 from validation.benchmark.targets import Target, judged
@@ -34,8 +35,11 @@ def test_two_sizes_fit_nothing() -> None:
     assert log_fit([1000, 2000, 2000], [1.0, 2.0, 3.0]) is None
 
 
-def test_contenders_take_turns_and_the_first_round_is_not_seen() -> None:
+def test_contenders_take_turns_after_a_rest_and_the_first_round_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     order: list[str] = []
+    rests: list[tuple[float, int]] = []
+    monkeypatch.setattr(tradeoff, "REST", 0.25)
+    monkeypatch.setattr(tradeoff.time, "sleep", lambda seconds: rests.append((seconds, len(order))))
 
     def call(name: str) -> Callable[[], float]:
         def seconds() -> float:
@@ -45,7 +49,7 @@ def test_contenders_take_turns_and_the_first_round_is_not_seen() -> None:
         return seconds
 
     seconds = interleaved({name: call(name) for name in "abc"}, runs=2)
-    assert "".join(order) == "abcabcabc"
+    assert "".join(order) == "abcabcabc" and rests == [(0.25, i) for i in range(9)]
     assert seconds == {"a": [4.0, 7.0], "b": [5.0, 8.0], "c": [6.0, 9.0]}
 
 
