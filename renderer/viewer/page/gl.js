@@ -53,7 +53,8 @@ export class GlLayer {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (shading === DEPTH && !seen.length) return;
     const clip = clipMatrix(view, this.scene.bounds);
-    this.model.draw(shading, clip, view.m.slice(12, 15), { scene: this.scene, direction, veil: [...dark, veil] });
+    const eye = view.m.slice(12, 15);
+    this.model.draw(shading, clip, { eye, scene: this.scene, direction, veil: [...dark, veil] });
     this.boxes.draw(panes, clip);
     for (const { name, set, hidden, fades } of seen) this.lines.draw(name, set, clip, this.fade(view, fades), hidden);
   }

@@ -20,6 +20,9 @@ const TRACED = ["brute", "octree"];
 const STALE = 250;
 // Brute force starts once the camera rests: a picture of seconds is not worth starting in each frame.
 const REST = 150;
+// So long what was drawn last stays while its successor is on its way: drawing the model in between, only to draw again
+// at once, would take where there is no graphics processor longer than all the rest.
+const HOLD = 50;
 // Hidden parts of lines shine through the model by these shares.
 const HIDDEN = { boxes: 0.1, visited: 0.3, rays: 0.65 };
 // Under boxes the model is darkened by this share, so that they glow.
@@ -29,7 +32,7 @@ const find = (selector) => document.querySelector(selector);
 
 class Viewer {
   constructor() {
-    Object.assign(this, { mode: "octree", seq: 0, sent: new Map(), shown: null, dirty: true, movedAt: 0 });
+    Object.assign(this, { mode: "octree", seq: 0, sent: new Map(), shown: null, dirty: true, movedAt: 0, heldSince: null });
     this.boxes = NO_BOXES;
     this.stage = find("#stage");
     this.picture = new Picture(find("#picture"));
@@ -206,8 +209,14 @@ class Viewer {
     this.before = moving ? now : null;
     const waiting = this.mode === "brute" && performance.now() - this.movedAt < REST;
     if (this.dirty && this.connection?.ready && !waiting) this.sendView();
-    this.draw();
+    if (this.held) setTimeout(() => this.request(), HOLD);
+    else this.draw();
     if (moving || waiting) this.request();
+  }
+
+  // Whether to wait a moment for the answer to the newest view.
+  get held() {
+    return this.sent.has(this.seq) && this.heldSince !== null && performance.now() - this.heldSince < HOLD;
   }
 
   sendView() {
@@ -216,6 +225,7 @@ class Viewer {
     this.seq++;
     if (this.mode !== "gl") this.sent.set(this.seq, view); // to which nothing is sent
     this.dirty = false;
+    this.heldSince ??= view.at;
     this.connection.send({ type: "view", seq: this.seq, mode: this.mode, m, fovy, w, h, settings: this.panel.settings });
     if (this.mode === "brute") this.progress.show(0);
   }
@@ -236,6 +246,7 @@ class Viewer {
   }
 
   draw() {
+    this.heldSince = null;
     const traced = TRACED.includes(this.mode);
     const current = traced && this.current;
     const live = current || (traced && this.recent);

@@ -2,50 +2,55 @@
 import { program } from "./program.js";
 
 const MAGIC = 0x4853454d;
-// Values of each face stand in textures of this width, which every WebGL2 offers.
-const COLUMNS = 2048;
 const MAX_LIGHTS = 8;
 // Texels a material: diffuse and shininess, specular and kind, reflectance, transmittance.
 const TEXELS = 4;
 const KINDS = { phong: 0, mirror: 1, dielectric: 2 };
 
+// Attributes of a corner. What belongs to a face, WebGL takes from the face's last corner.
+const [POSITION, NORMAL, MATERIAL, COLOR] = [0, 1, 2, 3];
+const LAST = 2;
+
 export const LIT = 0;
 export const FACES = 1;
 export const DEPTH = 2;
 
-// Each shading is a program of its own, so that none moves values which it does not look at.
-const source = (shading, text) => `#version 300 es
+// Each shading of what is opaque and of glass is a program of its own, so that none moves values it does not look at:
+// software GL, and whoever has only that, spends its time on the values of corners.
+const source = (shading, glass, text) => `#version 300 es
 #define LIT ${LIT}
 #define FACES ${FACES}
 #define SHADING ${shading}
+#define GLASS ${Number(glass)}
 precision highp float;
+precision highp int;
 ${text}`;
 
 const VERTEX = `
-layout(location = 0) in vec3 position;
+layout(location = ${POSITION}) in vec3 position;
 uniform mat4 clip;
-#if SHADING == LIT || SHADING == FACES
-layout(location = 1) in vec3 normal;
-uniform highp usampler2D materials_of;
+#if SHADING == LIT || GLASS
+layout(location = ${NORMAL}) in vec3 normal;
 out vec3 point;
 out vec3 shading_normal;
-flat out int material;
 #endif
-#if SHADING == FACES
-uniform sampler2D face_colors;
+#if SHADING == LIT
+layout(location = ${MATERIAL}) in uint material_of_face;
+flat out uint material;
+#elif SHADING == FACES
+layout(location = ${COLOR}) in vec3 color_of_face;
 flat out vec3 face_color;
 #endif
 
 void main() {
-#if SHADING == LIT || SHADING == FACES
-  int face = gl_VertexID / 3;
-  ivec2 texel = ivec2(face % ${COLUMNS}, face / ${COLUMNS});
-  material = int(texelFetch(materials_of, texel, 0).r);
+#if SHADING == LIT || GLASS
   point = position;
   shading_normal = normal;
 #endif
-#if SHADING == FACES
-  face_color = texelFetch(face_colors, texel, 0).rgb;
+#if SHADING == LIT
+  material = material_of_face;
+#elif SHADING == FACES
+  face_color = color_of_face;
 #endif
   gl_Position = clip * vec4(position, 1.0);
 }`;
@@ -56,17 +61,16 @@ const FRAGMENT = `
 uniform vec4 veil; // premultiplied
 out vec4 color;
 
-#if SHADING == LIT || SHADING == FACES
+#if SHADING == LIT || GLASS
 in vec3 point;
 in vec3 shading_normal;
-flat in int material;
-uniform bool glass;
 uniform vec3 eye;
-uniform sampler2D materials;
 #endif
 #if SHADING == FACES
 flat in vec3 face_color;
 #elif SHADING == LIT
+flat in uint material;
+uniform sampler2D materials;
 uniform vec3 ambient;
 uniform vec3 background;
 uniform int light_count;
@@ -78,13 +82,14 @@ vec3 srgb(vec3 linear) {
   return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, x));
 }
 
-vec3 lit(vec3 n, vec3 v, vec4 specular) {
-  vec4 diffuse = texelFetch(materials, ivec2(0, material), 0);
+vec3 lit(vec3 n, vec3 v) {
+  int row = int(material);
+  vec4 diffuse = texelFetch(materials, ivec2(0, row), 0), specular = texelFetch(materials, ivec2(1, row), 0);
   vec3 kd = diffuse.rgb, ks = specular.rgb, sum = ambient * kd;
   float shininess = diffuse.w;
   if (specular.w != 0.0) {
-    vec3 reflectance = texelFetch(materials, ivec2(2, material), 0).rgb;
-    vec3 transmittance = texelFetch(materials, ivec2(3, material), 0).rgb;
+    vec3 reflectance = texelFetch(materials, ivec2(2, row), 0).rgb;
+    vec3 transmittance = texelFetch(materials, ivec2(3, row), 0).rgb;
     vec3 around = mix(background * 0.45, background, smoothstep(-0.2, 0.5, reflect(-v, n).y));
     sum = specular.w == 1.0 ? reflectance * around * 0.8 : transmittance * background * 0.9;
     ks = vec3(0.5);
@@ -103,16 +108,18 @@ vec3 lit(vec3 n, vec3 v, vec4 specular) {
 #endif
 
 void main() {
-#if SHADING == LIT || SHADING == FACES
-  vec4 specular = texelFetch(materials, ivec2(1, material), 0);
-  if ((specular.w == 2.0) != glass) discard;
+#if SHADING == LIT || GLASS
   vec3 v = normalize(eye - point);
   vec3 n = normalize(shading_normal);
   n = dot(n, v) < 0.0 ? -n : n;
-  float alpha = glass ? 0.28 + 0.6 * pow(1.0 - dot(n, v), 3.0) : 1.0;
+#endif
+#if GLASS
+  float alpha = 0.28 + 0.6 * pow(1.0 - dot(n, v), 3.0);
+#else
+  const float alpha = 1.0;
 #endif
 #if SHADING == LIT
-  color = vec4((lit(n, v, specular) * (1.0 - veil.a) + veil.rgb) * alpha, alpha);
+  color = vec4((lit(n, v) * (1.0 - veil.a) + veil.rgb) * alpha, alpha);
 #elif SHADING == FACES
   color = vec4((face_color * (1.0 - veil.a) + veil.rgb) * alpha, alpha);
 #else
@@ -123,10 +130,10 @@ void main() {
 export class Model {
   constructor(gl) {
     this.gl = gl;
-    this.programs = []; // by shading, each made when it is first needed
+    this.programs = {}; // each made when it is first needed
     this.vertices = gl.createVertexArray();
-    this.buffers = [gl.createBuffer(), gl.createBuffer()];
-    this.textures = [0, 1, 2].map(() => gl.createTexture());
+    this.buffers = [POSITION, NORMAL, MATERIAL, COLOR].map(() => gl.createBuffer());
+    this.materials = gl.createTexture();
     this.faces = 0;
   }
 
@@ -136,93 +143,83 @@ export class Model {
     if (magic !== MAGIC) throw new Error("mesh: expected the renderer's format");
     const { gl } = this;
     this.faces = faces;
-    this.rows = Math.max(Math.ceil(faces / COLUMNS), 1);
     this.coloured = false;
+    this.colors = new Uint8Array(12 * faces);
     gl.bindVertexArray(this.vertices);
-    for (const location of [0, 1]) {
-      gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[location]);
-      gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(buffer, 8 + 36 * faces * location, 9 * faces), gl.STATIC_DRAW);
-      gl.enableVertexAttribArray(location);
+    for (const location of [POSITION, NORMAL]) {
+      this.fill(location, new Float32Array(buffer, 8 + 36 * faces * location, 9 * faces), gl.STATIC_DRAW);
       gl.vertexAttribPointer(location, 3, gl.FLOAT, false, 0, 0);
     }
-    const indices = new Uint16Array(COLUMNS * this.rows);
-    indices.set(new Uint16Array(buffer, 8 + 72 * faces, faces));
-    this.texture(0, gl.R16UI, COLUMNS, this.rows, gl.RED_INTEGER, gl.UNSIGNED_SHORT, indices);
-    this.texture(1, gl.RGB8, COLUMNS, this.rows, gl.RGB, gl.UNSIGNED_BYTE, null);
-    const rows = new Float32Array(scene.materials.flatMap(texels));
-    this.texture(2, gl.RGBA32F, TEXELS, scene.materials.length, gl.RGBA, gl.FLOAT, rows);
-    this.hasGlass = scene.materials.some((m) => m.type === "dielectric");
+    const materials = new Uint16Array(buffer, 8 + 72 * faces, faces);
+    const ofCorners = new Uint16Array(3 * faces);
+    for (let face = 0; face < faces; face++) ofCorners[3 * face + LAST] = materials[face];
+    this.fill(MATERIAL, ofCorners, gl.STATIC_DRAW);
+    gl.vertexAttribIPointer(MATERIAL, 1, gl.UNSIGNED_SHORT, 0, 0);
+    this.fill(COLOR, this.colors, gl.DYNAMIC_DRAW);
+    gl.vertexAttribPointer(COLOR, 3, gl.UNSIGNED_BYTE, true, 4, 0);
+    this.runs = runs(materials, scene.materials.map((m) => m.type === "dielectric"));
+    this.setMaterials(scene.materials);
   }
 
-  texture(unit, format, width, height, layout, type, values) {
+  fill(location, values, usage) {
     const { gl } = this;
-    gl.activeTexture(gl.TEXTURE0 + unit);
-    gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.texImage2D(gl.TEXTURE_2D, 0, format, width, height, 0, layout, type, values);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
-      gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[location]);
+    gl.bufferData(gl.ARRAY_BUFFER, values, usage);
+    gl.enableVertexAttribArray(location);
+  }
+
+  setMaterials(materials) {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.materials);
+    const rows = new Float32Array(materials.flatMap(texels));
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, TEXELS, materials.length, 0, gl.RGBA, gl.FLOAT, rows);
+    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
   }
 
   // Colours of the faces, three bytes each; those of another scene are left alone.
   setFaceColors(bytes) {
     if (bytes.length !== 3 * this.faces) return;
-    const { gl } = this;
-    const whole = Math.floor(this.faces / COLUMNS);
-    const rest = this.faces - whole * COLUMNS;
-    const values = new Uint8Array(bytes.buffer, bytes.byteOffset, bytes.length);
-    gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, this.textures[1]);
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    const part = (row, width, height, start) =>
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, gl.RGB, gl.UNSIGNED_BYTE, values.subarray(start));
-    if (whole) part(0, COLUMNS, whole, 0);
-    if (rest) part(whole, rest, 1, whole * COLUMNS * 3);
+    const { gl, colors } = this;
+    for (let face = 0; face < this.faces; face++)
+      for (let channel = 0; channel < 3; channel++) colors[4 * (3 * face + LAST) + channel] = bytes[3 * face + channel];
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[COLOR]);
+    gl.bufferData(gl.ARRAY_BUFFER, colors, gl.DYNAMIC_DRAW);
     this.coloured = true;
   }
 
-  // Draw by `clip` (world to clip space); `appearance` is {scene, direction or null, veil}.
-  draw(shading, clip, eye, appearance) {
+  // Draw by `clip` (world to clip space); `appearance` is {eye, scene, direction or null, veil}.
+  draw(shading, clip, appearance) {
     const { gl } = this;
     const seen = shading === FACES && !this.coloured ? LIT : shading;
-    this.programs[seen] ??= program(gl, source(seen, VERTEX), source(seen, FRAGMENT));
-    const { linked, uniforms } = this.programs[seen];
-    gl.useProgram(linked);
     gl.bindVertexArray(this.vertices);
-    gl.uniformMatrix4fv(uniforms.clip, false, clip);
-    gl.uniform4fv(uniforms.veil, appearance.veil);
-    if (seen !== DEPTH) this.bindTextures(uniforms);
-    if (seen !== DEPTH) gl.uniform3fv(uniforms.eye, eye);
-    if (seen === LIT) this.setLights(uniforms, appearance);
+    gl.bindTexture(gl.TEXTURE_2D, this.materials);
     gl.enable(gl.POLYGON_OFFSET_FILL); // so that lines on a surface are seen
     gl.polygonOffset(1, 1);
-    gl.drawArrays(gl.TRIANGLES, 0, 3 * this.faces);
-    if (this.hasGlass && seen !== DEPTH) this.drawGlass(uniforms);
+    this.drawRuns(this.runs.opaque, seen, false, clip, appearance);
+    // Where depth alone is wanted, glass hides as much as anything.
+    if (seen !== DEPTH) {
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    }
+    this.drawRuns(this.runs.glass, seen, seen !== DEPTH, clip, appearance);
+    gl.disable(gl.BLEND);
     gl.disable(gl.POLYGON_OFFSET_FILL);
   }
 
-  bindTextures(uniforms) {
+  drawRuns(runs, shading, glass, clip, { eye, scene, direction, veil }) {
+    if (!runs.length) return;
     const { gl } = this;
-    this.textures.forEach((texture, unit) => {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, texture);
-    });
-    gl.uniform1i(uniforms.materials_of, 0);
-    gl.uniform1i(uniforms.face_colors ?? null, 1);
-    gl.uniform1i(uniforms.materials, 2);
-    gl.uniform1i(uniforms.glass, 0);
+    this.programs[[shading, glass]] ??= program(gl, source(shading, glass, VERTEX), source(shading, glass, FRAGMENT));
+    const { linked, uniforms } = this.programs[[shading, glass]];
+    gl.useProgram(linked);
+    gl.uniformMatrix4fv(uniforms.clip, false, clip);
+    gl.uniform4fv(uniforms.veil, veil);
+    if (uniforms.eye) gl.uniform3fv(uniforms.eye, eye);
+    if (shading === LIT) this.setLights(uniforms, scene, direction);
+    for (const [first, count] of runs) gl.drawArrays(gl.TRIANGLES, 3 * first, 3 * count);
   }
 
-  drawGlass(uniforms) {
-    const { gl } = this;
-    gl.uniform1i(uniforms.glass, 1);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.drawArrays(gl.TRIANGLES, 0, 3 * this.faces);
-    gl.disable(gl.BLEND);
-  }
-
-  setLights(uniforms, { scene, direction }) {
+  setLights(uniforms, scene, direction) {
     const { gl } = this;
     const lights = scene.lights.slice(0, MAX_LIGHTS);
     const turned = direction ? lights.findIndex((l) => l.type === "directional") : -1;
@@ -239,6 +236,17 @@ export class Model {
     gl.uniform3fv(uniforms.background, scene.background);
   }
 }
+
+// The runs [first, count] of consecutive faces that are opaque, and of those that are glass.
+const runs = (materials, isGlass) => {
+  const found = { opaque: [], glass: [] };
+  for (let first = 0, end; first < materials.length; first = end) {
+    const glass = isGlass[materials[first]];
+    for (end = first + 1; end < materials.length && isGlass[materials[end]] === glass; end++);
+    found[glass ? "glass" : "opaque"].push([first, end - first]);
+  }
+  return found;
+};
 
 const texels = (m) => [
   ...m.diffuse, m.shininess,
