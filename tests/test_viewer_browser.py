@@ -129,6 +129,32 @@ def test_own_phong_shows_the_renderers_colors(viewer: Viewer, scenes: Path) -> N
     assert np.array_equal(seen[sure][:, :3], expected[sure])
 
 
+@pytest.mark.parametrize("answered", [True, False])
+def test_a_change_of_mode_waits_a_moment_for_its_picture_and_draws_once(viewer: Viewer, answered: bool) -> None:
+    """And no longer than a moment, should none come."""
+    drawn = viewer.page.evaluate(
+        """async (answered) => {
+          const { model } = viewer.layer, { draw } = model;
+          const drawn = [], frame = () => new Promise(requestAnimationFrame), sent = viewer.seq;
+          const noon = performance.now();
+          performance.now = () => noon; // time stands still, so that a slow machine changes nothing
+          model.draw = (...a) => { drawn.push(viewer.stage.dataset.mode); draw.apply(model, a); };
+          if (!answered) viewer.connection.send = () => {};
+          viewer.setMode("phong");
+          while (viewer.seq === sent) await frame();
+          for (let i = 0; i < 5 || (answered && viewer.stage.dataset.mode !== "phong"); i++) await frame();
+          const inTime = drawn.length;
+          delete performance.now;
+          for (let i = 0; i < 100 && !drawn.length; i++) await new Promise((r) => setTimeout(r, 50));
+          delete model.draw;
+          delete viewer.connection.send;
+          return [inTime, drawn.length > 0];
+        }""",
+        answered,
+    )
+    assert drawn == [int(answered), True]
+
+
 def test_gl_lighting_is_phong(viewer: Viewer, scenes: Path) -> None:
     viewer.choose("gl")
     seen, shown, stage = viewer.pixels("gl"), viewer.camera, stage_of(scenes)

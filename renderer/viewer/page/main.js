@@ -209,7 +209,7 @@ class Viewer {
     this.before = moving ? now : null;
     const waiting = this.mode === "brute" && performance.now() - this.movedAt < REST;
     if (this.dirty && this.connection?.ready && !waiting) this.sendView();
-    if (this.held) setTimeout(() => this.request(), HOLD);
+    if (this.held) setTimeout(() => this.heldSince !== null && this.request(), HOLD);
     else this.draw();
     if (moving || waiting) this.request();
   }
