@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from renderer.errors import expect
+
 FiniteVector = tuple[
     Annotated[float, Field(allow_inf_nan=False, strict=True)],
     Annotated[float, Field(allow_inf_nan=False, strict=True)],
@@ -25,6 +27,14 @@ def unit(vector: ArrayLike) -> NDArray[np.float64]:
     """At unit length, scaled first so that no square overflows or vanishes; zero gives nan."""
     scaled = np.asarray(vector, np.float64) / np.abs(vector).max()
     return scaled / np.linalg.norm(scaled)
+
+
+def checked_vector(argument: str, value: ArrayLike) -> tuple[float, float, float]:
+    """Three numbers (3,) as a tuple. Raises ``ValueError`` naming ``argument`` where they are not, or not finite."""
+    array = np.asarray(value, np.float64)
+    expect(array.shape == (3,) and bool(np.isfinite(array).all()), argument, "three finite numbers", repr(value))
+    x, y, z = array.tolist()
+    return x, y, z
 
 
 class _Camera(BaseModel):

@@ -9,23 +9,18 @@ from importlib.metadata import version
 from pathlib import Path
 
 from renderer.errors import expect
-from renderer.interrupt import INTERRUPTED, ends_while_compiling
-
-_FAREWELL = "octree-render: interrupted, nothing written"
+from renderer.interrupt import interruptible
 
 
+@interruptible("octree-render: interrupted, nothing written")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``octree-render``; returns the exit code: 0, 2 for bad input, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    own_process = arguments is None
+    if arguments is None:
+        _hide_scipy_from_numba()
     try:
-        with ends_while_compiling(_FAREWELL, own_process), _compile_notices(getattr(options, "quiet", False)):
-            if own_process:
-                _hide_scipy_from_numba()
+        with _compile_notices(getattr(options, "quiet", False)):
             options.command(options)
-    except KeyboardInterrupt:
-        print(_FAREWELL, file=sys.stderr)
-        return INTERRUPTED
     except (ValueError, OSError, ModuleNotFoundError) as error:
         print(f"octree-render: {_one_line(error)}", file=sys.stderr)
         return 2

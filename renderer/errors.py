@@ -17,3 +17,8 @@ def expect(condition: bool, argument: str, expected: str, got: object) -> None:
     """Raise ``ValueError`` naming ``argument``, what was expected and what came, unless ``condition``."""
     if not condition:
         raise ValueError(f"{argument}: expected {expected}, got {got}")
+
+
+def is_count(value: object) -> bool:
+    """Whether it is an int >= 0, which True and False are not meant as."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.errors import expect
+from renderer.camera import checked_vector
 from renderer.image import srgb, srgb_steps
 from renderer.jit import inlined, kernel
 from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
@@ -37,14 +37,12 @@ def face_colors(world: World, eye: ArrayLike, threads: int | None = None) -> NDA
     for a scene on which no light falls (``needs.shadows`` False) has none. The same bits for any number of threads.
     Raises ``ValueError`` naming the argument.
     """
-    at = np.asarray(eye, np.float64)
-    expect(at.shape == (3,) and bool(np.isfinite(at).all()), "eye", "three finite numbers", repr(eye))
+    at = checked_vector("eye", eye)
     seen = world._replace(materials=_with_stand_ins(world.materials))
-    x, y, z = at.tolist()
     colors = np.empty((len(world.faces), 3), np.uint8)
 
     def shade(begin: int, end: int) -> None:
-        _shade(seen, (x, y, z), colors, _table(), begin, end)
+        _shade(seen, at, colors, _table(), begin, end)
 
     for_chunks(shade, len(colors), _CHUNK, checked_threads(threads))
     return colors

@@ -1,14 +1,41 @@
-"""Ctrl-C in the midst of compiling, for commands that own their process."""
+"""How a command ends by Ctrl-C: with one line and an exit code, also in the midst of compiling."""
 
 import os
 import signal
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from threading import current_thread, main_thread
 from types import FrameType
+from typing import Protocol
 
 # The usual code of a shell for a process that SIGINT ended.
 INTERRUPTED = 130
+
+
+class Command(Protocol):
+    """A ``main``: from arguments, those of its own process for None, to an exit code."""
+
+    def __call__(self, arguments: Sequence[str] | None = None) -> int: ...
+
+
+def interruptible(message: str) -> Callable[[Command], Command]:
+    """Let a command print ``message`` to standard error and return ``INTERRUPTED`` on Ctrl-C."""
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def run(arguments: Sequence[str] | None = None) -> int:
+            try:
+                with ends_while_compiling(message, own_process=arguments is None):
+                    return command(arguments)
+            except KeyboardInterrupt:
+                print(message, file=sys.stderr)
+                return INTERRUPTED
+
+        return run
+
+    return decorate
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
-from renderer.errors import expect
+from renderer.errors import expect, is_count
 from renderer.material import Phong
 from renderer.scene import Instance, Scene
 
@@ -87,8 +87,7 @@ def needs_of(scene: Scene, max_depth: int | None = None) -> Needs:
     False
     """
     expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
-    counts = isinstance(max_depth, int) and not isinstance(max_depth, bool) and max_depth >= 0
-    expect(max_depth is None or counts, "max_depth", "an integer >= 0 or None", repr(max_depth))
+    expect(max_depth is None or is_count(max_depth), "max_depth", "an integer >= 0 or None", repr(max_depth))
     return Needs(**{f.feature: f.value for f in examine(scene, max_depth)})  # type: ignore[arg-type]
 
 

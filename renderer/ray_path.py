@@ -11,8 +11,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.camera import checked_vector
 from renderer.direct import SHORT_OF_LIGHT
-from renderer.errors import expect
+from renderer.errors import expect, is_count
 from renderer.jit import kernel
 from renderer.light import DIRECTIONAL
 from renderer.material import (
@@ -118,9 +119,8 @@ def ray_path(
     Without ``shadows`` the ray that met a surface brings home the light that falls there. Raises ``ValueError`` naming
     the argument.
     """
-    counts = isinstance(max_depth, int) and not isinstance(max_depth, bool) and max_depth >= 0
-    expect(counts, "max_depth", "an integer >= 0", repr(max_depth))
-    o, d = _vector("origin", origin), _vector("direction", direction)
+    expect(is_count(max_depth), "max_depth", "an integer >= 0", repr(max_depth))
+    o, d = checked_vector("origin", origin), checked_vector("direction", direction)
     expect(any(d), "direction", "a vector of non-zero length", repr(direction))
     bounces = max_depth if stage.needs.reflection or stage.needs.refraction else 0
     waiting = deque([_Ray("camera", 0, -1, o, normalized(d), (1.0, 1.0, 1.0), _media_at(stage, o))])
@@ -134,13 +134,6 @@ def ray_path(
         if met and ray.depth < bounces:
             waiting += [r for r in _bounce(stage, ray, met, own) if _goes_on(r.weight, min_weight)]
     return tuple(path)
-
-
-def _vector(argument: str, value: ArrayLike) -> Vector:
-    array = np.asarray(value, np.float64)
-    expect(array.shape == (3,) and bool(np.isfinite(array).all()), argument, "three finite numbers", repr(value))
-    x, y, z = array.tolist()
-    return x, y, z
 
 
 def _media_at(stage: Stage, eye: Vector) -> tuple[int, ...]:

@@ -46,7 +46,7 @@ def render(
     wanted = checked_needs(needs, scene, chosen.max_depth)
     rule = _offset(offset)
     stage = set_up(scene, wanted, accelerator, split, threads)
-    with _bar(tiles(chosen), progress) as bar:
+    with _bar(tiles(chosen.resolution), progress) as bar:
         return stage.picture(scene.camera, chosen, rule, threads, bar.update)
 
 

@@ -70,7 +70,7 @@ class Stage:
             tile = (x, y, min(x + TILE, width), min(y + TILE, height))
             render_tile(self.target, world, settings, rows, samples, film, tile)
 
-        for_chunks(render_one, tiles(chosen), 1, threads, finished)
+        for_chunks(render_one, tiles(chosen.resolution), 1, threads, finished)
         return Image(*film, build_seconds=self.build_seconds, render_seconds=time.perf_counter() - began)
 
 
@@ -89,9 +89,9 @@ def set_up(
     return Stage(scene, mesh, octree, needs, world, target, time.perf_counter() - began)
 
 
-def tiles(chosen: RenderSettings) -> int:
-    """How many tiles the picture has."""
-    width, height = chosen.resolution
+def tiles(resolution: tuple[int, int]) -> int:
+    """How many tiles a picture of (width, height) has."""
+    width, height = resolution
     return -(-width // TILE) * -(-height // TILE)
 
 

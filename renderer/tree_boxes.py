@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.errors import expect
+from renderer.errors import expect, is_count
 from renderer.intersect import Ray, box_limit, enter_boxes, make_shear, make_slabs, round_down
 from renderer.jit import kernel
 from renderer.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
@@ -30,13 +30,9 @@ class Visit(NamedTuple):
     is_leaf: bool
 
 
-def levels(tree: Tree) -> int:
+def levels(octree: Octree | BruteForce) -> int:
     """How many levels have boxes; 0 where there are no nodes, as of ``BruteForce``, or no faces."""
-    count, children = 0, np.zeros(len(_root_box(tree)), np.int64)
-    while len(children):
-        count += 1
-        _, children = _octants(tree, children[children >= 0])
-    return count
+    return octree.target.depth + 1 if len(_root_box(octree.target.tree)) else 0
 
 
 def boxes_at(octree: Octree | BruteForce, level: int) -> Boxes:
@@ -44,8 +40,7 @@ def boxes_at(octree: Octree | BruteForce, level: int) -> Boxes:
 
     Raises ``ValueError`` for a negative level.
     """
-    good = isinstance(level, int) and not isinstance(level, bool) and level >= 0
-    expect(good, "level", "an integer >= 0", repr(level))
+    expect(is_count(level), "level", "an integer >= 0", repr(level))
     tree, scale = octree.target.tree, octree.target.scale
     boxes = _root_box(tree)
     children = np.zeros(len(boxes), np.int64)

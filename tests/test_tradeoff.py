@@ -88,6 +88,13 @@ def test_a_film_refuses_what_it_cannot_judge(name: str, why: str) -> None:
         Film(scene, 8)
 
 
+def test_a_film_refuses_a_scene_without_shadows() -> None:
+    scene = load_scene(SCENES / "mirrors.toml")
+    assert can_judge(scene) is None
+    bright = scene.altered(render=scene.render.model_copy(update={"shadows": False}))
+    assert "render.shadows" in (can_judge(bright) or "")
+
+
 def test_sampling_and_truncation_fall_and_arithmetic_is_small(record: dict[str, Any]) -> None:
     curves = {(c["who"], c["knob"]): c for c in record["tradeoff_pictures"]["curves"]}
     for who in ("ours", "Mitsuba"):

@@ -68,8 +68,8 @@ def octrees() -> list[Any]:
 class TestLevels:
     def test_the_boxes_are_those_of_each_level(self, octree: Octree) -> None:
         found = places(octree)
-        assert levels(octree.target.tree) == max(p.level for p in found) + 1 == octree.target.depth + 1
-        for level in range(1, levels(octree.target.tree) + 1):
+        assert levels(octree) == max(p.level for p in found) + 1 == octree.target.depth + 1
+        for level in range(1, levels(octree) + 1):
             expected = [p.box for p in found if p.level == level]
             got = boxes_at(octree, level)
             assert got.dtype == np.float64 and got.shape == (len(expected), 6)
@@ -89,7 +89,7 @@ class TestLevels:
 
     def test_a_leafs_faces_lie_in_its_box(self, octree: Octree) -> None:
         seen = []
-        for level in range(1, levels(octree.target.tree)):
+        for level in range(1, levels(octree)):
             rows = {key(box) for box in boxes_at(octree, level)}
             for place in places(octree):
                 if place.level == level and place.faces is not None:
@@ -169,7 +169,7 @@ def test_octants_are_opened_nearest_first_and_not_behind_the_hit() -> None:
     through = visited(octree, origin, direction, t_max=0.5)
     assert through == []  # the sphere begins at t = 2
     inside = visited(octree, (0.0, 0.0, 0.0), direction)
-    assert 1 < len(visits) < sum(len(boxes_at(octree, k)) for k in range(levels(octree.target.tree))) / 20
+    assert 1 < len(visits) < sum(len(boxes_at(octree, k)) for k in range(levels(octree))) / 20
     assert all(v.lower[0] <= 0.0 for v in inside)
 
 
@@ -187,7 +187,7 @@ def test_a_ray_that_misses_the_root_visits_nothing() -> None:
 def test_without_a_tree_there_is_nothing_to_show() -> None:
     empty = Octree(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
     for target in (BruteForce.from_mesh(icosphere(1)), empty):
-        assert levels(target.target.tree) == 0
+        assert levels(target) == 0
         assert boxes_at(target, 0).shape == boxes_at(target, 3).shape == (0, 6)
         assert visited(target, (0, 0, 9), (0, 0, -1)) == []
 

@@ -14,16 +14,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from renderer.interrupt import INTERRUPTED, ends_while_compiling
+from renderer.interrupt import interruptible
 from validation.sections import NAMES, choose
 
 if TYPE_CHECKING:
     from validation.gates import Gate
     from validation.suite import Request
 
-_FAREWELL = "validation: interrupted, no report written"
 
-
+@interruptible("validation: interrupted, no report written")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do what the arguments ask for; returns the exit code."""
     parser = _parser()
@@ -31,11 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _check(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        with ends_while_compiling(_FAREWELL, own_process=arguments is None):
-            return _run(options, ("python -m validation " + shlex.join(given)).strip())
-    except KeyboardInterrupt:
-        print(_FAREWELL, file=sys.stderr)
-        return INTERRUPTED
+        return _run(options, ("python -m validation " + shlex.join(given)).strip())
     except (ImportError, ValueError, OSError) as error:
         missing = "; pip install 'octree-renderer[validate]'" if isinstance(error, ImportError) else ""
         print(f"validation: {' '.join(str(error).split())}{missing}", file=sys.stderr)

@@ -30,6 +30,9 @@ NAME = "Mitsuba's native path integrator (scalar_rgb)"
 # Longer than any path, so that none ends by chance.
 _NO_ROULETTE = 1000
 
+# What stands against any scene without them.
+SHADOWLESS = "Mitsuba's path integrator cannot leave shadows out"
+
 
 class _Pass(NamedTuple):
     """A part of the light: a Mitsuba scene that holds no other, and the largest number of edges of a path."""
@@ -46,7 +49,7 @@ def can_judge(scene: Scene) -> str | None:
 def _first_fault(scene: Scene, glass: str | None) -> str | None:
     """What stands against ``scene`` or a material of it; ``glass`` against a dielectric."""
     if not scene.render.shadows:
-        return "render.shadows: Mitsuba's path integrator cannot leave shadows out"
+        return f"render.shadows: {SHADOWLESS}"
     for name in sorted({instance.material for instance in scene.instances}):
         material, fault = scene.materials[name], None
         if isinstance(material, Dielectric):

@@ -16,6 +16,7 @@ from renderer.camera import PerspectiveCamera
 from renderer.material import Mirror, Phong
 from renderer.scene import Scene
 from validation import mitsuba_scene as source
+from validation.mitsuba_path import SHADOWLESS
 
 # Interreflection is then this share of direct light: below float32's resolution of a picture, 6e-8 of each radiance
 # times some ten; and 1e-6 times a radiance is far from float32's smallest number.
@@ -30,7 +31,7 @@ class Film:
     """``scene`` on a film of ``size`` x ``size`` pixels with a box filter, each pixel the mean over its square.
 
     Raises ``ValueError`` for a scene that is not made of diffuse surfaces and mirrors under a perspective camera, or
-    that has ambient light.
+    that has ambient light or no shadows.
     """
 
     def __init__(self, scene: Scene, size: int) -> None:
@@ -84,6 +85,8 @@ def can_judge(scene: Scene) -> str | None:
         return "a camera that is not perspective"
     if any(scene.ambient):
         return "ambient light"
+    if not scene.render.shadows:
+        return f"render.shadows: {SHADOWLESS}"
     for name in sorted({instance.material for instance in scene.instances}):
         material = scene.materials[name]
         plain = isinstance(material, Phong) and not any((*material.specular, *material.reflectance))

@@ -75,7 +75,7 @@ class Scatter:
 def can_judge(scene: Scene) -> str | None:
     """Why random paths say nothing about ``scene``; None if they do."""
     if not scene.render.shadows:
-        return "Mitsuba's path integrator cannot leave shadows out"
+        return mitsuba_path.SHADOWLESS
     if any(isinstance(scene.materials[i.material], Dielectric) for i in scene.instances):
         return None
     return "nothing is random without a dielectric; one path a ray is the picture"

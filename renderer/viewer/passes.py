@@ -13,7 +13,6 @@ from renderer.face_phong import face_colors
 from renderer.false_color import Limits, false_color, limits_of
 from renderer.image import Image
 from renderer.shading import BOUNDED
-from renderer.stage import TILE
 from renderer.viewer.exhibit import Exhibit, render_settings, varied
 from renderer.viewer.protocol import FACE_COLORS, JPEG, RGBA, View, packed
 from renderer.viewer.viewpoint import camera_of
@@ -26,18 +25,12 @@ _JPEG_QUALITY = 90
 
 @dataclass(frozen=True)
 class Pass:
-    """One answer to a view: its number from 0, whether it is the last, size (w, h), samples a pixel and tiles."""
+    """One answer to a view: its number from 0, whether it is the last, size (w, h) and samples a pixel."""
 
     step: int
     last: bool
     size: tuple[int, int]
     samples: int
-
-    @property
-    def tiles(self) -> int:
-        """How many tiles the picture has."""
-        w, h = self.size
-        return -(-w // TILE) * -(-h // TILE)
 
 
 def passes_of(view: View) -> list[Pass]:

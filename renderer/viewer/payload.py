@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from renderer.errors import expect
 from renderer.light import DirectionalLight, Light
 from renderer.material import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE, Material
+from renderer.mesh import face_normals
 from renderer.needs import examine
 from renderer.stage import Stage
 from renderer.tree_boxes import boxes_at, levels
@@ -38,7 +39,7 @@ def description(shown: Exhibit) -> dict[str, Any]:
         "background": scene.background,
         "needs": {feature: [value, reason] for feature, value, reason in examine(scene)},
         "octree": {
-            "levels": levels(shown.stage.octree.target.tree),
+            "levels": levels(shown.stage.octree),
             "nodes": stats.nodes,
             "leaves": stats.leaves,
             "bytes": stats.bytes,
@@ -76,17 +77,14 @@ def boxes_bytes(stage: Stage, level: int) -> bytes:
     """The answer to GET /octree, little-endian: uint32 n and the number of levels, then n boxes of 6 float32: the lower
     and the upper corner of each node of ``level``, the root's being 0.
     """
-    boxes = np.asarray(boxes_at(stage.octree, level)).astype("<f4")
-    return struct.pack("<2I", len(boxes), levels(stage.octree.target.tree)) + boxes.tobytes()
+    boxes = boxes_at(stage.octree, level).astype("<f4")
+    return struct.pack("<2I", len(boxes), levels(stage.octree)) + boxes.tobytes()
 
 
 def _normals(stage: Stage, corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """The normal at each corner, (F, 3, 3): the vertex's where a face is smooth, else the face's; 0 without area."""
     world = stage.world
-    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(crossed, axis=1, keepdims=True)
-    flat = np.divide(crossed, lengths, out=np.zeros_like(crossed), where=lengths > 0.0)
-    normals = np.repeat(flat[:, None], 3, axis=1)
+    normals = np.repeat(face_normals(corners)[:, None], 3, axis=1)
     if len(world.smooth):
         normals[world.smooth] = world.normals[world.faces[world.smooth]]
     return normals

@@ -33,9 +33,9 @@ def picked(shown: Exhibit, pick: Pick) -> dict[str, Any]:
         min_weight=shown.scene.render.min_weight,
         shadows=pick.settings.shadows,
     )
-    nodes = visited(stage.octree, origin, direction, np.inf)
+    nodes = visited(stage.octree, origin, direction)
     boxes = [
-        {"level": int(level), "lower": _listed(lower), "upper": _listed(upper), "leaf": bool(leaf)}
+        {"level": level, "lower": lower.tolist(), "upper": upper.tolist(), "leaf": leaf}
         for level, lower, upper, leaf in nodes[:_MAX_BOXES]
     ]
     met = _met(shown, stage, hits)
@@ -53,17 +53,13 @@ def _met(shown: Exhibit, stage: Stage, hits: Hits) -> dict[str, Any]:
         "t": float(hits.t[0]),
         "face": face,
         "material": material,
-        "point": _listed(hits.points[0]),
-        "normal": _listed(surface.n_s),
+        "point": hits.points[0].tolist(),
+        "normal": surface.n_s,
     }
 
 
 def _told(path: Sequence[Segment]) -> list[dict[str, Any]]:
     return [
-        {"kind": s.kind, "depth": s.depth, "start": _listed(s.start), "end": _listed(s.end), "hit": bool(s.hit)}
+        {"kind": s.kind, "depth": s.depth, "start": s.start, "end": s.end, "hit": s.hit}
         for s in path
     ]
-
-
-def _listed(vector: Any) -> list[float]:
-    return [float(x) for x in vector]

@@ -19,7 +19,7 @@ MIN_FOVY, MAX_FOVY = 0.001, 3.1
 
 RGBA, JPEG, FACE_COLORS = 1, 2, 3
 # kind, seq, step, last, w, h as uint32, then milliseconds and million rays a second as float32, little-endian.
-_HEADER = struct.Struct("<6I2f")
+HEADER = struct.Struct("<6I2f")
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 _Sequence = Annotated[int, Field(ge=0, lt=2**32)]
@@ -146,4 +146,4 @@ def packed(kind: int, view: View, step: int, last: bool, size: tuple[int, int], 
 
     32 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 a face.
     """
-    return _HEADER.pack(kind, view.seq, step, last, *size, *pace)
+    return HEADER.pack(kind, view.seq, step, last, *size, *pace)

@@ -14,6 +14,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from renderer.stage import tiles
 from renderer.viewer.exhibit import Exhibit
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
@@ -176,7 +177,7 @@ class Session:
             while not stubborn and not running.done():
                 await self._unless_newer(asyncio.wait({running}, timeout=_PROGRESS))
                 if view.mode == "brute" and not running.done():
-                    await self._tell(type="progress", seq=view.seq, done=done / wanted.tiles)
+                    await self._tell(type="progress", seq=view.seq, done=done / tiles(wanted.size))
             return await asyncio.shield(running)
         finally:
             left.set()

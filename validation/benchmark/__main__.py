@@ -13,24 +13,19 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from renderer.interrupt import INTERRUPTED, ends_while_compiling
+from renderer.interrupt import interruptible
 
 # Rays of a family, in full and in quick runs.
 RAYS, QUICK_RAYS = 1_000_000, 200_000
 
-_FAREWELL = "benchmark: interrupted, nothing written"
 
-
+@interruptible("benchmark: interrupted, nothing written")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run what the arguments ask for; returns the exit code."""
     options = _parser().parse_args(arguments)
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        with ends_while_compiling(_FAREWELL, own_process=arguments is None):
-            return _run(options, ("python -m validation.benchmark " + shlex.join(given)).strip())
-    except KeyboardInterrupt:
-        print(_FAREWELL, file=sys.stderr)
-        return INTERRUPTED
+        return _run(options, ("python -m validation.benchmark " + shlex.join(given)).strip())
     except (ValueError, OSError, ImportError) as error:
         print(f"benchmark: {error}", file=sys.stderr)
         return 2

@@ -9,7 +9,6 @@ import argparse
 import json
 import math
 import statistics
-import struct
 import time
 from collections import defaultdict
 from pathlib import Path
@@ -21,10 +20,9 @@ from websockets.typing import Origin
 
 import renderer
 from renderer.camera import PerspectiveCamera
+from renderer.viewer.protocol import HEADER
 from validation.cases import SCENES
 
-# Kind, seq, step, last, width, height; milliseconds, million rays a second. A payload follows.
-_HEADER = struct.Struct("<6I2f")
 _SIZE = 512
 # A turn in so many steps; each shows other parts of the scene.
 _STEP = 0.05
@@ -58,7 +56,7 @@ def measure(file: Path, mode: str, views: int) -> dict[str, list[float]]:
                 while not last:
                     message = socket.recv()
                     assert isinstance(message, bytes), message
-                    _, seq, step, last, width, height, _, _ = _HEADER.unpack_from(message)
+                    _, seq, step, last, width, height, _, _ = HEADER.unpack_from(message)
                     if number >= _UNSEEN:
                         what = "colours" if mode == "phong" else f"{width} x {height}"
                         seconds[what].append(time.perf_counter() - began)
@@ -74,10 +72,8 @@ def _view(camera: PerspectiveCamera, mode: str, number: int) -> dict[str, Any]:
     turned = camera.model_copy(update={"eye": tuple(eye.tolist())})
     right, up, forward = turned.frame()
     columns = [*right, 0.0, *up, 0.0, *-forward, 0.0, *eye, 1.0]
-    settings = {"max_depth": 6, "samples": 1, "shadows": True, "reflection": True, "refraction": True, "aov": "color",
-                "light": None, "pixels": "rgba"}  # fmt: skip
     return {"type": "view", "seq": number, "mode": mode, "m": [float(v) for v in columns],
-            "fovy": math.radians(camera.fov), "w": _SIZE, "h": _SIZE, "settings": settings}  # fmt: skip
+            "fovy": math.radians(camera.fov), "w": _SIZE, "h": _SIZE}  # fmt: skip
 
 
 if __name__ == "__main__":

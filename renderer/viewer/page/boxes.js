@@ -1,5 +1,5 @@
 // Faces of boxes as panes of tinted glass, brighter towards their rims.
-import { program } from "./program.js";
+import { layInstancesOut, program } from "./program.js";
 
 // Bytes a box: two corners and a colour (RGBA).
 const STRIDE = 28;
@@ -67,11 +67,7 @@ export class Boxes {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
     gl.bufferData(gl.ARRAY_BUFFER, set.bytes, gl.STATIC_DRAW);
     const layout = [[3, gl.FLOAT, false, 0], [3, gl.FLOAT, false, 12], [4, gl.UNSIGNED_BYTE, true, 24]];
-    layout.forEach(([size, type, normalized, offset], location) => {
-      gl.enableVertexAttribArray(location);
-      gl.vertexAttribPointer(location, size, type, normalized, STRIDE, offset);
-      gl.vertexAttribDivisor(location, 1);
-    });
+    layInstancesOut(gl, STRIDE, layout);
   }
 
   // Draw what the model does not hide of `set`, by `clip` (world to clip space).

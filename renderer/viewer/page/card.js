@@ -1,5 +1,5 @@
 // The card of a picked pixel: where its ray went and what it met.
-import { segmentColor } from "./overlay.js";
+import { KINDS, shownKind } from "./overlay.js";
 
 const NAMES = { camera: "camera ray", reflected: "reflected", refracted: "refracted", shadow: "shadow, lit", blocked: "shadow, blocked" };
 
@@ -31,12 +31,11 @@ function rows(pick, scene) {
 function legend(path) {
   const counts = new Map();
   for (const segment of path) {
-    const kind = segment.kind === "shadow" && segment.hit ? "blocked" : segment.kind;
-    const entry = counts.get(kind) ?? { color: segmentColor(segment), count: 0 };
-    counts.set(kind, { ...entry, count: entry.count + 1 });
+    const kind = shownKind(segment);
+    counts.set(kind, (counts.get(kind) ?? 0) + 1);
   }
-  return [...counts].map(([kind, { color, count }]) =>
-    element("li", {}, swatch(`rgb(${color.join(" ")})`), `${count} ${NAMES[kind]}`));
+  return [...counts].map(([kind, count]) =>
+    element("li", {}, swatch(`rgb(${KINDS[kind].join(" ")})`), `${count} ${NAMES[kind]}`));
 }
 
 // Fill and show `card`; `close()` is called by its button and `toggle(shown)` by the switch of the visited nodes.

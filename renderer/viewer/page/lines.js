@@ -1,5 +1,5 @@
 // Lines of any width over the model: each is a quad in the film's plane with round ends, a dark rim and soft edges.
-import { program } from "./program.js";
+import { layInstancesOut, program } from "./program.js";
 
 // Bytes a line: two points, colour (RGBA), width and dash in pixels.
 const STRIDE = 36;
@@ -112,11 +112,7 @@ export class Lines {
     gl.bindBuffer(gl.ARRAY_BUFFER, own.buffer);
     gl.bufferData(gl.ARRAY_BUFFER, new Uint8Array(set.bytes, 0, set.count * STRIDE), gl.STATIC_DRAW);
     const layout = [[3, gl.FLOAT, false, 0], [3, gl.FLOAT, false, 12], [4, gl.UNSIGNED_BYTE, true, 24], [2, gl.FLOAT, false, 28]];
-    layout.forEach(([size, type, normalized, offset], location) => {
-      gl.enableVertexAttribArray(location);
-      gl.vertexAttribPointer(location, size, type, normalized, STRIDE, offset);
-      gl.vertexAttribDivisor(location, 1);
-    });
+    layInstancesOut(gl, STRIDE, layout);
     return own.vertices;
   }
 

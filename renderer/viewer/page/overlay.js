@@ -44,14 +44,15 @@ export async function fetchBoxes(level) {
   return { edges, panes, count };
 }
 
-export const segmentColor = ({ kind, hit }) => KINDS[kind === "shadow" && hit ? "blocked" : kind];
+// As which of KINDS a segment of a path is shown.
+export const shownKind = ({ kind, hit }) => (kind === "shadow" && hit ? "blocked" : kind);
 
 // The rays of a picked pixel and the point that each of them met.
 export function pathLines(pick) {
   const set = new LineSet();
   for (const segment of pick.path) {
     const shadow = segment.kind === "shadow";
-    const color = [...segmentColor(segment), shadow ? 215 : 255];
+    const color = [...KINDS[shownKind(segment)], shadow ? 215 : 255];
     set.add(segment.start, segment.end, color, shadow ? 2 : 3, shadow && segment.hit ? 9 : 0);
     if (segment.hit) set.add(segment.end, segment.end, color, shadow ? 6 : 9);
   }

@@ -1,11 +1,11 @@
 // The panel: its form holds the settings, the rest shows what the scene is and how fast its pictures come.
 import { element } from "./card.js";
 import { levelColor } from "./overlay.js";
+import { count } from "./readings.js";
 
 // A pixel; the server allows no more.
 const MAX_SAMPLES = 64;
 const DEGREE = Math.PI / 180;
-const count = (n) => n.toLocaleString("en");
 
 export class Panel {
   // `changed(name)` is called with the name of the field that the user moved.

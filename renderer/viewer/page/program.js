@@ -1,4 +1,4 @@
-// Shaders compiled and their uniforms found.
+// Shaders compiled and their uniforms found, and the attributes of instances laid out.
 
 export function program(gl, vertex, fragment) {
   const linked = gl.createProgram();
@@ -17,4 +17,14 @@ export function program(gl, vertex, fragment) {
     uniforms[name.replace("[0]", "")] = gl.getUniformLocation(linked, name);
   }
   return { linked, uniforms };
+}
+
+// Lay the numbers of the bound buffer out as attributes 0, 1, ... of instances that are `stride` bytes apart; `layout`
+// has [size, type, normalized, offset] for each.
+export function layInstancesOut(gl, stride, layout) {
+  layout.forEach(([size, type, normalized, offset], location) => {
+    gl.enableVertexAttribArray(location);
+    gl.vertexAttribPointer(location, size, type, normalized, stride, offset);
+    gl.vertexAttribDivisor(location, 1);
+  });
 }

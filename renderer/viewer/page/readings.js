@@ -2,7 +2,7 @@
 import { element } from "./card.js";
 import { FACE_COLORS } from "./connection.js";
 
-const count = (n) => n.toLocaleString("en");
+export const count = (n) => n.toLocaleString("en");
 const bytes = (n) => (n < 1e6 ? `${(n / 1e3).toFixed(0)} kB` : `${(n / 1e6).toFixed(1)} MB`);
 const seconds = (s) => (s < 1 ? `${(1e3 * s).toFixed(0)} ms` : `${s.toFixed(2)} s`);
 const milliseconds = (ms) => (ms < 10 ? `${ms.toFixed(1)} ms` : seconds(ms / 1e3));
