@@ -1,11 +1,11 @@
-"""Loops over a batch of rays, for kernels: a check of the input, and the one-ray queries row by row."""
+"""Queries of a batch of rays, as Python calls them: a check of the rays, and their hits row by row."""
 
 import numpy as np
 
-from renderer.jit import kernel
-from renderer.leaf import view
-from renderer.simd import keep, pointer
-from renderer.traverse import Found, Rays, make_memory, make_scratch, trace
+from renderer.jit import inlined, kernel
+from renderer.leaf import NO_FACE, tree_pointers
+from renderer.simd import get, larger, pointer, put
+from renderer.traverse import Found, Rays, make_scratch, ray_at, search_blocks, search_singly, trace
 
 # Origins as far as float32 boxes can tell from infinity, and directions whose product with a determinant, at most
 # 2^254 there, stays a normal float64 number, as does one of 2^-300 with the shortest.
@@ -14,47 +14,84 @@ SHORTEST, LONGEST = 2.0**-600, 2.0**700
 
 
 @kernel
-def _first_bad_ray(origins, directions, scale, begin, end):
+def _first_bad_ray(rays, begin, end):
     """Row of the first ray of a range that is out of bounds, or -1. NaN fails every comparison, so it is too.
 
     In range: components of ``scale`` times the origin up to FARTHEST, the largest component of the direction from
     SHORTEST to LONGEST.
     """
-    step = np.int64(len(origins) > 1)
     for i in range(begin, end):
-        o = i * step
-        far = max(abs(origins[o, 0]), max(abs(origins[o, 1]), abs(origins[o, 2]))) * scale
-        largest = max(abs(directions[i, 0]), max(abs(directions[i, 1]), abs(directions[i, 2])))
-        # max drops a NaN in some places; x - x is NaN for NaN and inf and 0 otherwise.
-        odd = 0.0
+        far, largest, odd = 0.0, 0.0, 0.0
         for k in range(3):
-            odd += (origins[o, k] - origins[o, k]) + (directions[i, k] - directions[i, k])
-        if not (odd == 0.0 and far <= FARTHEST and SHORTEST <= largest <= LONGEST):
+            o, d = get(rays.origins, i * rays.origin_step + k), get(rays.directions, 3 * i + k)
+            far, largest = larger(far, abs(o)), larger(largest, abs(d))
+            # A NaN is never larger, but x - x is NaN for NaN and inf, and 0 otherwise.
+            odd += (o - o) + (d - d)
+        if not (odd == 0.0 and far * rays.scale <= FARTHEST and SHORTEST <= largest <= LONGEST):
             return i
     return -1
 
 
-@kernel
-def trace_chunk(tree, depth, scale, rays, out, begin, end, any_hit):
-    """Hits of rays[begin:end] into the arrays of ``out``: t, face, u, v, or with ``any_hit`` only the fifth, hit.
-
-    ``scale``, a power of two, is what the tree's vertices were multiplied by; ``depth`` 0 tests every block. Origins,
-    t_min and t_max have one row a ray or one for all. Returns the row of the first ray out of bounds, after which
-    nothing is traced, or -1.
-    """
+@inlined
+def _ray_pointers(rays, scale):
+    """``Rays`` of the arrays (origins, directions, t_min, t_max); all but the directions may have one row for all."""
     origins, directions, t_min, t_max = rays
-    t, face, u, v, hit = out
-    bad = _first_bad_ray(origins, directions, scale, begin, end)
-    if bad >= 0:
-        return bad
-    memory = make_memory(depth, end - begin)
-    source = Rays(
+    return Rays(
         pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
         3 * np.int64(len(origins) > 1), np.int64(len(t_min) > 1), np.int64(len(t_max) > 1), scale,
     )  # fmt: skip
-    found = Found(pointer(t), pointer(face), pointer(u), pointer(v), pointer(hit))
-    trace(view(tree), depth, source, found, begin, end, make_scratch(memory, depth), any_hit)
-    keep(memory.floats)
-    keep(memory.doubles)
-    keep(memory.integers)
+
+
+@inlined
+def _found_pointers(out):
+    """``Found`` of the arrays (t, face, u, v, hit)."""
+    t, face, u, v, hit = out
+    return Found(pointer(t), pointer(face), pointer(u), pointer(v), pointer(hit))
+
+
+@kernel
+def trace_chunk(words, rays, out, begin, end, any_hit, memory):
+    """Hits of the rays begin:end into the arrays of ``out``: t, face, u, v, or with ``any_hit`` only the fifth, hit.
+
+    ``words`` are the tree's, which must have nodes. Returns the row of the first ray out of bounds, for which nothing
+    is traced, or -1.
+    """
+    tree = tree_pointers(words)
+    source = _ray_pointers(rays, tree.scale)
+    bad = _first_bad_ray(source, begin, end)
+    if bad < 0:
+        trace(tree, source, _found_pointers(out), begin, end, make_scratch(memory), any_hit)
+    return bad
+
+
+@kernel
+def search_chunk(words, rays, out, begin, end, any_hit):
+    """``trace_chunk`` for a tree without nodes."""
+    tree = tree_pointers(words)
+    source = _ray_pointers(rays, tree.scale)
+    bad = _first_bad_ray(source, begin, end)
+    if bad < 0:
+        search_blocks(tree, source, _found_pointers(out), begin, end, any_hit)
+    return bad
+
+
+@kernel
+def trace_few(words, origins, directions, t_min, t_max, out, stack):
+    """Closest hits of so few rays that each goes alone: (4, n) ``out`` has rows t, u, v and the bits of face as int64.
+
+    Bounds and return value as of ``trace_chunk``; ``stack`` has ``traverse.stack_size`` words.
+    """
+    tree, count = tree_pointers(words), len(directions)
+    source = _ray_pointers((origins, directions, t_min, t_max), tree.scale)
+    bad = _first_bad_ray(source, 0, count)
+    if bad >= 0:
+        return bad
+    for i in range(count):
+        ray, limit = ray_at(source, i)
+        t, face, u, v, w = search_singly(tree, ray, limit, pointer(stack))
+        hit = face != NO_FACE
+        out[0, i] = t / tree.scale if hit else np.inf
+        out[1, i] = u / w if hit else np.nan
+        out[2, i] = v / w if hit else np.nan
+        out[3, i] = np.int64(face if hit else -1).view(np.float64)
     return -1

@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import carray
 from numpy.typing import NDArray
 
 from renderer.intersect import round_down, round_up
 from renderer.jit import inlined, kernel
-from renderer.simd import lane, load8, pointer, select, splat8, store
+from renderer.simd import lane, larger, load8, select, smaller, splat8, store
 
 # A box is eight 32-bit words: lower x, y, z, a face, and the negated upper x, y, z, and an unused one. The upper corner
 # is negated so that one vector minimum is the union of two boxes. The face is an int32 where a face has the box; of a
@@ -30,16 +29,6 @@ class Faces(NamedTuple):
     spare: NDArray[np.float32]
 
 
-@inlined
-def borrowed(array):
-    """The same memory as an array that nobody owns; the caller keeps the owner.
-
-    Numba counts a reference, with a locked instruction, for each array of a tuple that goes through a function, but
-    none for these: a midpoint build took twice as long on one thread.
-    """
-    return carray(pointer(array), array.shape)
-
-
 @kernel
 def face_boxes(vertices, faces, boxes, numbers, begin, end):
     """The box of each face in ``begin:end``, rounded outwards."""
@@ -48,8 +37,8 @@ def face_boxes(vertices, faces, boxes, numbers, begin, end):
         base = f * BOX
         for k in range(3):
             x, y, z = vertices[a, k], vertices[b, k], vertices[c, k]
-            boxes[base + k] = round_down(min(x, min(y, z)))
-            boxes[base + 4 + k] = -round_up(max(x, max(y, z)))
+            boxes[base + k] = round_down(smaller(x, smaller(y, z)))
+            boxes[base + 4 + k] = -round_up(larger(x, larger(y, z)))
         numbers[base + FACE] = f
         boxes[base + 7] = 0.0
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from renderer.blocks import fill_blocks
 from renderer.bounds import BOX, Faces, face_boxes, fit
 from renderer.collapse import collapse
-from renderer.emit import WAITING, emit_nodes, moved_link, place_subtree
+from renderer.emit import emit_nodes, emit_room, moved_link, place_subtree
 from renderer.hierarchy import MIDPOINT, SAH, Hierarchy, Rule, add_part, first_parts, new_hierarchy
 from renderer.layout import LANES, NODE_WORDS, Tree, cache_aligned
 from renderer.parallel import for_chunks
@@ -40,9 +40,9 @@ class _Subtree(NamedTuple):
 
 
 def build_tree(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, threads: int = 1
-) -> tuple[Tree, int]:
-    """Build the tree over all faces; returns it with the number of levels of nodes."""
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, scale: float = 1.0, threads: int = 1
+) -> Tree:
+    """Build the tree over all faces of vertices that were multiplied by ``scale``."""
     top, subtrees = _build_parts(vertices, faces, rule, threads)
     if len(subtrees) == 1:
         built = next(iter(subtrees.values()))
@@ -50,15 +50,16 @@ def build_tree(
         nodes[:] = built.nodes
     else:
         nodes, block_faces, depth = _join(top, subtrees, rule, threads)
-    return Tree(nodes, nodes.view(np.int32), fill_blocks(vertices, faces, block_faces, threads), block_faces), depth
+    return Tree(nodes, fill_blocks(vertices, faces, block_faces, threads), block_faces, depth, scale)
 
 
-def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], threads: int = 1) -> Tree:
+def build_blocks(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], scale: float = 1.0, threads: int = 1
+) -> Tree:
     """The blocks alone, in the order of the faces, for a search without a tree."""
     block_faces = np.full(-(-len(faces) // LANES) * LANES, -1, np.int32)
     block_faces[: len(faces)] = np.arange(len(faces))
-    nodes = np.empty(0, np.float32)
-    return Tree(nodes, nodes.view(np.int32), fill_blocks(vertices, faces, block_faces, threads), block_faces)
+    return Tree(np.empty(0, np.float32), fill_blocks(vertices, faces, block_faces, threads), block_faces, 0, scale)
 
 
 def _build_parts(
@@ -181,5 +182,5 @@ def _emit_top(
         ends[part] = moved_link(built.link, *start), built.depth
     nodes = np.empty(len(top.halves) * NODE_WORDS, np.float32)
     none = np.empty(0, np.int32)
-    used, _, depth = emit_nodes(top, none, ends, nodes, nodes.view(np.int32), none, np.empty((WAITING, 3), np.int32))
+    used, _, depth = emit_nodes(top, none, ends, nodes, nodes.view(np.int32), none, emit_room())
     return nodes[: used * NODE_WORDS], depth

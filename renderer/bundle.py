@@ -11,9 +11,9 @@ from renderer.simd import at, get, put
 SIDE = 8
 SIZE = SIDE * SIDE
 # Columns of float64: origin, direction and weight of each ray. Columns of int64: how many rays and their depth; the
-# pixel of each and the media that it is in: how many, then their materials' rows, outermost first.
+# pixel of each and the media that it is in: how many, then SIZE times their limit materials' rows, outermost first.
 _ORIGIN, _DIRECTION, _WEIGHT, BUNDLE_DOUBLES = 0, 3 * SIZE, 6 * SIZE, 9 * SIZE
-_PIXEL, _COUNT, _MEDIA = 2, 2 + SIZE, 2 + 2 * SIZE
+_PIXEL, _COUNT, BUNDLE_INTEGERS = 2, 2 + SIZE, 2 + 2 * SIZE
 
 
 class Bundle(NamedTuple):
@@ -30,18 +30,12 @@ class Bundle(NamedTuple):
 
 
 @inlined
-def bundle_integers(limit):
-    """Words of int64 that a bundle takes whose rays remember ``limit`` media."""
-    return _MEDIA + SIZE * limit
-
-
-@inlined
 def bundle_at(doubles, integers, limit, slot):
     """The bundle in place ``slot`` of two arrays of bundles."""
-    doubles, integers = at(doubles, slot * BUNDLE_DOUBLES), at(integers, slot * bundle_integers(limit))
+    doubles, integers = at(doubles, slot * BUNDLE_DOUBLES), at(integers, slot * (BUNDLE_INTEGERS + SIZE * limit))
     return Bundle(
         at(doubles, _ORIGIN), at(doubles, _DIRECTION), at(doubles, _WEIGHT),
-        integers, at(integers, _PIXEL), at(integers, _COUNT), at(integers, _MEDIA), limit,
+        integers, at(integers, _PIXEL), at(integers, _COUNT), at(integers, BUNDLE_INTEGERS), limit,
     )  # fmt: skip
 
 

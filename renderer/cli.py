@@ -117,7 +117,7 @@ def _render(options: argparse.Namespace) -> None:
     from renderer.image import check_picture_path
     from renderer.render import render
     from renderer.scene import load_scene
-    from renderer.warm import compile_in_two
+    from renderer.precompile import compile_in_two
 
     check_picture_path(options.output)
     scene = load_scene(options.scene)
@@ -145,7 +145,7 @@ def _render(options: argparse.Namespace) -> None:
 
 
 def _compile(_options: argparse.Namespace) -> None:
-    from renderer.warm import compile_all
+    from renderer.precompile import compile_all
 
     compile_all()
     print("all kernels are compiled")

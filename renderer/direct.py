@@ -12,7 +12,7 @@ from renderer.material import DIELECTRIC, KIND, MIRROR, UNLIT
 from renderer.shading import spawn_origin
 from renderer.sight import phong
 from renderer.simd import at, get, put
-from renderer.traverse import Rays, trace
+from renderer.traverse import Rays, search_blocks, trace
 from renderer.vec3 import add, dot, normalized, row3, scale, sub, three, times
 
 # What a lit ray of a bundle leaves for its light and its children, one column of SURFACE_DOUBLES float64 a ray.
@@ -25,6 +25,15 @@ _TOWARDS, _ARRIVING, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE
 # A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
 # covers angles down to 2^-12.
 SHORT_OF_LIGHT = 1.0 - 2.0**-36
+
+
+@kernel
+def trace_any(tree, rays, found, count, scratch, any_hit):
+    """``trace`` of the first ``count`` rays, or every block where the tree has no nodes."""
+    if tree.depth == 0:
+        search_blocks(tree, rays, found, 0, count, any_hit)
+    else:
+        trace(tree, rays, found, 0, count, scratch, any_hit)
 
 
 @inlined
@@ -95,18 +104,18 @@ def _shine(world, bundle, surface, i, towards, arriving):
 
 
 @inlined
-def _trace_shadows(target, bundle, lit, aimed, work):
+def _trace_shadows(tree, bundle, lit, aimed, work):
     """Find which of the ``aimed`` shadow rays meet something, and count them in their pixels."""
     shadows = work.shadows
     rays = Rays(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0)
-    trace(target.tree, target.depth, rays, work.found, 0, aimed, work.trace, np.bool_(True))
+    trace_any(tree, rays, work.found, aimed, work.trace, np.bool_(True))
     for k in range(aimed):
         pixel = get(bundle.pixels, get(lit, SIZE + k))
         put(work.traced, pixel, get(work.traced, pixel) + 1)
 
 
 @kernel
-def light_surfaces(target, world, bundle, surfaces, lit, settings, work):
+def light_surfaces(tree, world, bundle, surfaces, lit, settings, work):
     """Direct light of the surfaces that a bundle met, into their LIGHT.
 
     ``lit`` lists, after their number, the rays whose material shows it, with room for as many again. Shadow rays are
@@ -117,7 +126,7 @@ def light_surfaces(target, world, bundle, surfaces, lit, settings, work):
     for light in range(world.light_count):
         aimed = _aim_all(world, surfaces, lit, count, light, settings.offset, shadows)
         if settings.shadows:
-            _trace_shadows(target, bundle, lit, aimed, work)
+            _trace_shadows(tree, bundle, lit, aimed, work)
         for k in range(aimed):
             i = get(lit, SIZE + k)
             if not (settings.shadows and get(work.found.hit, k)):

@@ -1,32 +1,47 @@
 """Writing a collapsed hierarchy as nodes and leaves."""
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.bounds import BOX, FACE
 from renderer.jit import kernel
 from renderer.layout import CHILDREN, LANES, LEAF_BITS, NODE_WORDS
+from renderer.simd import larger
 
 # Parts that wait to become nodes: at most seven a level. Levels of cuts end at 3 * 64 by ``max_depth``, even halves
 # within 31 more.
 WAITING = 8 * 256
 
 
+class EmitRoom(NamedTuple):
+    """Scratch of ``emit_nodes``: parts that wait to become nodes, and those that share a node's places."""
+
+    waiting: NDArray[np.int32]
+    shares: NDArray[np.int32]
+
+
+def emit_room() -> EmitRoom:
+    """Scratch for one thread."""
+    return EmitRoom(np.empty((WAITING, 3), np.int32), np.empty((9, 2), np.int32))
+
+
 @kernel
-def emit_nodes(tree, numbers, ends, nodes, links, block_faces, waiting):
+def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
     """Write the nodes below part 0, which becomes node 0, depth first. Returns (nodes, blocks, levels of nodes).
 
     ``ends`` (n, 2) int32 tells the link and the levels below it for each whole part; when it is empty, whole parts and
-    those that ``collapse`` chose are written as leaves. ``nodes`` and ``links`` are the same memory. ``waiting`` is
-    (WAITING, 3) int32 scratch.
+    those that ``collapse`` chose are written as leaves. ``nodes`` and ``links`` are the same memory.
     """
+    waiting, shares = room
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 1, -1
-    top, used, blocks, depth = 1, np.int64(0), np.int64(0), 0
-    shares = np.empty((9, 2), np.int32)
+    top, used, blocks, depth = 1, np.int64(0), np.int64(0), np.int64(0)
     while top > 0:
         # Make the node and hang it below its parent.
         top -= 1
-        part, level, parent = np.int64(waiting[top, 0]), waiting[top, 1], waiting[top, 2]
-        depth = max(depth, level)
+        part, level, parent = np.int64(waiting[top, 0]), np.int64(waiting[top, 1]), waiting[top, 2]
+        depth = larger(depth, level)
         base = used * NODE_WORDS
         _clear_node(nodes, links, base)
         if parent >= 0:
@@ -50,7 +65,7 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, waiting):
                 top += 1
             elif len(ends) > 0:
                 links[link] = ends[child, 0]
-                depth = max(depth, level + ends[child, 1])
+                depth = larger(depth, level + ends[child, 1])
             else:
                 links[link] = leaf_link(blocks, tree.ranges[child, 1] - tree.ranges[child, 0])
                 blocks = emit_leaf(tree, child, numbers, block_faces, blocks)

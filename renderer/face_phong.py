@@ -15,7 +15,7 @@ from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
 from renderer.material import AMBIENT, DIFFUSE, KIND, LAMBERT, REFLECTANCE, TRANSMITTANCE
 from renderer.parallel import checked_threads, for_chunks
 from renderer.sight import World, look_at, phong
-from renderer.simd import get, pointer
+from renderer.simd import get, larger, pointer, smaller
 from renderer.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
 
 # 1 to 2 ms of work: little beside a frame, much beside taking a chunk.
@@ -90,7 +90,7 @@ def _shine(world, light, p, n, d, m):
 def _encoded(x, table):
     """The sRGB code of x: how many steps of ``_table`` it reaches, counted from those that its place does."""
     steps, first = table
-    x = min(max(x, 0.0), 1.0)
+    x = smaller(larger(x, 0.0), 1.0)
     code = get(first, np.int64(x * _PLACES))
     while get(steps, code) <= x:
         code += 1

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from renderer.bounds import BOX
 from renderer.jit import kernel
 from renderer.layout import LANES
+from renderer.simd import smaller
 
 MIDPOINT, SAH = 0, 1
 
@@ -65,4 +66,4 @@ def add_part(tree, part, begin, end):
 @kernel
 def whole_size(rule):
     """Parts of so many faces are never cut: they fill one block."""
-    return min(rule.leaf_size, LANES)
+    return smaller(rule.leaf_size, LANES)

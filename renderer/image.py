@@ -1,19 +1,17 @@
 """A rendered picture: linear radiance with its AOVs, tone mapping, and files."""
 
 import io
-import os
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect
 from renderer.exr import check_exr, exr_bytes
+from renderer.files import write_atomically
 
 
 def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
@@ -58,23 +56,6 @@ def _table() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     steps = exact.astype(np.float32)
     steps = np.where(steps < exact, np.nextafter(steps, np.float32(np.inf)), steps)
     return _encoded(np.nan_to_num(zeros, nan=0.0)), np.append(steps, np.float32(np.nan))
-
-
-def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
-    """Let ``write`` fill a temporary file beside ``path``, then rename it: never a half-written file."""
-    path = Path(path)
-    handle, name = tempfile.mkstemp(prefix=".picture.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-        # mkstemp makes the file private; give it the permissions that open() would have.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
 
 
 @dataclass(frozen=True, eq=False)

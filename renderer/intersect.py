@@ -9,7 +9,7 @@ import numpy as np
 
 from renderer.jit import inlined, kernel
 from renderer.layout import NODE_WORDS
-from renderer.simd import get, load4, load8, magnitude, movemask, select, splat4, splat8
+from renderer.simd import get, larger, load4, load8, magnitude, movemask, select, smaller, splat4, splat8
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).
@@ -27,7 +27,7 @@ _DOUBT = 2.0**-30
 def round_up(x):
     """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN."""
     # No branch, here and below: whether a random ray takes it cannot be predicted.
-    y = max(np.float32(x), -_LARGEST)
+    y = larger(np.float32(x), -_LARGEST)
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) < x else np.float32(0.0)
     return np.float32(y + step)
 
@@ -35,7 +35,7 @@ def round_up(x):
 @inlined
 def round_down(x):
     """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN."""
-    y = min(np.float32(x), _LARGEST)
+    y = smaller(np.float32(x), _LARGEST)
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) > x else np.float32(0.0)
     return np.float32(y - step)
 
@@ -56,6 +56,12 @@ class Ray(NamedTuple):
     dy: float
     dz: float
     t_min: float
+
+
+@inlined
+def largest_of(ray):
+    """The largest component of a ray's direction, without its sign."""
+    return larger(larger(abs(ray.dx), abs(ray.dy)), abs(ray.dz))
 
 
 class Slabs(NamedTuple):
@@ -95,14 +101,14 @@ def _slab(axis, o, d, largest):
     back = np.signbit(d)
     flip = 8 if back else 0
     down, up = round_down(o), round_up(o)
-    near_inverse = min(max(inverse, -_LARGEST), _LARGEST)
+    near_inverse = smaller(larger(inverse, -_LARGEST), _LARGEST)
     near_origin, far_origin = (down if back else up), (up if back else down)
     return 16 * axis + flip, 16 * axis + 8 - flip, near_origin, far_origin, near_inverse, inverse
 
 
 @inlined
 def make_slabs(ray, largest):
-    """Prepare a ray; ``largest`` is max(|dx|, |dy|, |dz|) > 0."""
+    """Prepare a ray; ``largest`` is ``largest_of(ray)`` > 0."""
     nx, fx, nox, fox, nix, fix = _slab(0, ray.ox, ray.dx, largest)
     ny, fy, noy, foy, niy, fiy = _slab(1, ray.oy, ray.dy, largest)
     nz, fz, noz, foz, niz, fiz = _slab(2, ray.oz, ray.dz, largest)
@@ -201,24 +207,33 @@ class Edges(NamedTuple):
 
 
 @inlined
-def see_triangles(blocks, base, ray):
+def _load_rows(blocks, base, ray):
+    """The nine rows of a block in the order of the ray's axes: x, y and z of each corner."""
+    x, y, z = base + ray.row_x, base + ray.row_y, base + ray.row_z
+    return (
+        load4(blocks, x), load4(blocks, x + 12), load4(blocks, x + 24),
+        load4(blocks, y), load4(blocks, y + 12), load4(blocks, y + 24),
+        load4(blocks, z), load4(blocks, z + 12), load4(blocks, z + 24),
+    )  # fmt: skip
+
+
+@inlined
+def see_triangles(tree, base, ray):
     """The ``Edges`` of a block's four triangles, and the mask of those whose edges a ray passes on the same side.
 
     Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
     ab - cd or is 0, and is antisymmetric, so two triangles never both miss on their shared edge; 0 counts as inside.
     When all three edge functions are 0 (the ray lies in the plane, or the triangle has no area) it is a miss.
     """
+    if tree.wide != 0:
+        x0, x1, x2, y0, y1, y2, z0, z1, z2 = _load_rows(tree.wide_blocks, base, ray)
+    else:
+        x0, x1, x2, y0, y1, y2, z0, z1, z2 = _load_rows(tree.blocks, base, ray)
     zero, ox, oy, oz = splat4(0.0), splat4(ray.origin_x), splat4(ray.origin_y), splat4(ray.origin_z)
     sx, sy = splat4(ray.shear_x), splat4(ray.shear_y)
-    z0 = load4(blocks, base + ray.row_z) - oz
-    z1 = load4(blocks, base + 12 + ray.row_z) - oz
-    z2 = load4(blocks, base + 24 + ray.row_z) - oz
-    x0 = (load4(blocks, base + ray.row_x) - ox) - sx * z0
-    x1 = (load4(blocks, base + 12 + ray.row_x) - ox) - sx * z1
-    x2 = (load4(blocks, base + 24 + ray.row_x) - ox) - sx * z2
-    y0 = (load4(blocks, base + ray.row_y) - oy) - sy * z0
-    y1 = (load4(blocks, base + 12 + ray.row_y) - oy) - sy * z1
-    y2 = (load4(blocks, base + 24 + ray.row_y) - oy) - sy * z2
+    z0, z1, z2 = z0 - oz, z1 - oz, z2 - oz
+    x0, x1, x2 = (x0 - ox) - sx * z0, (x1 - ox) - sx * z1, (x2 - ox) - sx * z2
+    y0, y1, y2 = (y0 - oy) - sy * z0, (y1 - oy) - sy * z1, (y2 - oy) - sy * z2
     e0 = x2 * y1 - y2 * x1
     e1 = x0 * y2 - y0 * x2
     e2 = x1 * y0 - y1 * x0
@@ -240,11 +255,11 @@ def meet_planes(edges, ray):
 
 
 @inlined
-def hit_triangles(blocks, base, ray):
+def hit_triangles(tree, base, ray):
     """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt, t, and the
     numerators of u and v with their denominator. Of a hit in doubt ``meets_face_box`` decides.
     """
-    edges, seen = see_triangles(blocks, base, ray)
+    edges, seen = see_triangles(tree, base, ray)
     bits, zero = movemask(seen), splat4(0.0)
     if bits == 0:
         return bits, bits, zero, zero, zero, zero
@@ -253,28 +268,34 @@ def hit_triangles(blocks, base, ray):
 
 
 @kernel
-def meets_face_box(blocks, at, ray, t):
+def meets_face_box(tree, at, ray, t):
     """Whether the ray meets the box of the face at ``at`` no later than at t, and the face has an area.
 
     Of a face seen edge-on the edge functions are noise, and so are the hit and its t. Such a hit counts only if the
     face's own box is entered no later than at its t; then every box around it is, and no tree can lose it.
     The arithmetic is that of ``enter_boxes``; it starts from the ray, because keeping ``Slabs`` for it costs every ray.
     """
-    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
+    largest = largest_of(ray)
     limit = box_limit(t, largest)
     t0, t1 = round_down(ray.t_min * largest), limit
-    t0, t1 = _meet_slab(blocks, at, 0, ray.ox, ray.dx, largest, t0, t1)
-    t0, t1 = _meet_slab(blocks, at, 1, ray.oy, ray.dy, largest, t0, t1)
-    t0, t1 = _meet_slab(blocks, at, 2, ray.oz, ray.dz, largest, t0, t1)
-    return t0 <= np.float32(t1 * FAR_PADDING) and t0 <= limit and _has_area(blocks, at)
+    t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
+    t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
+    t0, t1 = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
+    return t0 <= np.float32(t1 * FAR_PADDING) and t0 <= limit and _has_area(tree, at)
+
+
+@inlined
+def _coordinate(tree, at):
+    """One coordinate of a block, exactly."""
+    return get(tree.wide_blocks, at) if tree.wide != 0 else np.float64(get(tree.blocks, at))
 
 
 @kernel
-def _meet_slab(blocks, at, axis, o, d, largest, t0, t1):
+def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
     """Narrow [t0, t1] to one axis of a face's own box."""
     row = at + 4 * axis
-    a, b, c = np.float64(get(blocks, row)), np.float64(get(blocks, row + 12)), np.float64(get(blocks, row + 24))
-    near, far = round_down(min(a, min(b, c))), round_up(max(a, max(b, c)))
+    a, b, c = _coordinate(tree, row), _coordinate(tree, row + 12), _coordinate(tree, row + 24)
+    near, far = round_down(smaller(a, smaller(b, c))), round_up(larger(a, larger(b, c)))
     near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = _slab(axis, o, d, largest)
     if near_row > far_row:
         near, far = far, near
@@ -284,8 +305,8 @@ def _meet_slab(blocks, at, axis, o, d, largest, t0, t1):
 
 
 @kernel
-def _has_area(blocks, at):
-    ax, ay, az = np.float64(get(blocks, at)), np.float64(get(blocks, at + 4)), np.float64(get(blocks, at + 8))
-    bx, by, bz = get(blocks, at + 12) - ax, get(blocks, at + 16) - ay, get(blocks, at + 20) - az
-    cx, cy, cz = get(blocks, at + 24) - ax, get(blocks, at + 28) - ay, get(blocks, at + 32) - az
+def _has_area(tree, at):
+    ax, ay, az = _coordinate(tree, at), _coordinate(tree, at + 4), _coordinate(tree, at + 8)
+    bx, by, bz = _coordinate(tree, at + 12) - ax, _coordinate(tree, at + 16) - ay, _coordinate(tree, at + 20) - az
+    cx, cy, cz = _coordinate(tree, at + 24) - ax, _coordinate(tree, at + 28) - ay, _coordinate(tree, at + 32) - az
     return by * cz - bz * cy != 0.0 or bz * cx - bx * cz != 0.0 or bx * cy - by * cx != 0.0

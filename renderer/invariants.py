@@ -7,12 +7,12 @@ from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BL
 from renderer.mesh import Mesh
 
 
-def faults(tree: Tree, depth: int, mesh: Mesh) -> list[str]:
+def faults(tree: Tree, mesh: Mesh) -> list[str]:
     """What is wrong with ``tree`` as the octree of ``mesh``, in words; empty when all of these hold.
 
     Every node and block is reached exactly once. A child's box contains its descendants' and every vertex of its
-    faces. Every face with its own vertices stands in exactly one place. No path is longer than ``depth``. Unused places
-    hold no face and no area; unused octants have inverted boxes.
+    faces. Every face with its own vertices stands in exactly one place. No path is longer than ``tree.depth``. Unused
+    places hold no face and no area; unused octants have inverted boxes.
     """
     found = _block_faults(tree, mesh)
     nodes = len(tree.nodes) // NODE_WORDS
@@ -27,8 +27,8 @@ def faults(tree: Tree, depth: int, mesh: Mesh) -> list[str]:
         reached[node] += 1
         if reached[node] > 1:
             continue
-        if level > depth:
-            found.append(f"node {node}: level {level} is deeper than {depth}")
+        if level > tree.depth:
+            found.append(f"node {node}: level {level} is deeper than {tree.depth}")
         for place in range(8):
             low, high, child = _octant(tree, node, place)
             where = f"node {node}, octant {place}"

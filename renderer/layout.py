@@ -1,6 +1,8 @@
 """The records in memory: what a node and a block of triangles look like. Kernels and builder both read this page."""
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,20 +26,42 @@ MAX_LEAF_BLOCKS = 1 << LEAF_BITS
 LANES = 4
 BLOCK_WORDS = 36
 
+# A tree as kernels read it, int64: addresses of its arrays, the number of blocks, the levels of nodes, whether vertices
+# are float64, and the bits of its scale.
+NODES, BLOCKS, FACES, BLOCK_COUNT, DEPTH, WIDE, SCALE, TREE_WORDS = range(8)
 
-class Tree(NamedTuple):
-    """The arrays that a traversal reads.
 
-    nodes   (N * NODE_WORDS,) float32, rounded outwards from the float64 vertices
-    links   the same memory as int32
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """What rays are shot at.
+
+    nodes   (N * NODE_WORDS,) float32, rounded outwards from the float64 vertices; without any, every block is tested
     blocks  (B * BLOCK_WORDS,) float32 when every vertex is exactly a float32, else float64
     faces   (B * LANES,) int32, the face in each place of each block, -1 where unused
+    depth   the levels of nodes, 0 without any
+    scale   the power of two by which the vertices were multiplied
     """
 
     nodes: NDArray[np.float32]
-    links: NDArray[np.int32]
     blocks: NDArray[np.float32] | NDArray[np.float64]
     faces: NDArray[np.int32]
+    depth: int
+    scale: float = 1.0
+
+    @property
+    def links(self) -> NDArray[np.int32]:
+        """The memory of ``nodes`` as int32."""
+        return self.nodes.view(np.int32)
+
+    @cached_property
+    def words(self) -> NDArray[np.int64]:
+        """(TREE_WORDS,) int64: the record as kernels read it, with the arrays' addresses; keep the tree meanwhile."""
+        words = np.zeros(TREE_WORDS, np.int64)
+        words[NODES], words[BLOCKS], words[FACES] = (a.ctypes.data for a in (self.nodes, self.blocks, self.faces))
+        words[BLOCK_COUNT], words[DEPTH] = len(self.faces) // LANES, self.depth
+        words[WIDE] = self.blocks.dtype == np.float64
+        words[SCALE] = np.float64(self.scale).view(np.int64)
+        return words
 
 
 def cache_aligned(count: int, dtype: type[np.generic]) -> NDArray[Any]:

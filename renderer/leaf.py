@@ -6,25 +6,51 @@ import numpy as np
 
 from renderer.intersect import hit_triangles, make_shear, meets_face_box
 from renderer.jit import inlined, kernel
-from renderer.layout import BLOCK_WORDS, LANES
-from renderer.simd import get, lane, lowest_bit, pointer
+from renderer.layout import BLOCK_COUNT, BLOCK_WORDS, BLOCKS, DEPTH, FACES, LANES, NODES, SCALE, WIDE
+from renderer.simd import (
+    double_of,
+    float32_pointer,
+    float64_pointer,
+    get,
+    int32_pointer,
+    lane,
+    lowest_bit,
+    pointer,
+    smaller,
+)
 
 
-class View(NamedTuple):
-    """A ``Tree`` as the traversal reads it: pointers, and the number of blocks."""
+class TreePointers(NamedTuple):
+    """A ``Tree`` as the traversal reads it. Blocks are float64 where ``wide`` is 1 and float32 where it is 0: one of two
+    pointers to the same memory is of use.
+    """
 
     nodes: Any
     links: Any
     blocks: Any
+    wide_blocks: Any
+    wide: Any
     faces: Any
     count: int
+    depth: int
+    scale: float
 
 
 @inlined
-def view(tree):
-    """Pointers into a tree, which the caller must keep alive."""
-    return View(
-        pointer(tree.nodes), pointer(tree.links), pointer(tree.blocks), pointer(tree.faces), len(tree.faces) // LANES
+def tree_pointers(words):
+    """The pointers in ``Tree.words``, whose tree the caller must keep alive."""
+    at = pointer(words)
+    nodes, blocks = get(at, NODES), get(at, BLOCKS)
+    return TreePointers(
+        float32_pointer(nodes),
+        int32_pointer(nodes),
+        float32_pointer(blocks),
+        float64_pointer(blocks),
+        get(at, WIDE),
+        int32_pointer(get(at, FACES)),
+        get(at, BLOCK_COUNT),
+        get(at, DEPTH),
+        double_of(get(at, SCALE)),
     )
 
 
@@ -44,7 +70,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
     t, face, u, v, w = best
     doubtful = np.int64(0)
     for block in range(first, first + count):
-        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree, block * BLOCK_WORDS, shear)
         doubtful |= doubts
         bits &= ~doubts
         while bits != 0:
@@ -63,14 +89,14 @@ def nearest_carefully(tree, first, count, ray, shear, best):
     t, face, u, v, w = best
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
-        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree.blocks, base, shear)
+        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree, base, shear)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
             ti = lane(t4, i)
             fi = get(tree.faces, block * LANES + i)
             better = ti >= ray.t_min and (ti < t or (ti == t and fi < face))
-            if better and ((doubts >> i) & 1 == 0 or meets_face_box(tree.blocks, base + i, ray, ti)):
+            if better and ((doubts >> i) & 1 == 0 or meets_face_box(tree, base + i, ray, ti)):
                 t, face, u, v, w = ti, fi, lane(u4, i), lane(v4, i), lane(w4, i)
     return t, face, u, v, w
 
@@ -80,7 +106,7 @@ def search_all_blocks(tree, ray, t_max, any_hit):
     """The best hit (t, face, u, v, w) over every block; with ``any_hit`` it may stop at the first."""
     shear, best, doubtful = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(0)
     for first in range(0, tree.count, _BLOCKS_AT_ONCE):
-        count = min(_BLOCKS_AT_ONCE, tree.count - first)
+        count = smaller(_BLOCKS_AT_ONCE, tree.count - first)
         t, face, u, v, w, doubts = nearest_in_blocks(tree, first, count, ray.t_min, shear, best)
         best = t, face, u, v, w
         doubtful |= doubts

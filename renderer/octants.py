@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from renderer.bounds import BOX, double_centre, empty_box, united
 from renderer.hierarchy import add_part
 from renderer.jit import inlined, kernel
-from renderer.simd import load8, store
+from renderer.simd import larger, load8, smaller, store
 
 
 class OctantRoom(NamedTuple):
@@ -98,7 +98,7 @@ def _centres_middle_along(boxes, begin, end, axis):
     low, high = np.float32(np.inf), np.float32(-np.inf)
     for i in range(begin, end):
         centre = double_centre(boxes, i * BOX, axis)
-        low, high = min(low, centre), max(high, centre)
+        low, high = smaller(low, centre), larger(high, centre)
     return low + (high - low) * np.float32(0.5)
 
 

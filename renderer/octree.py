@@ -12,7 +12,7 @@ from renderer.hierarchy import Rule
 from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 from renderer.mesh import Mesh, Repairs
 from renderer.parallel import checked_threads
-from renderer.query import Hits, Target, any_hits, check_rays, closest_hits
+from renderer.query import Hits, any_hits, check_rays, closest_hits
 from renderer.refit import refit_tree
 
 MAX_LEAF_SIZE = LANES * MAX_LEAF_BLOCKS
@@ -53,9 +53,9 @@ class _Accelerator:
     the given arrays, and is None without it.
     """
 
-    def __init__(self, mesh: Mesh, target: Target, threads: int | None) -> None:
+    def __init__(self, mesh: Mesh, tree: Tree, threads: int | None) -> None:
         # One reference, so that a refit on another thread changes both at once.
-        self._built = (mesh, target)
+        self._built = (mesh, tree)
         self.repairs: Repairs | None = None
         self.threads = checked_threads(threads)
 
@@ -64,13 +64,13 @@ class _Accelerator:
         return self._built[0]
 
     @property
-    def target(self) -> Target:
+    def tree(self) -> Tree:
         """The arrays that rays are shot at."""
         return self._built[1]
 
-    @target.setter
-    def target(self, target: Target) -> None:
-        self._built = (self.mesh, target)
+    @tree.setter
+    def tree(self, tree: Tree) -> None:
+        self._built = (self.mesh, tree)
 
     def closest_hit(
         self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
@@ -82,16 +82,16 @@ class _Accelerator:
         misses it, unless the rounding of its slopes lifts it out of the plane. The same bits for any number of
         threads. Raises ``ValueError`` naming argument and row.
         """
-        mesh, target = self._built
+        mesh, tree = self._built
         rays = check_rays(origins, directions, t_min, t_max)
-        return closest_hits(target, rays, mesh, self.threads)
+        return closest_hits(tree, rays, mesh, self.threads)
 
     def any_hit(
         self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
     ) -> NDArray[np.bool_]:
         """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above."""
-        target = self.target
-        return any_hits(target, check_rays(origins, directions, t_min, t_max), self.threads)
+        tree = self.tree
+        return any_hits(tree, check_rays(origins, directions, t_min, t_max), self.threads)
 
     def refit(self, vertices: ArrayLike) -> None:
         """Move the vertices and keep the faces: ``vertices`` is (V, 3), finite, V as built.
@@ -109,23 +109,21 @@ class _Accelerator:
         >>> octree.closest_hit([[0.25, 0.25, 2.0]], [[0, 0, -1]]).t
         array([1.])
         """
-        mesh, target = self._built
+        mesh, tree = self._built
         moved = _moved(mesh, vertices)
         scaled, scale = _scaled(moved)
-        tree = refit_tree(target.tree, scaled, moved.faces, self.threads)
-        self._built = (moved, Target(tree, target.depth, scale))
+        self._built = (moved, refit_tree(tree, scaled, moved.faces, scale, self.threads))
 
     @property
     def stats(self) -> Stats:
         """Counts and bytes of the built arrays, those of the mesh left out."""
-        mesh, target = self._built
-        tree = target.tree
+        mesh, tree = self._built
         children = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
         return Stats(
             faces=len(mesh.faces),
             nodes=len(children),
             leaves=int((children < 0).sum()),
-            depth=target.depth,
+            depth=tree.depth,
             blocks=len(tree.faces) // LANES,
             references=int((tree.faces >= 0).sum()),
             bytes=tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes,
@@ -188,8 +186,7 @@ class Octree(_Accelerator):
         _expect_range("max_depth", max_depth, MAX_DEPTH)
         vertices, scale = _scaled(mesh)
         rule = Rule(SPLITS[split], int(leaf_size), int(max_depth))
-        tree, depth = build_tree(vertices, mesh.faces, rule, checked_threads(threads))
-        super().__init__(mesh, Target(tree, depth, scale), threads)
+        super().__init__(mesh, build_tree(vertices, mesh.faces, rule, scale, checked_threads(threads)), threads)
 
 
 class BruteForce(_Accelerator):
@@ -230,9 +227,9 @@ def _expect_range(argument: str, value: object, largest: int) -> None:
     expect(bool(good), argument, f"an integer from 1 to {largest}", repr(value))
 
 
-def _all_blocks(mesh: Mesh, threads: int) -> Target:
+def _all_blocks(mesh: Mesh, threads: int) -> Tree:
     vertices, scale = _scaled(mesh)
-    return Target(build_blocks(vertices, mesh.faces, threads), 0, scale)
+    return build_blocks(vertices, mesh.faces, scale, threads)
 
 
 def _moved(mesh: Mesh, vertices: ArrayLike) -> Mesh:

@@ -33,6 +33,7 @@ from renderer.simd import (
     float_bits,
     get,
     lane,
+    larger,
     least,
     load8,
     lowest_bit,
@@ -40,6 +41,7 @@ from renderer.simd import (
     movemask,
     put,
     select,
+    smaller,
     splat8,
 )
 
@@ -94,13 +96,13 @@ def _most(floats, row):
 @inlined
 def _lowest_origin(floats, axis):
     row = axis * WIDTH
-    return min(_least(floats, NEAR_ORIGIN + row), _least(floats, FAR_ORIGIN + row))
+    return smaller(_least(floats, NEAR_ORIGIN + row), _least(floats, FAR_ORIGIN + row))
 
 
 @inlined
 def _highest_origin(floats, axis):
     row = axis * WIDTH
-    return max(_most(floats, NEAR_ORIGIN + row), _most(floats, FAR_ORIGIN + row))
+    return larger(_most(floats, NEAR_ORIGIN + row), _most(floats, FAR_ORIGIN + row))
 
 
 @inlined

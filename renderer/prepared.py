@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.intersect import Shear, Slabs, box_limit, make_shear, make_slabs, round_down
+from renderer.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
 from renderer.jit import inlined
 from renderer.layout import LEAF_BITS, MAX_LEAF_BLOCKS
 from renderer.leaf import NO_FACE, nearest_in_blocks
@@ -39,7 +39,7 @@ class Prepared(NamedTuple):
 def prepare(rays, r, ray, t_max):
     """Make ``ray`` the ray in place ``r``, which has met nothing yet."""
     floats, doubles, integers = rays
-    largest = max(abs(ray.dx), abs(ray.dy), abs(ray.dz))
+    largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
     _put_axes(floats, NEAR_ORIGIN + r, slabs.near_origin_x, slabs.near_origin_y, slabs.near_origin_z)
     _put_axes(floats, FAR_ORIGIN + r, slabs.far_origin_x, slabs.far_origin_y, slabs.far_origin_z)

@@ -6,17 +6,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.batch import FARTHEST, LONGEST, SHORTEST, trace_chunk
+from renderer.batch import FARTHEST, LONGEST, SHORTEST, search_chunk, trace_chunk, trace_few
 from renderer.errors import expect
 from renderer.layout import Tree
 from renderer.mesh import Mesh, face_normals
 from renderer.parallel import for_chunks
+from renderer.prepared import WIDTH
+from renderer.traverse import make_memory, stack_size
 
 # Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
 # taking a chunk costs nothing beside its 1 to 10 ms of tracing.
 CHUNK = 8192
 # Few rays go in smaller chunks, sixteen a thread, so that no thread has much more to do than another.
 _LEAST_CHUNK = 1024
+# Fewer rays than a packet holds go one by one, by a kernel that compiles in a fraction of the time.
+FEW = WIDTH - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,43 +131,56 @@ def _reject(rays: Rays, row: int, scale: float) -> None:
     expect(False, "directions", expected, f"{rays.directions[row].tolist()} in row {row}")
 
 
-@dataclass(frozen=True)
-class Target:
-    """What rays are shot at: a tree, its depth (0: no nodes, every block is tested) and the power of two by which its
-    vertices were scaled.
-    """
-
-    tree: Tree
-    depth: int
-    scale: float
-
-
-def closest_hits(target: Target, rays: Rays, mesh: Mesh, threads: int) -> Hits:
+def closest_hits(tree: Tree, rays: Rays, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
     count = len(rays.directions)
+    if count <= FEW and tree.depth > 0:
+        return _few_hits(tree, rays, mesh)
     out = np.empty(count), np.empty(count, np.int64), np.empty(count), np.empty(count)
-    _run(target, rays, (*out, np.empty(0, np.bool_)), threads, any_hit=False)
+    _run(tree, rays, (*out, np.empty(0, np.bool_)), threads, any_hit=False)
     return Hits(*out, mesh)
 
 
-def any_hits(target: Target, rays: Rays, threads: int) -> NDArray[np.bool_]:
+def any_hits(tree: Tree, rays: Rays, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
-    none, out = np.empty(0), np.empty(len(rays.directions), np.bool_)
-    _run(target, rays, (none, np.empty(0, np.int64), none, none, out), threads, any_hit=True)
+    count = len(rays.directions)
+    if count <= FEW and tree.depth > 0:
+        return _few(tree, rays)[3].view(np.int64) >= 0
+    none, out = np.empty(0), np.empty(count, np.bool_)
+    _run(tree, rays, (none, np.empty(0, np.int64), none, none, out), threads, any_hit=True)
     return out
 
 
-def _run(target: Target, rays: Rays, out: Any, threads: int, any_hit: bool) -> None:
+def _few_hits(tree: Tree, rays: Rays, mesh: Mesh) -> Hits:
+    t, u, v, face = _few(tree, rays)
+    return Hits(t, face.view(np.int64), u, v, mesh)
+
+
+def _few(tree: Tree, rays: Rays) -> NDArray[np.float64]:
+    """Closest hits of a few rays on the caller's thread, as ``batch.trace_few`` writes them."""
+    out = np.empty((4, len(rays.directions)))
+    stack = np.empty(stack_size(tree.depth), np.int64)
+    row = trace_few(tree.words, rays.origins, rays.directions, rays.t_min, rays.t_max, out, stack)
+    if row >= 0:
+        _reject(rays, row, tree.scale)
+    return out
+
+
+def _run(tree: Tree, rays: Rays, out: Any, threads: int, any_hit: bool) -> None:
     arrays, count = (rays.origins, rays.directions, rays.t_min, rays.t_max), len(rays.directions)
+    size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     bad: list[int] = []
 
     def trace(begin: int, end: int) -> None:
         # Only chunks behind a bad ray are left out, so the first bad ray is always among the found.
         if not bad or begin < bad[0]:
-            row = trace_chunk(target.tree, target.depth, target.scale, arrays, out, begin, end, any_hit)
+            if tree.depth > 0:
+                row = trace_chunk(tree.words, arrays, out, begin, end, any_hit, make_memory(tree.depth, end - begin))
+            else:
+                row = search_chunk(tree.words, arrays, out, begin, end, any_hit)
             if row >= 0:
                 bad.append(row)
 
-    for_chunks(trace, count, min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads))), threads)
+    for_chunks(trace, count, size, threads)
     if bad:
-        _reject(rays, min(bad), target.scale)
+        _reject(rays, min(bad), tree.scale)

@@ -8,6 +8,7 @@ from renderer.intersect import round_down, round_up
 from renderer.jit import kernel
 from renderer.layout import CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, cache_aligned
 from renderer.parallel import for_chunks
+from renderer.simd import larger, smaller
 
 # Nodes whose leaves are one chunk: some tenths of a millisecond.
 _NODES = 1 << 10
@@ -37,7 +38,7 @@ def _fit_leaf(vertices, faces, block_faces, leaf, nodes, at):
             if face >= 0:
                 for corner in range(3):
                     x = vertices[faces[face, corner], axis]
-                    low, high = min(low, x), max(high, x)
+                    low, high = smaller(low, x), larger(high, x)
         nodes[at + 16 * axis], nodes[at + 16 * axis + 8] = round_down(low), round_up(high)
 
 
@@ -54,11 +55,13 @@ def _fit_nodes(nodes, links):
                     row, at = child * NODE_WORDS + 16 * axis, node * NODE_WORDS + 16 * axis + place
                     low, high = nodes[row], nodes[row + 8]
                     for k in range(1, 8):
-                        low, high = min(low, nodes[row + k]), max(high, nodes[row + 8 + k])
+                        low, high = smaller(low, nodes[row + k]), larger(high, nodes[row + 8 + k])
                     nodes[at], nodes[at + 8] = low, high
 
 
-def refit_tree(tree: Tree, vertices: NDArray[np.float64], faces: NDArray[np.int32], threads: int) -> Tree:
+def refit_tree(
+    tree: Tree, vertices: NDArray[np.float64], faces: NDArray[np.int32], scale: float, threads: int
+) -> Tree:
     """``tree`` over moved vertices, in new arrays; the faces of its blocks, which do not change, are shared."""
     nodes = cache_aligned(len(tree.nodes), np.float32)
     links = nodes.view(np.int32)
@@ -71,4 +74,4 @@ def refit_tree(tree: Tree, vertices: NDArray[np.float64], faces: NDArray[np.int3
         threads,
     )
     _fit_nodes(nodes, links)
-    return Tree(nodes, links, fill_blocks(vertices, faces, tree.faces, threads), tree.faces)
+    return Tree(nodes, fill_blocks(vertices, faces, tree.faces, threads), tree.faces, tree.depth, scale)

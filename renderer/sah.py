@@ -9,7 +9,7 @@ from renderer.bounds import BOX, double_centre, empty_box, half_area, united
 from renderer.hierarchy import add_part
 from renderer.jit import inlined, kernel
 from renderer.layout import LANES
-from renderer.simd import load8, store
+from renderer.simd import larger, load8, smaller, store
 
 _MOST_BINS = 16
 
@@ -61,8 +61,8 @@ def _spread_bins(boxes, begin, end, bins):
     for i in range(begin, end):
         base = i * BOX
         x, y, z = double_centre(boxes, base, 0), double_centre(boxes, base, 1), double_centre(boxes, base, 2)
-        x0, y0, z0 = min(x0, x), min(y0, y), min(z0, z)
-        x1, y1, z1 = max(x1, x), max(y1, y), max(z1, z)
+        x0, y0, z0 = smaller(x0, x), smaller(y0, y), smaller(z0, z)
+        x1, y1, z1 = larger(x1, x), larger(y1, y), larger(z1, z)
     return (x0, y0, z0), (_scale(x1 - x0, bins), _scale(y1 - y0, bins), _scale(z1 - z0, bins))
 
 
@@ -73,7 +73,7 @@ def _scale(extent, bins):
 
 @inlined
 def _bin(centre, low, scale, bins):
-    return min(bins - 1, max(0, int((centre - low) * scale)))
+    return smaller(bins - 1, larger(0, np.int64((centre - low) * scale)))
 
 
 @kernel

@@ -8,7 +8,8 @@ import math
 import numpy as np
 
 from renderer.jit import inlined, kernel
-from renderer.vec3 import add, cross, dot, length, scale, sub
+from renderer.simd import larger
+from renderer.vec3 import add, cross, dot, largest_component, length, scale, sub
 
 _ROUNDOFF = 2.0**-53
 # gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).
@@ -88,7 +89,7 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
     w, distance, reach = 1.0 - u - v, 0.0, 0.0
     for k in range(3):
         distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
-        reach = max(reach, max(abs(p0[k] - p[k]), max(abs(p1[k] - p[k]), abs(p2[k] - p[k]))))
+        reach = larger(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
     # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
     double_area = length(cross(sub(p1, p0), sub(p2, p0)))
     return _GAMMA7 * distance + _GAMMA264 * reach * (reach / double_area * reach)
@@ -116,7 +117,7 @@ def spawn_origin(p, error, n_g, w, offset):
     """
     side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
     if offset >= 0.0:
-        distance = (1.0 + max(abs(p[0]), max(abs(p[1]), abs(p[2])))) * offset
+        distance = (1.0 + largest_component(p)) * offset
         return add(p, scale(n_g, side * distance))
     step = scale(n_g, side * error)
     return (_away(p[0], step[0]), _away(p[1], step[1]), _away(p[2], step[2]))

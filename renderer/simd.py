@@ -107,12 +107,7 @@ def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any
 
 @intrinsic
 def pointer(typingctx, array):
-    """The address of an array's first element. It holds no reference: an array made in the kernel is freed after its
-    last use, so ``keep`` it behind the last use of its pointer.
-
-    Numba counts a reference, with a locked instruction, whenever an array in a tuple goes through a function; what the
-    inner loops read goes through them as pointers instead.
-    """
+    """The address of an array's first element. The caller of the kernel keeps the array alive."""
 
     def codegen(context, builder, sig, args):
         return cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0]).data
@@ -120,14 +115,56 @@ def pointer(typingctx, array):
     return types.CPointer(array.dtype)(array), codegen
 
 
-@intrinsic
-def keep(typingctx, array):
-    """Do nothing, but count as a use of the array, which therefore lives until here."""
+def _pointer_to(dtype: Any) -> Any:
+    """The function that makes an address, an int64, a ``pointer`` to values of ``dtype``."""
+
+    @intrinsic
+    def pointer_to(typingctx, address):
+        def codegen(context, builder, sig, args):
+            return builder.inttoptr(args[0], context.get_value_type(sig.return_type))
+
+        return types.CPointer(dtype)(types.int64), codegen
+
+    return pointer_to
+
+
+float32_pointer = _pointer_to(types.float32)
+float64_pointer = _pointer_to(types.float64)
+int32_pointer = _pointer_to(types.int32)
+
+
+def _extreme(predicate: str) -> Any:
+    """The second of two numbers of one type where ``predicate`` puts it before the first, else the first."""
 
     def codegen(context, builder, sig, args):
-        return context.get_dummy_value()
+        compare = builder.fcmp_ordered if isinstance(sig.return_type, types.Float) else builder.icmp_signed
+        return builder.select(compare(predicate, args[1], args[0]), args[1], args[0])
 
-    return types.void(array), codegen
+    return codegen
+
+
+@intrinsic
+def larger(typingctx, a, b):
+    """``max(a, b)`` of two numbers of one type; a where either is NaN. Numba's own takes longer to compile."""
+    number = types.unliteral(a)
+    return number(number, number), _extreme(">")
+
+
+@intrinsic
+def smaller(typingctx, a, b):
+    """``min(a, b)`` of two numbers of one type; a where either is NaN."""
+    number = types.unliteral(a)
+    return number(number, number), _extreme("<")
+
+
+@intrinsic
+def double_of(typingctx, bits):
+    """The float64 whose bits are those of an int64."""
+
+    def codegen(context, builder, sig, args):
+        return builder.bitcast(args[0], ir.DoubleType())
+
+    return types.float64(types.int64), codegen
 
 
 @intrinsic

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,8 +17,8 @@ from renderer.octree import BruteForce, Octree
 from renderer.parallel import for_chunks
 from renderer.scene import RenderSettings, Scene
 from renderer.sight import MAX_MEDIA, World
-from renderer.tile import Film, render_tile
-from renderer.whitted import Accelerator, Settings
+from renderer.tile import Film, render_tile, tile_memory
+from renderer.whitted import Settings
 from renderer.world import media_around, pack
 
 # Pixels a side: 256 tiles share a 512 x 512 picture evenly, and neighbouring rays find their nodes in the cache.
@@ -40,7 +40,7 @@ class Stage:
     octree: Octree | BruteForce
     needs: Needs
     world: World
-    target: Accelerator
+    tree: Tree
     build_seconds: float
 
     def picture(
@@ -68,7 +68,8 @@ class Stage:
         def render_one(first: int, _end: int) -> None:
             x, y = first % across * TILE, first // across * TILE
             tile = (x, y, min(x + TILE, width), min(y + TILE, height))
-            render_tile(self.target, world, settings, rows, samples, film, tile)
+            memory = tile_memory(self.tree.depth, settings)
+            render_tile(self.tree.words, world, settings, rows, samples, film, tile, memory)
 
         for_chunks(render_one, tiles(chosen.resolution), 1, threads, finished)
         return Image(*film, build_seconds=self.build_seconds, render_seconds=time.perf_counter() - began)
@@ -85,8 +86,8 @@ def set_up(
     began = time.perf_counter()
     mesh, world = pack(scene, needs)
     octree = build_octree(mesh, accelerator, split, needs, threads)
-    target = accelerator_of(octree, needs)
-    return Stage(scene, mesh, octree, needs, world, target, time.perf_counter() - began)
+    tree = tree_for(octree, needs)
+    return Stage(scene, mesh, octree, needs, world, tree, time.perf_counter() - began)
 
 
 def tiles(resolution: tuple[int, int]) -> int:
@@ -104,21 +105,20 @@ def build_octree(
     """
     with_tree = needs.octree if accelerator == "auto" else accelerator == "octree"
     built = Octree.from_mesh(mesh, split=split, threads=threads) if with_tree else BruteForce.from_mesh(mesh)
-    expect(built.target.scale == 1.0, "scene", "a largest coordinate from 2^-60 to 2^60", f"bounds {mesh.bounds}")
+    expect(built.tree.scale == 1.0, "scene", "a largest coordinate from 2^-60 to 2^60", f"bounds {mesh.bounds}")
     return built
 
 
-def accelerator_of(octree: Octree | BruteForce, needs: Needs) -> Accelerator:
+def tree_for(octree: Octree | BruteForce, needs: Needs) -> Tree:
     """What the kernel shoots rays at."""
-    tree = octree.target.tree
-    return Accelerator(_widened(tree) if needs.float64_vertices else tree, octree.target.depth)
+    return _widened(octree.tree) if needs.float64_vertices else octree.tree
 
 
 def _widened(tree: Tree) -> Tree:
     """The tree with its vertices in float64, whether they need it or not."""
     blocks = cache_aligned(len(tree.blocks), np.float64)
     blocks[:] = tree.blocks
-    return tree._replace(blocks=blocks)
+    return replace(tree, blocks=blocks)
 
 
 def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: float) -> Settings:

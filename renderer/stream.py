@@ -19,10 +19,12 @@ from renderer.simd import (
     count_bits,
     float_bits,
     get,
+    larger,
     lowest_bit,
     movemask,
     prefetch,
     put,
+    smaller,
     splat4,
     splat8,
     store,
@@ -64,8 +66,9 @@ def _prefetch_child(tree, child):
             prefetch(tree.nodes, child * NODE_WORDS + line * _LINE)
     else:
         # The last vertex of a float64 block lies two lines further on; the hardware fetches what follows by itself.
+        first = (~child >> LEAF_BITS) * BLOCK_WORDS
         for line in range(3):
-            prefetch(tree.blocks, (~child >> LEAF_BITS) * BLOCK_WORDS + line * _LINE)
+            prefetch(tree.blocks, (first + line * _LINE) << tree.wide)
 
 
 class Lanes(NamedTuple):
@@ -149,8 +152,8 @@ def leave_node(tree, rays, lanes, r, any_hit):
     else:
         a, b = _entry(tree, base, lowest_bit(bits | 128), t0), _entry(tree, base, lowest_bit(others | 128), t0)
         waiting = get(stack, top - 1)
-        put(stack, top, max(a, b))
-        nearest = min(a, b) if others != 0 else a
+        put(stack, top, larger(a, b))
+        nearest = smaller(a, b) if others != 0 else a
         entry = nearest if bits != 0 else waiting
         top += count_bits(bits) - 1
     return _go_on(tree, rays, lanes, r, stack, entry, top)
@@ -178,7 +181,7 @@ def meet_leaves(tree, rays, lanes, count):
         child = get(lanes.child, r)
         block = (~child >> LEAF_BITS) if child != END else 0
         shear = shear_of(rays, r)
-        edges, seen = see_triangles(tree.blocks, block * BLOCK_WORDS, shear)
+        edges, seen = see_triangles(tree, block * BLOCK_WORDS, shear)
         t, doubt = meet_planes(edges, shear)
         # What lies beyond the best hit matters no more, in doubt or not.
         seen = seen & (t >= splat4(get(rays.doubles, T_MIN + r))) & (t <= splat4(get(rays.doubles, T + r)))

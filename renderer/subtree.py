@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bounds import BOX, Faces, borrowed, fit
+from renderer.bounds import BOX, fit
 from renderer.collapse import collapse, leaf_cost
-from renderer.emit import WAITING, emit_leaf, emit_nodes, leaf_link
+from renderer.emit import EmitRoom, emit_leaf, emit_nodes, emit_room, leaf_link
 from renderer.hierarchy import SAH, Hierarchy, add_part, new_hierarchy, whole_size
-from renderer.jit import inlined, kernel
+from renderer.jit import kernel
 from renderer.layout import LANES, NODE_WORDS
 from renderer.octants import OctantRoom, cut_octants, octant_room
 from renderer.sah import BinRoom, bin_room, cut_sah
@@ -25,7 +25,7 @@ class Room(NamedTuple):
 
     octants: OctantRoom
     bins: BinRoom
-    waiting: NDArray[np.int32]
+    emit: EmitRoom
 
 
 class Workspace(NamedTuple):
@@ -36,18 +36,20 @@ class Workspace(NamedTuple):
     nodes: NDArray[np.float32]
     links: NDArray[np.int32]
     block_faces: NDArray[np.int32]
+    no_ends: NDArray[np.int32]
 
 
 def new_room() -> Room:
     """Scratch for one thread."""
-    return Room(octant_room(), bin_room(), np.empty((WAITING, 3), np.int32))
+    return Room(octant_room(), bin_room(), emit_room())
 
 
 def new_workspace(faces: int) -> Workspace:
     """Memory for subtrees of up to ``faces`` faces, most of which a subtree leaves untouched."""
     nodes = np.empty(max(1, faces) * NODE_WORDS, np.float32)
     tree = new_hierarchy(max(1, 2 * faces - 1))
-    return Workspace(tree, new_room(), nodes, nodes.view(np.int32), np.empty(faces * LANES, np.int32))
+    block_faces, no_ends = np.empty(faces * LANES, np.int32), np.empty((0, 2), np.int32)
+    return Workspace(tree, new_room(), nodes, nodes.view(np.int32), block_faces, no_ends)
 
 
 @kernel
@@ -82,7 +84,7 @@ def _cut_in_half(faces, tree, part, count):
 @kernel
 def _cut_all(faces, tree, rule, level, room):
     """Cut part 0 until every part is whole; returns the number of parts."""
-    waiting, whole = room.waiting, whole_size(rule)
+    waiting, whole = room.emit.waiting, whole_size(rule)
     waiting[0, 0], waiting[0, 1] = 0, level
     # Counters are int64 from the start: Numba would compile what it calls for the literal and for the number.
     top, count = 1, np.int64(1)
@@ -100,49 +102,20 @@ def _cut_all(faces, tree, rule, level, room):
     return count
 
 
-@inlined
-def _borrowed_faces(faces):
-    return Faces(borrowed(faces.boxes), borrowed(faces.numbers), borrowed(faces.spare))
-
-
-@inlined
-def _borrowed_tree(tree):
-    return Hierarchy(
-        borrowed(tree.boxes),
-        borrowed(tree.ranges),
-        borrowed(tree.halves),
-        borrowed(tree.costs),
-        borrowed(tree.choices),
-    )
-
-
-@inlined
-def _borrowed_room(room):
-    octants, bins = room.octants, room.bins
-    return Room(
-        OctantRoom(borrowed(octants.starts), borrowed(octants.boxes), borrowed(octants.waiting)),
-        BinRoom(borrowed(bins.counts), borrowed(bins.boxes), borrowed(bins.beyond)),
-        borrowed(room.waiting),
-    )
-
-
 @kernel
-def cut_once(owned, tree, rule, level, room):
+def cut_once(faces, tree, rule, level, room):
     """Cut part 0, the only one, once; returns as ``cut_part``."""
-    return cut_part(
-        _borrowed_faces(owned), _borrowed_tree(tree), np.int64(0), rule, level, np.int64(1), _borrowed_room(room)
-    )
+    return cut_part(faces, tree, np.int64(0), rule, level, np.int64(1), room)
 
 
 @kernel
-def build_subtree(owned, rule, begin, end, level, space):
+def build_subtree(faces, rule, begin, end, level, space):
     """Build over the faces ``begin:end``, which were cut off by ``level`` cuts, into ``space``.
 
     Returns (link, cost, nodes, blocks, levels of nodes), the link counted from the subtree's own first node and block.
     What makes one leaf has no node, unless it is the whole tree, which begins with a node in any case.
     """
-    faces, tree, room = _borrowed_faces(owned), _borrowed_tree(space.tree), _borrowed_room(space.room)
-    nodes, links, block_faces = borrowed(space.nodes), borrowed(space.links), borrowed(space.block_faces)
+    tree, room, block_faces = space.tree, space.room, space.block_faces
     add_part(tree, 0, begin, end)
     fit(faces.boxes, begin, end, tree.boxes, 0)
     count = _cut_all(faces, tree, rule, level, room)
@@ -153,6 +126,6 @@ def build_subtree(owned, rule, begin, end, level, space):
     if tree.choices[0] == 0 and level > 0:
         blocks = emit_leaf(tree, np.int64(0), faces.numbers, block_faces, np.int64(0))
         return leaf_link(0, end - begin), tree.costs[0], 0, blocks, 0
-    none = np.empty((0, 2), np.int32)
-    used, blocks, depth = emit_nodes(tree, faces.numbers, none, nodes, links, block_faces, room.waiting)
+    numbers, nodes, links = faces.numbers, space.nodes, space.links
+    used, blocks, depth = emit_nodes(tree, numbers, space.no_ends, nodes, links, block_faces, room.emit)
     return 0, tree.costs[0], used, blocks, depth

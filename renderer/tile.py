@@ -8,14 +8,15 @@ from numpy.typing import NDArray
 from renderer.bundle import SIDE, SIZE, append, clear, count_of
 from renderer.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
 from renderer.jit import inlined, kernel
-from renderer.leaf import view
+from renderer.layout import cache_aligned
+from renderer.leaf import tree_pointers
 from renderer.sight import look_at
-from renderer.simd import at, get, keep, pointer, put
-from renderer.traverse import make_memory, make_scratch
+from renderer.simd import at, get, pointer, put, smaller
+from renderer.traverse import Memory, make_memory, make_scratch
 from renderer.vec3 import add, normalized, row3, scale, three
-from renderer.whitted import Accelerator, Settings, make_work, push_children, slot, trace_bundle, work_lengths
+from renderer.whitted import Settings, make_work, push_children, slot, trace_bundle, work_lengths
 
-_BRIGHTEST = np.finfo(np.float32).max
+_BRIGHTEST = float(np.finfo(np.float32).max)
 # Pixels a side of the squares that become packets.
 _SQUARE = 4
 
@@ -77,7 +78,7 @@ def _write_first_hits(film, bundle, work, x0, y0):
 
 
 @kernel
-def _render_block(target, world, settings, camera, film, block, work, total):
+def _render_block(tree, world, settings, camera, film, block, work, total):
     """Fill the pixels of one block."""
     x0, y0, x1, y1 = block
     for k in range(SIZE):
@@ -93,7 +94,7 @@ def _render_block(target, world, settings, camera, film, block, work, total):
         while top > 0:
             top -= 1
             bundle = slot(work, settings, top)
-            trace_bundle(target, world, settings, bundle, work)
+            trace_bundle(tree, world, settings, bundle, work)
             if first and sample == middle:
                 _write_first_hits(film, bundle, work, x0, y0)
             first = False
@@ -105,38 +106,42 @@ def _render_block(target, world, settings, camera, film, block, work, total):
             pixel = (y - y0) * SIDE + x - x0
             # The brightest float32 stands for anything brighter: a light within 1e-15 of a surface.
             for k in range(3):
-                film.radiance[y, x, k] = min(get(total, 3 * pixel + k) / count, _BRIGHTEST)
+                film.radiance[y, x, k] = smaller(get(total, 3 * pixel + k) / count, _BRIGHTEST)
             film.rays[y, x] = get(work.traced, pixel)
 
 
-def scratch_bytes(depth: int, settings: Settings) -> int:
-    """Bytes that ``render_tile`` takes beside its film, for a tree of ``depth`` levels."""
+class TileMemory(NamedTuple):
+    """Memory of one thread that renders tiles: for tracing, for a bundle's ``Work``, and for the sums of a block."""
+
+    trace: Memory
+    doubles: NDArray[np.float64]
+    integers: NDArray[np.int64]
+    hits: NDArray[np.bool_]
+    total: NDArray[np.float64]
+
+
+def tile_memory(depth: int, settings: Settings) -> TileMemory:
+    """What ``render_tile`` needs beside its film, for a tree of ``depth`` levels."""
     doubles, integers = work_lengths(settings)
-    memory = make_memory(depth, SIZE)
-    return 8 * (doubles + 3 * SIZE + integers) + SIZE + sum(array.nbytes for array in memory)
+    trace, hits = make_memory(depth, SIZE), np.empty(SIZE, np.bool_)
+    return TileMemory(
+        trace, cache_aligned(doubles, np.float64), cache_aligned(integers, np.int64), hits, np.empty(3 * SIZE)
+    )
 
 
 @kernel
-def render_tile(accelerator, world, settings, camera, samples, film, tile):
+def render_tile(words, world, settings, camera, samples, film, tile, memory):
     """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
 
-    Depth, face and normal come from the middle sample (the pixel's centre for one sample), radiance from the mean.
+    ``words`` are the tree's. Depth, face and normal come from the middle sample (the pixel's centre for one sample),
+    radiance from the mean.
     """
     x0, y0, x1, y1 = tile
-    depth = accelerator.depth
-    memory, (double_count, integer_count) = make_memory(depth, SIZE), work_lengths(settings)
-    doubles, integers = np.empty(double_count + 3 * SIZE), np.empty(integer_count, np.int64)
-    hits = np.empty(SIZE, np.bool_)
-    work = make_work(pointer(doubles), pointer(integers), pointer(hits), settings, make_scratch(memory, depth))
-    target, seen = Accelerator(view(accelerator.tree), depth), look_at(world)
+    doubles, integers, hits = pointer(memory.doubles), pointer(memory.integers), pointer(memory.hits)
+    work = make_work(doubles, integers, hits, settings, make_scratch(memory.trace))
+    tree, seen = tree_pointers(words), look_at(world)
     shooting = Camera(pointer(camera), pointer(samples), len(samples))
     for y in range(y0, y1, SIDE):
         for x in range(x0, x1, SIDE):
-            block = x, y, min(x + SIDE, x1), min(y + SIDE, y1)
-            _render_block(target, seen, settings, shooting, film, block, work, at(pointer(doubles), double_count))
-    keep(memory.floats)
-    keep(memory.doubles)
-    keep(memory.integers)
-    keep(doubles)
-    keep(integers)
-    keep(hits)
+            block = x, y, smaller(x + SIDE, x1), smaller(y + SIDE, y1)
+            _render_block(tree, seen, settings, shooting, film, block, work, pointer(memory.total))

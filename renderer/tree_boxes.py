@@ -4,16 +4,17 @@ The root is level 0, and an octant, be it a node or a leaf, is one level below i
 the traversal knows them: rounded outwards to float32.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect, is_count
-from renderer.intersect import Ray, box_limit, enter_boxes, make_shear, make_slabs, round_down
+from renderer.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.jit import kernel
 from renderer.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
-from renderer.leaf import NO_FACE, nearest_carefully, view
+from renderer.leaf import NO_FACE, nearest_carefully, tree_pointers
 from renderer.octree import BruteForce, Octree
 from renderer.query import check_rays
 from renderer.simd import splat8, store
@@ -32,7 +33,7 @@ class Visit(NamedTuple):
 
 def levels(octree: Octree | BruteForce) -> int:
     """How many levels have boxes; 0 where there are no nodes, as of ``BruteForce``, or no faces."""
-    return octree.target.depth + 1 if len(_root_box(octree.target.tree)) else 0
+    return octree.tree.depth + 1 if len(_root_box(octree.tree)) else 0
 
 
 def boxes_at(octree: Octree | BruteForce, level: int) -> Boxes:
@@ -41,7 +42,7 @@ def boxes_at(octree: Octree | BruteForce, level: int) -> Boxes:
     Raises ``ValueError`` for a negative level.
     """
     expect(is_count(level), "level", "an integer >= 0", repr(level))
-    tree, scale = octree.target.tree, octree.target.scale
+    tree, scale = octree.tree, octree.tree.scale
     boxes = _root_box(tree)
     children = np.zeros(len(boxes), np.int64)
     for _ in range(level):
@@ -75,7 +76,7 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
     """
     rays = check_rays(np.asarray(origin)[None], np.asarray(direction)[None], 0.0, t_max)
     octree.any_hit(rays.origins, rays.directions)  # raises for rays out of bounds
-    tree, scale = octree.target.tree, octree.target.scale
+    tree, scale = octree.tree, octree.tree.scale
     (ox, oy, oz), (dx, dy, dz) = (scale * rays.origins[0]).tolist(), rays.directions[0].tolist()
     ray, best = Ray(ox, oy, oz, dx, dy, dz, 0.0), (scale * float(rays.t_max[0]), NO_FACE)
     opened: list[Visit] = []
@@ -86,7 +87,7 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
             continue
         opened.append(Visit(level, box[:3] / scale, box[3:] / scale, child < 0))
         if child < 0:
-            best = _best_in_leaf(tree, child, ray, best)
+            best = _best_in_leaf(tree.words, child, ray, best)
         else:
             waiting += _met_octants(tree, child, level, ray, best[0])
     return opened
@@ -107,7 +108,7 @@ def _above(tree: Tree, box: NDArray[np.float64]) -> Tree:
     words[:CHILDREN].reshape(3, 2, 8)[:, 1] = -np.inf
     words[:CHILDREN].reshape(3, 2, 8)[:, :, 0] = box.reshape(2, 3).T
     words[CHILDREN:] = 0.0
-    return tree._replace(nodes=words, links=words.view(np.int32))
+    return replace(tree, nodes=words)
 
 
 def _met_octants(tree: Tree, node: int, level: int, ray: Ray, t_max: float) -> list[_Waiting]:
@@ -127,7 +128,7 @@ def _met_octants(tree: Tree, node: int, level: int, ray: Ray, t_max: float) -> l
 @kernel
 def _meet(nodes: NDArray[np.float32], node: int, ray: Ray, t_max: float, distances: NDArray[np.float32]) -> int:
     """``enter_boxes`` for Python: fills ``distances`` (8,) float32 and returns the bits of the octants met."""
-    largest = max(abs(ray.dx), max(abs(ray.dy), abs(ray.dz)))
+    largest = largest_of(ray)
     lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
     t0, bits = enter_boxes(nodes, node, make_slabs(ray, largest), lower, upper)
     store(distances, 0, t0)
@@ -137,13 +138,13 @@ def _meet(nodes: NDArray[np.float32], node: int, ray: Ray, t_max: float, distanc
 @kernel
 def _limit(ray: Ray, t: float) -> float:
     """The distance beyond which an octant holds no hit at t or nearer."""
-    return box_limit(t, max(abs(ray.dx), max(abs(ray.dy), abs(ray.dz))))
+    return box_limit(t, largest_of(ray))
 
 
 @kernel
-def _best_in_leaf(tree: Tree, leaf: int, ray: Ray, best: tuple[float, int]) -> tuple[float, np.int64]:
+def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, best: tuple[float, int]) -> tuple[float, np.int64]:
     """The better of ``best`` = (t, face) and the hits in a leaf."""
-    code, seen, t_max = ~leaf, view(tree), best[0]
+    code, seen, t_max = ~leaf, tree_pointers(words), best[0]
     first, count = code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1
     start = (t_max, np.int32(best[1]), 0.0, 0.0, 1.0)
     t, face, _, _, _ = nearest_carefully(seen, first, count, ray, make_shear(ray), start)

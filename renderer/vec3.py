@@ -3,7 +3,7 @@
 import math
 
 from renderer.jit import inlined, kernel
-from renderer.simd import get
+from renderer.simd import get, larger
 
 
 @kernel
@@ -47,10 +47,16 @@ def times(a, b):
     return (_product(a[0], b[0]), _product(a[1], b[1]), _product(a[2], b[2]))
 
 
+@inlined
+def largest_component(a):
+    """The largest of three numbers without their signs."""
+    return larger(abs(a[0]), larger(abs(a[1]), abs(a[2])))
+
+
 @kernel
 def normalized(a):
     """a / |a|, scaled first so that no square overflows or vanishes; the zero vector stays."""
-    largest = max(abs(a[0]), max(abs(a[1]), abs(a[2])))
+    largest = largest_component(a)
     if largest == 0.0:
         return a
     b = scale(a, 1.0 / largest)
@@ -60,7 +66,7 @@ def normalized(a):
 @kernel
 def length(a):
     """|a|, scaled first so that no square overflows or vanishes."""
-    largest = max(abs(a[0]), max(abs(a[1]), abs(a[2])))
+    largest = largest_component(a)
     if largest == 0.0:
         return 0.0
     b = scale(a, 1.0 / largest)

@@ -12,10 +12,10 @@ import numpy as np
 
 from renderer.bundle import (
     BUNDLE_DOUBLES,
+    BUNDLE_INTEGERS,
     SIZE,
     append,
     bundle_at,
-    bundle_integers,
     clear,
     count_of,
     depth_of,
@@ -33,22 +33,15 @@ from renderer.direct import (
     is_lit,
     light_surfaces,
     put3,
+    trace_any,
 )
 from renderer.jit import inlined, kernel
-from renderer.layout import Tree
 from renderer.material import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shading import fresnel, reflect, refract, spawn_origin
 from renderer.sight import surface_at
 from renderer.simd import at, get, put
-from renderer.traverse import Found, Rays, Scratch, trace
-from renderer.vec3 import add, dot, normalized, row3, scale, three, times
-
-
-class Accelerator(NamedTuple):
-    """The tree with its depth; depth 0 means that every block is tested."""
-
-    tree: Tree
-    depth: int
+from renderer.traverse import Found, Rays, Scratch
+from renderer.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
 
 
 class Settings(NamedTuple):
@@ -86,15 +79,15 @@ class Work(NamedTuple):
     traced: Any
 
 
-@kernel
-def work_lengths(settings):
+def work_lengths(settings: Settings) -> tuple[int, int]:
     """Words of float64 and of int64 of the arrays behind a ``Work``, less those of ``trace``.
 
     Each bundle leaves at most one waiting a level; one more is under way and two are free for what it leaves.
     """
     slots = settings.max_depth + 4
     doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE
-    return doubles, slots * (bundle_integers(settings.media) + 1) + SIZE + 1 + 2 * SIZE + settings.media + SIZE
+    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + settings.media + SIZE
+    return doubles, integers
 
 
 @inlined
@@ -105,7 +98,7 @@ def make_work(doubles, integers, hits, settings, scratch):
     u, v, zero = at(t, SIZE), at(t, 2 * SIZE), at(t, 3 * SIZE)
     infinity, surfaces = at(zero, 1), at(zero, 2)
     shadows = at(surfaces, SIZE * SURFACE_DOUBLES)
-    order = at(integers, slots * bundle_integers(settings.media))
+    order = at(integers, slots * (BUNDLE_INTEGERS + SIZE * settings.media))
     face = at(order, slots)
     lit = at(face, SIZE)
     beyond = at(lit, 1 + 2 * SIZE)
@@ -128,7 +121,7 @@ def slot(work, settings, k):
 
 @inlined
 def _goes_on(weight, min_weight):
-    largest = max(weight[0], max(weight[1], weight[2]))
+    largest = largest_component(weight)
     return largest > 0.0 and largest >= min_weight
 
 
@@ -230,7 +223,7 @@ def _bounce(world, bundle, settings, work, refracted, reflected):
         surface = at(work.surfaces, i * SURFACE_DOUBLES)
         m, weight = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i)
         k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
-        if max(k_t[0], max(k_t[1], k_t[2])) > 0.0 or get(materials, m + KIND) == DIELECTRIC:
+        if largest_component(k_t) > 0.0 or get(materials, m + KIND) == DIELECTRIC:
             w, passes, k_r, k_t, left = _refract(world, bundle, surface, i, settings, work.beyond)
             if passes:
                 _leave(bundle, surface, i, w, times(weight, k_t), refracted, work.beyond, left, settings)
@@ -254,12 +247,12 @@ def _collect_light(world, bundle, work):
 
 
 @kernel
-def trace_bundle(target, world, settings, bundle, work):
+def trace_bundle(tree, world, settings, bundle, work):
     """Trace the rays of a bundle and light what they meet; what they leave is up to ``_bounce``."""
     rays = Rays(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 0, 0, 1.0)
-    trace(target.tree, target.depth, rays, work.found, 0, count_of(bundle), work.trace, np.bool_(False))
+    trace_any(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
     _meet_surfaces(world, bundle, work)
-    light_surfaces(target, world, bundle, work.surfaces, work.lit, settings, work)
+    light_surfaces(tree, world, bundle, work.surfaces, work.lit, settings, work)
     _collect_light(world, bundle, work)
 
 

@@ -119,6 +119,11 @@ def rays_at(vertices: Floats, faces: NDArray[np.int32], seed: int, count: int = 
     return origins, directions
 
 
+def arrays(tree):
+    """The arrays of a tree."""
+    return tree.nodes, tree.blocks, tree.faces
+
+
 def assert_same_hits(got: Hits, expected: Hits) -> None:
     """The same bits in t, face, u and v."""
     for name in ("face", "t", "u", "v"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from meshes import KINDS, make_mesh
+from meshes import KINDS, arrays, make_mesh
 
 from renderer.bounds import BOX, FACE, Faces, face_boxes
 from renderer.build import SPLITS, _build_parts, build_tree
@@ -31,11 +31,11 @@ MANY = 30_000
 def test_the_tree_does_not_depend_on_the_threads(kind, split):
     mesh = Mesh(*make_mesh(kind, 5, MANY))
     rule = Rule(SPLITS[split], 4, 32)
-    expected, depth = build_tree(mesh.vertices, mesh.faces, rule, 1)
+    expected = build_tree(mesh.vertices, mesh.faces, rule, threads=1)
     for threads in (2, 3, 7):
-        tree, levels = build_tree(mesh.vertices, mesh.faces, rule, threads)
-        assert levels == depth
-        for a, b in zip(tree, expected, strict=True):
+        tree = build_tree(mesh.vertices, mesh.faces, rule, threads=threads)
+        assert tree.depth == expected.depth
+        for a, b in zip(arrays(tree), arrays(expected), strict=True):
             assert a.dtype == b.dtype and a.tobytes() == b.tobytes()
 
 
@@ -43,7 +43,7 @@ def test_the_tree_does_not_depend_on_the_threads(kind, split):
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_trees_of_many_subtrees_are_sound(kind, split):
     octree = Octree(*make_mesh(kind, 6, MANY), split=split, threads=2)
-    assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+    assert faults(octree.tree, octree.mesh) == []
 
 
 @SPLIT
@@ -53,7 +53,7 @@ def test_faces_that_nothing_separates_are_shared_out(split, max_depth):
     corners = np.tile([[[0.0, 0, 0], [1, 0, 0], [0, 1, 1]]], (10_000, 1, 1)) - [0.5, 0.5, 0.5]
     corners[::3] *= 2
     octree = Octree(corners.reshape(-1, 3), np.arange(30_000).reshape(-1, 3), split=split, max_depth=max_depth)
-    assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+    assert faults(octree.tree, octree.mesh) == []
     assert octree.stats.depth <= 8 and octree.stats.fill > 0.5
 
 
@@ -63,7 +63,7 @@ def test_one_far_face_at_a_time_ends(split):
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]) * 2.0 ** -(np.arange(9000) % 100 / 1.0)[:, None, None]
     corners[:, :, 2] += 2.0 ** -(np.arange(9000) % 100 / 1.0)[:, None]
     octree = Octree(corners.reshape(-1, 3), np.arange(27_000).reshape(-1, 3), split=split, threads=2)
-    assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+    assert faults(octree.tree, octree.mesh) == []
 
 
 def cut(kind, seed, count, split):

@@ -15,7 +15,7 @@ import pytest
 from renderer.cli import main
 from renderer.render import render
 from renderer.scene import load_scene
-from renderer.warm import compile_all
+from renderer.precompile import compile_all
 
 ROOT = Path(__file__).parents[1]
 STAIRS = ROOT / "scenes" / "stairs.toml"

@@ -1,6 +1,7 @@
 """The checker of a tree: silent on every tree that is built, and loud on every fault that is put into one."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,21 +19,21 @@ from renderer.shapes import icosphere, torus
 @given(meshes, options)
 def test_every_tree_is_sound(mesh, chosen):
     octree = Octree(*mesh, **chosen)
-    assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+    assert faults(octree.tree, octree.mesh) == []
 
 
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_larger_trees_are_sound(kind, split):
     octree = Octree(*make_mesh(kind, 1, 2000), split=split)
-    assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+    assert faults(octree.tree, octree.mesh) == []
 
 
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
 def test_trees_of_surfaces_are_sound(split):
     for mesh in (icosphere(4), torus(), Mesh([], [])):
         octree = Octree.from_mesh(mesh, split=split)
-        assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+        assert faults(octree.tree, octree.mesh) == []
 
 
 class Broken:
@@ -40,16 +41,16 @@ class Broken:
 
     def __init__(self, kind="soup"):
         octree = Octree(*make_mesh(kind, 2, 301))
-        self.mesh, self.depth = octree.mesh, octree.target.depth
-        nodes = octree.target.tree.nodes.copy()
-        self.tree = Tree(nodes, nodes.view(np.int32), octree.target.tree.blocks.copy(), octree.target.tree.faces.copy())
+        self.mesh = octree.mesh
+        nodes = octree.tree.nodes.copy()
+        self.tree = Tree(nodes, octree.tree.blocks.copy(), octree.tree.faces.copy(), octree.tree.depth)
         self.links = self.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
         self.boxes = nodes.reshape(-1, NODE_WORDS)[:, :CHILDREN].reshape(-1, 3, 2, 8)
         self.used = self.boxes[:, 0, 0] < np.inf
-        assert self.depth > 2 and (~self.used).any() and (self.tree.faces < 0).any()
+        assert self.tree.depth > 2 and (~self.used).any() and (self.tree.faces < 0).any()
 
     def found(self):
-        return faults(self.tree, self.depth, self.mesh)
+        return faults(self.tree, self.mesh)
 
     def some_node(self):
         """(node, place) of a child of the root that is a node."""
@@ -165,7 +166,7 @@ def test_a_wrong_number_of_blocks_is_found(change):
 
 def test_an_understated_depth_is_found():
     broken = Broken()
-    broken.depth -= 1
+    broken.tree = replace(broken.tree, depth=broken.tree.depth - 1)
     assert any("deeper" in fault for fault in broken.found())
 
 
@@ -250,7 +251,7 @@ def test_another_mesh_is_found():
         Mesh(broken.mesh.vertices[::-1], broken.mesh.faces),
         Mesh([], []),
     ):
-        assert faults(broken.tree, broken.depth, other)
+        assert faults(broken.tree, other)
 
 
 @pytest.mark.parametrize("seed", range(15))

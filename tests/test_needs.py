@@ -17,7 +17,7 @@ from renderer.needs import FEW_FACES, examine
 from renderer.scene import Floor, RenderSettings, SceneObject
 from renderer.shapes import box, grid, icosphere
 from renderer.sight import MAX_MEDIA
-from renderer.stage import accelerator_of, build_octree, kernel_settings_of
+from renderer.stage import build_octree, kernel_settings_of, tree_for
 from renderer.world import pack
 
 MODULE = importlib.import_module("renderer.stage")
@@ -210,11 +210,11 @@ def test_vertices_take_half_where_float32_holds_them() -> None:
         mesh, _ = pack(what)
         own, widened = needs_of(what), replace(needs_of(what), float64_vertices=True)
         octree = build_octree(mesh, "auto", "midpoint", own)
-        assert accelerator_of(octree, own).tree.blocks.itemsize == size
-        wide = accelerator_of(octree, widened).tree.blocks
+        assert tree_for(octree, own).blocks.itemsize == size
+        wide = tree_for(octree, widened).blocks
         assert wide.dtype == np.float64
         brute = build_octree(mesh, "brute", "midpoint", own)
-        np.testing.assert_array_equal(wide, accelerator_of(brute, own).tree.blocks)
+        np.testing.assert_array_equal(wide, tree_for(brute, own).blocks)
 
 
 @pytest.mark.parametrize(("mesh", "tree"), [(box(), False), (grid(4, 4), True)], ids=["few", "many"])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from meshes import assert_same_hits, make_mesh, rays_at
+from meshes import arrays, assert_same_hits, make_mesh, rays_at
 
 from renderer.invariants import faults
 from renderer.layout import CHILDREN, LANES, NODE_WORDS
@@ -134,7 +134,7 @@ def test_bounds_of_two_ulp_far_from_the_origin(split):
     rng = np.random.default_rng(4)
     vertices = 1e6 + rng.integers(0, 3, (300, 3)) * np.spacing(1e6)
     octree = Octree(vertices, np.arange(300).reshape(-1, 3), split=split, leaf_size=1)
-    assert octree.stats.references == 100 and faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+    assert octree.stats.references == 100 and faults(octree.tree, octree.mesh) == []
     origins, directions = rays_at(vertices, octree.mesh.faces, 5)
     brute = BruteForce(vertices, octree.mesh.faces)
     assert_same_hits(octree.closest_hit(origins, directions), brute.closest_hit(origins, directions))
@@ -177,9 +177,9 @@ def test_extreme_coordinates_build_and_trace():
         for split in ("midpoint", "sah"):
             mesh = Mesh(np.ldexp(sphere.vertices, exponent), sphere.faces)
             octree = Octree.from_mesh(mesh, split=split)
-            scaled = Mesh(mesh.vertices * octree.target.scale, mesh.faces)
+            scaled = Mesh(mesh.vertices * octree.tree.scale, mesh.faces)
             assert 0.5 <= np.abs(scaled.vertices).max() <= 1.0
-            assert faults(octree.target.tree, octree.target.depth, scaled) == []
+            assert faults(octree.tree, scaled) == []
             hits = octree.closest_hit(np.ldexp(origins, exponent), directions)
             np.testing.assert_array_equal(hits.face, expected.face)
             np.testing.assert_array_equal(hits.t, np.ldexp(expected.t, exponent))
@@ -235,7 +235,7 @@ assert os.waitpid(pid, 0)[1] == 0, "the child hangs"
 def test_stats_count_what_is_there():
     mesh = icosphere(3)
     octree = Octree.from_mesh(mesh, leaf_size=8)
-    stats, tree = octree.stats, octree.target.tree
+    stats, tree = octree.stats, octree.tree
     assert stats.faces == stats.references == 1280
     assert stats.bytes == tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes
     assert stats.fill == 1280 / (LANES * stats.blocks)
@@ -257,16 +257,16 @@ def test_options_shape_the_tree(split):
     assert deep != shallow
     for size in (1, 3, 4, 7, 32):
         octree = Octree.from_mesh(mesh, split=split, leaf_size=size)
-        links = octree.target.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
+        links = octree.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
         for code in ~links[links < 0]:
             first, count = code >> 3, (code & 7) + 1
-            assert (octree.target.tree.faces[first * LANES : (first + count) * LANES] >= 0).sum() <= size
+            assert (octree.tree.faces[first * LANES : (first + count) * LANES] >= 0).sum() <= size
 
 
 def test_float32_vertices_take_half_the_memory_and_give_the_same_hits():
     vertices, faces = make_mesh("soup_float32", 9, 500)
     narrow, wide = Octree(vertices, faces), Octree(np.concatenate([vertices, [[0.1, 0, 0]]]), faces)
-    assert narrow.target.tree.blocks.dtype == np.float32 and wide.target.tree.blocks.dtype == np.float64
+    assert narrow.tree.blocks.dtype == np.float32 and wide.tree.blocks.dtype == np.float64
     rays = rays_at(vertices, faces, 10)
     assert_same_hits(narrow.closest_hit(*rays), wide.closest_hit(*rays))
 
@@ -274,7 +274,7 @@ def test_float32_vertices_take_half_the_memory_and_give_the_same_hits():
 def test_the_tree_is_the_same_every_time_and_for_every_entrance():
     mesh = icosphere(3)
     first, second = Octree.from_mesh(mesh), Octree(mesh.vertices.tolist(), mesh.faces.tolist())
-    for a, b in zip(first.target.tree, second.target.tree, strict=True):
+    for a, b in zip(arrays(first.tree), arrays(second.tree), strict=True):
         assert a.tobytes() == b.tobytes()
     assert first.mesh is mesh
 

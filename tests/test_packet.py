@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at
-from numba import njit
 
 from renderer.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
+from renderer.jit import kernel
 from renderer.layout import NODE_WORDS
 from renderer.octree import BruteForce, Octree
 from renderer.packet import enter_beam, make_beam
 from renderer.prepared import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare
 from renderer.shapes import icosphere
-from renderer.simd import keep, pointer, splat8
+from renderer.simd import pointer, splat8
 from renderer.traverse import Rays, are_coherent
 
 SEEDS = st.integers(0, 2**20)
@@ -84,13 +84,13 @@ def test_a_packet_that_gives_up_is_traced_all_the_same():
     np.testing.assert_array_equal(octree.any_hit(origins, directions), expected.hit)
 
 
-@njit(error_model="numpy")
+@kernel
+def _are_coherent(origins, directions, bound):
+    return are_coherent(Rays(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 0, 0, 1.0), 0)
+
+
 def _coherent(origins, directions):
-    bound = np.zeros(1)
-    rays = Rays(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 0, 0, 1.0)
-    found = are_coherent(rays, 0)
-    keep(bound)
-    return found
+    return _are_coherent(origins, directions, np.zeros(1))
 
 
 def test_what_is_coherent():
@@ -104,10 +104,9 @@ def test_what_is_coherent():
     assert not _coherent(straight, np.tile([1.0, 0.5, 1.0], (WIDTH, 1))), "two dominant axes"
 
 
-@njit(error_model="numpy")
-def _beam_and_rays(nodes, origins, directions, t_max):
-    """The bits of the octants that the beam of sixteen rays meets, and those that any of them meets alone."""
-    floats, doubles, integers = np.empty(FLOATS, np.float32), np.empty(DOUBLES), np.empty(INTEGERS, np.int64)
+@kernel
+def _meet_beam_and_rays(nodes, origins, directions, t_max, room):
+    floats, doubles, integers = room
     rays, alone, limit = Prepared(pointer(floats), pointer(doubles), pointer(integers)), 0, np.float32(0.0)
     for r in range(WIDTH):
         o, d = origins[r], directions[r]
@@ -117,11 +116,13 @@ def _beam_and_rays(nodes, origins, directions, t_max):
         farthest = box_limit(t_max, largest)
         limit = max(limit, farthest)
         alone |= enter_boxes(nodes, 0, make_slabs(ray, largest), splat8(round_down(0.0)), splat8(farthest))[1]
-    bits = enter_beam(pointer(nodes), 0, make_beam(rays), limit)[1]
-    keep(floats)
-    keep(doubles)
-    keep(integers)
-    return bits, alone
+    return enter_beam(pointer(nodes), 0, make_beam(rays), limit)[1], alone
+
+
+def _beam_and_rays(nodes, origins, directions, t_max):
+    """The bits of the octants that the beam of sixteen rays meets, and those that any of them meets alone."""
+    room = np.empty(FLOATS, np.float32), np.empty(DOUBLES), np.empty(INTEGERS, np.int64)
+    return _meet_beam_and_rays(nodes, origins, directions, t_max, room)
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at, separate
+from meshes import KINDS, arrays, assert_same_hits, make_mesh, meshes, options, rays_at, separate
 
 import renderer.refit
 from renderer.errors import MeshError
@@ -30,12 +30,12 @@ def moved_vertices(vertices, seed):
 
 def assert_like_new(octree, vertices, faces, seed):
     """Sound, and with the hits of a new build."""
-    assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+    assert faults(octree.tree, octree.mesh) == []
     fresh = Octree(vertices, faces, threads=1)
     origins, directions = rays_at(vertices, faces, seed)
     assert_same_hits(octree.closest_hit(origins, directions), fresh.closest_hit(origins, directions))
     np.testing.assert_array_equal(octree.any_hit(origins, directions), fresh.any_hit(origins, directions))
-    assert octree.target.tree.blocks.dtype == fresh.target.tree.blocks.dtype
+    assert octree.tree.blocks.dtype == fresh.tree.blocks.dtype
     return fresh
 
 
@@ -63,11 +63,11 @@ def test_larger_refitted_trees_hit_like_new_ones(kind, split):
 @SPLIT
 def test_refit_without_a_move_changes_nothing(split):
     octree = Octree(*make_mesh("soup", 1, 10_000), split=split)
-    before, stats = octree.target, octree.stats
+    before, stats = octree.tree, octree.stats
     octree.refit(octree.mesh.vertices)
-    for a, b in zip(octree.target.tree, before.tree, strict=True):
+    for a, b in zip(arrays(octree.tree), arrays(before), strict=True):
         np.testing.assert_array_equal(a, b)
-    assert octree.stats == stats and octree.target is not before
+    assert octree.stats == stats and octree.tree is not before
 
 
 @SPLIT
@@ -78,7 +78,7 @@ def test_the_refitted_tree_does_not_depend_on_the_threads(split):
     for threads in (1, 2, 7):
         octree = Octree(vertices, faces, split=split, threads=threads)
         octree.refit(moved)
-        trees.append([array.tobytes() for array in octree.target.tree])
+        trees.append([array.tobytes() for array in arrays(octree.tree)])
     assert trees[0] == trees[1] == trees[2]
 
 
@@ -87,7 +87,7 @@ def test_blocks_are_as_narrow_as_the_new_vertices_allow():
     octree = Octree(vertices, faces)
     for chosen, dtype in ((vertices + 0.1, np.float64), (vertices, np.float32)):
         octree.refit(chosen)
-        assert octree.target.tree.blocks.dtype == dtype
+        assert octree.tree.blocks.dtype == dtype
 
 
 @ACCELERATORS
@@ -98,7 +98,7 @@ def test_extreme_scales_are_brought_near_one_as_at_a_build(accelerator, exponent
     moved = accelerator.from_mesh(sphere)
     moved.refit(vertices)
     fresh = accelerator(vertices, sphere.faces)
-    assert moved.target.scale == fresh.target.scale != 1.0
+    assert moved.tree.scale == fresh.tree.scale != 1.0
     origins, directions = rays_at(sphere.vertices, sphere.faces, 1)
     near = np.abs(origins).max(axis=1) < 100
     origins, directions = np.ldexp(origins[near], exponent), directions[near]
@@ -106,7 +106,7 @@ def test_extreme_scales_are_brought_near_one_as_at_a_build(accelerator, exponent
     assert_same_hits(hits, fresh.closest_hit(origins, directions))
     assert hits.hit.any()
     moved.refit(sphere.vertices)
-    assert moved.target.scale == 1.0
+    assert moved.tree.scale == 1.0
 
 
 def test_brute_force_refits_too():
@@ -121,7 +121,7 @@ def test_empty_meshes_refit():
     for octree in (Octree(np.empty((0, 3)), np.empty((0, 3), int)), Octree(np.zeros((2, 3)), np.empty((0, 3), int))):
         octree.refit(octree.mesh.vertices + 1.0)
         assert not octree.any_hit([[0, 0, 0]], [[0, 0, 1]]).any()
-        assert faults(octree.target.tree, octree.target.depth, octree.mesh) == []
+        assert faults(octree.tree, octree.mesh) == []
 
 
 def test_a_repaired_mesh_refits():
@@ -149,11 +149,11 @@ def test_a_repaired_mesh_refits():
 )
 def test_what_is_no_move_is_refused_and_changes_nothing(accelerator, vertices, words):
     built = accelerator([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2], [0, 1, 3]])
-    before = built.mesh, built.target
+    before = built.mesh, built.tree
     with pytest.raises(MeshError, match=r"^vertices: ") as error:
         built.refit(vertices)
     assert all(word in str(error.value) for word in words)
-    assert (built.mesh, built.target) == before
+    assert (built.mesh, built.tree) == before
 
 
 def test_the_caller_may_change_its_array_afterwards():
@@ -201,12 +201,12 @@ def test_mesh_and_arrays_change_at_once():
         def __setattr__(self, name, value):
             super().__setattr__(name, value)
             if "seen" in self.__dict__:
-                self.seen.append((self.mesh, self.target))
+                self.seen.append((self.mesh, self.tree))
 
     octree = Watched([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     octree.__dict__["seen"] = []
     octree.refit(octree.mesh.vertices * 2.0)
-    assert octree.seen == [(octree.mesh, octree.target)]
+    assert octree.seen == [(octree.mesh, octree.tree)]
 
 
 @pytest.mark.parametrize("forgotten", ["_fit_leaves", "_fit_nodes"])
@@ -214,8 +214,8 @@ def test_boxes_that_were_forgotten_are_noticed(monkeypatch, forgotten):
     vertices, faces = make_mesh("soup", 1, 300)
     octree, moved = Octree(vertices, faces), vertices * 2.0 + 1.0
     monkeypatch.setattr(renderer.refit, forgotten, lambda *arguments: None)
-    tree = refit_tree(octree.target.tree, moved, octree.mesh.faces, 1)
-    assert faults(tree, octree.target.depth, Mesh(moved, faces))
+    tree = refit_tree(octree.tree, moved, octree.mesh.faces, 1.0, 1)
+    assert faults(tree, Mesh(moved, faces))
 
 
 def test_the_cost_tells_when_to_build_anew():

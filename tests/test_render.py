@@ -163,7 +163,7 @@ def test_each_tile_is_rendered_once_and_they_cover_the_film(monkeypatch: pytest.
     covered = np.zeros((2 * TILE + 7, 3 * TILE + 1), int)
 
     def count(*arguments: Any) -> None:
-        x0, y0, x1, y1 = arguments[-1]
+        x0, y0, x1, y1 = arguments[-2]
         covered[y0:y1, x0:x1] += 1
 
     monkeypatch.setattr(stage, "render_tile", count)

@@ -6,17 +6,21 @@ from numba import njit
 
 from renderer.simd import (
     bits_float,
+    double_of,
+    float32_pointer,
+    float64_pointer,
     float_bits,
     get,
-    keep,
+    int32_pointer,
     lane,
+    larger,
     load4,
     load8,
     lowest_bit,
     movemask,
-    pointer,
     put,
     select,
+    smaller,
     splat4,
     splat8,
     store,
@@ -133,18 +137,31 @@ def test_bits():
 
 
 @njit
-def _written_then_crowded():
-    first = np.empty(64, np.int64)
-    base = pointer(first)
-    put(base, 0, 7)
-    second = np.empty(64, np.int64)
-    second[:] = 9
-    found = get(base, 0)
-    keep(second)
-    keep(first)
-    return found
+def extremes_of(a, b):
+    return larger(a, b), smaller(a, b)
 
 
-def test_a_kept_array_outlives_its_pointer():
-    """Without ``keep`` Numba frees ``first`` before ``second`` is made, which then takes its memory."""
-    assert _written_then_crowded() == 7
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int32, np.int64])
+def test_larger_and_smaller_are_those_of_python(kind):
+    """Also which of two equal ones, and of a NaN and a number, is taken: the first."""
+    values = [kind(v) for v in ([0, 1, -5, 7] if np.issubdtype(kind, np.integer) else F32)]
+    for a in values:
+        for b in values:
+            got, expected = extremes_of(a, b), (max(a, b), min(a, b))
+            for one, other in zip(got, expected, strict=True):
+                assert np.array([one], kind).tobytes() == np.array([other], kind).tobytes(), (a, b)
+
+
+@njit
+def through_addresses(floats, doubles, integers, bits):
+    a, b, c = float32_pointer(floats), float64_pointer(doubles), int32_pointer(integers)
+    put(a, 1, get(a, 0) + np.float32(1.0))
+    put(b, 1, get(b, 0) + 1.0)
+    put(c, 1, get(c, 0) + np.int32(1))
+    return double_of(bits)
+
+
+def test_pointers_from_addresses():
+    arrays = np.array([2, 0], np.float32), np.array([1 / 3, 0]), np.array([-9, 0], np.int32)
+    assert through_addresses(*(a.ctypes.data for a in arrays), np.float64(-0.1).view(np.int64)) == -0.1
+    assert [a[1] for a in arrays] == [np.float32(3), 1 / 3 + 1, -8]

@@ -95,7 +95,7 @@ def test_compiling_ahead_leaves_nothing_to_compile():
 import sys
 import numpy as np
 from numba.core.dispatcher import Dispatcher
-from renderer.warm import compile_all
+from renderer.precompile import compile_all
 def signatures():
     modules = [m for name, m in sys.modules.items() if name.startswith("renderer.")]
     kernels = {id(v): v for m in modules for v in vars(m).values() if isinstance(v, Dispatcher)}

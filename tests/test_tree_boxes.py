@@ -26,7 +26,7 @@ class Place(NamedTuple):
 
 def places(octree: Octree) -> list[Place]:
     """All nodes and leaves below the root, read from the words one by one."""
-    tree = octree.target.tree
+    tree = octree.tree
     found: list[Place] = []
     pending = [(0, 0, -1)]
     while pending:
@@ -37,7 +37,7 @@ def places(octree: Octree) -> list[Place]:
             if lower[0] > upper[0]:
                 continue
             child = int(tree.links[node * NODE_WORDS + CHILDREN + octant])
-            box, faces = np.array(lower + upper) / octree.target.scale, None
+            box, faces = np.array(lower + upper) / octree.tree.scale, None
             if child < 0:
                 first, count = ~child // 8, ~child % 8 + 1
                 faces = tree.faces[LANES * first : LANES * (first + count)]
@@ -59,7 +59,7 @@ def key(box: Any) -> bytes:
 def octrees() -> list[Any]:
     flat = Octree(*make_mesh("flat", 3, 60))
     tiny = Octree(2.0**-90 * icosphere(2).vertices, icosphere(2).faces)
-    assert tiny.target.scale != 1.0
+    assert tiny.tree.scale != 1.0
     built = (Octree.from_mesh(torus(), split="sah"), Octree(*make_mesh("sizes", 1, 90)), flat, tiny)
     return [pytest.param(o, id=name) for o, name in zip(built, ("sah", "sizes", "flat", "tiny"), strict=True)]
 
@@ -68,7 +68,7 @@ def octrees() -> list[Any]:
 class TestLevels:
     def test_the_boxes_are_those_of_each_level(self, octree: Octree) -> None:
         found = places(octree)
-        assert levels(octree) == max(p.level for p in found) + 1 == octree.target.depth + 1
+        assert levels(octree) == max(p.level for p in found) + 1 == octree.tree.depth + 1
         for level in range(1, levels(octree) + 1):
             expected = [p.box for p in found if p.level == level]
             got = boxes_at(octree, level)

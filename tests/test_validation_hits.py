@@ -59,9 +59,8 @@ def broken(monkeypatch: pytest.MonkeyPatch, change: Callable[[Octree], None]) ->
 
     def build(mesh: Mesh) -> Octree:
         octree = Octree.from_mesh(mesh)
-        tree = octree.target.tree
-        copied = tree._replace(faces=tree.faces.copy(), blocks=tree.blocks.copy())
-        octree.target = dataclasses.replace(octree.target, tree=copied)
+        tree = octree.tree
+        octree.tree = dataclasses.replace(tree, faces=tree.faces.copy(), blocks=tree.blocks.copy())
         change(octree)
         return octree
 
@@ -70,18 +69,18 @@ def broken(monkeypatch: pytest.MonkeyPatch, change: Callable[[Octree], None]) ->
 
 def _drop_a_face(octree: Octree) -> None:
     """Collapse the triangle in the first place of block 7 to a point, as an unused place is."""
-    rows = octree.target.tree.blocks.reshape(-1, 9, LANES)
+    rows = octree.tree.blocks.reshape(-1, 9, LANES)
     rows[7, 3:6, 0] = rows[7, 0:3, 0]
     rows[7, 6:9, 0] = rows[7, 0:3, 0]
 
 
 def _scale_vertices(octree: Octree) -> None:
-    octree.target.tree.blocks[:] *= np.float32(1.0 + 2.0**-20)
+    octree.tree.blocks[:] *= np.float32(1.0 + 2.0**-20)
 
 
 def _swap_two_faces(octree: Octree) -> None:
     """Report the face of another block, so that t belongs to a face that is elsewhere."""
-    faces = octree.target.tree.faces
+    faces = octree.tree.faces
     faces[[0, LANES * 40]] = faces[[LANES * 40, 0]]
 
 

@@ -12,9 +12,9 @@ from renderer.needs import needs_of
 from renderer.parallel import available_threads
 from renderer.scene import RenderSettings, Scene, load_scene
 from renderer.shading import BOUNDED
-from renderer.stage import Stage, accelerator_of, build_octree, set_up
+from renderer.stage import Stage, tree_for, build_octree, set_up
 from renderer.viewer.protocol import ViewSettings
-from renderer.warm import touch_viewing
+from renderer.precompile import touch_viewing
 from renderer.world import light_rows
 
 
@@ -51,7 +51,7 @@ class Exhibit:
     def brute(self) -> Stage:
         """The same scene with every ray tested against every face."""
         octree = build_octree(self.stage.mesh, "brute", "midpoint", self.stage.needs, self.threads)
-        return replace(self.stage, octree=octree, target=accelerator_of(octree, self.stage.needs))
+        return replace(self.stage, octree=octree, tree=tree_for(octree, self.stage.needs))
 
 
 def prepare(scene: Scene, path: Path | None = None) -> Exhibit:

@@ -31,7 +31,7 @@ def view(
         told = f"the viewer needs the package {package}: pip install 'octree-renderer[viewer]'"
         raise ModuleNotFoundError(told, name=package) from None
     from renderer.viewer.exhibit import open_file, prepare
-    from renderer.warm import compile_in_two
+    from renderer.precompile import compile_in_two
 
     compile_in_two()
     shown = prepare(scene) if isinstance(scene, Scene) else open_file(Path(scene))

@@ -16,8 +16,8 @@ from renderer.parallel import available_threads
 from renderer.scene import Floor, SceneObject
 from renderer.shading import BOUNDED
 from renderer.shapes import box, icosphere
-from renderer.stage import accelerator_of, build_octree, kernel_settings_of
-from renderer.tile import scratch_bytes
+from renderer.stage import build_octree, kernel_settings_of, tree_for
+from renderer.tile import tile_memory
 from renderer.world import pack
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -106,8 +106,9 @@ def _render(scene: Scene, needs: Needs, size: int) -> Image:
 def memory(scene: Scene, needs: Needs) -> int:
     """Bytes of the arrays that a picture reads: the scene's, the tree's and the scratch of every thread."""
     mesh, world = pack(scene, needs)
-    target = accelerator_of(build_octree(mesh, "auto", "midpoint", needs), needs)
-    tree = target.tree  # links are the nodes' memory seen as integers
-    scratch = scratch_bytes(target.depth, kernel_settings_of(needs, scene.render, BOUNDED))
+    tree = tree_for(build_octree(mesh, "auto", "midpoint", needs), needs)
+    memory = tile_memory(tree.depth, kernel_settings_of(needs, scene.render, BOUNDED))
+    rays, *own = memory
+    scratch = sum(array.nbytes for array in (*rays[:-1], *own))
     arrays = [*world, tree.nodes, tree.blocks, tree.faces]
     return sum(array.nbytes for array in arrays) + available_threads() * scratch

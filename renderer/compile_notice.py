@@ -1,0 +1,47 @@
+"""What is said of compiling, and how long it takes: one line on standard error, each kernel at level INFO.
+
+The line comes from the logger ``renderer.jit`` at level WARNING, which Python prints where logging is not configured;
+``logging.getLogger("renderer").setLevel("ERROR")`` or the environment variable OCTREE_RENDERER_QUIET=1 turns it off.
+"""
+
+import gc
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from logging import getLogger
+
+QUIET_VARIABLE = "OCTREE_RENDERER_QUIET"
+_LOG = getLogger("renderer.jit")
+
+
+class _Clock:
+    """Kernels that this process has compiled, and seconds. Numba compiles under one lock, so these do not overlap."""
+
+    kernels = 0
+    seconds = 0.0
+
+
+def compile_seconds() -> float:
+    """Seconds that this process has spent compiling kernels so far; loading them does not count."""
+    return _Clock.seconds
+
+
+@contextmanager
+def compiling(name: str, folder: str | None) -> Iterator[None]:
+    """Around the compiling of one kernel by the one thread that does: says so, and counts its time."""
+    kept = f"once, kept in {folder}" if folder else "for this process only: no cache folder can be written"
+    if _Clock.kernels == 0 and os.environ.get(QUIET_VARIABLE, "0") in ("", "0"):
+        _LOG.warning("renderer: compiling kernels, which takes some seconds (%s)", kept)
+    _LOG.info("compiling %s (%s)", name, kept)
+    _Clock.kernels += 1
+    began = time.perf_counter()
+    # Numba makes millions of objects that stay: looking for cycles among them takes 6 % of the time.
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+        _Clock.seconds += time.perf_counter() - began

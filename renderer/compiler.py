@@ -1,0 +1,281 @@
+"""Kernels through Numba at a third of its usual cost: only what Python calls is optimised and compiled.
+
+Numba takes each function, however small, through its whole pipeline: LLVM optimises and compiles it alone, again within
+each of its callers, and a wrapper lets Python call it. Here a function that kernels call stays a *piece*: typed,
+lowered, and left as LLVM wrote it down. What Python calls is an *entry*: its piece and all below it linked into one
+module, which LLVM optimises once.
+
+This relies on Numba's insides. ``probe`` tries them; ``jit`` asks it where the version of Numba is not one that was
+tested, and does without this module where it fails.
+"""
+
+import pickle
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import llvmlite.binding as llvm  # type: ignore[import-untyped]
+from numba.core import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompileResult, CompilerBase, compile_result
+from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
+from numba.core.environment import lookup_environment
+from numba.core.registry import CPUDispatcher
+from numba.core.serialize import dumps
+from numba.core.typed_passes import (
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
+
+from renderer.compile_notice import compiling
+from renderer.kernel_store import KernelStore
+
+# No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
+# Each is said, because what is not said Numba inherits from the kernel whose compiling asked for this one.
+OPTIONS = {
+    "nopython": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "forceinline": False,
+    "_nrt": False,
+    "no_cfunc_wrapper": True,
+}
+
+
+class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """A function's module as it was lowered, neither optimised nor compiled."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        self._finalized = True
+
+    def _get_module_for_linking(self) -> Any:
+        """This module with all below it, for kernels that are not ours."""
+        if self._shared_module is None:
+            module = self._final_module.clone()
+            _link_all(module, self._linking_libraries)
+            for function in module.functions:
+                if not function.is_declaration:
+                    function.linkage = "linkonce_odr"
+            self._shared_module = module
+        return self._shared_module
+
+
+class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """A wrapper for Python and all pieces behind it, optimised together."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        self._codegen._check_llvm_bugs()
+        module = self._final_module
+        outer = [function.name for function in module.functions if not function.is_declaration]
+        _link_all(module, self._linking_libraries)
+        for function in module.functions:
+            if not function.is_declaration and function.name not in outer:
+                function.linkage = "internal"  # so that what is inlined everywhere is dropped
+        # Each function alone first, as Numba does: what is inlined then is small. Worth 2 % of tracing.
+        for function in module.functions:
+            passes, builder = self._codegen._function_pass_manager()
+            passes.run(function, builder)
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(module, builder)
+        module.verify()
+        self._finalize_final_module()
+
+    def serialize_using_object_code(self) -> Any:
+        """The machine code. Of the module only the names remain: kernels that call this one link its piece."""
+        names = [f.name for f in self._final_module.functions if not f.is_declaration and f.linkage.name == "external"]
+        stub = llvm.parse_assembly("\n".join(f'define void @"{name}"() {{ ret void }}' for name in names))
+        return (self.name, "object", (self._get_compiled_object(), stub.as_bitcode()))
+
+
+def _link_all(module: Any, libraries: list[Any]) -> None:
+    """Link libraries and all that they are linked with into ``module``, each once."""
+    done: set[int] = set()
+    pending = list(libraries)
+    while pending:
+        library = pending.pop()
+        if id(library) in done:
+            continue
+        done.add(id(library))
+        if isinstance(library, _PieceLibrary):
+            module.link_in(library._final_module, preserve=True)
+            pending += library._linking_libraries
+        else:  # a function of Numba's own
+            module.link_in(library._get_module_for_linking(), preserve=True)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LowerPiece(NativeLowering):  # type: ignore[misc]
+    """Lower a function for other kernels alone."""
+
+    _name = "renderer_lower_piece"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _PieceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        state.flags.no_cpython_wrapper = True
+        super().run_pass(state)
+        key = object()  # by which callers find it, in place of a function that Python can call
+        state.cr = state.cr._replace(cfunc=key)
+        state.targetctx.insert_user_function(key, state.cr.fndesc, [state.library])
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LinkEntry(LoweringPass):  # type: ignore[misc]
+    """Make a function's piece one that Python can call."""
+
+    _name = "renderer_link_entry"
+
+    def __init__(self) -> None:
+        LoweringPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        entry, context = _entries[state.func_id.func], state.targetctx
+        with entry.notice():
+            piece = entry.piece.compiled(state.args)
+            library = _EntryLibrary(context.codegen(), state.func_id.func_qualname)
+            library.enable_object_caching()
+            library.add_linking_library(piece.library)
+            context.create_cpython_wrapper(
+                library, piece.fndesc, piece.environment, piece.call_helper, state.flags.release_gil
+            )
+            function = context.get_executable(library, piece.fndesc, piece.environment)
+            _set_environments(library)
+        state.cr = compile_result(
+            typing_context=state.typingctx,
+            target_context=context,
+            entry_point=function,
+            typing_error=None,
+            library=library,
+            call_helper=piece.call_helper,
+            signature=piece.signature,
+            objectmode=False,
+            lifted=(),
+            fndesc=piece.fndesc,
+            environment=piece.environment,
+            metadata=state.metadata,
+            reload_init=[],
+        )
+        return True
+
+
+def _set_environments(library: Any) -> None:
+    for variable in library._final_module.global_variables:
+        environment = lookup_environment(variable.name) if variable.name.startswith("_ZN08NumbaEnv") else None
+        if environment is not None:
+            library.codegen.set_env(variable.name, environment)
+
+
+# What kernels need of Numba's passes: they have no closures, no ``with``, no array expressions, no object mode.
+_PIECE_PASSES = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    GenericRewrites,
+    ReconstructSSA,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    IRLegalization,
+    _LowerPiece,
+    NoPythonBackend,
+)
+
+
+class _PieceCompiler(CompilerBase):  # type: ignore[misc]
+    def define_pipelines(self) -> list[PassManager]:
+        return [_pipeline("piece", _PIECE_PASSES)]
+
+
+class _EntryCompiler(CompilerBase):  # type: ignore[misc]
+    def define_pipelines(self) -> list[PassManager]:
+        return [_pipeline("entry", (_LinkEntry,))]
+
+
+def _pipeline(name: str, passes: tuple[Any, ...]) -> PassManager:
+    manager = PassManager(name)
+    for one in passes:
+        manager.add_pass(one, one.__name__)
+    manager.finalize()
+    return manager
+
+
+class _Piece(CPUDispatcher):  # type: ignore[misc]
+    """A function as kernels call it."""
+
+    def add_overload(self, compiled: Any) -> None:
+        # Not for the dispatcher's table of what Python may call.
+        self.overloads[tuple(compiled.signature.args)] = compiled
+
+    def compiled(self, arguments: Any) -> Any:
+        """What was compiled for arguments of these types, now if not before."""
+        self.compile(tuple(arguments))
+        return self.overloads[tuple(arguments)]
+
+
+class Kernel(CPUDispatcher):  # type: ignore[misc]
+    """A function as Python calls it; kernels that call it get its piece."""
+
+    def __init__(self, function: Any, locals: Any = None, targetoptions: Any = None) -> None:
+        options = {**OPTIONS, **(targetoptions or {})}
+        super().__init__(function, targetoptions=options, pipeline_class=_EntryCompiler)
+        self.piece = _Piece(function, targetoptions=options, pipeline_class=_PieceCompiler)
+        self._cache = KernelStore(function)
+        _entries[function] = self
+
+    def notice(self) -> AbstractContextManager[None]:
+        """What surrounds the compiling of this kernel."""
+        return compiling(self.py_func.__qualname__, self._cache.cache_path)
+
+    def get_call_template(self, arguments: Any, keywords: Any) -> Any:
+        # Numba would compile a kernel for each constant that a caller writes as a literal.
+        plain = [types.unliteral(a) for a in arguments]
+        return self.piece.get_call_template(plain, {k: types.unliteral(v) for k, v in keywords.items()})
+
+    def get_overload(self, signature: Any) -> Any:
+        return self.piece.get_overload(signature)
+
+
+_entries: dict[Any, Kernel] = {}
+
+
+def probe() -> None:
+    """Compile, call, store and load a kernel that calls another; raises whatever does not fit this Numba."""
+
+    def doubled(x):  # type: ignore[no-untyped-def]
+        return x + x
+
+    def answer(x):  # type: ignore[no-untyped-def]
+        return inner(x) + 1
+
+    inner = Kernel(doubled, targetoptions={"forceinline": True})
+    outer = Kernel(answer)
+    outer._cache, outer.notice = _NoStore(), nullcontext  # nothing is kept, and nothing said
+    try:
+        if outer(20) != 41:
+            raise RuntimeError(f"a kernel answered {outer(20)} for 41")
+        (compiled,) = outer.overloads.values()
+        stored = CompileResult._rebuild(outer.targetctx, *pickle.loads(dumps(compiled._reduce())))
+        if stored.entry_point(20) != 41:
+            raise RuntimeError(f"a stored kernel answered {stored.entry_point(20)} for 41")
+    finally:
+        del _entries[doubled], _entries[answer]
+
+
+class _NoStore:
+    """A cache that keeps nothing."""
+
+    cache_path = None
+
+    def load_overload(self, signature: Any, context: Any) -> None:
+        context.refresh()
+
+    def save_overload(self, signature: Any, compiled: Any) -> None: ...

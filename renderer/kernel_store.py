@@ -1,0 +1,262 @@
+"""Compiled kernels on disk: one file for each kernel, argument types, sources, Python, Numba and processor.
+
+Files are found by their names, so there is no index to keep in step. What cannot be read counts as absent, what cannot
+be written is compiled in each process; neither stops a run. A folder made ahead of time (``octree-render compile
+-o FOLDER``) is only read, after the user's own.
+"""
+
+import hashlib
+import os
+import pickle
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from logging import getLogger
+from pathlib import Path
+from typing import Any
+
+import llvmlite  # type: ignore[import-untyped]
+import llvmlite.binding as llvm  # type: ignore[import-untyped]
+import numba
+from numba.core import config
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from renderer.files import write_atomically
+from renderer.source_digest import source_digest
+
+# Folders of kernels compiled ahead, separated as in PATH.
+AHEAD_VARIABLE = "OCTREE_RENDERER_KERNELS"
+# Where a wheel for one platform carries its own.
+_CARRIED = Path(__file__).parent / "compiled"
+_SUFFIX = ".kernel"
+_HEADER = b"octree-renderer kernel 1\n"
+_LOG = getLogger("renderer.jit")
+
+# Processors that kernels are compiled ahead for: LLVM's name of each, and what a machine must have to run them (the
+# x86-64 psABI's levels), best first.
+_V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
+_V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+_V4 = (*_V3, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
+LEVELS: dict[str, tuple[str, ...]] = {"x86-64-v4": _V4, "x86-64-v3": _V3, "x86-64-v2": _V2, "aarch64": ("neon",)}
+# What LLVM calls the level.
+LEVEL_PROCESSORS = {"aarch64": "generic"}
+
+
+@dataclass(frozen=True)
+class Folders:
+    """Where kernels of one source folder are kept: ``written`` (None where nothing can be) and all that are read."""
+
+    written: Path | None
+    read: tuple[Path, ...]
+
+
+class KernelStore:
+    """The files of one kernel, with the interface that Numba's dispatchers expect of a cache."""
+
+    def __init__(self, function: Any) -> None:
+        self._source = Path(function.__code__.co_filename)
+        self._name = f"{self._source.stem}.{function.__qualname__}".replace("<", "").replace(">", "")
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder that new kernels go to, or None."""
+        written = _folders(self._source.parent).written
+        return None if written is None else str(written)
+
+    def is_stored(self) -> bool:
+        """Whether a file of these sources is there for any types of arguments, so that a later run need not compile.
+
+        True, too, where nothing can be written: then no process can help another.
+        """
+        folders = _folders(self._source.parent)
+        begin = f"{self._prefix()}{source_digest(self._source)[:16]}-"
+        return folders.written is None or any(
+            name.startswith(begin) for folder in (*folders.read, *ahead_folders()) for name in _names(folder)
+        )
+
+    def load_overload(self, signature: Any, context: Any) -> CompileResult | None:
+        """The kernel compiled for the types in ``signature``, or None where it must be compiled."""
+        context.refresh()  # a stored kernel refers to what Numba registers lazily
+        for path, key in self._places(signature, context.codegen().magic_tuple()):
+            payload = _read(path, key)
+            if payload is not None:
+                with _tolerant(path):
+                    return CompileResult._rebuild(context, *payload)
+        return None
+
+    def save_overload(self, signature: Any, compiled: CompileResult) -> None:
+        """Keep a kernel for later processes, and remove what was compiled of other sources."""
+        folder = _folders(self._source.parent).written
+        if folder is None or compiled.library.has_dynamic_globals:
+            return
+        key = self._key(signature, compiled.library.codegen.magic_tuple())
+        path = folder / self._file(key)
+        try:
+            _write(path, key, dumps(compiled._reduce()))
+        except OSError as error:
+            _warn_once("unwritable", f"compiled kernels cannot be kept: {path}: {error.strerror}")
+            return
+        current = f"{self._prefix()}{key[1][:16]}-"
+        for name in _names(folder):
+            if name.startswith(self._prefix()) and not name.startswith(current):
+                with suppress(OSError):
+                    (folder / name).unlink()
+
+    def _places(self, signature: Any, machine: tuple[str, ...]) -> Iterable[tuple[Path, tuple[str, ...]]]:
+        own = self._key(signature, machine)
+        for folder in _folders(self._source.parent).read:
+            yield folder / self._file(own), own
+        ahead = ahead_folders()
+        for processor in ("", *runnable_levels()) if ahead else ():
+            level = (machine[0], LEVEL_PROCESSORS.get(processor, processor), "") if processor else machine
+            key = self._key(signature, level)
+            for folder in ahead:
+                yield folder / self._file(key), key
+
+    def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
+        return (str(signature), source_digest(self._source), _versions(), *machine, f"svml {config.USING_SVML}")
+
+    def _prefix(self) -> str:
+        short = hashlib.sha256(_versions().encode()).hexdigest()[:8]
+        return f"{self._name}-{short}-"
+
+    def _file(self, key: tuple[str, ...]) -> str:
+        return f"{self._prefix()}{key[1][:16]}-{_hash(key)}{_SUFFIX}"
+
+
+def keep_in(folder: Path) -> None:
+    """From now on keep compiled kernels in ``folder`` alone, and look for them nowhere else."""
+    _Chosen.folders = Folders(folder, (folder,))
+
+
+def ahead_folders() -> tuple[Path, ...]:
+    """Folders of kernels compiled ahead that exist: those of the environment, then the package's own."""
+    return () if _Chosen.folders else _named_folders()
+
+
+class _Chosen:
+    """The folders that ``keep_in`` chose, None for the usual ones."""
+
+    folders: Folders | None = None
+
+
+@cache
+def _named_folders() -> tuple[Path, ...]:
+    named = [Path(text) for text in os.environ.get(AHEAD_VARIABLE, "").split(os.pathsep) if text]
+    return tuple(folder for folder in (*named, _CARRIED) if folder.is_dir())
+
+
+@cache
+def runnable_levels() -> tuple[str, ...]:
+    """The levels whose kernels this machine can run, best first."""
+    has = llvm.get_host_cpu_features()
+    arm = llvm.get_process_triple().startswith(("aarch64", "arm64"))
+    return tuple(
+        name for name, needs in LEVELS.items() if (name == "aarch64") == arm and all(has.get(f, False) for f in needs)
+    )
+
+
+def is_kernel_file(path: Path) -> bool:
+    """Whether ``path`` is one of the files that this module writes."""
+    return path.suffix == _SUFFIX
+
+
+@cache
+def _versions() -> str:
+    tag = sys.implementation.cache_tag or sys.implementation.name
+    flags = getattr(sys, "abiflags", "")
+    return f"{tag}{flags} numba {numba.__version__} llvmlite {llvmlite.__version__}"
+
+
+def _hash(key: tuple[str, ...]) -> str:
+    return hashlib.sha256("\0".join(key).encode()).hexdigest()[:16]
+
+
+def _folders(sources: Path) -> Folders:
+    """Where kernels of the sources in one folder are kept and looked for."""
+    return _Chosen.folders or _usual_folders(sources)
+
+
+@cache
+def _usual_folders(sources: Path) -> Folders:
+    """The folder that the environment names, the sources' own, and the user's, in this order."""
+    places = []
+    own = f"{sources.name}_{hashlib.sha256(str(sources).encode()).hexdigest()[:16]}"
+    if config.CACHE_DIR:
+        places.append(Path(config.CACHE_DIR) / own)
+    places.append(sources / "__pycache__")
+    with suppress(RuntimeError):  # no home
+        places.append(_user_cache() / "octree-renderer" / own)
+    written = next((place for place in places if _can_write(place)), None)
+    return Folders(written, tuple(place for place in places if place.is_dir()))
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+
+
+def _can_write(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def _names(folder: Path) -> list[str]:
+    try:
+        return [name for name in os.listdir(folder) if name.endswith(_SUFFIX)]
+    except OSError:
+        return []
+
+
+def _read(path: Path, key: tuple[str, ...]) -> Any:
+    """What a file holds, or None where it is absent, damaged or of another key."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        _warn_once("unreadable", f"a compiled kernel cannot be read and is compiled anew: {path}: {error.strerror}")
+        return None
+    head, body = content[: len(_HEADER)], content[len(_HEADER) + 32 :]
+    with _tolerant(path):
+        if head != _HEADER or hashlib.sha256(body).digest() != content[len(_HEADER) : len(_HEADER) + 32]:
+            raise ValueError("its content is not what was written")
+        stored, payload = pickle.loads(body)
+        # Two keys may share a file's name, though hardly ever.
+        return pickle.loads(payload) if stored == key else None
+    return None
+
+
+@contextmanager
+def _tolerant(path: Path) -> Iterator[None]:
+    """Within, an error means that a stored kernel is of no use; it is said once and the kernel is compiled."""
+    try:
+        yield
+    except Exception as error:
+        _warn_once("damaged", f"a compiled kernel is damaged and is compiled anew: {path}: {error}")
+
+
+def _write(path: Path, key: tuple[str, ...], payload: bytes) -> None:
+    body = pickle.dumps((key, payload))
+    write_atomically(path, lambda file: file.write(_HEADER + hashlib.sha256(body).digest() + body))
+
+
+_said: set[str] = set()
+
+
+def _warn_once(kind: str, message: str) -> None:
+    """Log the first message of each kind: what is wrong with one kernel's file is mostly wrong with all."""
+    if kind not in _said:
+        _said.add(kind)
+        _LOG.warning(message)

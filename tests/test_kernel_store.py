@@ -1,0 +1,281 @@
+"""Compiled kernels on disk: an edit below a kernel compiles it anew, and no state of the disk stops or misleads a run."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import llvmlite.binding as llvm
+import pytest
+from kernel_package import COMPILED, LOADED, MIDDLE, PACKAGE, RUN, UPPER, bottom_of, run, start, write_package
+
+from renderer.kernel_store import LEVEL_PROCESSORS, LEVELS, runnable_levels
+
+TELL = """
+import logging, sys
+logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message)s")
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    return write_package(tmp_path)
+
+
+@pytest.fixture
+def kernels(package):
+    """The folder of kernels of the small package, which are compiled there."""
+    assert run(package) == COMPILED
+    return package / "__pycache__"
+
+
+def stored(folder):
+    return sorted(folder.glob("*.kernel"))
+
+
+def test_an_edit_below_a_kernel_shows_and_an_edit_beside_it_keeps_the_cache(package):
+    assert run(package) == COMPILED
+    assert run(package) == LOADED
+    (package / "below" / "deep" / "aside.py").write_text("STEP = 11\n")
+    assert run(package) == LOADED
+    bottom_of(package).write_text("STEP = 20\n")
+    assert run(package) == ["27", "0", "1"]
+    (package / "middle.py").write_text(MIDDLE.replace("2 * x", "5 * x"))
+    assert run(package) == ["36", "0", "1"]
+    (package / "upper.py").write_text(UPPER.replace("+ 1", "+ 2"))
+    assert run(package) == ["37", "0", "1"]
+    assert run(package) == ["37", "1", "0"]
+
+
+def test_an_edit_of_the_real_triangle_test_shows(tmp_path):
+    # The whole package, where the kernel that runs is two modules above the one edited.
+    folder = tmp_path / "renderer"
+    shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    script = """
+from renderer.octree import BruteForce
+brute = BruteForce([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], threads=1)
+print(brute.any_hit([[0.25, 0.25, 1]], [[0, 0, -1]])[0])
+"""
+    assert run(folder, script) == ["True"]
+    source = (folder / "intersect.py").read_text()
+    edited = source.replace("determinant != zero", "determinant != determinant")
+    assert edited != source
+    (folder / "intersect.py").write_text(edited)
+    assert run(folder, script) == ["False"]
+
+
+@pytest.mark.parametrize("pretend", ["import llvmlite\nllvmlite.__version__ = '99.0'\n", "import numba\n"
+                         "numba.__version__ = '0.68.99'\n"])  # fmt: skip
+def test_another_compiler_version_shows(package, pretend):
+    assert run(package) == COMPILED
+    assert run(package, pretend + RUN) == COMPILED
+    assert run(package, pretend + RUN) == LOADED
+    # And does not take what it made from the first one, which may be used in turn.
+    assert run(package) == LOADED
+
+
+def test_another_processor_shows(package):
+    assert run(package) == COMPILED
+    generic = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    assert run(package, **generic) == COMPILED
+    assert run(package, **generic) == LOADED
+    assert run(package) == LOADED
+
+
+def test_a_kernel_of_another_package_is_kept_too_and_follows_ours(package):
+    # By an import that the digest need not follow: it covers all of ours.
+    ours = "from renderer.middle import (\n    doubled,\n)"
+    mine = UPPER.replace(ours, "import renderer.middle as m\ndoubled = m.doubled")
+    assert mine != UPPER
+    (package.parent / "mine.py").write_text(mine)
+    script = RUN.replace("renderer.upper", "mine")
+    assert run(package, script) == COMPILED
+    assert run(package, script) == LOADED
+    bottom_of(package).write_text("STEP = 20\n")
+    assert run(package, script) == ["27", "0", "1"]
+
+
+def test_code_of_older_sources_is_removed_and_never_used(package, kernels):
+    old = {path.name: path.read_bytes() for path in stored(kernels)}
+    bottom_of(package).write_text("STEP = 20\n")
+    assert run(package) == ["27", "0", "1"]
+    new = stored(kernels)
+    assert len(new) == 1 and new[0].name not in old
+    # As a process of older sources may write it meanwhile; even under the new name.
+    new[0].write_bytes(next(iter(old.values())))
+    assert run(package) == ["27", "0", "1"]
+    assert run(package) == ["27", "1", "0"]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: b"",
+        lambda content: content[:10],
+        lambda content: content[: len(content) // 2],
+        lambda content: content[:-1],
+        lambda content: content[:2000] + bytes([content[2000] ^ 1]) + content[2001:],
+        lambda content: b"x" + content,
+    ],
+    ids=["empty", "head only", "half", "one byte short", "a bit flipped", "another header"],
+)
+def test_a_damaged_file_is_said_once_and_made_anew(package, kernels, damage):
+    (path,) = stored(kernels)
+    path.write_bytes(damage(path.read_bytes()))
+    done = start(package)
+    assert done.stdout.split() == COMPILED
+    assert done.stderr.count("a compiled kernel is damaged and is compiled anew") == 1
+    assert run(package) == LOADED
+
+
+def test_a_stored_kernel_that_cannot_be_rebuilt_is_made_anew(package, kernels):
+    broken = "from numba.core.compiler import CompileResult\ndef no(*a): raise AttributeError('gone')\n"
+    done = start(package, f"{broken}sound = CompileResult._rebuild\nCompileResult._rebuild = no\n{RUN}")
+    assert done.stdout.split() == COMPILED and "damaged" in done.stderr and "gone" in done.stderr
+
+
+def test_a_folder_that_cannot_be_written_falls_back_to_the_users_own(package, tmp_path):
+    (package / "__pycache__").write_text("a file in the way, because root may write anywhere")
+    users = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    assert run(package, **users) == COMPILED
+    assert run(package, **users) == LOADED
+    assert stored(next((tmp_path / "cache" / "octree-renderer").iterdir()))
+    bottom_of(package).write_text("STEP = 20\n")
+    assert run(package, **users) == ["27", "0", "1"]
+    (tmp_path / "blocked").touch()
+    nowhere = {"XDG_CACHE_HOME": str(tmp_path / "blocked")}
+    for _ in range(2):
+        assert " ".join(run(package, TELL + RUN, **nowhere)) == (
+            "renderer: compiling kernels, which takes some seconds (for this process only: no cache folder can be "
+            "written) compiling answer (for this process only: no cache folder can be written) 27 0 1"
+        )
+
+
+# The folder is there and may be read; whatever writes to it fails as on a read-only file system.
+READ_ONLY = """
+import errno, os, tempfile
+def refuse(*a, **k): raise OSError(errno.EROFS, "Read-only file system")
+tempfile.TemporaryFile = os.mkdir = refuse
+"""
+
+
+@pytest.mark.parametrize("own", ["in the tree", "NUMBA_CACHE_DIR"])
+def test_what_cannot_be_written_is_still_read(package, tmp_path, own):
+    """A read-only install, as a container has it, with a home of its own and without one."""
+    chosen = {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")} if own == "NUMBA_CACHE_DIR" else {}
+    assert run(package, **chosen) == COMPILED
+    for home in ({"XDG_CACHE_HOME": str(tmp_path / "fresh")}, {"XDG_CACHE_HOME": "", "HOME": "/dev/null/none"}):
+        assert run(package, READ_ONLY + RUN, **chosen, **home) == LOADED
+
+
+def test_without_a_home_kernels_are_compiled(package, tmp_path):
+    (package / "__pycache__").touch()
+    script = "import os\nos.environ.pop('HOME', None)\nimport pathlib\n"
+    script += "def no(*a): raise RuntimeError('Could not determine home directory.')\npathlib.Path.home = no\n"
+    assert run(package, script + RUN, XDG_CACHE_HOME="") == COMPILED
+
+
+def test_a_full_disk_stops_nothing_and_is_said_once(package):
+    full = """
+import errno, renderer.kernel_store as store
+def refuse(path, write): raise OSError(errno.ENOSPC, "No space left on device")
+store.write_atomically = refuse
+from renderer.middle import doubled
+assert doubled(3) == 16
+"""
+    done = start(package, full + RUN)
+    assert done.stdout.split() == COMPILED
+    said = [line for line in done.stderr.splitlines() if "cannot be kept" in line]
+    assert len(said) == 1 and said[0].endswith("No space left on device") and "__pycache__" in said[0]
+
+
+def test_what_is_compiled_is_logged_and_what_is_loaded_is_not(package):
+    kept = f"(once, kept in {package / '__pycache__'})"
+    first = f"renderer: compiling kernels, which takes some seconds {kept} compiling answer {kept} 17 0 1"
+    assert " ".join(run(package, TELL + RUN)) == first
+    assert run(package, TELL + RUN) == LOADED
+
+
+@pytest.mark.parametrize(
+    ("how", "told"),
+    [
+        ("", 1),
+        ("import logging\nlogging.getLogger('renderer').setLevel('ERROR')\n", 0),
+        ("import os\nos.environ['OCTREE_RENDERER_QUIET'] = '1'\n", 0),
+        ("import os\nos.environ['OCTREE_RENDERER_QUIET'] = '0'\n", 1),
+    ],
+    ids=["as it comes", "logging", "environment", "environment 0"],
+)
+def test_the_first_compiling_is_said_on_one_line_that_can_be_turned_off(package, how, told):
+    done = start(package, how + "from renderer.middle import doubled\nassert doubled(3) == 16\n" + RUN)
+    assert done.stdout.split() == COMPILED
+    assert len(done.stderr.splitlines()) == done.stderr.count("renderer: compiling kernels") == told
+
+
+def test_two_processes_that_compile_at_the_same_time_agree(package):
+    own = {**os.environ, "NUMBA_CACHE_DIR": "", "PYTHONPATH": str(package.parent)}
+    command = [sys.executable, "-B", "-P", "-c", RUN]
+    both = [subprocess.Popen(command, env=own, stdout=subprocess.PIPE, text=True) for _ in range(3)]
+    for process in both:
+        out, _ = process.communicate(timeout=300)
+        assert process.returncode == 0 and out.split()[0] == "17"
+    assert run(package) == LOADED
+
+
+@pytest.mark.parametrize(
+    ("lacks", "triple", "levels"),
+    [
+        ((), "x86_64-unknown-linux-gnu", ("x86-64-v4", "x86-64-v3", "x86-64-v2")),
+        (("avx512dq",), "x86_64-pc-windows-msvc", ("x86-64-v3", "x86-64-v2")),
+        (("avx512f", "bmi2"), "x86_64-apple-darwin", ("x86-64-v2",)),
+        (("ssse3",), "x86_64-unknown-linux-gnu", ()),
+        ((), "aarch64-unknown-linux-gnu", ("aarch64",)),
+        ((), "arm64-apple-darwin", ("aarch64",)),
+    ],
+)
+def test_a_machine_runs_the_levels_whose_features_it_has(monkeypatch, lacks, triple, levels):
+    features = {feature: feature not in lacks for needs in LEVELS.values() for feature in needs}
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: features)
+    monkeypatch.setattr(llvm, "get_process_triple", lambda: triple)
+    assert runnable_levels.__wrapped__() == levels
+
+
+class TestAhead:
+    """Folders of kernels that were compiled for a level of processors, and are only read."""
+
+    def made(self, package, tmp_path, level):
+        """A folder of the package's kernels for a level, which no other folder has."""
+        processor = {"NUMBA_CPU_NAME": LEVEL_PROCESSORS.get(level, level), "NUMBA_CPU_FEATURES": ""}
+        made = tmp_path / "made"
+        assert run(package, NUMBA_CACHE_DIR=str(made), **processor) == COMPILED
+        (folder,) = made.iterdir()
+        return folder
+
+    def level(self):
+        return runnable_levels()[-1]
+
+    def test_they_are_found_where_the_environment_names_them(self, package, tmp_path):
+        folder = self.made(package, tmp_path, self.level())
+        assert run(package, OCTREE_RENDERER_KERNELS=f"{tmp_path / 'none'}{os.pathsep}{folder}") == LOADED
+        assert run(package) == COMPILED
+
+    def test_a_package_may_carry_them(self, package, tmp_path):
+        self.made(package, tmp_path, self.level()).rename(package / "compiled")
+        assert run(package) == LOADED
+
+    def test_they_are_not_used_for_other_sources(self, package, tmp_path):
+        folder = self.made(package, tmp_path, self.level())
+        bottom_of(package).write_text("STEP = 20\n")
+        assert run(package, OCTREE_RENDERER_KERNELS=str(folder)) == ["27", "0", "1"]
+
+    def test_they_are_not_used_by_a_machine_that_lacks_the_level(self, package, tmp_path):
+        folder = self.made(package, tmp_path, self.level())
+        pretend = "import renderer.kernel_store as store\nstore.runnable_levels = tuple\n"
+        assert run(package, pretend + RUN, OCTREE_RENDERER_KERNELS=str(folder)) == COMPILED
+
+    def test_they_are_never_written(self, package, tmp_path):
+        folder = self.made(package, tmp_path, self.level())
+        before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+        bottom_of(package).write_text("STEP = 20\n")
+        assert run(package, OCTREE_RENDERER_KERNELS=str(folder)) == ["27", "0", "1"]
+        assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before

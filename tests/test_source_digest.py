@@ -1,0 +1,119 @@
+"""Digests of kernels' sources: whatever a kernel can see shows, however many folders down; nothing else does."""
+
+import ast
+import shutil
+
+import pytest
+from kernel_package import MIDDLE, PACKAGE, bottom_of, run, write_package
+
+from renderer.source_digest import _imports, source_digest
+
+TELL = """
+from pathlib import Path
+from renderer.source_digest import source_digest
+for m in {modules!r}: print(source_digest(Path('renderer').resolve() / m))
+"""
+
+
+def digests(folder):
+    modules = [path.relative_to(folder).as_posix() for path in folder.rglob("*.py")]
+    return dict(zip(modules, run(folder, TELL.format(modules=modules)), strict=True))
+
+
+def changed_by(folder, *edited):
+    """The modules whose digest changes with a line at the end of the edited ones."""
+    before = digests(folder)
+    for name in edited:
+        with (folder / name).open("a") as source:
+            source.write("\n# edited\n")
+    after = digests(folder)
+    return {module for module in before if before[module] != after[module]}
+
+
+@pytest.fixture
+def whole(tmp_path):
+    """A copy of the package."""
+    folder = tmp_path / "renderer"
+    shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+def test_an_edit_of_the_layout_changes_the_kernels_over_it_alone(whole):
+    changed = changed_by(whole, "layout.py")
+    assert {"layout.py", "intersect.py", "traverse.py", "batch.py", "build.py", "whitted.py"} <= changed
+    assert not changed & {"simd.py", "jit.py", "errors.py", "mesh.py", "vec3.py", "parallel.py"}
+
+
+@pytest.mark.parametrize("edited", ["cli.py", "viewer/session.py", "needs.py"])
+def test_an_edit_beside_the_kernels_changes_none_of_them(whole, edited):
+    kernels = {"batch.py", "build.py", "subtree.py", "whitted.py", "tile.py", "refit.py", "blocks.py"}
+    assert not changed_by(whole, edited) & kernels
+
+
+def test_an_edit_two_folders_down_shows_and_one_beside_it_does_not(tmp_path):
+    folder = write_package(tmp_path)
+    assert changed_by(folder, "below/deep/bottom.py") == {"below/deep/bottom.py", "middle.py", "upper.py"}
+    assert changed_by(folder, "below/deep/aside.py") == {"below/deep/aside.py"}
+
+
+@pytest.mark.parametrize("line", ["from renderer.below.deep import bottom", "from renderer.below import (\n  deep,\n)"])
+def test_a_module_imported_by_name_counts(tmp_path, line):
+    folder = write_package(tmp_path)
+    (folder / "below" / "deep.py").write_text("STEP = 1\n")
+    (folder / "middle.py").write_text(line + "\n")
+    edited = "below/deep.py" if "deep," in line else "below/deep/bottom.py"
+    assert {"middle.py", "upper.py"} <= changed_by(folder, edited)
+
+
+def package_imports(path, package=PACKAGE):
+    """The files of the package that a source imports, by Python's own parser; refuses what the digest cannot see."""
+    found, tree = set(), ast.parse(path.read_text())
+    within = {node for outer in ast.walk(tree) if isinstance(outer, ast.FunctionDef) for node in ast.walk(outer)}
+    # What is imported inside a function, a kernel cannot use.
+    for node in (node for node in ast.walk(tree) if node not in within):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path.name}:{node.lineno}: a relative import"
+            module, *below = (node.module or "").split(".")
+            if module == "renderer" and node.col_offset == 0:
+                base = package.joinpath(*below)
+                names = [base / f"{alias.name}.py" for alias in node.names]
+                found |= {file for file in (base.with_suffix(".py"), base / "__init__.py", *names) if file.exists()}
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                assert alias.name.partition(".")[0] != "renderer", f"{path.name}:{node.lineno}: import {alias.name}"
+    return found
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_every_import_in_the_package_has_the_form_that_the_digest_follows(path):
+    assert set(_imports(path)) == package_imports(path)
+
+
+@pytest.mark.parametrize("line", ["from . import jit", "from .jit import kernel", "import renderer.jit as j",
+                                  "import numpy, renderer.jit"])  # fmt: skip
+def test_forms_that_the_digest_does_not_follow_are_found(tmp_path, line):
+    (tmp_path / "a.py").write_text(line)
+    with pytest.raises(AssertionError, match=r"a\.py:"):
+        package_imports(tmp_path / "a.py")
+
+
+def test_an_unknown_module_has_the_digest_of_nothing():
+    assert source_digest(PACKAGE / "no_such_module.py") != source_digest(PACKAGE / "jit.py")
+
+
+def test_a_renamed_module_shows(tmp_path):
+    folder = write_package(tmp_path)
+    before = digests(folder)
+    bottom_of(folder).rename(folder / "floor.py")
+    (folder / "middle.py").write_text(MIDDLE.replace("renderer.below.deep.bottom", "renderer.floor"))
+    after = digests(folder)
+    assert {m for m in before if before[m] != after.get(m)} == {"below/deep/bottom.py", "middle.py", "upper.py"}
+
+
+def test_a_kernel_of_another_package_follows_all_of_ours(tmp_path):
+    folder = write_package(tmp_path)
+    (tmp_path / "mine.py").write_text("import renderer.middle as m\n")
+    script = TELL.format(modules=["../mine.py"])
+    before = run(folder, script)
+    (folder / "below" / "deep" / "aside.py").write_text("STEP = 11\n")
+    assert run(folder, script) != before
