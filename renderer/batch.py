@@ -4,7 +4,7 @@ import numpy as np
 
 from renderer.jit import inlined, kernel
 from renderer.leaf import NO_FACE, tree_pointers
-from renderer.simd import get, larger, pointer, put
+from renderer.simd import get, larger, pointer
 from renderer.traverse import Found, Rays, make_scratch, ray_at, search_blocks, search_singly, trace
 
 # Origins as far as float32 boxes can tell from infinity, and directions whose product with a determinant, at most

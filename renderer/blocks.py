@@ -8,24 +8,19 @@ from numpy.typing import NDArray
 from renderer.jit import kernel
 from renderer.layout import BLOCK_WORDS, LANES, cache_aligned
 from renderer.parallel import for_chunks
+from renderer.simd import float32_pointer, float64_pointer, put
 
 # A tenth of a millisecond each, so that taking a chunk costs nothing beside it.
 _VERTICES, _BLOCKS = 1 << 16, 1 << 12
 
 
 @kernel
-def _is_float32(vertices, begin, end):
-    """Whether float32 holds every vertex in ``begin:end`` exactly."""
-    for i in range(begin, end):
-        for axis in range(3):
-            if np.float64(np.float32(vertices[i, axis])) != vertices[i, axis]:
-                return False
-    return True
+def _fill(vertices, faces, block_faces, address, wide, begin, end):
+    """Copy the vertices of each face of blocks ``begin:end`` into its rows; unused places repeat one vertex.
 
-
-@kernel
-def _fill(vertices, faces, block_faces, blocks, begin, end):
-    """Copy the vertices of each face of blocks ``begin:end`` into its rows; unused places repeat one vertex."""
+    The blocks stand at ``address``, float64 where ``wide``, else float32: one kernel for both.
+    """
+    doubles, floats = float64_pointer(address), float32_pointer(address)
     for place in range(begin * LANES, end * LANES):
         face = block_faces[place]
         first = faces[block_faces[place // LANES * LANES], 0]
@@ -33,7 +28,11 @@ def _fill(vertices, faces, block_faces, blocks, begin, end):
         for corner in range(3):
             vertex = first if face < 0 else faces[face, corner]
             for axis in range(3):
-                blocks[base + LANES * (3 * corner + axis)] = vertices[vertex, axis]
+                at = base + LANES * (3 * corner + axis)
+                if wide:
+                    put(doubles, at, vertices[vertex, axis])
+                else:
+                    put(floats, at, np.float32(vertices[vertex, axis]))
 
 
 def fill_blocks(
@@ -43,11 +42,16 @@ def fill_blocks(
     inexact: list[int] = []
 
     def check(begin: int, end: int) -> None:
-        if not inexact and not _is_float32(vertices, begin, end):
-            inexact.append(begin)
+        part = vertices[begin:end]
+        with np.errstate(over="ignore"):  # what float32 cannot hold becomes inf
+            if not inexact and (part.astype(np.float32) != part).any():
+                inexact.append(begin)
 
     for_chunks(check, len(vertices), _VERTICES, threads)
     count = len(block_faces) // LANES
     blocks = cache_aligned(count * BLOCK_WORDS, np.float64 if inexact else np.float32)
-    for_chunks(lambda begin, end: _fill(vertices, faces, block_faces, blocks, begin, end), count, _BLOCKS, threads)
+    address, wide = blocks.ctypes.data, bool(inexact)
+    for_chunks(
+        lambda begin, end: _fill(vertices, faces, block_faces, address, wide, begin, end), count, _BLOCKS, threads
+    )
     return blocks

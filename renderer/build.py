@@ -79,9 +79,10 @@ def _cut_top(order: Faces, rule: Rule, threads: int) -> tuple[Hierarchy, list[in
     """Cut all faces until no part is larger than a subtree; also the levels of cuts above each part."""
     count = len(order.boxes) // BOX
     top, levels = new_hierarchy(1), [0]
-    add_part(top, 0, 0, count)
-    fit(order.boxes, 0, count, top.boxes, 0)
+    add_part.py_func(top, 0, 0, count)  # a few words, not worth a kernel
     waiting = [0] if count > _SUBTREE else []
+    if waiting:
+        fit(order.boxes, 0, count, top.boxes, 0)
     while waiting:
         pieces = _cut_each(order, rule, top, levels, waiting, threads)
         before = len(top.halves)
@@ -179,7 +180,7 @@ def _emit_top(
     """The nodes above the subtrees, whose first nodes and blocks are ``starts``, and the levels of all nodes."""
     ends = np.zeros((len(top.halves), 2), np.int32)
     for (part, built), start in zip(subtrees.items(), starts, strict=True):
-        ends[part] = moved_link(built.link, *start), built.depth
+        ends[part] = moved_link.py_func(built.link, *start), built.depth
     nodes = np.empty(len(top.halves) * NODE_WORDS, np.float32)
     none = np.empty(0, np.int32)
     used, _, depth = emit_nodes(top, none, ends, nodes, nodes.view(np.int32), none, emit_room())

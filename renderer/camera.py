@@ -12,15 +12,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from renderer.errors import expect
-
-FiniteVector = tuple[
-    Annotated[float, Field(allow_inf_nan=False, strict=True)],
-    Annotated[float, Field(allow_inf_nan=False, strict=True)],
-    Annotated[float, Field(allow_inf_nan=False, strict=True)],
-]
+from renderer.fields import Fields, FiniteVector
 
 
 def unit(vector: ArrayLike) -> NDArray[np.float64]:
@@ -37,9 +32,7 @@ def checked_vector(argument: str, value: ArrayLike) -> tuple[float, float, float
     return x, y, z
 
 
-class _Camera(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
+class _Camera(Fields):
     eye: FiniteVector
     target: FiniteVector
     up: FiniteVector = (0.0, 1.0, 0.0)
@@ -77,7 +70,7 @@ class PerspectiveCamera(_Camera):
 class OrthographicCamera(_Camera):
     """Parallel rays; ``height`` is the height of the film in scene units."""
 
-    type: Literal["orthographic"]
+    type: Literal["orthographic"] = "orthographic"
     height: Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 
     def rows(self, width: int, height: int) -> NDArray[np.float64]:

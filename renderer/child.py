@@ -33,12 +33,13 @@ def _call(target: str, *arguments: str) -> object:
     home = Path(__file__).resolve().parent.parent
     for name in _OUR_PACKAGES:
         if name not in sys.modules and (home / name).is_dir():
-            _load(name, home / name)
+            load_package(name, home / name)
     module, _, function = target.partition(":")
     return getattr(import_module(module), function)(*arguments)
 
 
-def _load(name: str, folder: Path) -> None:
+def load_package(name: str, folder: Path) -> None:
+    """Import the package in ``folder`` as ``name``, whatever the path would find under that name."""
     spec = spec_from_file_location(name, folder / "__init__.py", submodule_search_locations=[str(folder)])
     assert spec is not None and spec.loader is not None  # the file is there
     module = module_from_spec(spec)

@@ -2,23 +2,28 @@
 
 import argparse
 import logging
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
+from renderer import __version__
 from renderer.errors import expect
 from renderer.interrupt import interruptible
+from renderer.levels import AHEAD_VARIABLE, LEVELS
 
 
 @interruptible("octree-render: interrupted, nothing written")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``octree-render``; returns the exit code: 0, 2 for bad input, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    if arguments is None:
-        _hide_scipy_from_numba()
     try:
+        if getattr(options, "level", None):
+            _choose_processor(options.level, options.output)
+        if arguments is None:
+            _hide_scipy_from_numba()
         with _compile_notices(getattr(options, "quiet", False)):
             options.command(options)
     except (ValueError, OSError, ModuleNotFoundError) as error:
@@ -38,18 +43,17 @@ def _hide_scipy_from_numba() -> None:
 
 @contextmanager
 def _compile_notices(silent: bool) -> Iterator[None]:
-    """Show on standard error which kernels are compiled, so that nobody takes the first run for the usual one."""
+    """Say on standard error that kernels are compiled, so that nobody takes the first run for the usual one."""
     log, notices = logging.getLogger("renderer.jit"), _Notices()
-    level = log.level
-    if silent:
-        yield
-        return
+    level, propagate = log.level, log.propagate
     log.addHandler(notices)
-    log.setLevel(logging.INFO)
+    log.propagate = False
+    log.setLevel(logging.ERROR if silent else logging.WARNING)
     try:
         yield
     finally:
         log.removeHandler(notices)
+        log.propagate = propagate
         log.setLevel(level)
 
 
@@ -59,23 +63,16 @@ class _Notices(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         from tqdm import tqdm
 
-        tqdm.write(f"octree-render: {record.getMessage()}", file=sys.stderr)
+        tqdm.write(f"octree-render: {record.getMessage().removeprefix('renderer: ')}", file=sys.stderr)
 
 
 def _one_line(error: Exception) -> str:
-    """The error's message on one line; pydantic's start with a headline that says less than the rest."""
-    from pydantic import ValidationError
-
-    if isinstance(error, ValidationError):
-        first = error.errors()[0]
-        where = ".".join(str(k) for k in first["loc"])
-        return f"{where}: {first['msg']}, got {first['input']!r}" if where else first["msg"]
     return " ".join(str(error).split())
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="octree-render", description="Octree ray tracer for triangle meshes.")
-    parser.add_argument("--version", action="version", version=version("octree-renderer"))
+    parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
     render = commands.add_parser("render", help="render a scene file to a picture")
     render.add_argument("scene", type=Path)
@@ -100,9 +97,28 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--port", type=int, default=0, help="default: 0, any free one")
     view.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
     view.set_defaults(command=_view)
-    ahead = commands.add_parser("compile", help="compile all kernels now, for CI and container images")
-    ahead.set_defaults(command=_compile)
+    _add_compile(commands)
     return parser
+
+
+def _add_compile(commands: Any) -> None:
+    ahead = commands.add_parser(
+        "compile",
+        help="compile kernels now, for CI, container images and folders that travel",
+        description="Compile kernels now, so that no later run of these versions has to.",
+        epilog=f"A folder made with -o is found by {AHEAD_VARIABLE}=FOLDER, and never written by a run.",
+    )
+    what = ahead.add_mutually_exclusive_group()
+    for name, does in (
+        ("queries", "what an Octree and a BruteForce call"),
+        ("pictures", "the same, and what renders pictures"),
+        ("all", "the same, and what the viewer calls; the default"),
+    ):
+        what.add_argument(f"--{name}", dest="what", action="store_const", const=name, help=does)
+    ahead.add_argument("--level", choices=LEVELS, help="for any processor of a level, not this machine's; needs -o")
+    ahead.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="keep them there and not in the usual cache")
+    ahead.add_argument("--quiet", action="store_true", help="no progress bar and no word at the end")
+    ahead.set_defaults(command=_compile, what="all")
 
 
 def _resolution(text: str) -> tuple[int, int]:
@@ -115,9 +131,9 @@ def _resolution(text: str) -> tuple[int, int]:
 def _render(options: argparse.Namespace) -> None:
     # Imported here so that --help and --version need no compiler.
     from renderer.image import check_picture_path
+    from renderer.precompile import compile_in_two
     from renderer.render import render
     from renderer.scene import load_scene
-    from renderer.precompile import compile_in_two
 
     check_picture_path(options.output)
     scene = load_scene(options.scene)
@@ -144,11 +160,34 @@ def _render(options: argparse.Namespace) -> None:
         )
 
 
-def _compile(_options: argparse.Namespace) -> None:
-    from renderer.precompile import compile_all
+def _compile(options: argparse.Namespace) -> None:
+    from tqdm import tqdm
 
-    compile_all()
-    print("all kernels are compiled")
+    from renderer.compile_notice import compile_seconds
+    from renderer.kernel_store import stored_in
+    from renderer.precompile import PARTS, compile_ahead, compile_into
+
+    if options.output is not None:
+        compile_into(options.output)
+    visible = not options.quiet and sys.stderr.isatty()
+    with tqdm(total=len(PARTS[options.what]), unit="part", leave=False, disable=not visible) as bar:
+
+        def began(name: str) -> None:
+            bar.set_description(name)
+            bar.update()
+
+        compile_ahead(options.what, began)
+    if not options.quiet:
+        where = f"; {stored_in(options.output)} kernels in {options.output}" if options.output else ""
+        print(f"compiled in {compile_seconds():.1f} s{where}")
+
+
+def _choose_processor(level: str, output: Path | None) -> None:
+    """Let Numba, which reads the environment when it is imported, compile for a level."""
+    expect(output is not None, "--output", "a folder, as kernels for a level are not this machine's", "none")
+    expect("numba" not in sys.modules, "--level", "a process that has not imported Numba yet", "one that has")
+    os.environ["NUMBA_CPU_NAME"] = LEVELS[level]
+    os.environ["NUMBA_CPU_FEATURES"] = ""
 
 
 def _view(options: argparse.Namespace) -> None:

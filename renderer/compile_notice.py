@@ -27,6 +27,17 @@ def compile_seconds() -> float:
     return _Clock.seconds
 
 
+class Stopwatch:
+    """Seconds since it was made, those spent compiling left out. What another thread compiles meanwhile is, too."""
+
+    def __init__(self) -> None:
+        self._began = time.perf_counter() - compile_seconds()
+
+    def seconds(self) -> float:
+        """Seconds so far."""
+        return time.perf_counter() - compile_seconds() - self._began
+
+
 @contextmanager
 def compiling(name: str, folder: str | None) -> Iterator[None]:
     """Around the compiling of one kernel by the one thread that does: says so, and counts its time."""

@@ -16,7 +16,7 @@ from typing import Any
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from numba.core import types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompileResult, CompilerBase, compile_result
+from numba.core.compiler import CompilerBase, CompileResult, compile_result
 from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.registry import CPUDispatcher
@@ -48,6 +48,8 @@ OPTIONS = {
 class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
     """A function's module as it was lowered, neither optimised nor compiled."""
 
+    _merged: Any = None
+
     def _optimize_functions(self, module: Any) -> None:
         module.data_layout = self._codegen._data_layout
 
@@ -56,14 +58,14 @@ class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     def _get_module_for_linking(self) -> Any:
         """This module with all below it, for kernels that are not ours."""
-        if self._shared_module is None:
+        if self._merged is None:
             module = self._final_module.clone()
             _link_all(module, self._linking_libraries)
             for function in module.functions:
                 if not function.is_declaration:
                     function.linkage = "linkonce_odr"
-            self._shared_module = module
-        return self._shared_module
+            self._merged = module
+        return self._merged
 
 
 class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -228,11 +230,13 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         options = {**OPTIONS, **(targetoptions or {})}
         super().__init__(function, targetoptions=options, pipeline_class=_EntryCompiler)
         self.piece = _Piece(function, targetoptions=options, pipeline_class=_PieceCompiler)
-        self._cache = KernelStore(function)
+        self._cache: KernelStore | _NoStore = KernelStore(function)
         _entries[function] = self
 
     def notice(self) -> AbstractContextManager[None]:
         """What surrounds the compiling of this kernel."""
+        if isinstance(self._cache, _NoStore):
+            return nullcontext()
         return compiling(self.py_func.__qualname__, self._cache.cache_path)
 
     def get_call_template(self, arguments: Any, keywords: Any) -> Any:
@@ -258,7 +262,7 @@ def probe() -> None:
 
     inner = Kernel(doubled, targetoptions={"forceinline": True})
     outer = Kernel(answer)
-    outer._cache, outer.notice = _NoStore(), nullcontext  # nothing is kept, and nothing said
+    outer._cache = _NoStore()
     try:
         if outer(20) != 41:
             raise RuntimeError(f"a kernel answered {outer(20)} for 41")
@@ -271,9 +275,7 @@ def probe() -> None:
 
 
 class _NoStore:
-    """A cache that keeps nothing."""
-
-    cache_path = None
+    """A cache that keeps nothing, of kernels of which nothing is said."""
 
     def load_overload(self, signature: Any, context: Any) -> None:
         context.refresh()

@@ -7,11 +7,10 @@ import numpy as np
 
 from renderer.bundle import SIZE
 from renderer.jit import inlined, kernel
-from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
-from renderer.material import DIELECTRIC, KIND, MIRROR, UNLIT
-from renderer.shading import spawn_origin
+from renderer.scene_rows import DIELECTRIC, DIRECTIONAL, KIND, LIGHT_COLUMNS, MIRROR, UNLIT
 from renderer.sight import phong
 from renderer.simd import at, get, put
+from renderer.spawn import spawn_origin
 from renderer.traverse import Rays, search_blocks, trace
 from renderer.vec3 import add, dot, normalized, row3, scale, sub, three, times
 

@@ -19,6 +19,11 @@ def expect(condition: bool, argument: str, expected: str, got: object) -> None:
         raise ValueError(f"{argument}: expected {expected}, got {got}")
 
 
+def extra_hint(name: str) -> str:
+    """How to install what an optional part needs; there is no package on an index yet."""
+    return f"in a checkout of octree-renderer: pip install '.[{name}]'"
+
+
 def is_count(value: object) -> bool:
     """Whether it is an int >= 0, which True and False are not meant as."""
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0

@@ -1,4 +1,4 @@
-"""OpenEXR files, by the package ``OpenEXR``, which only they need: ``pip install 'octree-renderer[exr]'``."""
+"""OpenEXR files, by the package ``OpenEXR``, which only they need and the extra ``exr`` brings."""
 
 import tempfile
 from collections.abc import Mapping
@@ -7,6 +7,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from renderer.errors import extra_hint
+
 
 def check_exr() -> None:
     """Raise ``ValueError`` where the package is absent."""
@@ -14,7 +16,7 @@ def check_exr() -> None:
         import OpenEXR  # noqa: F401
     except ImportError:
         raise ValueError(
-            "output: expected the package OpenEXR for an .exr file, got none: pip install 'octree-renderer[exr]'"
+            f"output: expected the package OpenEXR for an .exr file, got none; {extra_hint('exr')}"
         ) from None
 
 

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.camera import checked_vector
 from renderer.image import srgb, srgb_steps
 from renderer.jit import inlined, kernel
-from renderer.light import DIRECTIONAL, LIGHT_COLUMNS
-from renderer.material import AMBIENT, DIFFUSE, KIND, LAMBERT, REFLECTANCE, TRANSMITTANCE
 from renderer.parallel import checked_threads, for_chunks
+from renderer.scene_rows import AMBIENT, DIFFUSE, DIRECTIONAL, KIND, LAMBERT, LIGHT_COLUMNS, REFLECTANCE, TRANSMITTANCE
 from renderer.sight import World, look_at, phong
 from renderer.simd import get, larger, pointer, smaller
 from renderer.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times

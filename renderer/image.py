@@ -95,13 +95,18 @@ class Image:
         else:
             write_atomically(path, lambda file: file.write(self._repr_png_()))
 
+    @property
+    def srgb(self) -> NDArray[np.uint8]:
+        """The picture as (h, w, 3) uint8 sRGB, as a PNG file holds it."""
+        return srgb(self.radiance)
+
     def _repr_png_(self) -> bytes:
         """The picture as PNG; notebooks show it."""
         from PIL import Image as Pillow  # not needed to trace rays, and slow to import
 
         expect(not np.isnan(self.radiance).any(), "radiance", "numbers that have a colour", "nan")
         buffer = io.BytesIO()
-        Pillow.fromarray(srgb(self.radiance)).save(buffer, "png")
+        Pillow.fromarray(self.srgb).save(buffer, "png")
         return buffer.getvalue()
 
 

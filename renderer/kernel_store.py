@@ -26,25 +26,14 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from renderer.files import write_atomically
+from renderer.levels import AHEAD_VARIABLE, FEATURES, LEVELS
 from renderer.source_digest import source_digest
 
-# Folders of kernels compiled ahead, separated as in PATH.
-AHEAD_VARIABLE = "OCTREE_RENDERER_KERNELS"
 # Where a wheel for one platform carries its own.
 _CARRIED = Path(__file__).parent / "compiled"
 _SUFFIX = ".kernel"
 _HEADER = b"octree-renderer kernel 1\n"
 _LOG = getLogger("renderer.jit")
-
-# Processors that kernels are compiled ahead for: LLVM's name of each, and what a machine must have to run them (the
-# x86-64 psABI's levels), best first.
-_V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
-_V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
-_V4 = (*_V3, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
-LEVELS: dict[str, tuple[str, ...]] = {"x86-64-v4": _V4, "x86-64-v3": _V3, "x86-64-v2": _V2, "aarch64": ("neon",)}
-# What LLVM calls the level.
-LEVEL_PROCESSORS = {"aarch64": "generic"}
-
 
 @dataclass(frozen=True)
 class Folders:
@@ -112,7 +101,7 @@ class KernelStore:
             yield folder / self._file(own), own
         ahead = ahead_folders()
         for processor in ("", *runnable_levels()) if ahead else ():
-            level = (machine[0], LEVEL_PROCESSORS.get(processor, processor), "") if processor else machine
+            level = (machine[0], LEVELS[processor], "") if processor else machine
             key = self._key(signature, level)
             for folder in ahead:
                 yield folder / self._file(key), key
@@ -156,13 +145,13 @@ def runnable_levels() -> tuple[str, ...]:
     has = llvm.get_host_cpu_features()
     arm = llvm.get_process_triple().startswith(("aarch64", "arm64"))
     return tuple(
-        name for name, needs in LEVELS.items() if (name == "aarch64") == arm and all(has.get(f, False) for f in needs)
+        name for name, needs in FEATURES.items() if (name == "aarch64") == arm and all(has.get(f, False) for f in needs)
     )
 
 
-def is_kernel_file(path: Path) -> bool:
-    """Whether ``path`` is one of the files that this module writes."""
-    return path.suffix == _SUFFIX
+def stored_in(folder: Path) -> int:
+    """How many kernels a folder holds."""
+    return len(_names(folder))
 
 
 @cache
@@ -183,11 +172,13 @@ def _folders(sources: Path) -> Folders:
 
 @cache
 def _usual_folders(sources: Path) -> Folders:
-    """The folder that the environment names, the sources' own, and the user's, in this order."""
-    places = []
-    own = f"{sources.name}_{hashlib.sha256(str(sources).encode()).hexdigest()[:16]}"
+    """The folder that NUMBA_CACHE_DIR names, alone if it can be written; else the sources' own and the user's too."""
+    own, places = f"{sources.name}_{hashlib.sha256(str(sources).encode()).hexdigest()[:16]}", []
     if config.CACHE_DIR:
-        places.append(Path(config.CACHE_DIR) / own)
+        chosen = Path(config.CACHE_DIR) / own
+        if _can_write(chosen):
+            return Folders(chosen, (chosen,))
+        places.append(chosen)
     places.append(sources / "__pycache__")
     with suppress(RuntimeError):  # no home
         places.append(_user_cache() / "octree-renderer" / own)

@@ -21,8 +21,9 @@ from renderer.simd import (
 
 
 class TreePointers(NamedTuple):
-    """A ``Tree`` as the traversal reads it. Blocks are float64 where ``wide`` is 1 and float32 where it is 0: one of two
-    pointers to the same memory is of use.
+    """A ``Tree`` as the traversal reads it.
+
+    Blocks are float64 where ``wide`` is 1 and float32 where it is 0: one of two pointers to the same memory is of use.
     """
 
     nodes: Any

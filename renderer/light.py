@@ -1,33 +1,17 @@
-"""Lights, and the rows of the array in which the kernels read them."""
+"""Lights, and how each is written as a row for the kernels."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
+from pydantic import field_validator
 
-from renderer.camera import FiniteVector, unit
-
-# One row a light, float64: kind, x, y, z, red, green, blue. A directional light stores the unit vector
-# towards the light, a point light its position.
-LIGHT_COLUMNS = 7
-DIRECTIONAL, POINT = 0, 1
+from renderer.camera import unit
+from renderer.fields import Color, Fields, FiniteVector
+from renderer.scene_rows import DIRECTIONAL, POINT
 
 
-def _grey(value: object) -> object:
-    """Let one number stand for an equal red, green and blue."""
-    return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
-
-
-_Channel = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=True)]
-Color = Annotated[tuple[_Channel, _Channel, _Channel], BeforeValidator(_grey)]
-
-
-class _Light(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class DirectionalLight(_Light):
+class DirectionalLight(Fields):
     """Parallel light that travels along ``direction``; ``irradiance`` falls on a surface that faces it."""
 
     type: Literal["directional"] = "directional"
@@ -47,7 +31,7 @@ class DirectionalLight(_Light):
         return np.array([DIRECTIONAL, *towards, *self.irradiance])
 
 
-class PointLight(_Light):
+class PointLight(Fields):
     """A point that shines evenly; the light arriving at distance r is ``intensity`` / r^2."""
 
     type: Literal["point"] = "point"

@@ -1,30 +1,20 @@
-"""Materials, and the rows of the array in which the kernels read them."""
+"""Materials, and how each is written as a row for the kernels."""
 
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from renderer.light import Color
-
-# One row a material, float64. Colours take three columns from the one named.
-KIND, AMBIENT, DIFFUSE, SPECULAR, REFLECTANCE, TRANSMITTANCE = 0, 1, 4, 7, 10, 13
-SHININESS, IOR = 16, 17
-MATERIAL_COLUMNS = 18
-# A Phong material without highlights is LAMBERT; without a diffuse colour too it is UNLIT, and needs no shadow rays.
-PHONG, MIRROR, DIELECTRIC, LAMBERT, UNLIT = 0, 1, 2, 3, 4
+from renderer.fields import Color, Fields
+from renderer.scene_rows import DIELECTRIC, LAMBERT, MIRROR, PHONG, UNLIT
 
 _Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 _BLACK = (0.0, 0.0, 0.0)
 _WHITE = (1.0, 1.0, 1.0)
 
 
-class _Material(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Phong(_Material):
+class Phong(Fields):
     """Ambient, diffuse and specular light with a constant reflected and transmitted part.
 
     ``ambient`` (k_a) is ``diffuse`` unless given. Under total internal reflection there is no transmitted part.
@@ -61,10 +51,10 @@ class Phong(_Material):
         return np.array([self.kind, *colors, self.shininess, self.ior])
 
 
-class Mirror(_Material):
+class Mirror(Fields):
     """A perfect mirror: ``reflectance`` times the reflected light, nothing else."""
 
-    type: Literal["mirror"]
+    type: Literal["mirror"] = "mirror"
     reflectance: Color = _WHITE
 
     @property
@@ -77,10 +67,10 @@ class Mirror(_Material):
         return np.array([MIRROR, *_BLACK, *_BLACK, *_BLACK, *self.reflectance, *_BLACK, 0.0, 1.0])
 
 
-class Dielectric(_Material):
+class Dielectric(Fields):
     """Clear glass of index ``ior``: Fresnel's share reflected, the rest refracted, tinted by the two colours."""
 
-    type: Literal["dielectric"]
+    type: Literal["dielectric"] = "dielectric"
     ior: _Ior = 1.5
     reflectance: Color = _WHITE
     transmittance: Color = _WHITE

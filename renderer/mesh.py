@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,6 +81,18 @@ class Mesh:
     colors: NDArray[np.float32] | None = None
     texcoords: Float64Array | None = None
     name: str = ""
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            vertices: ArrayLike,
+            faces: ArrayLike,
+            normals: ArrayLike | None = None,
+            colors: ArrayLike | None = None,
+            texcoords: ArrayLike | None = None,
+            name: str = "",
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):

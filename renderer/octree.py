@@ -1,7 +1,7 @@
 """The public accelerators: ``Octree``, and ``BruteForce`` as its baseline with the same interface and triangle test."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from renderer.hierarchy import Rule
 from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 from renderer.mesh import Mesh, Repairs
 from renderer.parallel import checked_threads
-from renderer.query import Hits, any_hits, check_rays, closest_hits
+from renderer.query import Hits, any_hits, check_rays, closest_hits, left
 from renderer.refit import refit_tree
 
 MAX_LEAF_SIZE = LANES * MAX_LEAF_BLOCKS
@@ -73,25 +73,56 @@ class _Accelerator:
         self._built = (self.mesh, tree)
 
     def closest_hit(
-        self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
     ) -> Hits:
         """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
 
-        ``origins`` and ``directions`` are (n, 3), finite, directions non-zero and of any length; ``t_min`` and
-        ``t_max`` are >= 0, one number or (n,), in units of |direction|. No face is culled. A ray in a face's plane
-        misses it, unless the rounding of its slopes lifts it out of the plane. The same bits for any number of
-        threads. Raises ``ValueError`` naming argument and row.
+        origins, directions  (n, 3), finite; directions are not zero and of any length
+        t_min, t_max         >= 0, one number or (n,), in units of |direction|
+        leaving              faces that the rays start on, one or (n,), -1 for none: each start is moved off its face by
+                             more than rounding errors, to the side that the direction points to, so that the ray
+                             meets neither that face nor another in its plane. Nobody needs an epsilon
+
+        No face is culled. A ray in a face's plane misses it, unless the rounding of its slopes lifts it out of the
+        plane. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.
+
+        >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> hits = octree.closest_hit([[0.1, 0.2, 3.0], [2, 2, 2]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.t, hits.face
+        (array([ 3., inf]), array([ 0, -1]))
+        >>> octree.closest_hit(hits.points[:1], [[0, 0, -1]], leaving=hits.face[:1]).hit
+        array([False])
         """
         mesh, tree = self._built
         rays = check_rays(origins, directions, t_min, t_max)
+        if leaving is not None:
+            rays = left(rays, leaving, mesh, self.threads)
         return closest_hits(tree, rays, mesh, self.threads)
 
     def any_hit(
-        self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
     ) -> NDArray[np.bool_]:
-        """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above."""
-        tree = self.tree
-        return any_hits(tree, check_rays(origins, directions, t_min, t_max), self.threads)
+        """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above.
+
+        >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> octree.any_hit([[0.1, 0.2, 3.0]], [[0, 0, -1]], t_max=[2.5])
+        array([False])
+        """
+        mesh, tree = self._built
+        rays = check_rays(origins, directions, t_min, t_max)
+        if leaving is not None:
+            rays = left(rays, leaving, mesh, self.threads)
+        return any_hits(tree, rays, self.threads)
 
     def refit(self, vertices: ArrayLike) -> None:
         """Move the vertices and keep the faces: ``vertices`` is (V, 3), finite, V as built.
@@ -215,7 +246,7 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike, repair: bool) -> tuple[Mesh, Re
     expect(isinstance(repair, bool), "repair", "True or False", repr(repair))
     if repair:
         return Mesh.repaired(vertices, faces)
-    return Mesh(vertices, faces), None  # type: ignore[arg-type]  # Mesh checks and converts
+    return Mesh(vertices, faces), None
 
 
 def _expect_mesh(mesh: object) -> None:
@@ -240,7 +271,8 @@ def _moved(mesh: Mesh, vertices: ArrayLike) -> Mesh:
         shape = mesh.vertices.shape
     if shape != mesh.vertices.shape:
         raise MeshError(f"vertices: expected shape {mesh.vertices.shape} as built, got {shape}")
-    return replace(mesh, vertices=vertices)  # type: ignore[arg-type]  # Mesh checks and converts
+    changed: Any = {"vertices": vertices}  # Mesh checks and converts
+    return replace(mesh, **changed)
 
 
 def _cost(tree: Tree) -> float:

@@ -5,7 +5,8 @@ Numba compiles in one thread of a process only, so a second process halves the w
 
 import os
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 from logging import getLogger
 from pathlib import Path
 from threading import Thread
@@ -25,11 +26,11 @@ from renderer.mesh import Mesh
 from renderer.needs import needs_of
 from renderer.octree import BruteForce, Octree
 from renderer.parallel import available_threads
+from renderer.prepared_scene import PreparedScene, prepare_scene
 from renderer.ray_path import ray_path
 from renderer.render import render
 from renderer.scene import Scene, SceneObject
 from renderer.shapes import icosphere
-from renderer.stage import Stage, set_up
 from renderer.tile import render_tile
 from renderer.tree_boxes import visited
 
@@ -40,36 +41,54 @@ _GLASS = Dielectric(type="dielectric", ior=1.5)
 
 
 class Part(NamedTuple):
-    """Kernels that are called together: what for, and a function that calls them all."""
+    """Kernels that are called together: what for, and a function that calls them."""
 
     name: str
     call: Callable[[], object]
 
 
-def queries() -> Iterator[Part]:
-    """What builds, refits and asks an ``Octree`` or ``BruteForce``."""
-    ray, rays = np.array([[0.1, 0.1, 1.0]]), np.tile([0.1, 0.1, 1.0], (20, 1))
-    yield Part("build", lambda: Octree.from_mesh(icosphere(_SUBDIVISIONS)))
-    sphere = Octree.from_mesh(icosphere(1))
-    yield Part("refit", lambda: sphere.refit(sphere.mesh.vertices))
-    yield Part("a few rays", lambda: sphere.closest_hit(ray, -ray))
-    yield Part("many rays", lambda: sphere.closest_hit(rays, -rays))
-    yield Part("brute force", lambda: BruteForce.from_mesh(_TRIANGLE).closest_hit(ray, -ray))
+def _build() -> None:
+    Octree.from_mesh(icosphere(_SUBDIVISIONS))
 
 
-def pictures() -> Iterator[Part]:
-    """What renders pictures and what the viewer calls beside them."""
-    yield Part("pictures", lambda: render(_scene(_GLASS), resolution=(1, 1), accelerator="brute"))
-    scene = _scene(Phong())
-    stage = set_up(scene, needs_of(scene), "octree")
-    yield Part("the viewer", lambda: touch_viewing(stage))
+def _refit() -> None:
+    octree = Octree.from_mesh(_TRIANGLE)
+    octree.refit(octree.mesh.vertices)
 
 
-# By the name of the option.
-PARTS: dict[str, tuple[Callable[[], Iterator[Part]], ...]] = {
-    "queries": (queries,),
-    "pictures": (queries, pictures),
-    "all": (queries, pictures),
+def _trace(count: int) -> None:
+    rays = np.tile([0.1, 0.1, 1.0], (count, 1))
+    Octree.from_mesh(_TRIANGLE).closest_hit(rays, -rays)
+
+
+def _search() -> None:
+    BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
+
+
+def _render() -> None:
+    # No tree is built for it.
+    render(_scene(_GLASS), resolution=(1, 1), accelerator="brute")
+
+
+def _view() -> None:
+    for material in (_GLASS, Phong()):
+        scene = _scene(material)
+        touch_viewing(prepare_scene(scene, needs_of(scene), "octree"))
+
+
+_QUERIES = (
+    Part("build", _build),
+    Part("refit", _refit),
+    Part("a few rays", partial(_trace, 1)),
+    Part("many rays", partial(_trace, 20)),
+    Part("brute force", _search),
+)
+_PICTURES = (Part("pictures", _render), Part("the viewer", _view))
+# By the name of the command's option.
+PARTS: dict[str, tuple[Part, ...]] = {
+    "queries": _QUERIES,
+    "pictures": (*_QUERIES, *_PICTURES[:1]),
+    "all": (*_QUERIES, *_PICTURES),
 }
 
 
@@ -79,10 +98,9 @@ def compile_ahead(what: str = "all", began: Callable[[str], object] = lambda nam
     ``began(name)`` is called before each part.
     """
     expect(what in PARTS, "what", f"one of {sorted(PARTS)}", repr(what))
-    for parts in PARTS[what]:
-        for part in parts():
-            began(part.name)
-            part.call()
+    for part in PARTS[what]:
+        began(part.name)
+        part.call()
 
 
 def compile_into(folder: Path) -> None:
@@ -91,7 +109,7 @@ def compile_into(folder: Path) -> None:
     kernel_store.keep_in(folder)
 
 
-def touch_viewing(stage: Stage) -> None:
+def touch_viewing(stage: PreparedScene) -> None:
     """Compile or load what the viewer calls beside pictures; takes milliseconds where that was done before."""
     eye, forward = stage.scene.camera.eye, stage.scene.camera.frame()[2]
     face_colors(stage.world, eye)
@@ -117,7 +135,7 @@ def compile_in_two() -> None:
         text=True,
     ) as other:
         try:
-            Octree.from_mesh(icosphere(_SUBDIVISIONS))
+            _build()
             # The child reads its input to the end, so that must stay open: no communicate().
             assert other.stderr is not None
             said = other.stderr.read().strip().splitlines()
@@ -135,7 +153,7 @@ def compile_picture() -> None:
     Of use in a process of its own only, which it ends when standard input does, as it does when the parent is gone.
     """
     Thread(target=_end_with_input, daemon=True).start()
-    render(_scene(_GLASS), resolution=(1, 1), accelerator="brute")
+    _render()
 
 
 def _end_with_input() -> None:

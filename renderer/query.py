@@ -1,6 +1,6 @@
 """Batches of rays against a tree: checks at the boundary, chunks on threads, and the results."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from renderer.layout import Tree
 from renderer.mesh import Mesh, face_normals
 from renderer.parallel import for_chunks
 from renderer.prepared import WIDTH
+from renderer.spawn import leave_faces
 from renderer.traverse import make_memory, stack_size
 
 # Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
@@ -119,6 +120,30 @@ def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_ma
     # An eye broadcast to all rays, as of a camera, need not be copied for each.
     shared = len(origins) > 1 and origins.strides[0] == 0
     return Rays(_doubles(origins[:1] if shared else origins), _doubles(directions), low, high)
+
+
+def left(rays: Rays, leaving: ArrayLike, mesh: Mesh, threads: int) -> Rays:
+    """The rays with their starts moved off the faces ``leaving``, see ``spawn.leave_faces``.
+
+    Raises ``ValueError`` naming the argument and, for a face that is not there, its row.
+    """
+    count = len(rays.directions)
+    array = _array("leaving", leaving)
+    whole = array.dtype.kind in "iu" and (array.ndim == 0 or array.shape == (count,))
+    expect(whole, "leaving", f"an integer or integers of shape ({count},)", f"{array.dtype} of shape {array.shape}")
+    good = (array >= -1) & (array < len(mesh.faces))
+    if not good.all():
+        row = int((~np.atleast_1d(good)).argmax())
+        expected = f"faces from 0 to {len(mesh.faces) - 1}, or -1"
+        expect(False, "leaving", expected, f"{np.atleast_1d(array)[row]} in row {row}")
+    faces = np.array(np.broadcast_to(array, (count,)), np.int64)
+    starts = np.empty((count, 3))
+
+    def leave(begin: int, end: int) -> None:
+        leave_faces(mesh.vertices, mesh.faces, rays.origins, rays.directions, faces, starts, begin, end)
+
+    for_chunks(leave, count, CHUNK, threads)
+    return replace(rays, origins=starts)
 
 
 def _reject(rays: Rays, row: int, scale: float) -> None:

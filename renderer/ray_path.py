@@ -15,10 +15,11 @@ from renderer.camera import checked_vector
 from renderer.direct import SHORT_OF_LIGHT
 from renderer.errors import expect, is_count
 from renderer.jit import kernel
-from renderer.light import DIRECTIONAL
-from renderer.material import (
+from renderer.prepared_scene import PreparedScene
+from renderer.scene_rows import (
     AMBIENT,
     DIELECTRIC,
+    DIRECTIONAL,
     IOR,
     KIND,
     LAMBERT,
@@ -27,9 +28,9 @@ from renderer.material import (
     REFLECTANCE,
     TRANSMITTANCE,
 )
-from renderer.shading import BOUNDED, fresnel, reflect, refract, spawn_origin
+from renderer.shading import fresnel, reflect, refract
 from renderer.sight import MAX_MEDIA, Surface, World, look_at, phong, surface_at
-from renderer.stage import Stage
+from renderer.spawn import BOUNDED, spawn_origin
 from renderer.vec3 import add, dot, normalized, scale, sub, times
 from renderer.world import media_around
 
@@ -102,7 +103,7 @@ class _Aim(NamedTuple):
 
 
 def ray_path(
-    stage: Stage,
+    stage: PreparedScene,
     origin: ArrayLike,
     direction: ArrayLike,
     max_depth: int,
@@ -136,8 +137,8 @@ def ray_path(
     return tuple(path)
 
 
-def _media_at(stage: Stage, eye: Vector) -> tuple[int, ...]:
-    """The media around the eye, as ``Stage.picture`` has them for a camera there."""
+def _media_at(stage: PreparedScene, eye: Vector) -> tuple[int, ...]:
+    """The media around the eye, as ``PreparedScene.picture`` has them for a camera there."""
     if not stage.needs.refraction:
         return ()
     return tuple(media_around(stage.scene, stage.scene.camera.model_copy(update={"eye": eye})).tolist())
@@ -153,7 +154,7 @@ def surface_of(world: World, face: int, u: float, v: float) -> Surface:
     return surface_at(look_at(world), face, u, v)
 
 
-def _meet(stage: Stage, ray: _Ray) -> _Met | None:
+def _meet(stage: PreparedScene, ray: _Ray) -> _Met | None:
     """The nearest surface on the ray's way."""
     hits = stage.octree.closest_hit([ray.origin], [ray.direction])
     if not hits.hit[0]:
@@ -170,21 +171,21 @@ def _color(columns: NDArray[np.float64], first: int) -> Vector:
     return x, y, z
 
 
-def _lost(stage: Stage, ray: _Ray) -> Segment:
+def _lost(stage: PreparedScene, ray: _Ray) -> Segment:
     """The segment of a ray that met nothing."""
     radiance = times(ray.weight, _color(stage.world.colors[1], 0))
     end = _beyond(stage, ray.origin, ray.direction)
     return Segment(ray.kind, ray.depth, ray.parent, ray.origin, end, False, -1, ray.weight, radiance)
 
 
-def _beyond(stage: Stage, origin: Vector, direction: Vector) -> Vector:
+def _beyond(stage: PreparedScene, origin: Vector, direction: Vector) -> Vector:
     """The point in unit ``direction`` at which the sphere around all faces is left behind for certain."""
     lower, upper = stage.mesh.bounds if len(stage.mesh.faces) else (np.zeros(3), np.ones(3))
     reach = np.linalg.norm(origin - (lower + upper) / 2.0) + np.linalg.norm(upper - lower) / 2.0
     return add(origin, scale(direction, float(reach)))
 
 
-def _lit(stage: Stage, ray: _Ray, met: _Met, own: int, shadows: bool) -> list[Segment]:
+def _lit(stage: PreparedScene, ray: _Ray, met: _Met, own: int, shadows: bool) -> list[Segment]:
     """The segment of a ray that met a surface, in place ``own`` of the path, and those of its shadow rays."""
     radiance = times(ray.weight, times(_color(met.material, AMBIENT), _color(stage.world.colors[0], 0)))
     aims, shadow_rays = _aim(stage, ray, met), []
@@ -197,7 +198,7 @@ def _lit(stage: Stage, ray: _Ray, met: _Met, own: int, shadows: bool) -> list[Se
     return [Segment(ray.kind, ray.depth, ray.parent, ray.origin, p, True, met.face, ray.weight, radiance), *shadow_rays]
 
 
-def _aim(stage: Stage, ray: _Ray, met: _Met) -> list[_Aim]:
+def _aim(stage: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
     """The ways to the lights that the surface faces, by the rules of ``direct``."""
     if met.material[KIND] not in (PHONG, LAMBERT):
         return []
@@ -226,7 +227,7 @@ def _phong(world: World, m: int, n: Vector, d: Vector, towards: Vector) -> Vecto
     return phong(look_at(world), m, n, d, towards)
 
 
-def _shadow(stage: Stage, ray: _Ray, own: int, aim: _Aim) -> Segment:
+def _shadow(stage: PreparedScene, ray: _Ray, own: int, aim: _Aim) -> Segment:
     """The segment of a shadow ray; it ends at the nearest surface that hides the light."""
     hits = stage.octree.closest_hit([aim.origin], [aim.direction], t_max=aim.t_max)
     hidden = bool(hits.hit[0])
@@ -235,7 +236,7 @@ def _shadow(stage: Stage, ray: _Ray, own: int, aim: _Aim) -> Segment:
     return Segment("shadow", ray.depth, own, aim.origin, end, hidden, int(hits.face[0]), ray.weight, radiance)
 
 
-def _bounce(stage: Stage, ray: _Ray, met: _Met, own: int) -> list[_Ray]:
+def _bounce(stage: PreparedScene, ray: _Ray, met: _Met, own: int) -> list[_Ray]:
     """The rays that leave the surface: the reflected one, then the refracted one where light passes."""
     d, m = ray.direction, met.material
     k_r, k_t = _color(m, REFLECTANCE), _color(m, TRANSMITTANCE)
@@ -273,5 +274,5 @@ def _cross(media: tuple[int, ...], met: _Met, limit: int) -> tuple[int, ...]:
     return media
 
 
-def _innermost_ior(stage: Stage, media: tuple[int, ...]) -> float:
+def _innermost_ior(stage: PreparedScene, media: tuple[int, ...]) -> float:
     return float(stage.world.materials[media[-1] // MATERIAL_COLUMNS, IOR]) if media else 1.0

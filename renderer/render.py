@@ -1,21 +1,23 @@
-"""``render``: a scene and settings in, checked, and a picture out."""
+"""``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
 import sys
 from typing import Any, Literal
 
 from renderer.build import SPLITS
+from renderer.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.errors import expect
 from renderer.image import Image
 from renderer.needs import Needs, checked_needs
 from renderer.parallel import checked_threads
-from renderer.scene import RenderSettings, Scene
-from renderer.shading import BOUNDED, MITSUBA_EPSILON
-from renderer.stage import set_up, tiles
+from renderer.prepared_scene import PreparedScene, prepare_scene, tiles
+from renderer.scene import Scene, checked_settings
+from renderer.spawn import BOUNDED, MITSUBA_EPSILON
 
 
 def render(
-    scene: Scene,
+    scene: Scene | PreparedScene,
     *,
+    camera: Camera | None = None,
     accelerator: Literal["auto", "octree", "brute"] = "auto",
     split: Literal["midpoint", "sah"] = "midpoint",
     needs: Needs | None = None,
@@ -27,36 +29,89 @@ def render(
     """Render ``scene``; ``resolution``, ``samples``, ``max_depth``, ``min_weight`` and ``shadows`` override the scene's
     own.
 
+    scene        a ``Scene``, or what ``prepare`` made of one: its pictures then share the tree and all else that does
+                 not depend on the camera or these settings
+    camera       another camera than the scene's
     accelerator  "octree", "brute" to test every ray against every face, or "auto": the octree unless the faces are so
-                 few that it does not pay
+                 few that it does not pay. This and the next two are for a ``Scene`` that is not prepared
+    split        how the octree is cut, "midpoint" or "sah"
     needs        what to have ready: at least what ``needs_of`` says, which None stands for. More changes no bit of
                  radiance, depth, normal or face, and costs time and memory
     offset       how spawned rays leave a surface: "bounded" by their rounding error, or Mitsuba's rule with its
                  epsilon or another one
+    threads      None takes all processors
     progress     a bar on standard error when that is a terminal
 
     The same bits for any number of threads. Raises ``ValueError`` naming the argument. Ctrl-C stops between tiles.
+
+    >>> from renderer import Mesh, PerspectiveCamera, Phong, SceneObject
+    >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
+    >>> camera = PerspectiveCamera(eye=(0.3, 0.3, 2), target=(0.3, 0.3, 0))
+    >>> scene = Scene(camera=camera, materials={"grey": Phong()}, objects=[triangle], ambient=1)
+    >>> render(scene, resolution=(3, 3)).face[1].tolist()
+    [-1, 0, -1]
+    """
+    threads, rule = checked_threads(threads), _offset(offset)
+    expect(isinstance(scene, Scene | PreparedScene), "scene", "a Scene or a PreparedScene", type(scene).__name__)
+    source = scene.scene if isinstance(scene, PreparedScene) else scene
+    eye = source.camera if camera is None else camera
+    expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
+    chosen = checked_settings(source.render, settings)
+    if isinstance(scene, PreparedScene):
+        _expect_usual(accelerator, split, needs)
+        prepared = scene
+    else:
+        prepared = _prepared(scene, chosen.max_depth, accelerator, split, needs, threads)
+    with _bar(tiles(chosen.resolution), progress) as bar:
+        return prepared.picture(eye, chosen, rule, threads, bar.update)
+
+
+def prepare(
+    scene: Scene,
+    *,
+    accelerator: Literal["auto", "octree", "brute"] = "auto",
+    split: Literal["midpoint", "sah"] = "midpoint",
+    needs: Needs | None = None,
+    threads: int | None = None,
+) -> PreparedScene:
+    """Work out once what all pictures of ``scene`` share, its tree above all: for animations and several cameras.
+
+    Arguments as of ``render``. The result renders at any ``max_depth``. Its pictures have the same bits as those of the
+    scene itself. Raises ``ValueError`` naming the argument.
+
+    >>> from renderer import Mesh, PerspectiveCamera, Phong, SceneObject
+    >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
+    >>> camera = PerspectiveCamera(eye=(0.3, 0.3, 2), target=(0.3, 0.3, 0))
+    >>> ready = prepare(Scene(camera=camera, materials={"grey": Phong()}, objects=[triangle]))
+    >>> beside = PerspectiveCamera(eye=(9, 0, 2), target=(9, 0, 0))
+    >>> [int(render(ready, camera=eye, resolution=(1, 1)).face[0, 0]) for eye in (camera, beside)]
+    [0, -1]
     """
     expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
-    chosen = settings_of(scene, settings)
+    # One bounce stands for any number of them.
+    depth = max(1, scene.render.max_depth)
+    return _prepared(scene, depth, accelerator, split, needs, checked_threads(threads))
+
+
+def _prepared(
+    scene: Scene,
+    max_depth: int,
+    accelerator: str,
+    split: Literal["midpoint", "sah"],
+    needs: Needs | None,
+    threads: int,
+) -> PreparedScene:
     named = isinstance(accelerator, str) and accelerator in ("auto", "octree", "brute")
     expect(named, "accelerator", "'auto', 'octree' or 'brute'", repr(accelerator))
     expect(isinstance(split, str) and split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
-    threads = checked_threads(threads)
-    wanted = checked_needs(needs, scene, chosen.max_depth)
-    rule = _offset(offset)
-    stage = set_up(scene, wanted, accelerator, split, threads)
-    with _bar(tiles(chosen.resolution), progress) as bar:
-        return stage.picture(scene.camera, chosen, rule, threads, bar.update)
+    return prepare_scene(scene, checked_needs(needs, scene, max_depth), accelerator, split, threads)
 
 
-def settings_of(scene: Scene, given: dict[str, Any]) -> RenderSettings:
-    """The scene's settings with those given in their place, checked as a file's would be."""
-    known = RenderSettings.model_fields
-    for name in given:
-        expect(name in known, "render", f"settings among {sorted(known)}", repr(name))
-    values = {k: v for k, v in given.items() if v is not None}
-    return RenderSettings(**{**scene.render.model_dump(), **values})
+def _expect_usual(accelerator: object, split: object, needs: object) -> None:
+    """Refuse what a prepared scene cannot change any more."""
+    for name, value, usual in (("accelerator", accelerator, "auto"), ("split", split, "midpoint")):
+        expect(isinstance(value, str) and value == usual, name, f"{usual!r}, as the scene is prepared", repr(value))
+    expect(needs is None, "needs", "None, as the scene is prepared", repr(needs))
 
 
 def _offset(offset: str | float) -> float:

@@ -4,6 +4,7 @@ Units are scene units and degrees, y is up. Paths are relative to the scene file
 file or a bad value is one ``SceneError`` that names the file, the key's path, what was expected and what stood there.
 """
 
+import os
 import tomllib
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,11 +13,12 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from renderer.camera import FiniteVector, OrthographicCamera, PerspectiveCamera, sample_offsets
-from renderer.errors import MeshError, SceneError
-from renderer.light import Color, DirectionalLight, PointLight
+from renderer.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
+from renderer.errors import MeshError, SceneError, expect
+from renderer.fields import Color, Fields, FiniteVector, Keys, first_fault
+from renderer.light import DirectionalLight, PointLight
 from renderer.material import Dielectric, Material, Mirror, Phong
 from renderer.mesh import Mesh
 from renderer.mesh_io import load_mesh
@@ -41,15 +43,17 @@ _Squares = Annotated[int, Field(ge=1, le=1000, strict=True)]
 _Finite = Annotated[float, Field(strict=True)]
 
 
+def _path_or_mesh(value: Any) -> Any:
+    if not isinstance(value, str | os.PathLike | Mesh):
+        raise ValueError(f"expected a path or a Mesh, got {type(value).__name__}")
+    return value
+
+
 def _uniform(value: Any) -> Any:
     return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
-
-
-class RenderSettings(_Table):
+class RenderSettings(Fields):
     """Defaults of ``render``; each can be given there instead.
 
     ``max_depth`` is the number of bounces: 0 shows what the eye sees directly. ``min_weight`` ends a ray whose
@@ -69,10 +73,25 @@ class RenderSettings(_Table):
         return self
 
 
-class SceneObject(_Table):
+def checked_settings(defaults: RenderSettings, given: dict[str, Any]) -> RenderSettings:
+    """``defaults`` with the settings that are given, and not None, in their place, checked as a file's would be.
+
+    Raises ``ValueError`` with one line that names the setting.
+    """
+    known = RenderSettings.model_fields
+    for name in given:
+        expect(name in known, "render", f"settings among {sorted(known)}", repr(name))
+    values = {k: v for k, v in given.items() if v is not None}
+    try:
+        return RenderSettings.model_validate({**defaults.model_dump(), **values})
+    except ValidationError as error:
+        raise ValueError(first_fault(error)) from None
+
+
+class SceneObject(Fields):
     """A mesh in the world: scaled, then turned about x, y and z (degrees, in this order), then moved."""
 
-    mesh: Path | Mesh
+    mesh: Annotated[Path | Mesh, BeforeValidator(_path_or_mesh)]
     material: str
     normals: Literal["flat", "smooth"] = "flat"
     scale: Annotated[FiniteVector, BeforeValidator(_uniform)] = (1.0, 1.0, 1.0)
@@ -90,7 +109,7 @@ class SceneObject(_Table):
         return result
 
 
-class Floor(_Table):
+class Floor(Fields):
     """The plane y = 0 cut to the rectangle from ``min`` to ``max`` (x, z), tiled with its materials in turn."""
 
     min: tuple[_Finite, _Finite]
@@ -119,7 +138,7 @@ class Instance:
         return self.mesh.normals if self.mesh.normals is not None else self.mesh.vertex_normals()
 
 
-class Scene(_Table):
+class Scene(Fields):
     """Everything that a picture needs. Read one with ``load_scene`` or build it from keyword arguments."""
 
     camera: AnyCamera
@@ -139,6 +158,10 @@ class Scene(_Table):
             if name not in self.materials:
                 raise ValueError(f"{where}: expected one of {sorted(self.materials)}, got {name!r}")
         return self
+
+    @staticmethod
+    def _union_member(keys: Keys) -> int | None:
+        return {"camera": 1, "materials": 2, "lights": 2}.get(str(keys[0])) if keys else None
 
     @cached_property
     def instances(self) -> tuple[Instance, ...]:
@@ -174,43 +197,13 @@ def load_scene(path: str | Path) -> Scene:
     try:
         scene = Scene.model_validate(table)
     except ValidationError as error:
-        raise SceneError(f"{path}: {_first_fault(error)}") from None
+        raise SceneError(f"{path}: {first_fault(error, Scene._union_member)}") from None
     try:
         with np.errstate(all="ignore"):
             _ = scene.instances
     except MeshError as error:
         raise SceneError(f"{path}: objects: {' '.join(str(error).split())}") from None
     return scene
-
-
-def _first_fault(error: ValidationError) -> str:
-    """One line for the first thing that is wrong, with the number of others."""
-    faults = error.errors()
-    first = faults[0]
-    # The names of the union's members are ours, not keys of the file.
-    tag = {"camera": 1, "materials": 2, "lights": 2}.get(str(first["loc"][0]) if first["loc"] else "")
-    if first["loc"][:1] == ("objects",) and len(first["loc"]) > 3 and first["loc"][2] == "mesh":
-        tag = 3
-    keys = [_shown(k) for i, k in enumerate(first["loc"]) if i != tag]
-    where = ".".join(keys) + ": " if keys else ""
-    # It may quote a tag of the file, line breaks and all.
-    message = " ".join(first["msg"].removeprefix("Value error, ").split())
-    says_it = (first["type"] == "value_error" and ", got" in message) or isinstance(first["input"], dict)
-    got = "" if says_it else f", got {_shown(first['input'])}"
-    if first["type"] == "extra_forbidden":
-        message, got = "unknown key", f" (its value is {_shown(first['input'])})"
-    others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return f"{where}{message}{got}{others}"
-
-
-def _shown(value: object) -> str:
-    """A value or key on one line; Python writes no integer of more than 4300 digits."""
-    if isinstance(value, str) and value.isprintable() and value:
-        return value if value.replace("-", "").replace("_", "").isalnum() else repr(value)
-    try:
-        return repr(value)
-    except ValueError:
-        return "an integer of more than 4300 digits"
 
 
 def _loaded(mesh: Path | Mesh) -> Mesh:

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit import inlined
-from renderer.material import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
-from renderer.shading import offset_distance, specular
+from renderer.scene_rows import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
+from renderer.shading import specular
 from renderer.simd import get, pointer
+from renderer.spawn import offset_distance
 from renderer.vec3 import add, barycentric, cross, dot, normalized, row3, scale, sub, three
 
 # Media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.

@@ -36,16 +36,17 @@ from renderer.direct import (
     trace_any,
 )
 from renderer.jit import inlined, kernel
-from renderer.material import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
-from renderer.shading import fresnel, reflect, refract, spawn_origin
+from renderer.scene_rows import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
+from renderer.shading import fresnel, reflect, refract
 from renderer.sight import surface_at
 from renderer.simd import at, get, put
+from renderer.spawn import spawn_origin
 from renderer.traverse import Found, Rays, Scratch
 from renderer.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
 
 
 class Settings(NamedTuple):
-    """Bounces, the weight below which a ray ends, the offset rule of ``shading.spawn_origin``, how many media a ray
+    """Bounces, the weight below which a ray ends, the offset rule of ``spawn.spawn_origin``, how many media a ray
     remembers (``sight.MAX_MEDIA``, or 0 where nothing refracts), and whether surfaces hide lights.
     """
 

@@ -4,11 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.camera import Camera
-from renderer.light import LIGHT_COLUMNS
-from renderer.material import KIND, LAMBERT, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.mesh import Mesh
 from renderer.needs import Needs, needs_of
 from renderer.scene import Scene
+from renderer.scene_rows import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.sight import MAX_MEDIA, World
 
 

@@ -19,9 +19,9 @@ from renderer.camera import PerspectiveCamera
 from renderer.image import Image, srgb
 from renderer.needs import needs_of
 from renderer.parallel import available_threads
+from renderer.prepared_scene import PreparedScene, prepare_scene
 from renderer.scene import load_scene
-from renderer.shading import BOUNDED
-from renderer.stage import Stage, set_up
+from renderer.spawn import BOUNDED
 from renderer.tree_boxes import boxes_at
 
 Array = NDArray[np.float64]
@@ -40,14 +40,14 @@ EDGES = np.array([(k, k | 1 << axis) for k in range(8) for axis in range(3) if n
 def main(path: Path) -> None:
     """Render all frames and write them."""
     scene = load_scene(Path(__file__).parent / "three_models.toml")
-    stage = set_up(scene, needs_of(scene))
+    stage = prepare_scene(scene, needs_of(scene))
     frames = [frame(stage, number) for number in trange(FRAMES, disable=None)]
     pictures = [Pillow.fromarray(one) for one in frames]
     first, *rest = pictures
     first.save(path, save_all=True, append_images=rest, duration=MILLISECONDS, loop=0, quality=62, method=6)
 
 
-def frame(stage: Stage, number: int) -> NDArray[np.uint8]:
+def frame(stage: PreparedScene, number: int) -> NDArray[np.uint8]:
     """A frame as sRGB, (h, w, 3)."""
     camera = turned(stage.scene.camera, 2.0 * np.pi * number / FRAMES)
     chosen = stage.scene.render.model_copy(update={"resolution": SIZE, "samples": 9})

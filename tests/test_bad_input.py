@@ -483,7 +483,7 @@ def test_settings_of_render(name: str, bad: Any) -> None:
     "bad", [None, "scene.toml", 3, {"camera": {}}, BOX, np.ones(3)], ids=lambda b: type(b).__name__
 )
 def test_render_takes_scenes(bad: Any) -> None:
-    with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
+    with pytest.raises(ValueError, match=r"^scene: expected a Scene or a PreparedScene, got"):
         render(bad, resolution=(4, 4))
     with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
         needs_of(bad)
@@ -495,7 +495,66 @@ def test_bounces_of_needs_of(bad: Any) -> None:
         needs_of(SCENE, bad)
 
 
+PREPARED = renderer.prepare(SCENE)
+
+
+@pytest.mark.parametrize(
+    ("name", "bad"),
+    [("accelerator", "octree"), ("split", "sah"), ("needs", needs_of(SCENE)), ("camera", SCENE), ("samples", 3)],
+    ids=lambda value: str(value)[:12],
+)
+def test_what_a_prepared_scene_cannot_change_is_refused(name: str, bad: Any) -> None:
+    with pytest.raises(ValueError, match=rf"^{name}: expected .*, got "):
+        render(PREPARED, **{"resolution": (4, 4), name: bad})
+
+
+@pytest.mark.parametrize("bad", [None, "scene.toml", PREPARED], ids=lambda b: type(b).__name__)
+def test_prepare_takes_scenes(bad: Any) -> None:
+    with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
+        renderer.prepare(bad)
+
+
 # --- scenes from Python ---------------------------------------------------------------------------------------
+
+EYE = {"eye": (0, 0, 4), "target": (0, 0, 0)}
+# A good way to make each scene class, and fields with what they do not take.
+CLASSES: list[tuple[type, dict[str, Any], dict[str, Any]]] = [
+    (renderer.PerspectiveCamera, EYE, {"eye": "x", "target": (1, 2), "up": 3, "fov": 180.0, "zoom": 1}),
+    (renderer.OrthographicCamera, {**EYE, "height": 2.0}, {"height": -1.0, "eye": (0, 0, np.nan)}),
+    (renderer.Phong, {}, {"diffuse": -1.0, "shininess": "x", "ior": 0.0, "color": 1}),
+    (renderer.Mirror, {}, {"reflectance": (1, 2), "type": "phong"}),
+    (renderer.Dielectric, {"ior": 1.3}, {"ior": np.inf, "transmittance": None}),
+    (renderer.DirectionalLight, {"direction": (0, -1, 0)}, {"direction": (0, 0, 0), "irradiance": "bright"}),
+    (renderer.PointLight, {"position": (0, 3, 0)}, {"position": None, "intensity": -1.0}),
+    (renderer.SceneObject, {"mesh": BOX, "material": "m"}, {"mesh": 3, "material": 3, "normals": "round", "scale": ()}),
+    (renderer.Floor, {"min": (-1, -1), "max": (1, 1), "materials": ["m"]}, {"min": (1, 1), "squares": (0, 1)}),
+    (renderer.RenderSettings, {}, {"resolution": 512, "samples": 5, "max_depth": -1, "min_weight": 1.0}),
+    (Scene, {"camera": EYE, "materials": {}}, {"camera": 3, "lights": [{"type": "sun"}], "objects": [1]}),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "good", "field", "bad"),
+    [(kind, good, field, bad) for kind, good, fields in CLASSES for field, bad in fields.items()],
+    ids=lambda value: getattr(value, "__name__", str(value)[:12]),
+)
+def test_each_class_of_a_scene_says_on_one_line_what_is_wrong(
+    kind: type, good: dict[str, Any], field: str, bad: Any
+) -> None:
+    kind(**good)
+    with pytest.raises(SceneError) as caught:
+        kind(**{**good, field: bad})
+    message = str(caught.value)
+    assert message.startswith(f"{kind.__name__}: ") and len(message.splitlines()) == 1 and "http" not in message
+    # A direction or a rectangle is judged as a whole.
+    assert field in message or "non-zero length" in message or "min < max" in message
+
+
+def test_a_prepared_scene_has_a_class_and_the_package_a_version() -> None:
+    assert isinstance(PREPARED, renderer.PreparedScene)
+    assert re.fullmatch(r"\d+\.\d+\.\d+", renderer.__version__)
+    assert renderer.srgb(np.array([0.0, 1.0, np.inf])).tolist() == [0, 255, 255]
+
 
 GOOD_SCENE: dict[str, Any] = {
     "camera": {"eye": (0, 0, 4), "target": (0, 0, 0), "up": (0, 1, 0), "fov": 40},

@@ -64,7 +64,7 @@ class TestSeam:
     def test_kernels_follow_though_the_cache_holds_sound_ones(self, tmp_path: Path) -> None:
         """The digest of ``shading`` and of what imports it changes; that of ``simd`` does not."""
         call = (
-            "from renderer.shading import fresnel; from renderer.jit import source_digest\n"
+            "from renderer.shading import fresnel; from renderer.source_digest import source_digest\n"
             "from pathlib import Path; import json\n"
             "digests = [source_digest(Path('renderer').resolve() / f'{m}.py') for m in ('shading', 'direct', 'simd')]\n"
             "print(json.dumps([fresnel(1.0, 1.0, 1.0, 1.5), *digests]))"

@@ -108,8 +108,6 @@ FAULTS = [
     ("sight.py", "m + DIFFUSE), dot(n, towards))", "m + DIFFUSE), abs(dot(n, towards)))"),
     ("direct.py", "else SHORT_OF_LIGHT", "else 2.0"),
     ("shading.py", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
-    # No fault: with every vertex in float64 the kernels are compiled once and not twice.
-    ("stage.py", "_widened(tree) if needs.float64_vertices else tree", "_widened(tree)"),
 ]
 NOTICED = [40, 41, 42, 43, 44, 45]
 

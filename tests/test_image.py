@@ -10,7 +10,8 @@ import numpy as np
 import PIL.Image
 import pytest
 
-from renderer.image import Image, check_picture_path, srgb, srgb_steps, write_atomically
+from renderer.files import write_atomically
+from renderer.image import Image, check_picture_path, srgb, srgb_steps
 
 
 def image(radiance: Any = None) -> Image:

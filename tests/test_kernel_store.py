@@ -1,4 +1,4 @@
-"""Compiled kernels on disk: an edit below a kernel compiles it anew, and no state of the disk stops or misleads a run."""
+"""Compiled kernels on disk: an edit below a kernel compiles it anew; no state of the disk stops or misleads a run."""
 
 import os
 import shutil
@@ -9,7 +9,8 @@ import llvmlite.binding as llvm
 import pytest
 from kernel_package import COMPILED, LOADED, MIDDLE, PACKAGE, RUN, UPPER, bottom_of, run, start, write_package
 
-from renderer.kernel_store import LEVEL_PROCESSORS, LEVELS, runnable_levels
+from renderer.kernel_store import runnable_levels
+from renderer.levels import FEATURES, LEVELS
 
 TELL = """
 import logging, sys
@@ -234,7 +235,7 @@ def test_two_processes_that_compile_at_the_same_time_agree(package):
     ],
 )
 def test_a_machine_runs_the_levels_whose_features_it_has(monkeypatch, lacks, triple, levels):
-    features = {feature: feature not in lacks for needs in LEVELS.values() for feature in needs}
+    features = {feature: feature not in lacks for needs in FEATURES.values() for feature in needs}
     monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: features)
     monkeypatch.setattr(llvm, "get_process_triple", lambda: triple)
     assert runnable_levels.__wrapped__() == levels
@@ -245,7 +246,7 @@ class TestAhead:
 
     def made(self, package, tmp_path, level):
         """A folder of the package's kernels for a level, which no other folder has."""
-        processor = {"NUMBA_CPU_NAME": LEVEL_PROCESSORS.get(level, level), "NUMBA_CPU_FEATURES": ""}
+        processor = {"NUMBA_CPU_NAME": LEVELS[level], "NUMBA_CPU_FEATURES": ""}
         made = tmp_path / "made"
         assert run(package, NUMBA_CACHE_DIR=str(made), **processor) == COMPILED
         (folder,) = made.iterdir()

@@ -12,15 +12,16 @@ from renderer import Image, Mesh, Needs, Scene, load_scene, needs_of, render
 from renderer.camera import PerspectiveCamera
 from renderer.cli import main
 from renderer.light import DirectionalLight, PointLight
-from renderer.material import KIND, PHONG, Dielectric, Mirror, Phong
+from renderer.material import Dielectric, Mirror, Phong
 from renderer.needs import FEW_FACES, examine
+from renderer.prepared_scene import build_octree, kernel_settings_of, tree_for
 from renderer.scene import Floor, RenderSettings, SceneObject
+from renderer.scene_rows import KIND, PHONG
 from renderer.shapes import box, grid, icosphere
 from renderer.sight import MAX_MEDIA
-from renderer.stage import build_octree, kernel_settings_of, tree_for
 from renderer.world import pack
 
-MODULE = importlib.import_module("renderer.stage")
+MODULE = importlib.import_module("renderer.prepared_scene")
 SCENES = Path(__file__).parents[1] / "scenes"
 SUN = DirectionalLight(direction=(-1, -2, -1))
 DARK = PointLight(position=(0, 5, 0), intensity=0.0)

@@ -12,11 +12,11 @@ from renderer.light import DirectionalLight, PointLight
 from renderer.material import Dielectric, Material, Mirror, Phong
 from renderer.mesh import Mesh
 from renderer.needs import needs_of
+from renderer.prepared_scene import PreparedScene, prepare_scene
 from renderer.ray_path import MAX_RAYS, Segment, ray_path
 from renderer.render import render
 from renderer.scene import Floor, Scene, SceneObject, load_scene
 from renderer.shapes import box, icosphere, torus
-from renderer.stage import Stage, set_up
 
 SCENES = Path(__file__).parents[1] / "scenes"
 # Radiance is stored as float32: half an ulp, and as much again for the float64 sums before it.
@@ -40,8 +40,8 @@ def scene(*parts: tuple[Mesh, Material], eye: Any = (0.0, 2.0, 6.0), smooth: boo
     )
 
 
-def stage_of(what: Scene, accelerator: str = "octree", max_depth: int = 6) -> Stage:
-    return set_up(what, needs_of(what, max_depth=max_depth), accelerator, threads=1)
+def stage_of(what: Scene, accelerator: str = "octree", max_depth: int = 6) -> PreparedScene:
+    return prepare_scene(what, needs_of(what, max_depth=max_depth), accelerator, threads=1)
 
 
 def moved(mesh: Mesh, *by: float) -> Mesh:
@@ -64,7 +64,7 @@ def zoo(smooth: bool, eye: Any = (0.0, 2.0, 6.0)) -> Scene:
     return scene(*parts, eye=eye, smooth=smooth, **shared)
 
 
-def paths_of(stage: Stage, size: tuple[int, int], **options: Any) -> list[tuple[Segment, ...]]:
+def paths_of(stage: PreparedScene, size: tuple[int, int], **options: Any) -> list[tuple[Segment, ...]]:
     """The path of each pixel's ray, in scanline order; the direction as the kernel has it, to the bit."""
     rows = stage.scene.camera.rows(*size)
     centres = [(x + 0.5, y + 0.5) for y in range(size[1]) for x in range(size[0])]

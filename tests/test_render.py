@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer import stage
+from renderer import prepared_scene as stage
 from renderer.camera import PerspectiveCamera
 from renderer.light import DirectionalLight
 from renderer.material import Phong
 from renderer.needs import needs_of
-from renderer.render import render, settings_of
-from renderer.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
-from renderer.shading import BOUNDED
+from renderer.prepared_scene import TILE
+from renderer.render import render
+from renderer.scene import Floor, RenderSettings, Scene, SceneObject, checked_settings, load_scene
 from renderer.shapes import icosphere
-from renderer.stage import TILE
+from renderer.spawn import BOUNDED
 
 SCENES = Path(__file__).parents[1] / "scenes"
 
@@ -101,7 +101,7 @@ def test_every_pixel_is_written_once(resolution: tuple[int, int]) -> None:
         ("min_weight", float("nan"), "nan"),
         ("shadows", 1, "1"),
         ("speed", 3, "speed"),
-        ("camera", None, "camera"),
+        ("camera", "x", "str"),
     ],
 )
 def test_errors_name_the_argument_and_what_came(argument: str, value: Any, got: str) -> None:
@@ -218,13 +218,14 @@ def test_without_shadows_every_light_reaches_what_faces_it() -> None:
 def test_a_stage_takes_pictures_with_other_cameras_as_render_does() -> None:
     """Also from within glass, where the media around the eye are the new camera's."""
     scene = load_scene(SCENES / "glass.toml")
-    ready = stage.set_up(scene, needs_of(scene))
+    ready = stage.prepare_scene(scene, needs_of(scene))
     glass = next(i.mesh for i in scene.instances if scene.materials[i.material].passes_light)
     inside = np.mean(glass.bounds, axis=0)
     for eye in ((4.0, 2.0, 5.0), tuple(inside.tolist())):
         camera = PerspectiveCamera(eye=eye, target=(0.0, 0.5, 0.0), fov=50)
         moved = scene.model_copy(update={"camera": camera})
         expected = render(moved, resolution=(24, 20), max_depth=4)
-        picture = ready.picture(camera, settings_of(scene, {"resolution": (24, 20), "max_depth": 4}), BOUNDED, 2)
+        chosen = checked_settings(scene.render, {"resolution": (24, 20), "max_depth": 4})
+        picture = ready.picture(camera, chosen, BOUNDED, 2)
         assert picture.radiance.tobytes() == expected.radiance.tobytes()
         assert picture.rays.tobytes() == expected.rays.tobytes()

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from renderer.camera import OrthographicCamera, PerspectiveCamera
 from renderer.errors import MeshError, SceneError
 from renderer.light import DirectionalLight, PointLight
-from renderer.material import MATERIAL_COLUMNS, Dielectric, Mirror, Phong
+from renderer.material import Dielectric, Mirror, Phong
 from renderer.mesh import Mesh
 from renderer.mesh_io import save_ply
 from renderer.scene import Floor, Scene, SceneObject, load_scene
+from renderer.scene_rows import MATERIAL_COLUMNS
 from renderer.shapes import box, icosphere
 from renderer.world import pack
 

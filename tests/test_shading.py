@@ -12,17 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer.octree import Octree
-from renderer.shading import (
-    BOUNDED,
-    MITSUBA_EPSILON,
-    fresnel,
-    offset_distance,
-    reflect,
-    refract,
-    spawn_origin,
-    specular,
-)
+from renderer.shading import fresnel, reflect, refract, specular
 from renderer.shapes import icosphere
+from renderer.spawn import BOUNDED, MITSUBA_EPSILON, offset_distance, spawn_origin
 
 U = 2.0**-53
 UP = (0.0, 1.0, 0.0)

@@ -73,16 +73,15 @@ import scipy.linalg
 
 
 def test_the_public_names_are_there_whatever_was_imported_first():
-    script = "import renderer, renderer.scene\nfrom renderer.render import settings_of\nfrom renderer import *"
-    tell = "print(callable(render), *[f'{n}:{getattr(renderer, n).__module__}' for n in renderer.__all__])"
+    script = "import renderer, renderer.scene\nfrom renderer.render import prepare\nfrom renderer import *"
+    tell = "print(callable(render), *[f'{n}:{getattr(renderer, n).__module__}' for n in renderer._HOMES])"
     is_callable, *names = output(f"{script}\n{tell}").split()
     assert is_callable == "True" and "render:renderer.render" in names and "Mesh:renderer.mesh" in names
-    assert len(names) == len(renderer.__all__)
+    assert {*renderer._HOMES, "__version__"} == set(renderer.__all__)
 
 
 def test_the_public_names_are_listed_and_others_are_errors():
-    assert set(renderer.__all__) <= set(dir(renderer))
-    assert sorted(renderer._HOMES) == sorted(renderer.__all__)
+    assert dir(renderer) == sorted(renderer.__all__)
     with pytest.raises(AttributeError, match="module 'renderer' has no attribute 'Octre'"):
         _ = renderer.Octre
     with pytest.raises(ImportError, match="Octre"):
@@ -95,22 +94,22 @@ def test_compiling_ahead_leaves_nothing_to_compile():
 import sys
 import numpy as np
 from numba.core.dispatcher import Dispatcher
-from renderer.precompile import compile_all
+from renderer.precompile import compile_ahead
 def signatures():
     modules = [m for name, m in sys.modules.items() if name.startswith("renderer.")]
     kernels = {id(v): v for m in modules for v in vars(m).values() if isinstance(v, Dispatcher)}
     return {(k.py_func.__name__, str(s)) for k in kernels.values() for s in k.signatures}
-compile_all()
+compile_ahead()
 before = signatures()
 from renderer import BruteForce, Octree, load_scene, needs_of, render
 from renderer.face_phong import face_colors
 from renderer.ray_path import ray_path
-from renderer.stage import set_up
+from renderer.prepared_scene import prepare_scene
 from renderer.tree_boxes import visited
 for name in ("three_models", "stairs", "glass"):
     for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
         render(load_scene(f"scenes/{name}.toml"), resolution=(3, 2), **options)
-    stage = set_up(load_scene(f"scenes/{name}.toml"), needs_of(load_scene(f"scenes/{name}.toml")), "octree")
+    stage = prepare_scene(load_scene(f"scenes/{name}.toml"), needs_of(load_scene(f"scenes/{name}.toml")), "octree")
     face_colors(stage.world, [0, 1, 5])
     ray_path(stage, [0, 1, 5], [0, 0, -1], 2)
     visited(stage.octree, [0, 1, 5], [0, 0, -1])
@@ -148,9 +147,9 @@ def test_control_c_while_compiling_ends_with_130_and_no_traceback(tmp_path, seco
 @pytest.mark.parametrize("quiet", [False, True])
 def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatch, quiet):
     log = logging.getLogger("renderer.jit")
-    monkeypatch.setattr(log, "level", logging.ERROR)
-    before = logging.ERROR, list(log.handlers)
-    monkeypatch.setattr("renderer.cli._render", lambda _options: log.info("compiling %s", "it"))
+    monkeypatch.setattr(log, "level", logging.CRITICAL)
+    before = logging.CRITICAL, list(log.handlers)
+    monkeypatch.setattr("renderer.cli._render", lambda _options: log.warning("renderer: compiling %s", "it"))
     assert main(["render", "any.toml", *(["--quiet"] if quiet else [])]) == 0
     assert capsys.readouterr() == ("", "" if quiet else "octree-render: compiling it\n")
     assert (log.level, log.handlers) == before
@@ -163,7 +162,7 @@ from tqdm import tqdm
 from renderer.cli import _compile_notices
 sys.stderr = io.StringIO()
 with _compile_notices(silent=False), tqdm(total=3, file=sys.stderr, ncols=40):
-    logging.getLogger("renderer.jit").info("compiling it")
+    logging.getLogger("renderer.jit").warning("renderer: compiling it")
 print("\\roctree-render: compiling it\\n" in sys.stderr.getvalue().replace(" " * 2, ""))
 print(repr(sys.stderr.getvalue()))
 """

@@ -17,9 +17,9 @@ from renderer import load_scene, render
 from renderer.camera import PerspectiveCamera
 from renderer.face_phong import face_colors
 from renderer.image import Image, srgb
-from renderer.material import MATERIAL_COLUMNS
 from renderer.needs import needs_of
-from renderer.stage import Stage, set_up
+from renderer.prepared_scene import PreparedScene, prepare_scene
+from renderer.scene_rows import MATERIAL_COLUMNS
 
 playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
@@ -83,12 +83,12 @@ def picture_of(scenes: Path, shown: dict[str, Any], **settings: Any) -> Image:
     return render(scene, resolution=(shown["w"], shown["h"]), **settings)
 
 
-def stage_of(scenes: Path) -> Stage:
+def stage_of(scenes: Path) -> PreparedScene:
     scene = load_scene(scenes / "blocks.toml")
-    return set_up(scene, needs_of(scene), "octree")
+    return prepare_scene(scene, needs_of(scene), "octree")
 
 
-def inside(faces: NDArray[np.int32], stage: Stage) -> NDArray[np.bool_]:
+def inside(faces: NDArray[np.int32], stage: PreparedScene) -> NDArray[np.bool_]:
     """The pixels whose neighbours show the same face, which is not of glass."""
     glass = list(stage.scene.materials).index("glass")
     opaque = np.append(stage.world.material // MATERIAL_COLUMNS != glass, False)[faces]

@@ -37,7 +37,7 @@ from renderer.face_phong import face_colors
 from renderer.false_color import false_color, limits_of
 from renderer.image import srgb
 from renderer.scene import Scene
-from renderer.shading import BOUNDED
+from renderer.spawn import BOUNDED
 from renderer.tree_boxes import boxes_at, visited
 from renderer.viewer import app, session
 from renderer.viewer.exhibit import Exhibit, open_file
@@ -698,7 +698,8 @@ def test_without_the_extra_one_line_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, package, None)
     assert main(["view", str(folder / "blocks.toml")]) == 2
     out, err = capsys.readouterr()
-    line = f"octree-render: the viewer needs the package {package}: pip install 'octree-renderer[viewer]'\n"
+    hint = "in a checkout of octree-renderer: pip install '.[viewer]'"
+    line = f"octree-render: the viewer needs the package {package}; {hint}\n"
     assert (out, err) == ("", line)
 
 

@@ -1,4 +1,6 @@
-"""``python -m validation``: judge hits and pictures, write the report, exit 1 when a gate fails.
+"""``octree-validate``: judge hits and pictures, write the report, exit 1 when a gate fails.
+
+``python -m validation`` is the same, for a checkout: it takes a folder ``validation`` of the current folder first.
 
 Exit codes:
   0    every gate holds
@@ -14,7 +16,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from renderer.errors import extra_hint
 from renderer.interrupt import interruptible
+from validation.output import add_output, check_output
 from validation.sections import NAMES, choose
 
 if TYPE_CHECKING:
@@ -30,23 +34,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _check(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        return _run(options, ("python -m validation " + shlex.join(given)).strip())
+        return _run(options, f"{_program()} {shlex.join(given)}".strip())
     except (ImportError, ValueError, OSError) as error:
-        missing = "; pip install 'octree-renderer[validate]'" if isinstance(error, ImportError) else ""
+        missing = f"; {extra_hint('validate')}" if isinstance(error, ImportError) else ""
         print(f"validation: {' '.join(str(error).split())}{missing}", file=sys.stderr)
         return 2
 
 
+def _program() -> str:
+    """The command as it was given."""
+    return "octree-validate" if Path(sys.argv[0]).stem == "octree-validate" else "python -m validation"
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m validation",
+        prog=_program(),
         description="Judge hits and pictures by references that nobody here wrote; write a report.",
         epilog=(__doc__ or "").partition("\n\n")[2],
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--quick", action="store_true", help="fewer rays and smaller pictures, under 3 minutes")
     parser.add_argument("--only", type=_sections, default=NAMES, metavar="A,B", help=f"of {', '.join(NAMES)}")
-    parser.add_argument("--output", type=Path, default=Path("reports"), metavar="DIR", help="folder of the report")
+    add_output(parser, "folder of the report")
     parser.add_argument("--gate", type=Path, metavar="FILE", help="TOML file that moves thresholds")
     for name, section in (("scene", "images"), ("mesh", "hits")):
         parser.add_argument(
@@ -67,7 +76,8 @@ def _sections(text: str) -> tuple[str, ...]:
 
 
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """End with exit code 2 where arguments are at odds."""
+    """End with exit code 2 where arguments are missing or at odds."""
+    check_output(parser, options)
     kinds = {kind for kind in ("scene", "mesh") if getattr(options, kind)}
     if options.defects or options.write_baseline:
         alone = "--defects" if options.defects else "--write-baseline"

@@ -5,28 +5,25 @@ from, in a folder of its own, so the kernels of this checkout stay as they are.
 """
 
 import json
-import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from renderer import child
+from validation.defects_answer import MARK
 from validation.defects_list import DEFECTS, Defect
-from validation.defects_seam import Replacement, inject
+from validation.defects_seam import Replacement
 from validation.gates import Gate
 
-_ROOT = Path(__file__).resolve().parent.parent
 # Ten times what the slowest defect takes on two busy cores: beyond it a kernel does not end.
 _PATIENCE = 600.0
-_MARK = "gates: "
 # Each compiles on one core.
 _AT_ONCE = 2
 _CHECKS = "validation.defects_checks"
@@ -103,33 +100,21 @@ def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, c
     began = time.perf_counter()
     cache.mkdir(parents=True, exist_ok=True)
     asked = json.dumps([None if replacement is None else vars(replacement), groups, checks])
-    command = [sys.executable, "-c", "import sys; from validation.defects import answer; answer(sys.argv[1])", asked]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    command = child.command("validation.defects_answer:answer", asked)
+    environment = child.environment(NUMBA_CACHE_DIR=str(cache))
     try:
         done = subprocess.run(
-            command, cwd=_ROOT, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False
+            command, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False
         )
     except subprocess.TimeoutExpired:
         return Answer((), (), f"did not end within {_PATIENCE:.0f} s", time.perf_counter() - began)
     seconds = time.perf_counter() - began
-    said = [line for line in done.stdout.splitlines() if line.startswith(_MARK)]
+    said = [line for line in done.stdout.splitlines() if line.startswith(MARK)]
     if done.returncode or not said:
         last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
         return Answer((), (), last, seconds)
-    found = json.loads(said[-1].removeprefix(_MARK))
+    found = json.loads(said[-1].removeprefix(MARK))
     return Answer(tuple(found["gates"]), tuple(found["red"]), None, seconds)
-
-
-def answer(asked: str) -> None:
-    """The other end of ``ask``: inject, check, print the gates as one line of JSON."""
-    replacement, groups, checks = json.loads(asked)
-    if replacement is not None:
-        inject(Replacement(**replacement))
-    # It loads the renderer, so not before.
-    found = import_module(checks).run(tuple(groups))
-    names = [_name(gate) for gate in found]
-    red = [name for name, gate in zip(names, found, strict=True) if not gate.passed]
-    print(_MARK + json.dumps({"gates": names, "red": red}))
 
 
 def record(chosen: list[Defect], control: Answer, answers: list[Answer]) -> dict[str, Any]:
@@ -185,10 +170,6 @@ def idle(found: dict[str, Any]) -> Gate:
     count = sum(not (row["alone"] or row["kept"]) for row in found["gates"])
     quantity, reason = "that caught no defect alone and are not kept", "a measure that tells nothing new is dropped"
     return Gate("defects", "kinds of gates", quantity, float(count), "at most", 0.0, reason)
-
-
-def _name(gate: Gate) -> str:
-    return f"{gate.section}: {gate.subject}: {gate.quantity}"
 
 
 def kind_of(name: str) -> str:

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 _PACKAGE = Path(__file__).resolve().parent.parent / "renderer"
-_DIGEST = "renderer.jit"
+_DIGEST = "renderer.source_digest"
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,9 @@ def describe() -> dict[str, object]:
 
 
 def sources_sha256() -> str:
-    """SHA-256 over names and texts of ``renderer/*.py`` and ``validation/*.py``: changes when any of them does."""
+    """SHA-256 over names and texts of all sources of ``renderer`` and ``validation``: changes when any of them does."""
     digest = hashlib.sha256()
-    for path in sorted([*_ROOT.glob("renderer/*.py"), *_ROOT.glob("validation/*.py")]):
+    for path in sorted([*_ROOT.glob("renderer/**/*.py"), *_ROOT.glob("validation/**/*.py")]):
         text = path.read_bytes()
         digest.update(f"{path.relative_to(_ROOT).as_posix()} {len(text)}\n".encode() + text)
     return digest.hexdigest()

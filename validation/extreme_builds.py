@@ -270,7 +270,7 @@ def _not_manifold(quick: bool) -> Outcome:
     rng, count = np.random.default_rng(SEED), 4_000 if quick else 40_000
     angle = np.arange(5) * (2 * np.pi / 5)
     pages = np.column_stack([2 * np.cos(angle), 2 * np.sin(angle), np.full(5, 0.5)])
-    book = Mesh(np.vstack([[(0, 0, 0), (0, 0, 1)], pages]), [(0, 1, k) for k in range(2, 7)])  # type: ignore[arg-type]
+    book = Mesh(np.vstack([[(0, 0, 0), (0, 0, 1)], pages]), [(0, 1, k) for k in range(2, 7)])
     ball = icosphere(3)
     bowl = Mesh(ball.vertices + np.array([5, 0, 0]), ball.faces[ball.triangles[:, :, 1].max(axis=1) < 0.3])
     mesh = float32_mesh(Mesh.concatenate([book, bowl]))

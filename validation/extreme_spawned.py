@@ -10,8 +10,9 @@ import numpy as np
 from renderer import Mesh, Octree, Scene, render
 from renderer.light import DirectionalLight
 from renderer.material import Phong
-from renderer.shading import BOUNDED, offset_distance, reflect, refract, spawn_origin
+from renderer.shading import reflect, refract
 from renderer.shapes import icosphere
+from renderer.spawn import BOUNDED, offset_distance, spawn_origin
 from validation.extreme import ExtremeCase, Outcome
 from validation.extreme_scenes import GLOWS, MIRROR, WHITE, Vector, ball, eye_at, level, pixel, scene_of, unit, vector
 from validation.mitsuba_whitted import whitted

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.image import srgb, write_atomically, write_exr
+from renderer.files import write_atomically
+from renderer.image import srgb, write_exr
 from validation.compare_images import ImageComparison, Picture
 
 # One step of an 8-bit picture becomes a grey that is seen.

@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from renderer.image import write_atomically
+from renderer.files import write_atomically
 from renderer.mesh_io import load_mesh
 from renderer.scene import load_scene
 from validation import baseline, environment, junit, report, schema, summary

@@ -6,15 +6,14 @@ from pathlib import Path
 
 from renderer.camera import unit
 from renderer.errors import expect
-from renderer.light import DIRECTIONAL
-from renderer.material import REFLECTANCE, TRANSMITTANCE
 from renderer.needs import needs_of
 from renderer.parallel import available_threads
-from renderer.scene import RenderSettings, Scene, load_scene
-from renderer.shading import BOUNDED
-from renderer.stage import Stage, tree_for, build_octree, set_up
-from renderer.viewer.protocol import ViewSettings
 from renderer.precompile import touch_viewing
+from renderer.prepared_scene import PreparedScene, build_octree, prepare_scene, tree_for
+from renderer.scene import RenderSettings, Scene, load_scene
+from renderer.scene_rows import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
+from renderer.spawn import BOUNDED
+from renderer.viewer.protocol import ViewSettings
 from renderer.world import light_rows
 
 
@@ -28,7 +27,7 @@ class Exhibit:
 
     scene: Scene
     path: Path | None
-    stage: Stage
+    stage: PreparedScene
     threads: int
 
     @property
@@ -48,7 +47,7 @@ class Exhibit:
         return self.path.parent / file
 
     @cached_property
-    def brute(self) -> Stage:
+    def brute(self) -> PreparedScene:
         """The same scene with every ray tested against every face."""
         octree = build_octree(self.stage.mesh, "brute", "midpoint", self.stage.needs, self.threads)
         return replace(self.stage, octree=octree, tree=tree_for(octree, self.stage.needs))
@@ -58,8 +57,8 @@ def prepare(scene: Scene, path: Path | None = None) -> Exhibit:
     """Make ``scene`` ready and its kernels warm. Raises ``ValueError`` for a scene that cannot be shown."""
     expect(any(len(i.mesh.faces) for i in scene.instances), "scene", "at least one face", "none")
     # One bounce stands for any number of them: a panel may ask for more than the file does.
-    threads = available_threads()
-    stage = set_up(scene, needs_of(scene, max_depth=max(1, scene.render.max_depth)), "octree", "midpoint", threads)
+    threads, needs = available_threads(), needs_of(scene, max_depth=max(1, scene.render.max_depth))
+    stage = prepare_scene(scene, needs, "octree", "midpoint", threads)
     # Mirrors and glass need no lights, and a scene of them alone has none packed; their colours a face do.
     stage = replace(stage, world=stage.world._replace(lights=light_rows(scene, replace(stage.needs, shadows=True))))
     # The first call of a kernel loads or compiles it, which the first picture should not wait for.
@@ -73,7 +72,7 @@ def open_file(path: Path) -> Exhibit:
     return prepare(load_scene(path), path)
 
 
-def varied(stage: Stage, settings: ViewSettings) -> Stage:
+def varied(stage: PreparedScene, settings: ViewSettings) -> PreparedScene:
     """``stage`` without what ``settings`` switch off and with its first directional light turned; no tree is rebuilt.
 
     Lights that are dark do not count, and without a directional light none is turned.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from renderer.face_phong import face_colors
 from renderer.false_color import Limits, false_color, limits_of
 from renderer.image import Image
-from renderer.shading import BOUNDED
+from renderer.spawn import BOUNDED
 from renderer.viewer.exhibit import Exhibit, render_settings, varied
 from renderer.viewer.protocol import FACE_COLORS, JPEG, RGBA, View, packed
 from renderer.viewer.viewpoint import camera_of

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from renderer.errors import expect
 from renderer.light import DirectionalLight, Light
-from renderer.material import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE, Material
+from renderer.material import Material
 from renderer.mesh import face_normals
 from renderer.needs import examine
-from renderer.stage import Stage
+from renderer.prepared_scene import PreparedScene
+from renderer.scene_rows import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.tree_boxes import boxes_at, levels
 from renderer.viewer.exhibit import Exhibit
 from renderer.viewer.protocol import MODES
@@ -50,7 +51,7 @@ def description(shown: Exhibit) -> dict[str, Any]:
     }
 
 
-def mesh_bytes(stage: Stage) -> bytes:
+def mesh_bytes(stage: PreparedScene) -> bytes:
     """The answer to GET /mesh, little-endian: uint32 MAGIC and F, then for each of F faces the corners as 9 float32 and
     their shading normals as 9 float32, then the materials as F uint16, filled up to four bytes.
 
@@ -73,7 +74,7 @@ def mesh_bytes(stage: Stage) -> bytes:
     )
 
 
-def boxes_bytes(stage: Stage, level: int) -> bytes:
+def boxes_bytes(stage: PreparedScene, level: int) -> bytes:
     """The answer to GET /octree, little-endian: uint32 n and the number of levels, then n boxes of 6 float32: the lower
     and the upper corner of each node of ``level``, the root's being 0.
     """
@@ -81,7 +82,7 @@ def boxes_bytes(stage: Stage, level: int) -> bytes:
     return struct.pack("<2I", len(boxes), levels(stage.octree)) + boxes.tobytes()
 
 
-def _normals(stage: Stage, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normals(stage: PreparedScene, corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """The normal at each corner, (F, 3, 3): the vertex's where a face is smooth, else the face's; 0 without area."""
     world = stage.world
     normals = np.repeat(face_normals(corners)[:, None], 3, axis=1)

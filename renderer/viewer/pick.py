@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from renderer.material import MATERIAL_COLUMNS
+from renderer.prepared_scene import PreparedScene
 from renderer.query import Hits
 from renderer.ray_path import Segment, ray_path, surface_of
-from renderer.stage import Stage
+from renderer.scene_rows import MATERIAL_COLUMNS
 from renderer.tree_boxes import visited
 from renderer.viewer.exhibit import Exhibit, varied
 from renderer.viewer.protocol import Pick
@@ -42,7 +42,7 @@ def picked(shown: Exhibit, pick: Pick) -> dict[str, Any]:
     return {"type": "pick", "seq": pick.seq, **met, "path": _told(path), "nodes": boxes, "visited": len(nodes)}
 
 
-def _met(shown: Exhibit, stage: Stage, hits: Hits) -> dict[str, Any]:
+def _met(shown: Exhibit, stage: PreparedScene, hits: Hits) -> dict[str, Any]:
     if not hits.hit[0]:
         return {"hit": False, "t": None, "face": None, "material": None, "point": None, "normal": None}
     face = int(hits.face[0])

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from renderer.errors import expect
+from renderer.errors import expect, extra_hint
 from renderer.scene import Scene
 
 if TYPE_CHECKING:
@@ -28,10 +28,10 @@ def view(
         from renderer.viewer.server import Viewing
     except ModuleNotFoundError as error:
         package = str(error.name).partition(".")[0]
-        told = f"the viewer needs the package {package}: pip install 'octree-renderer[viewer]'"
+        told = f"the viewer needs the package {package}; {extra_hint('viewer')}"
         raise ModuleNotFoundError(told, name=package) from None
-    from renderer.viewer.exhibit import open_file, prepare
     from renderer.precompile import compile_in_two
+    from renderer.viewer.exhibit import open_file, prepare
 
     compile_in_two()
     shown = prepare(scene) if isinstance(scene, Scene) else open_file(Path(scene))

@@ -13,7 +13,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from renderer.errors import extra_hint
 from renderer.interrupt import interruptible
+from validation.output import add_output, check_output
 
 # Rays of a family, in full and in quick runs.
 RAYS, QUICK_RAYS = 1_000_000, 200_000
@@ -22,12 +24,15 @@ RAYS, QUICK_RAYS = 1_000_000, 200_000
 @interruptible("benchmark: interrupted, nothing written")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run what the arguments ask for; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    check_output(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
         return _run(options, ("python -m validation.benchmark " + shlex.join(given)).strip())
     except (ValueError, OSError, ImportError) as error:
-        print(f"benchmark: {error}", file=sys.stderr)
+        missing = f"; {extra_hint('validate')}" if isinstance(error, ImportError) else ""
+        print(f"benchmark: {' '.join(str(error).split())}{missing}", file=sys.stderr)
         return 2
 
 
@@ -36,14 +41,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="200,000 rays, at most 100,000 faces, small pictures")
     parser.add_argument("--huge", action="store_true", help="a mesh of 10 million faces too")
     parser.add_argument("--mesh", type=Path, nargs="+", default=[], metavar="PATH", help="PLY, OBJ, STL or GLB as well")
-    parser.add_argument("--output", type=Path, default=Path("reports"), metavar="DIR", help="where record and page go")
+    add_output(parser, "where record and page go")
     parser.add_argument("--page-only", action="store_true", help="draw the page again from the stored record")
     return parser
 
 
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here so that --help answers at once.
-    from renderer.image import write_atomically
+    from renderer.files import write_atomically
     from validation.benchmark import page, record
     from validation.progress import steps
 

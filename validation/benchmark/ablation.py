@@ -13,10 +13,10 @@ from renderer.camera import PerspectiveCamera
 from renderer.light import DirectionalLight
 from renderer.material import Mirror, Phong
 from renderer.parallel import available_threads
+from renderer.prepared_scene import build_octree, kernel_settings_of, tree_for
 from renderer.scene import Floor, SceneObject
-from renderer.shading import BOUNDED
 from renderer.shapes import box, icosphere
-from renderer.stage import build_octree, kernel_settings_of, tree_for
+from renderer.spawn import BOUNDED
 from renderer.tile import tile_memory
 from renderer.world import pack
 
@@ -108,7 +108,8 @@ def memory(scene: Scene, needs: Needs) -> int:
     mesh, world = pack(scene, needs)
     tree = tree_for(build_octree(mesh, "auto", "midpoint", needs), needs)
     memory = tile_memory(tree.depth, kernel_settings_of(needs, scene.render, BOUNDED))
-    rays, *own = memory
-    scratch = sum(array.nbytes for array in (*rays[:-1], *own))
+    rays = memory.trace
+    parts = (rays.floats, rays.doubles, rays.integers, memory.doubles, memory.integers, memory.hits, memory.total)
+    scratch = sum(array.nbytes for array in parts)
     arrays = [*world, tree.nodes, tree.blocks, tree.faces]
     return sum(array.nbytes for array in arrays) + available_threads() * scratch

@@ -52,5 +52,5 @@ def version(path: str) -> int:
 def _works(path: str) -> bool:
     environment = os.environ | {VARIABLE: path}
     # Loading takes a second; a minute is for a machine that is busy.
-    command = [sys.executable, "-c", _TRIAL]
+    command = [sys.executable, "-P", "-c", _TRIAL]
     return subprocess.run(command, env=environment, capture_output=True, timeout=60, check=False).returncode == 0

@@ -11,7 +11,6 @@ import gc
 import json
 import re
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from renderer import child
 from renderer.mesh import Mesh
 from validation.benchmark import ours
 from validation.benchmark.contender import System
@@ -39,8 +39,8 @@ def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) 
         for system in systems:
             if system.times_build and system.takes(len(mesh.faces)):
                 step(f"{mesh.name}: memory of {system.label}")
-                command = [sys.executable, "-m", "validation.benchmark.memory", system.name, folder]
-                answer = subprocess.run(command, capture_output=True, text=True, check=True)
+                command = child.command("validation.benchmark.memory:answer", system.name, folder)
+                answer = subprocess.run(command, env=child.environment(), capture_output=True, text=True, check=True)
                 found[system.name] = json.loads(answer.stdout.splitlines()[-1])
     return {"mesh": mesh.name, "faces": len(mesh.faces), "systems": found}
 
@@ -79,6 +79,6 @@ def _bytes(field: str) -> int:
     return int(found.group(1)) * 1024
 
 
-if __name__ == "__main__":
-    _name, _folder = sys.argv[1:]
-    print(json.dumps(grown(next(s for s in available()[0] if s.name == _name), Path(_folder))))
+def answer(name: str, folder: str) -> None:
+    """The other end of ``measure``: print what one system takes."""
+    print(json.dumps(grown(next(s for s in available()[0] if s.name == name), Path(folder))))

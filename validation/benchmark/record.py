@@ -30,7 +30,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from renderer.image import write_atomically
+from renderer.files import write_atomically
 from validation import environment
 from validation.benchmark.contender import System
 

@@ -1,6 +1,5 @@
 """A scene made ready: what its pictures share is worked out once, and each camera then costs its rays alone."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -8,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from renderer.camera import Camera, sample_offsets
+from renderer.compile_notice import Stopwatch
 from renderer.errors import expect
 from renderer.image import Image
 from renderer.layout import Tree, cache_aligned
@@ -26,13 +26,14 @@ TILE = 32
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """What the pictures of a scene share; build one with ``set_up``.
+class PreparedScene:
+    """What the pictures of a scene share; make one with ``prepare`` and render it with ``render``.
 
+    scene          what it was made of
     mesh           all instances' triangles, in their order
     octree         the tree over ``mesh``, or its ``BruteForce``
     needs          what is ready: at least what ``needs_of`` says of the scene
-    build_seconds  what it took
+    build_seconds  what it took, without compiling
     """
 
     scene: Scene
@@ -56,7 +57,7 @@ class Stage:
         ``finished(tiles)`` is called after each tile, by one thread at a time. What it raises stops the others and is
         raised here.
         """
-        began = time.perf_counter()
+        clock = Stopwatch()
         width, height = chosen.resolution
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
         settings, film = kernel_settings_of(self.needs, chosen, offset), _film(width, height)
@@ -72,22 +73,22 @@ class Stage:
             render_tile(self.tree.words, world, settings, rows, samples, film, tile, memory)
 
         for_chunks(render_one, tiles(chosen.resolution), 1, threads, finished)
-        return Image(*film, build_seconds=self.build_seconds, render_seconds=time.perf_counter() - began)
+        return Image(*film, build_seconds=self.build_seconds, render_seconds=clock.seconds())
 
 
-def set_up(
+def prepare_scene(
     scene: Scene,
     needs: Needs,
     accelerator: str = "auto",
     split: Literal["midpoint", "sah"] = "midpoint",
     threads: int | None = None,
-) -> Stage:
+) -> PreparedScene:
     """Make ``scene`` ready, by checked arguments; see ``render``."""
-    began = time.perf_counter()
+    clock = Stopwatch()
     mesh, world = pack(scene, needs)
     octree = build_octree(mesh, accelerator, split, needs, threads)
     tree = tree_for(octree, needs)
-    return Stage(scene, mesh, octree, needs, world, tree, time.perf_counter() - began)
+    return PreparedScene(scene, mesh, octree, needs, world, tree, clock.seconds())
 
 
 def tiles(resolution: tuple[int, int]) -> int:

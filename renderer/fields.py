@@ -1,0 +1,95 @@
+"""What scene classes share: kinds of fields, what is unknown or wrong refused, and one line for what is wrong."""
+
+import re
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from renderer.errors import SceneError
+
+_Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+FiniteVector = tuple[_Number, _Number, _Number]
+
+
+# Where a fault stands: names of fields and places in lists.
+Keys = tuple[int | str, ...]
+
+
+def _grey(value: object) -> object:
+    """Let one number stand for an equal red, green and blue."""
+    return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+_Channel = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=True)]
+Color = Annotated[tuple[_Channel, _Channel, _Channel], BeforeValidator(_grey)]
+
+
+class Fields(BaseModel):
+    """A record whose fields are checked when it is made, and do not change.
+
+    Raises ``SceneError``, which is a ``ValueError``, with one line that names the field.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+    def __init__(self, /, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise SceneError(f"{type(self).__name__}: {first_fault(error, self._union_member)}") from None
+
+    # Without it pydantic would call __init__ for each record within another, and lose where that stands.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+
+    @staticmethod
+    def _union_member(keys: Keys) -> int | None:
+        """Where ``keys`` hold the name of a union's member; see ``first_fault``."""
+        return None
+
+
+def first_fault(error: ValidationError, member: Callable[[Keys], int | None] = lambda keys: None) -> str:
+    """One line for the first thing that is wrong, with the number of others.
+
+    Of a union pydantic puts the name of a member, which is ours, among the keys; ``member`` tells where.
+    """
+    faults = error.errors()
+    first = faults[0]
+    keys = first["loc"]
+    where = ".".join(shown(k) for i, k in enumerate(keys) if i != member(keys))
+    # It may quote what was given, line breaks and all.
+    message = _in_our_words(" ".join(first["msg"].split()))
+    says_it = (first["type"] == "value_error" and ", got" in message) or isinstance(first["input"], dict)
+    got = "" if says_it else f", got {shown(first['input'])}"
+    if first["type"] == "extra_forbidden":
+        message, got = "unknown key", f" (its value is {shown(first['input'])})"
+    others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return f"{where}: {message}{got}{others}" if where else f"{message}{got}{others}"
+
+
+# What pydantic says, and what every other error of this package does.
+_WORDS = (
+    (r"^Value error, ", ""),
+    (r"^Input should (be|have) (a valid )?", "expected "),
+    (r"^expected (greater|less) ", r"expected a number \1 "),
+    (r"^expected (tuple|list)\b", "expected a list"),
+    (r"^expected integer", "expected an integer"),
+    (r"^expected (number|string|dictionary|boolean)", r"expected a \1"),
+)
+
+
+def _in_our_words(message: str) -> str:
+    for theirs, ours in _WORDS:
+        message = re.sub(theirs, ours, message)
+    return message
+
+
+def shown(value: object) -> str:
+    """A value or key on one line; Python writes no integer of more than 4300 digits."""
+    if isinstance(value, str) and value.isprintable() and value:
+        return value if value.replace("-", "").replace("_", "").isalnum() else repr(value)
+    try:
+        return repr(value)
+    except ValueError:
+        return "an integer of more than 4300 digits"

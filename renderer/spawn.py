@@ -1,0 +1,111 @@
+"""Where a ray starts that leaves a surface: off it by more than rounding errors, and by no epsilon of anyone's choice.
+
+Vectors are tuples of float64.
+"""
+
+import math
+
+import numpy as np
+
+from renderer.jit import inlined, kernel
+from renderer.simd import at, larger, pointer, put
+from renderer.vec3 import add, cross, dot, largest_component, length, normalized, row3, scale, sub, three
+
+_ROUNDOFF = 2.0**-53
+# gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).
+_GAMMA7 = 7.0 * _ROUNDOFF / (1.0 - 7.0 * _ROUNDOFF)
+# The next ray's test of the same triangle errs too. With L the largest component of a vertex relative to the origin and
+# every shear at most 1: a sheared coordinate is at most 2 L and errs by 5 u L; an edge function is at most 8 L^2 and
+# errs by 56 u L^2; the sum of the three e z errs by 3 (56 + 8 + 24) u L^3. Divided by the determinant, which is
+# |cross(p1 - p0, p2 - p0) . d| / |d_z|, and projected onto the normal, the direction drops out: 264 u L^3 / |cross|.
+_GAMMA264 = 264.0 * _ROUNDOFF / (1.0 - 264.0 * _ROUNDOFF)
+# The same for the distance of a point from a face's plane as ``leave_faces`` finds it: the cross product's components
+# err by 32 u L^2, its product with the point by 192 u L^3, and dividing by its length adds 6 u of at most 24 L^3.
+_GAMMA336 = 336.0 * _ROUNDOFF / (1.0 - 336.0 * _ROUNDOFF)
+_SMALLEST = 2.0**-1074
+# Mitsuba 3's RayEpsilon: 1500 times the unit roundoff of float32.
+MITSUBA_EPSILON = 1500.0 * 2.0**-24
+# ``offset`` below 0 asks for the error-bounded rule.
+BOUNDED = -1.0
+
+
+@inlined
+def offset_distance(p, p0, p1, p2, u, v, n_g):
+    """How far p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
+
+    The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
+    matters where the first vanishes (on a plane through the origin) and for slivers.
+    """
+    w, distance, reach = 1.0 - u - v, 0.0, 0.0
+    for k in range(3):
+        distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
+        reach = larger(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
+    # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
+    double_area = length(cross(sub(p1, p0), sub(p2, p0)))
+    return _GAMMA7 * distance + _GAMMA264 * reach * (reach / double_area * reach)
+
+
+@inlined
+def _away(x, step):
+    """x + step, rounded at least one float64 further in the direction of ``step``."""
+    y = x + step
+    if step == 0.0 or not math.isfinite(y):
+        return y
+    # nextafter without its call: the bits of a float64 count up away from 0.
+    if y == 0.0:
+        return math.copysign(_SMALLEST, step)
+    away = 1 if (y > 0.0) == (step > 0.0) else -1
+    return np.int64(np.float64(y).view(np.int64) + away).view(np.float64)
+
+
+@inlined
+def spawn_origin(p, error, n_g, w, offset):
+    """Where a ray from the surface point p in direction w starts, so that it does not meet that surface again.
+
+    ``offset`` < 0: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away.
+    Otherwise Mitsuba's rule, (1 + max|p|) ``offset`` along n_g.
+    """
+    side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
+    if offset >= 0.0:
+        distance = (1.0 + largest_component(p)) * offset
+        return add(p, scale(n_g, side * distance))
+    step = scale(n_g, side * error)
+    return (_away(p[0], step[0]), _away(p[1], step[1]), _away(p[2], step[2]))
+
+
+@inlined
+def _leave(p0, p1, p2, o, w):
+    """The point o near the plane of a face, moved along the normal to the side of w until it is off for certain."""
+    normal = cross(sub(p1, p0), sub(p2, p0))
+    double_area = length(normal)
+    if double_area == 0.0:
+        return o  # no ray hits such a face
+    n_g, reach = normalized(normal), 0.0
+    for p in (p0, p1, p2):
+        reach = larger(reach, largest_component(sub(p, o)))
+    side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
+    # A 1024th more, because the next test measures from where the point is moved to.
+    needed = (_GAMMA264 + _GAMMA336) * (1.0 + 2.0**-10) * reach * (reach / double_area * reach)
+    missing = needed - side * dot(n_g, sub(o, p0))
+    if missing <= 0.0:
+        return o
+    step = scale(n_g, side * missing)
+    return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
+
+
+@kernel
+def leave_faces(vertices, faces, origins, directions, leaving, starts, begin, end):
+    """Write to ``starts`` (n, 3) where the rays begin:end start that leave the faces ``leaving``, -1 for none.
+
+    A start moves along its face's normal only, by no more than its distance from the plane and some roundings, so that
+    the ray meets neither that face nor another in its plane. Origins have one row a ray or one for all.
+    """
+    corners, points, step = pointer(vertices), pointer(origins), 3 * np.int64(len(origins) > 1)
+    for i in range(begin, end):
+        face, o, w = leaving[i], three(points, i * step), row3(pointer(directions), i)
+        if face >= 0:
+            a, b, c = row3(pointer(faces), face)
+            o = _leave(row3(corners, a), row3(corners, b), row3(corners, c), o, w)
+        row = at(pointer(starts), 3 * i)
+        for k in range(3):
+            put(row, k, o[k])
