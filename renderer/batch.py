@@ -4,13 +4,15 @@ import numpy as np
 
 from renderer.jit import inlined, kernel
 from renderer.leaf import NO_FACE, tree_pointers
-from renderer.simd import get, larger, pointer
-from renderer.traverse import Found, Rays, make_scratch, ray_at, search_blocks, search_singly, trace
+from renderer.simd import LOCAL_WORDS, get, larger, local_words, pointer
+from renderer.traverse import Found, Rays, depth_of_stack, make_scratch, ray_at, search_blocks, search_singly, trace
 
 # Origins as far as float32 boxes can tell from infinity, and directions whose product with a determinant, at most
 # 2^254 there, stays a normal float64 number, as does one of 2^-300 with the shortest.
 FARTHEST = 2.0**126
 SHORTEST, LONGEST = 2.0**-600, 2.0**700
+# The deepest tree whose stack fits into a kernel's own frame.
+FEW_DEPTH = depth_of_stack(LOCAL_WORDS)
 
 
 @kernel
@@ -76,19 +78,20 @@ def search_chunk(words, rays, out, begin, end, any_hit):
 
 
 @kernel
-def trace_few(words, origins, directions, t_min, t_max, out, stack):
+def trace_few(words, origins, directions, t_min, t_max, out):
     """Closest hits of so few rays that each goes alone: (4, n) ``out`` has rows t, u, v and the bits of face as int64.
 
-    Bounds and return value as of ``trace_chunk``; ``stack`` has ``traverse.stack_size`` words.
+    Bounds and return value as of ``trace_chunk``. The tree has at most FEW_DEPTH levels.
     """
     tree, count = tree_pointers(words), len(directions)
     source = _ray_pointers((origins, directions, t_min, t_max), tree.scale)
     bad = _first_bad_ray(source, 0, count)
     if bad >= 0:
         return bad
+    stack = local_words()
     for i in range(count):
         ray, limit = ray_at(source, i)
-        t, face, u, v, w = search_singly(tree, ray, limit, pointer(stack))
+        t, face, u, v, w = search_singly(tree, ray, limit, stack)
         hit = face != NO_FACE
         out[0, i] = t / tree.scale if hit else np.inf
         out[1, i] = u / w if hit else np.nan

@@ -33,10 +33,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _hide_scipy_from_numba() -> None:
-    """Spare a process of our own the fifth of a second in which Numba loads SciPy's BLAS, which no kernel calls."""
+    """Spare a process of our own the time in which Numba imports SciPy, of which no kernel calls anything."""
     if "scipy" not in sys.modules:
         sys.modules["scipy"] = None  # type: ignore[assignment]  # so the import statement finds none
-        import numba.np.arraymath  # noqa: F401
+        import numba  # noqa: F401
 
         del sys.modules["scipy"]
 

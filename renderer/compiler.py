@@ -10,7 +10,9 @@ tested, and does without this module where it fails.
 """
 
 import pickle
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import cached_property, update_wrapper
 from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
@@ -141,9 +143,9 @@ class _LinkEntry(LoweringPass):  # type: ignore[misc]
         LoweringPass.__init__(self)
 
     def run_pass(self, state: Any) -> bool:
-        entry, context = _entries[state.func_id.func], state.targetctx
-        with entry.notice():
-            piece = entry.piece.compiled(state.args)
+        kernel, context = _kernels[state.func_id.func], state.targetctx
+        with kernel.notice():
+            piece = kernel.piece.compiled(state.args)
             library = _EntryLibrary(context.codegen(), state.func_id.func_qualname)
             library.enable_object_caching()
             library.add_linking_library(piece.library)
@@ -222,33 +224,58 @@ class _Piece(CPUDispatcher):  # type: ignore[misc]
         self.compile(tuple(arguments))
         return self.overloads[tuple(arguments)]
 
-
-class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A function as Python calls it; kernels that call it get its piece."""
-
-    def __init__(self, function: Any, locals: Any = None, targetoptions: Any = None) -> None:
-        options = {**OPTIONS, **(targetoptions or {})}
-        super().__init__(function, targetoptions=options, pipeline_class=_EntryCompiler)
-        self.piece = _Piece(function, targetoptions=options, pipeline_class=_PieceCompiler)
-        self._cache: KernelStore | _NoStore = KernelStore(function)
-        _entries[function] = self
-
-    def notice(self) -> AbstractContextManager[None]:
-        """What surrounds the compiling of this kernel."""
-        if isinstance(self._cache, _NoStore):
-            return nullcontext()
-        return compiling(self.py_func.__qualname__, self._cache.cache_path)
-
     def get_call_template(self, arguments: Any, keywords: Any) -> Any:
         # Numba would compile a kernel for each constant that a caller writes as a literal.
         plain = [types.unliteral(a) for a in arguments]
-        return self.piece.get_call_template(plain, {k: types.unliteral(v) for k, v in keywords.items()})
-
-    def get_overload(self, signature: Any) -> Any:
-        return self.piece.get_overload(signature)
+        return super().get_call_template(plain, {k: types.unliteral(v) for k, v in keywords.items()})
 
 
-_entries: dict[Any, Kernel] = {}
+class Kernel:
+    """A function that Python and kernels call; each way is made when it is first gone.
+
+    Numba's dispatchers take a third of a millisecond to make, and most kernels are never called by Python, nor by
+    kernels that are compiled now.
+    """
+
+    def __init__(self, function: Callable[..., Any], forceinline: bool = False, kept: bool = True) -> None:
+        self.py_func = function
+        self.kept = kept
+        self._options = {**OPTIONS, "forceinline": forceinline}
+        _kernels[function] = self
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.entry(*arguments)
+
+    @cached_property
+    def entry(self) -> Any:
+        """The dispatcher that Python calls."""
+        entry = CPUDispatcher(self.py_func, targetoptions=self._options, pipeline_class=_EntryCompiler)
+        if self.kept:
+            entry._cache = self.store
+        return entry
+
+    @cached_property
+    def piece(self) -> _Piece:
+        """The dispatcher that kernels call."""
+        return _Piece(self.py_func, targetoptions=self._options, pipeline_class=_PieceCompiler)
+
+    @cached_property
+    def store(self) -> KernelStore:
+        """Where its machine code is kept."""
+        return KernelStore(self.py_func)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """How Numba sees it in a kernel that calls it."""
+        return types.Dispatcher(self.piece)
+
+    def notice(self) -> AbstractContextManager[None]:
+        """What surrounds its compiling."""
+        return compiling(self.py_func.__qualname__, self.store.cache_path) if self.kept else nullcontext()
+
+
+_kernels: dict[Callable[..., Any], Kernel] = {}
 
 
 def probe() -> None:
@@ -260,24 +287,10 @@ def probe() -> None:
     def answer(x):  # type: ignore[no-untyped-def]
         return inner(x) + 1
 
-    inner = Kernel(doubled, targetoptions={"forceinline": True})
-    outer = Kernel(answer)
-    outer._cache = _NoStore()
-    try:
-        if outer(20) != 41:
-            raise RuntimeError(f"a kernel answered {outer(20)} for 41")
-        (compiled,) = outer.overloads.values()
-        stored = CompileResult._rebuild(outer.targetctx, *pickle.loads(dumps(compiled._reduce())))
-        if stored.entry_point(20) != 41:
-            raise RuntimeError(f"a stored kernel answered {stored.entry_point(20)} for 41")
-    finally:
-        del _entries[doubled], _entries[answer]
-
-
-class _NoStore:
-    """A cache that keeps nothing, of kernels of which nothing is said."""
-
-    def load_overload(self, signature: Any, context: Any) -> None:
-        context.refresh()
-
-    def save_overload(self, signature: Any, compiled: Any) -> None: ...
+    inner, outer = Kernel(doubled, forceinline=True, kept=False), Kernel(answer, kept=False)
+    if outer(20) != 41:
+        raise RuntimeError(f"a kernel answered {outer(20)} for 41")
+    (compiled,) = outer.entry.overloads.values()
+    stored = CompileResult._rebuild(outer.entry.targetctx, *pickle.loads(dumps(compiled._reduce())))
+    if stored.entry_point(20) != 41:
+        raise RuntimeError(f"a stored kernel answered {stored.entry_point(20)} for 41")

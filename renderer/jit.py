@@ -26,20 +26,20 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _decorated(function, forceinline=True)
 
 
-def is_on_disk(dispatcher: Any) -> bool:
+def is_on_disk(kernel: Any) -> bool:
     """Whether a kernel is kept for some types of arguments, so that another process need not compile it.
 
     True, too, where nothing can be kept: then no process can help another.
     """
-    stored = getattr(getattr(dispatcher, "_cache", None), "is_stored", None)
-    return stored is None or bool(stored())
+    store = getattr(kernel, "store", None)
+    return store is None or bool(store.is_stored())
 
 
 def _decorated(function: Callable[..., Any], forceinline: bool) -> Any:
     compiler = _compiler()
     if compiler is None:
         return numba.njit(nogil=True, error_model="numpy", forceinline=forceinline)(function)
-    return compiler.Kernel(function, targetoptions={"forceinline": forceinline})
+    return compiler.Kernel(function, forceinline)
 
 
 @cache

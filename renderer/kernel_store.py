@@ -69,7 +69,6 @@ class KernelStore:
 
     def load_overload(self, signature: Any, context: Any) -> CompileResult | None:
         """The kernel compiled for the types in ``signature``, or None where it must be compiled."""
-        context.refresh()  # a stored kernel refers to what Numba registers lazily
         for path, key in self._places(signature, context.codegen().magic_tuple()):
             payload = _read(path, key)
             if payload is not None:

@@ -172,19 +172,19 @@ class Mesh:
         Unlike area weights, angles do not depend on how a flat region is cut into triangles (Thürmer and
         Wüthrich 1998). A vertex that no face with area uses gets zero.
         """
-        corners = self.triangles
-        weighted = np.empty_like(corners)
-        face_normals = self.face_normals()
+        x, y, z = (np.ascontiguousarray(self.vertices[:, axis])[self.faces.T] for axis in range(3))
+        corners = [(x[k], y[k], z[k]) for k in range(3)]
+        normals = _unit(_cross(*_scaled(_minus(corners[1], corners[0]), _minus(corners[2], corners[0]))))
+        # Each edge once, as the way from a corner to the next; the way back is the same with other signs.
+        edges = [_unit(_minus(corners[(k + 1) % 3], corners[k])) for k in range(3)]
+        weighted = np.empty((3, *self.faces.shape))
         for corner in range(3):
-            to_next = _unit(corners[:, (corner + 1) % 3] - corners[:, corner])
-            to_last = _unit(corners[:, (corner + 2) % 3] - corners[:, corner])
-            # 2 atan2(|a - b|, |a + b|) is accurate for every angle, as acos(a . b) is not (Kahan 2006).
-            apart, along = to_next - to_last, to_next + to_last
-            angle = 2 * np.arctan2(_lengths(apart), _lengths(along))
-            weighted[:, corner] = face_normals * angle[:, None]
+            angle = _angle(edges[corner], edges[corner - 1])
+            for axis in range(3):
+                weighted[axis, :, corner] = normals[axis] * angle
         flat, count = self.faces.ravel(), len(self.vertices)
-        sums = [np.bincount(flat, weighted[:, :, axis].ravel(), minlength=count) for axis in range(3)]
-        return _unit(np.stack(sums, axis=1))
+        sums = [np.bincount(flat, along.ravel(), minlength=count).astype(np.float64) for along in weighted]
+        return np.stack(_unit((sums[0], sums[1], sums[2])), axis=1)
 
     def is_closed(self) -> bool:
         """Whether the faces bound a volume: each edge is used exactly twice, once in either direction.
@@ -226,7 +226,8 @@ class Mesh:
             # The cofactors are det times the inverse transpose, and exist for a singular map too.
             columns = np.ldexp(linear, -np.frexp(np.abs(linear).max())[1]).T
             cofactors = np.stack([np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)])
-            normals = _unit(self.normals @ cofactors) * (-1.0 if mirrors else 1.0)
+            turned = np.stack(_unit(_columns(self.normals @ cofactors)), axis=1)
+            normals = turned * (-1.0 if mirrors else 1.0)
         faces = self.faces[:, [0, 2, 1]] if mirrors else self.faces
         with np.errstate(over="ignore", invalid="ignore"):  # the constructor rejects it with its row
             vertices = self.vertices @ linear.T + affine[:3, 3]
@@ -300,8 +301,8 @@ def face_normals(corners: Float64Array) -> Float64Array:
 
     The edges are scaled by powers of two first, so that triangles of any size have one.
     """
-    first, second = _scaled_edges(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return _unit(np.cross(first, second))
+    first, second = (_columns(corners[:, k] - corners[:, 0]) for k in (1, 2))
+    return np.stack(_unit(_cross(*_scaled(first, second))), axis=1)
 
 
 def build_mesh(repairs: list[Repairs] | None, vertices: Any, faces: Any, **attributes: Any) -> Mesh:
@@ -363,21 +364,49 @@ def _read_only(array: NDArray[T]) -> NDArray[T]:
     return array
 
 
-def _scaled_edges(*edges: Float64Array) -> list[Float64Array]:
-    """Edges over a power of two near each row's largest component: products neither overflow nor vanish."""
-    # Column by column: NumPy reduces along a short last axis five times slower.
-    largest = np.maximum.reduce([np.abs(edge[:, axis]) for edge in edges for axis in range(3)])
+# Vectors by component, (n,) float64 each: NumPy works along contiguous columns several times faster than along rows of
+# three. Sums of three are written out, because what einsum makes of them depends on the processor.
+_Columns = tuple[Float64Array, Float64Array, Float64Array]
+
+
+def _columns(vectors: Float64Array) -> _Columns:
+    return vectors[:, 0], vectors[:, 1], vectors[:, 2]
+
+
+def _minus(a: _Columns, b: _Columns) -> _Columns:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _cross(a: _Columns, b: _Columns) -> _Columns:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _scaled(*vectors: _Columns) -> list[_Columns]:
+    """Vectors over a power of two near each row's largest component: products neither overflow nor vanish."""
+    largest = np.maximum.reduce([np.abs(column) for vector in vectors for column in vector])
     exponent = -np.frexp(largest)[1]
-    return [np.ldexp(edge, exponent[:, None]) for edge in edges]
+    if np.abs(exponent).max(initial=0) > 1000:  # beyond what a factor can be
+        return [(np.ldexp(x, exponent), np.ldexp(y, exponent), np.ldexp(z, exponent)) for x, y, z in vectors]
+    factor = np.ldexp(1.0, exponent)
+    return [(x * factor, y * factor, z * factor) for x, y, z in vectors]
 
 
-def _lengths(vectors: Float64Array) -> Float64Array:
-    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+def _length(a: _Columns) -> Float64Array:
+    length: Float64Array = np.sqrt((a[0] * a[0] + a[2] * a[2]) + a[1] * a[1])
+    return length
 
 
-def _unit(vectors: Float64Array) -> Float64Array:
-    """(n, 3) vectors at unit length; zero stays zero."""
-    (scaled,) = _scaled_edges(vectors)
-    lengths = _lengths(scaled)[:, None]
-    unit: Float64Array = np.divide(scaled, lengths, out=np.zeros_like(scaled), where=lengths > 0)
-    return unit
+def _unit(vectors: _Columns) -> _Columns:
+    """Vectors at unit length; zero stays zero."""
+    ((x, y, z),) = _scaled(vectors)
+    length = _length((x, y, z))
+    length[length == 0.0] = 1.0
+    return x / length, y / length, z / length
+
+
+def _angle(a: _Columns, b: _Columns) -> Float64Array:
+    """The angle between the unit vectors a and -b, 0 where one is zero."""
+    # 2 atan2(|a - c|, |a + c|) is accurate for every angle, as acos(a . c) is not (Kahan 2006); here c = -b.
+    plus = (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+    angle: Float64Array = 2 * np.arctan2(_length(plus), _length(_minus(a, b)))
+    return angle

@@ -1,19 +1,20 @@
 """Batches of rays against a tree: checks at the boundary, chunks on threads, and the results."""
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+import threading
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.batch import FARTHEST, LONGEST, SHORTEST, search_chunk, trace_chunk, trace_few
+from renderer.batch import FARTHEST, FEW_DEPTH, LONGEST, SHORTEST, search_chunk, trace_chunk, trace_few
 from renderer.errors import expect
 from renderer.layout import Tree
 from renderer.mesh import Mesh, face_normals
 from renderer.parallel import for_chunks
 from renderer.prepared import WIDTH
 from renderer.spawn import leave_faces
-from renderer.traverse import make_memory, stack_size
+from renderer.traverse import Memory, make_memory, stack_size
 
 # Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
 # taking a chunk costs nothing beside its 1 to 10 ms of tracing.
@@ -24,7 +25,8 @@ _LEAST_CHUNK = 1024
 FEW = WIDTH - 1
 
 
-@dataclass(frozen=True, eq=False)
+# Slots and not frozen: a call with one ray spends a third of its time on making objects.
+@dataclass(eq=False, slots=True)
 class Hits:
     """Closest hits, one row a ray.
 
@@ -73,6 +75,9 @@ def _array(argument: str, values: ArrayLike) -> NDArray[Any]:
     return array
 
 
+_MOST = float(np.finfo(np.float64).max)
+
+
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
     array = _array(argument, values)
     expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
@@ -80,6 +85,9 @@ def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
 
 
 def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
+    flags = array.flags
+    if flags.c_contiguous and flags.writeable and array.dtype == np.float64:
+        return array
     with np.errstate(over="ignore", invalid="ignore"):  # infinities and NaN are rejected with their row
         # Writable, because Numba would compile all kernels again for arrays that are not.
         return np.require(array, np.float64, ("C_CONTIGUOUS", "WRITEABLE"))
@@ -98,9 +106,11 @@ def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArr
     return array
 
 
-@dataclass(frozen=True)
-class Rays:
-    """Rays whose shapes and bounds passed the checks; build them with ``check_rays``. One origin may stand for all."""
+class RayBatch(NamedTuple):
+    """Rays whose shapes and bounds passed the checks; build them with ``check_rays``.
+
+    origins (n, 3) or (1, 3) for all, directions (n, 3), t_min and t_max (n,) or (1,) for all, all float64.
+    """
 
     origins: NDArray[np.float64]
     directions: NDArray[np.float64]
@@ -108,21 +118,32 @@ class Rays:
     t_max: NDArray[np.float64]
 
 
-def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike) -> Rays:
+_ZERO, _INFINITY = np.zeros(1), np.full(1, np.inf)
+
+
+def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike) -> RayBatch:
     """Check shapes, types and bounds of a batch; whether each ray is finite is seen when it is traced.
 
     Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
-    origins, directions = _vectors("origins", origins), _vectors("directions", directions)
-    expect(len(origins) == len(directions), "directions", f"{len(origins)} rows as in origins", len(directions))
-    low = _bound("t_min", t_min, len(origins), float(np.finfo(np.float64).max))
-    high = _bound("t_max", t_max, len(origins), np.inf)
+    if not (_is_plain(origins) and _is_plain(directions)):
+        origins, directions = _vectors("origins", origins), _vectors("directions", directions)
+    count = len(origins)
+    expect(count == len(directions), "directions", f"{count} rows as in origins", len(directions))
+    # The usual bounds, by identity of the defaults or as other zeros and infinities, need no arrays of their own.
+    low = _ZERO if type(t_min) is float and t_min == 0.0 else _bound("t_min", t_min, count, _MOST)
+    high = _INFINITY if type(t_max) is float and t_max == np.inf else _bound("t_max", t_max, count, np.inf)
     # An eye broadcast to all rays, as of a camera, need not be copied for each.
-    shared = len(origins) > 1 and origins.strides[0] == 0
-    return Rays(_doubles(origins[:1] if shared else origins), _doubles(directions), low, high)
+    shared = count > 1 and origins.strides[0] == 0
+    return RayBatch(_doubles(origins[:1] if shared else origins), _doubles(directions), low, high)
 
 
-def left(rays: Rays, leaving: ArrayLike, mesh: Mesh, threads: int) -> Rays:
+def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
+    """Whether it is an (n, 3) array of float64, as most are; a quick answer for calls with few rays."""
+    return type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2 and values.shape[1] == 3
+
+
+def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, threads: int) -> RayBatch:
     """The rays with their starts moved off the faces ``leaving``, see ``spawn.leave_faces``.
 
     Raises ``ValueError`` naming the argument and, for a face that is not there, its row.
@@ -143,10 +164,10 @@ def left(rays: Rays, leaving: ArrayLike, mesh: Mesh, threads: int) -> Rays:
         leave_faces(mesh.vertices, mesh.faces, rays.origins, rays.directions, faces, starts, begin, end)
 
     for_chunks(leave, count, CHUNK, threads)
-    return replace(rays, origins=starts)
+    return rays._replace(origins=starts)
 
 
-def _reject(rays: Rays, row: int, scale: float) -> None:
+def _reject(rays: RayBatch, row: int, scale: float) -> None:
     """Raise the error of a ray out of bounds."""
     origin = rays.origins[row if len(rays.origins) > 1 else 0]
     if not (np.abs(origin) * scale <= FARTHEST).all():
@@ -156,43 +177,41 @@ def _reject(rays: Rays, row: int, scale: float) -> None:
     expect(False, "directions", expected, f"{rays.directions[row].tolist()} in row {row}")
 
 
-def closest_hits(tree: Tree, rays: Rays, mesh: Mesh, threads: int) -> Hits:
+def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
     count = len(rays.directions)
-    if count <= FEW and tree.depth > 0:
-        return _few_hits(tree, rays, mesh)
+    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
+        t, u, v, face = _trace_few(tree, rays)
+        return Hits(t, face.view(np.int64), u, v, mesh)
     out = np.empty(count), np.empty(count, np.int64), np.empty(count), np.empty(count)
-    _run(tree, rays, (*out, np.empty(0, np.bool_)), threads, any_hit=False)
+    _run(tree, rays, (*out, _NO_BOOLS), threads, any_hit=False)
     return Hits(*out, mesh)
 
 
-def any_hits(tree: Tree, rays: Rays, threads: int) -> NDArray[np.bool_]:
+def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
     count = len(rays.directions)
-    if count <= FEW and tree.depth > 0:
-        return _few(tree, rays)[3].view(np.int64) >= 0
-    none, out = np.empty(0), np.empty(count, np.bool_)
-    _run(tree, rays, (none, np.empty(0, np.int64), none, none, out), threads, any_hit=True)
+    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
+        return _trace_few(tree, rays)[3].view(np.int64) >= 0
+    out = np.empty(count, np.bool_)
+    _run(tree, rays, (_NONE, _NO_INTEGERS, _NONE, _NONE, out), threads, any_hit=True)
     return out
 
 
-def _few_hits(tree: Tree, rays: Rays, mesh: Mesh) -> Hits:
-    t, u, v, face = _few(tree, rays)
-    return Hits(t, face.view(np.int64), u, v, mesh)
+_NONE, _NO_INTEGERS, _NO_BOOLS = np.empty(0), np.empty(0, np.int64), np.empty(0, np.bool_)
 
 
-def _few(tree: Tree, rays: Rays) -> NDArray[np.float64]:
+def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
     """Closest hits of a few rays on the caller's thread, as ``batch.trace_few`` writes them."""
     out = np.empty((4, len(rays.directions)))
-    stack = np.empty(stack_size(tree.depth), np.int64)
-    row = trace_few(tree.words, rays.origins, rays.directions, rays.t_min, rays.t_max, out, stack)
+    row = trace_few(tree.words, *rays, out)
     if row >= 0:
         _reject(rays, row, tree.scale)
     return out
 
 
-def _run(tree: Tree, rays: Rays, out: Any, threads: int, any_hit: bool) -> None:
-    arrays, count = (rays.origins, rays.directions, rays.t_min, rays.t_max), len(rays.directions)
+def _run(tree: Tree, rays: RayBatch, out: Any, threads: int, any_hit: bool) -> None:
+    count = len(rays.directions)
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     bad: list[int] = []
 
@@ -200,12 +219,31 @@ def _run(tree: Tree, rays: Rays, out: Any, threads: int, any_hit: bool) -> None:
         # Only chunks behind a bad ray are left out, so the first bad ray is always among the found.
         if not bad or begin < bad[0]:
             if tree.depth > 0:
-                row = trace_chunk(tree.words, arrays, out, begin, end, any_hit, make_memory(tree.depth, end - begin))
+                row = trace_chunk(tree.words, rays, out, begin, end, any_hit, _thread_memory(tree.depth))
             else:
-                row = search_chunk(tree.words, arrays, out, begin, end, any_hit)
+                row = search_chunk(tree.words, rays, out, begin, end, any_hit)
             if row >= 0:
                 bad.append(row)
 
-    for_chunks(trace, count, size, threads)
+    if count <= size:
+        trace(0, count)
+    else:
+        for_chunks(trace, count, size, threads)
     if bad:
         _reject(rays, min(bad), tree.scale)
+
+
+class _Local(threading.local):
+    """Memory that one thread traces chunks in, kept from one chunk to the next: 100 kB."""
+
+    memory: Memory | None = None
+
+
+_local = _Local()
+
+
+def _thread_memory(depth: int) -> Memory:
+    memory = _local.memory
+    if memory is None or memory.stack_size < stack_size(depth):
+        memory = _local.memory = make_memory(depth, CHUNK)
+    return memory

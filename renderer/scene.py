@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from renderer.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.errors import MeshError, SceneError, expect
-from renderer.fields import Color, Fields, FiniteVector, Keys, first_fault
+from renderer.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
 from renderer.light import DirectionalLight, PointLight
 from renderer.material import Dielectric, Material, Mirror, Phong
 from renderer.mesh import Mesh
@@ -45,7 +45,7 @@ _Finite = Annotated[float, Field(strict=True)]
 
 def _path_or_mesh(value: Any) -> Any:
     if not isinstance(value, str | os.PathLike | Mesh):
-        raise ValueError(f"expected a path or a Mesh, got {type(value).__name__}")
+        raise ValueError(f"expected a path or a Mesh, got {shown(value)}")
     return value
 
 

@@ -157,6 +157,21 @@ def smaller(typingctx, a, b):
     return number(number, number), _extreme("<")
 
 
+# Words of ``local_words``: what a frame may take without asking the system, which on Windows is less than 4,096 bytes.
+LOCAL_WORDS = 500
+
+
+@intrinsic
+def local_words(typingctx):
+    """A ``pointer`` to LOCAL_WORDS int64 in the kernel's own frame, uninitialised and gone when it returns."""
+
+    def codegen(context, builder, sig, args):
+        words = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), LOCAL_WORDS))
+        return builder.bitcast(words, ir.IntType(64).as_pointer())
+
+    return types.CPointer(types.int64)(), codegen
+
+
 @intrinsic
 def double_of(typingctx, bits):
     """The float64 whose bits are those of an int64."""

@@ -87,6 +87,11 @@ def stack_size(depth: int) -> int:
     return 7 * depth + 24
 
 
+def depth_of_stack(size: int) -> int:
+    """The levels of a tree for which a stack of ``size`` entries is enough."""
+    return (size - 24) // 7
+
+
 def make_memory(depth: int, rays: int) -> Memory:
     """Memory for ranges of up to ``rays`` rays against a tree of ``depth`` levels."""
     size = stack_size(depth)

@@ -28,7 +28,7 @@ def doubled(x):
 """
 RUN = """
 from renderer.upper import answer
-print(answer(3), sum(answer.stats.cache_hits.values()), sum(answer.stats.cache_misses.values()))
+print(answer(3), sum(answer.entry.stats.cache_hits.values()), sum(answer.entry.stats.cache_misses.values()))
 """
 # What RUN prints: the answer, kernels loaded, kernels compiled.
 COMPILED, LOADED = ["17", "0", "1"], ["17", "1", "0"]
