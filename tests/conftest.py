@@ -1,5 +1,7 @@
 """Settings that all tests share."""
 
+import signal
+
 from hypothesis import settings
 
 from validation import tradeoff
@@ -10,3 +12,6 @@ settings.load_profile("fixed")
 
 # No test judges a time that was measured, so none waits for other contenders' threads to come to rest.
 tradeoff.REST = 0.0
+
+# A job in the background inherits SIGINT ignored, and would hand that on to the processes that tests interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -194,8 +194,14 @@ class Viewer {
     return { m: this.camera.matrix(), fovy: this.camera.fovy, ...this.size };
   }
 
-  // Ask for a frame, once there is something to draw.
+  // Ask for a drawing in the next frame.
   request() {
+    this.undrawn = true;
+    this.wake();
+  }
+
+  // Ask for a frame, once there is something to draw.
+  wake() {
     if (this.size) this.pending ??= requestAnimationFrame((now) => {
       this.pending = null;
       this.frame(now);
@@ -209,8 +215,9 @@ class Viewer {
     this.before = moving ? now : null;
     const waiting = this.mode === "brute" && performance.now() - this.movedAt < REST;
     if (this.dirty && this.connection?.ready && !waiting) this.sendView();
-    if (this.held) setTimeout(() => this.heldSince !== null && this.request(), HOLD);
-    else this.draw();
+    // An answer that came since this frame was asked for has drawn it all.
+    if (this.held) setTimeout(() => this.heldSince !== null && this.wake(), HOLD);
+    else if (this.undrawn) this.draw();
     if (moving || waiting) this.request();
   }
 
@@ -247,6 +254,7 @@ class Viewer {
 
   draw() {
     this.heldSince = null;
+    this.undrawn = false;
     const traced = TRACED.includes(this.mode);
     const current = traced && this.current;
     const live = current || (traced && this.recent);
@@ -263,7 +271,9 @@ class Viewer {
       ] });
     }
     if (this.mode === "gl") this.note({ seq: this.seq, step: 0, last: true }, this.view());
-    if (live && !current && this.layer) setTimeout(() => this.request(), STALE);
+    // A picture of an earlier camera stands for a while only, unless another drawing has replaced it by then.
+    this.standing = live && !current && Boolean(this.layer);
+    if (this.standing) setTimeout(() => this.standing && this.request(), STALE);
   }
 
   // Say on the stage which view is seen now.
