@@ -133,9 +133,8 @@ class Mesh:
             raise self._error(f"vertices: expected at most {MAX_VERTICES} rows, got {vertex_count}")
         if faces.size and (faces.min() < 0 or faces.max() >= vertex_count):
             row, corner = np.argwhere((faces < 0) | (faces >= vertex_count))[0]
-            raise self._error(
-                f"faces: expected indices of {vertex_count} vertices, got {faces[row, corner]} in row {row}"
-            )
+            there = f"indices from 0 to {vertex_count - 1}" if vertex_count else "no faces, as there are no vertices"
+            raise self._error(f"faces: expected {there}, got {faces[row, corner]} in row {row}")
         return np.array(faces, dtype=np.int32, order="C")
 
     @cached_property

@@ -250,7 +250,9 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike, repair: bool) -> tuple[Mesh, Re
 
 
 def _expect_mesh(mesh: object) -> None:
-    expect(isinstance(mesh, Mesh), "mesh", "a Mesh", type(mesh).__name__)
+    arrays = hasattr(mesh, "vertices") and hasattr(mesh, "faces")  # as a trimesh.Trimesh, or Open3D's mesh, has them
+    hint = ", whose arrays Octree(mesh.vertices, mesh.faces) takes" if arrays else ""
+    expect(isinstance(mesh, Mesh), "mesh", "a renderer.Mesh", f"{type(mesh).__module__}.{type(mesh).__name__}{hint}")
 
 
 def _expect_range(argument: str, value: object, largest: int) -> None:

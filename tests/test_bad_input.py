@@ -366,7 +366,7 @@ NOT_MESHES = [None, "x", 3, np.ones((3, 3)), [BOX], Mesh, {"vertices": []}]
 class TestWhatIsNoMesh:
     @pytest.mark.parametrize("accelerator", [Octree, BruteForce])
     def test_from_mesh(self, accelerator: Any, bad: Any) -> None:
-        with pytest.raises(ValueError, match=r"^mesh: expected a Mesh, got"):
+        with pytest.raises(ValueError, match=r"^mesh: expected a renderer.Mesh, got"):
             accelerator.from_mesh(bad)
 
     def test_concatenate(self, bad: Any) -> None:

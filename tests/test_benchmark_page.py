@@ -8,7 +8,18 @@ import pytest
 
 from renderer.mesh_io import save_ply
 from validation.benchmark import __main__ as command
-from validation.benchmark import ablation, frames, knobs, memory, meshes, page, processes, record, systems
+from validation.benchmark import (
+    ablation,
+    first_answers,
+    frames,
+    knobs,
+    memory,
+    meshes,
+    page,
+    processes,
+    record,
+    systems,
+)
 from validation.benchmark.ours import OURS, OURS_ONE
 
 
@@ -23,8 +34,13 @@ def _frames(*_: Any) -> dict[str, Any]:
 
 
 def _processes(*_: Any) -> dict[str, Any]:
-    names = (processes.WARM, processes.FIRST, processes.IMPORT)
+    names = (processes.WARM, processes.IMPORT)
     return {name: {"command": f"python {name}", "seconds": [0.25], "median": 0.25} for name in names}
+
+
+def _first_answers(*_: Any) -> dict[str, Any]:
+    row = {"unit": "CPU s", "values": [3.0, 4.0, 9.0], "median": 4.0}
+    return {"level": "x86-64-v3", "rows": {"first_hit_cpu": row}}
 
 
 def _ablation(*_: Any) -> dict[str, Any]:
@@ -44,6 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(command, "QUICK_RAYS", 300)
         patch.setattr(frames, "measure", _frames)
         patch.setattr(processes, "measure", _processes)
+        patch.setattr(first_answers, "measure", _first_answers)
         patch.setattr(ablation, "run", _ablation)
         patch.setattr(knobs, "run", lambda *_: None)
         row = {"systems": {OURS: {"rest": 100, "peak": 200, "own": 90}}}
@@ -81,7 +98,7 @@ def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: py
     assert "12.34" in text and "A &lt;made-up&gt; processor" in text and "pip install nobody" in text
     # Memory is not drawn for meshes as small as these.
     assert text.count("<svg") == 8 + 1
-    assert "0.9987654" in text
+    assert "0.9987654" in text and "First answers" in text and "--level x86-64-v3" in text
     assert "12.34" in capsys.readouterr().out
     for outside in ("http://", "https://", "<script", "<link"):
         assert outside not in text.replace("http://www.w3.org", "")
@@ -91,6 +108,8 @@ def test_the_terminal_shows_ratios_and_what_is_missing(folder: Path) -> None:
     lines = page.ratios(record.read(folder / "benchmark.json")).splitlines()
     assert any(line.startswith("spheres_") and "bounce" in line for line in lines)
     assert any("target import renderer: 0.25 s (below 0.5) met" in line for line in lines)
+    assert any("target first hit: 4.00 CPU s (below 8) met" in line for line in lines)
+    assert any("target first picture: - not measured" in line for line in lines)
     assert "not measured: nobody; pip install nobody" in lines
 
 
@@ -111,7 +130,7 @@ def test_other_records_are_refused(folder: Path, tmp_path: Path) -> None:
     stored = record.read(folder / "benchmark.json")
     path = tmp_path / "benchmark.json"
     path.write_text(json.dumps(stored | {"schema": 99}))
-    with pytest.raises(ValueError, match="schema 1, got 99"):
+    with pytest.raises(ValueError, match="schema 2, got 99"):
         record.read(path)
     path.write_text(json.dumps({k: v for k, v in stored.items() if k != "fits"}))
     with pytest.raises(ValueError, match="expected the keys"):

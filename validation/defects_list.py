@@ -137,7 +137,7 @@ PICTURES = (
             "_rotation(axis, -degrees) @ linear"),
     _python("pictures", "objects moved 0.1 % too far", "scene", "result[:3, 3] = self.translate",
             "result[:3, 3] = np.multiply(1.001, self.translate)"),
-    _python("pictures", "vertex normals of equal weights", "mesh", "= face_normals * angle[:, None]", "= face_normals"),
+    _python("pictures", "vertex normals of equal weights", "mesh", "= normals[axis] * angle", "= normals[axis]"),
     _python("pictures", "normals of the film point inwards", "prepared_scene", _IMAGE,
             "film.normal[...] *= -1; " + _IMAGE),
     _python("pictures", "a miss shows face 0 in the tiles from the third on", "prepared_scene", _IMAGE,

@@ -73,7 +73,7 @@ def measure(
     quick: bool, huge: bool, paths: tuple[Path, ...], command: str, step: Callable[[str], None]
 ) -> dict[str, Any]:
     """The whole record; see ``validation.benchmark.record``."""
-    from validation.benchmark import ablation, frames, knobs, meshes, processes, record, targets
+    from validation.benchmark import ablation, first_answers, frames, knobs, meshes, processes, record, targets
     from validation.benchmark.queries import fits
     from validation.benchmark.systems import available
 
@@ -94,6 +94,7 @@ def measure(
         "fits": fits(rows["queries"], series),
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
+        "first_answers": first_answers.measure(names, step),
         "ablation": ablation.run(quick, step), "knobs": knobs.run(quick, step),
     }  # fmt: skip
     return found | {"targets": targets.judged(found), "seconds": time.perf_counter() - began}

@@ -18,6 +18,7 @@ memory[]          mesh, faces, systems: rest, peak (bytes by which a process gro
 frames            scene, size, max_depth, faces, labels, contenders, ratios, rays (by contender), pictures: ssim,
                   mean_error, pixel_share against ours
 processes         by name: command, seconds, median
+first_answers     level, for which kernels were compiled ahead; rows by name: unit, values, median; null where not run
 ablation, knobs   see ``ablation.run`` and ``knobs.run``; null where not run
 targets[]         see ``targets.Target``; met and aimed are null where nothing was measured
 """
@@ -34,10 +35,10 @@ from renderer.files import write_atomically
 from validation import environment
 from validation.benchmark.contender import System
 
-SCHEMA = 1
+SCHEMA = 2
 KEYS = (
     "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series", "queries",
-    "fits", "builds", "memory", "frames", "processes", "ablation", "knobs", "targets",
+    "fits", "builds", "memory", "frames", "processes", "first_answers", "ablation", "knobs", "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 

@@ -1,0 +1,187 @@
+"""How kernels are compiled: pieces and entries, what other kernels may do with them, and other versions of Numba."""
+
+import gc
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from renderer import compiler
+from renderer.compile_notice import Stopwatch, compile_seconds
+
+ROOT = Path(__file__).parents[1]
+
+
+def kernel(function, forceinline=False):
+    """A kernel that is compiled in each process, whatever is on disk."""
+    made = compiler.Kernel(function, forceinline)
+    made.store.load_overload = made.store.save_overload = lambda *arguments: None
+    return made
+
+
+def inlined(function):
+    return kernel(function, forceinline=True)
+
+
+def attributes(made):
+    """The LLVM attributes of a kernel's own function in its piece."""
+    (compiled,) = made.piece.overloads.values()
+    (function,) = [f for f in compiled.library._final_module.functions if not f.is_declaration]
+    return set(function.attributes)
+
+
+def test_only_what_is_decorated_so_is_inlined_by_force():
+    """A kernel that an inlined one calls was inlined too, because Numba hands options on: rays 10 % slower."""
+
+    @kernel
+    def inner(x):
+        return x * 3
+
+    @inlined
+    def middle(x):
+        return inner(x) + 1
+
+    @kernel
+    def outer(x):
+        return middle(x) * 2
+
+    assert outer(2) == 14
+    assert b"alwaysinline" in attributes(middle)
+    assert b"alwaysinline" not in attributes(inner) | attributes(outer)
+
+
+def test_constants_compile_a_kernel_once():
+    @kernel
+    def power(x, n):
+        return x**n
+
+    @kernel
+    def sum_of_powers(x):
+        return power(x, 1) + power(x, 2) + power(x, 3)
+
+    assert sum_of_powers(2.0) == 14.0
+    assert len(power.piece.overloads) == 1
+
+
+def test_what_python_does_not_call_is_not_compiled_for_it():
+    @kernel
+    def below(x):
+        return x + 1
+
+    @kernel
+    def above(x):
+        return below(x) + 1
+
+    assert above(1) == 3
+    assert "entry" not in vars(below) and "piece" in vars(above)
+    assert below(1) == 2 and below.__name__ == "below"
+
+
+def test_plain_kernels_of_numba_may_call_ours():
+    @kernel
+    def low(x):
+        return x + 1.0
+
+    @kernel
+    def high(x):
+        return low(x) * 2.0
+
+    @numba.njit
+    def theirs(values):
+        total = np.zeros(1)
+        for value in values:
+            total[0] += high(value)
+        return total[0]
+
+    assert theirs(np.array([1.0, 2.0])) == 10.0
+    assert high(1.0) == 4.0
+
+
+def test_a_kernel_that_cannot_be_compiled_says_so_each_time():
+    @kernel
+    def wrong(x):
+        return x.no_such_attribute
+
+    for _ in range(2):
+        with pytest.raises(numba.core.errors.TypingError, match="no_such_attribute"):
+            wrong(1.0)
+    assert gc.isenabled()
+
+
+def test_compiling_leaves_the_garbage_collector_as_it_was():
+    @kernel
+    def once(x):
+        return x + 41
+
+    gc.disable()
+    try:
+        assert once(1) == 42 and not gc.isenabled()
+    finally:
+        gc.enable()
+    assert once(1.0) == 42.0 and gc.isenabled()
+
+
+def test_a_stopwatch_does_not_count_compiling():
+    @kernel
+    def timed(x):
+        return x * x
+
+    clock, before = Stopwatch(), compile_seconds()
+    timed(3)
+    compiled = compile_seconds() - before
+    assert compiled > 0.0
+    again = compile_seconds()
+    timed(4)
+    assert compile_seconds() == again
+    # What is left is the call, less than a wall clock would say by what was compiled.
+    assert 0.0 <= clock.seconds() < compiled + 10.0
+
+
+def test_the_probe_finds_a_numba_that_fits_and_one_that_does_not(monkeypatch):
+    before = compile_seconds()
+    compiler.probe()
+    assert compile_seconds() == before  # it is none of the user's kernels
+    monkeypatch.setattr(compiler, "_PIECE_PASSES", compiler._PIECE_PASSES[1:])
+    with pytest.raises(Exception, match=r"."):
+        compiler.probe()
+
+
+# What another version of Numba may have changed, before anything of ours is imported.
+PRETEND = "import numba\nnumba.__version__ = '0.99.0'\n"
+CHANGES = {
+    "a name is gone": "import numba.core.environment as e\ndel e.lookup_environment\n",
+    "stored kernels are made otherwise": "from numba.core.compiler import CompileResult\n"
+    "CompileResult._rebuild = lambda *a: None\n",
+}
+ASK = """
+from renderer.shading import fresnel
+print(fresnel(1.0, 1.0, 1.0, 1.5), fresnel(1.0, 1.0, 1.0, 1.5) == fresnel.py_func(1.0, 1.0, 1.0, 1.5))
+"""
+
+
+def ask(script: str, cache: Path) -> "subprocess.CompletedProcess[str]":
+    environment = {"NUMBA_CACHE_DIR": str(cache), "PATH": "", "HOME": str(cache)}
+    command = [sys.executable, "-c", script + ASK]
+    return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300, check=False)
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_kernels_work_without_our_compiler_where_numba_has_changed(tmp_path, change):
+    done = ask(PRETEND + CHANGES[change], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[1] == "True" and abs(float(done.stdout.split()[0]) - 0.04) < 1e-15
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("renderer: Numba 0.99.0 is not one of those that this version was made for (0.68.*): ")
+    assert not list(tmp_path.rglob("*.kernel"))
+
+
+def test_another_numba_that_fits_is_used_without_a_word_and_keeps_its_kernels(tmp_path):
+    for told in (1, 0):
+        done = ask(PRETEND, tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr.count("compiling kernels") == told == len(done.stderr.splitlines())
+        assert done.stdout.split()[1] == "True"
+    assert len(list(tmp_path.rglob("*.kernel"))) == 1

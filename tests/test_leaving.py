@@ -1,0 +1,155 @@
+"""Rays that leave faces: they meet neither that face nor another in its plane, and start where they should."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from meshes import make_mesh
+
+from renderer import BruteForce, Octree
+from renderer.shapes import box, grid, icosphere, torus
+
+SCALES = (1e-12, 1.0, 1e12)
+OFFSETS = (0.0, 1e3, 1e8)
+
+
+def on_faces(vertices, faces, seed, count=400):
+    """Faces, points on them as anyone computes them, and directions to all sides."""
+    rng = np.random.default_rng(seed)
+    face = rng.integers(0, len(faces), count)
+    u, v = rng.random((2, count))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    # At edges and corners too.
+    u[rng.random(count) < 0.1], v[rng.random(count) < 0.1] = 0.0, 0.0
+    p0, p1, p2 = vertices[faces[face]].transpose(1, 0, 2)
+    points = (1 - u - v)[:, None] * p0 + u[:, None] * p1 + v[:, None] * p2
+    return face, points, rng.normal(size=(count, 3)) * 10.0 ** rng.integers(-3, 4, (count, 1))
+
+
+@pytest.mark.parametrize("kind", ["icosphere", "torus", "box", "soup", "sizes"])
+@pytest.mark.parametrize("scale", SCALES)
+# In float32 nothing is left of a mesh 1e8 away.
+@pytest.mark.parametrize(("offset", "single"), [(o, s) for o in OFFSETS for s in (False, True) if not (s and o > 1e7)])
+def test_no_ray_meets_the_face_that_it_leaves(kind, scale, offset, single):
+    shapes = {"icosphere": lambda: icosphere(3), "torus": torus, "box": box}
+    mesh = shapes[kind]() if kind in shapes else None
+    vertices, faces = (mesh.vertices, mesh.faces) if mesh else make_mesh(kind, 3, 200)
+    vertices = vertices * scale + offset * scale * np.array([1.0, -0.7, 0.3])
+    if single:
+        vertices = vertices.astype(np.float32).astype(np.float64)
+    octree = Octree(vertices, faces)
+    face, points, directions = on_faces(vertices, faces, 7)
+    if single:
+        points = points.astype(np.float32)
+    hits = octree.closest_hit(points, directions, leaving=face)
+    assert not (hits.face == face).any()
+    np.testing.assert_array_equal(octree.any_hit(points, directions, leaving=face), hits.hit)
+    # Without it many do: the test would see it.
+    assert (octree.closest_hit(points, directions).face == face).any()
+    brute = BruteForce(vertices, faces).closest_hit(points, directions, leaving=face)
+    np.testing.assert_array_equal(brute.t, hits.t)
+    np.testing.assert_array_equal(brute.face, hits.face)
+
+
+@given(st.integers(0, 2**20))
+def test_soups_of_any_kind_keep_the_law(seed):
+    kinds = ("soup", "soup_float32", "sizes", "scaled", "far_away")
+    vertices, faces = make_mesh(kinds[seed % len(kinds)], seed, 12)
+    octree = Octree(vertices, faces)
+    face, points, directions = on_faces(vertices, faces, seed, 40)
+    assert not (octree.closest_hit(points, directions, leaving=face).face == face).any()
+
+
+def test_a_flat_wall_of_many_faces_is_left_whole():
+    """At the edges of its triangles, too: to leave out the own face by its number would not be enough."""
+    wall = grid(7, 5)
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    wall_in_space = wall.vertices @ turn.T + np.array([5.0, -3.0, 2.0])
+    octree = Octree(wall_in_space, wall.faces)
+    face, points, directions = on_faces(wall_in_space, wall.faces, 2, 4000)
+    plain = octree.closest_hit(points, directions)
+    assert (plain.hit & (plain.face != face)).any()
+    # The vertices are rounded, so the wall is flat to rounding only: grazing rays may meet what stands out.
+    normal = np.cross(*(wall_in_space[wall.faces[0]][1:] - wall_in_space[wall.faces[0]][0]))
+    slope = np.abs(directions @ normal) / np.linalg.norm(directions, axis=1) / np.linalg.norm(normal)
+    steep = slope > 1e-6
+    assert steep.mean() > 0.99
+    assert not octree.any_hit(points[steep], directions[steep], leaving=face[steep]).any()
+
+
+def test_out_of_a_closed_body_nothing_is_met_and_into_it_something_is():
+    ball = icosphere(4)
+    octree = Octree.from_mesh(ball)
+    face, points, directions = on_faces(ball.vertices, ball.faces, 3, 5000)
+    outwards = np.einsum("ij,ij->i", directions, ball.face_normals()[face]) > 0
+    hit = octree.any_hit(points, directions, leaving=face)
+    assert not hit[outwards].any() and hit[~outwards].all()
+
+
+def plane_distance(vertices, face, point):
+    """Exact sign and square of the distance of a point from a face's plane, with the plane's squared normal."""
+    p0, p1, p2, p = ([Fraction(float(x)) for x in vertex] for vertex in (*vertices[face], point))
+    a, b = [y - x for x, y in zip(p0, p1, strict=True)], [y - x for x, y in zip(p0, p2, strict=True)]
+    n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    return sum(k * (y - x) for k, x, y in zip(n, p0, p, strict=True)), sum(k * k for k in n)
+
+
+def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_distance():
+    from renderer.query import check_rays, left
+
+    ball = icosphere(2)
+    for offset in OFFSETS:
+        vertices = ball.vertices + offset
+        octree = Octree(vertices, ball.faces)
+        face, points, directions = on_faces(vertices, ball.faces, 5, 300)
+        # Some lie off the plane, on either side, by more than rounding.
+        points[::3] += 1e-6 * ball.face_normals()[face[::3]] * np.random.default_rng(0).choice([-1, 1], (100, 1))
+        rays = left(check_rays(points, directions, 0.0, np.inf), face, octree.mesh, 1)
+        normals = ball.face_normals()[face]
+        for k in range(len(face)):
+            side = 1 if directions[k] @ normals[k] >= 0 else -1
+            before, square = plane_distance(vertices, ball.faces[face[k]], points[k])
+            after, _ = plane_distance(vertices, ball.faces[face[k]], rays.origins[k])
+            assert side * after > 0
+            moved = np.linalg.norm(rays.origins[k] - points[k])
+            away = max(0.0, -side * float(before) / float(square) ** 0.5)
+            assert moved <= away + 2e-13 * (1.0 + offset)
+            if moved == 0.0:
+                assert side * before > 0
+
+
+def test_minus_one_leaves_no_face_and_one_number_stands_for_all():
+    octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    origins, directions = np.array([[0.2, 0.2, 0.0], [0.3, 0.3, 0.0]]), np.array([[0, 0, 1.0], [0, 0, -1.0]])
+    assert octree.any_hit(origins, directions, leaving=-1).tolist() == [True, True]
+    assert octree.any_hit(origins, directions, leaving=[0, -1]).tolist() == [False, True]
+    assert octree.any_hit(origins, directions, leaving=0).tolist() == [False, False]
+    assert not octree.any_hit(np.broadcast_to(origins[0], (20, 3)), np.tile(directions[0], (20, 1)), leaving=0).any()
+    assert octree.any_hit(np.empty((0, 3)), np.empty((0, 3)), leaving=np.empty(0, int)).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("bad", "told"),
+    [
+        ([0.0, 1.0], r"an integer or integers of shape \(2,\), got float64 of shape \(2,\)"),
+        ([0], r"an integer or integers of shape \(2,\), got int64 of shape \(1,\)"),
+        ([0, 1], r"faces from 0 to 0, or -1, got 1 in row 1"),
+        (-2, r"faces from 0 to 0, or -1, got -2 in row 0"),
+        (True, r"real numbers, got dtype bool"),
+        ("x", r"real numbers, got dtype <U1"),
+    ],
+)
+def test_faces_that_are_not_there_are_errors(bad, told):
+    octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.raises(ValueError, match=f"^leaving: expected {told}$"):
+        octree.any_hit([[0, 0, 0], [1, 1, 1]], [[0, 0, 1], [0, 0, 1]], leaving=bad)
+
+
+def test_rays_that_are_no_good_are_errors_all_the_same():
+    octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.raises(ValueError, match=r"^origins: expected finite"):
+        octree.closest_hit([[np.nan, 0, 0]], [[0, 0, 1]], leaving=0)
+    with pytest.raises(ValueError, match=r"^directions: expected finite, non-zero"):
+        octree.closest_hit([[0, 0, 0]], [[0, 0, 0]], leaving=0)

@@ -1,0 +1,189 @@
+"""How long the first answers take: with nothing compiled, with kernels compiled ahead, and call by call afterwards.
+
+CPU seconds are those of a process and its children, as the system counts them: what compiles in two processes at once
+does not look cheaper. Each process begins with a cache folder of its own.
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from renderer import child
+from renderer.levels import AHEAD_VARIABLE
+from validation.cases import SCENES
+
+_RUNS = 3
+_HERE = "validation.benchmark.first_answers"
+# float32 does not hold thirds, and does hold these vertices as they are.
+_FLOAT64, _FLOAT32 = "0.3333333333333333", "1.0"
+# Calls of one ray or few whose time is taken together: some milliseconds.
+_CALLS = 1_000
+
+
+class Spent(NamedTuple):
+    """What a process took: seconds on the wall, and CPU seconds with those of its children."""
+
+    wall: float
+    cpu: float
+
+
+def measure(installed: set[str], step: Callable[[str], None]) -> dict[str, Any] | None:
+    """``rows`` by name, with ``unit``, the ``values`` of all runs and their ``median``; and ``level``, of the kernels
+    compiled ahead. None where the system does not count what children spend.
+    """
+    if os.name != "posix":
+        return None
+    step("first answers")
+    found: dict[str, list[float]] = {}
+    with tempfile.TemporaryDirectory(prefix="first-") as name:
+        folder = Path(name)
+        level, ahead = _kernels_ahead(folder)
+        for run in range(_RUNS):
+            for what, value in _one_round(folder / str(run), ahead).items():
+                found.setdefault(what, []).append(value)
+        step("first answers: kernels compiled for a level beside native ones")
+        found |= _level_speed(folder, ahead)
+    step("first answers: a call of one ray")
+    found |= _calls(installed)
+    units = {"cpu": "CPU s", "wall": "s", "us": "us", "ratio": "times"}
+    rows = {
+        name: {"unit": units[name.rpartition("_")[2]], "values": values, "median": statistics.median(values)}
+        for name, values in found.items()
+    }
+    return {"level": level, "rows": rows}
+
+
+def _one_round(cache: Path, ahead: Path) -> dict[str, float]:
+    """Each first answer once, with an empty cache where it shall be cold."""
+    render = [sys.executable, "-P", "-m", "renderer", "render", str(SCENES / "three_models.toml"), "-o",
+              f"{cache}.png", "--resolution", "512x512", "--quiet"]  # fmt: skip
+    hit = child.command(f"{_HERE}:first_hit", _FLOAT64)
+    single = child.command(f"{_HERE}:first_hit", _FLOAT32)
+    cold = _spend(hit, NUMBA_CACHE_DIR=f"{cache}/hit")
+    again, other = _spend(hit, NUMBA_CACHE_DIR=f"{cache}/hit"), _spend(single, NUMBA_CACHE_DIR=f"{cache}/hit")
+    picture = _spend(render, NUMBA_CACHE_DIR=f"{cache}/picture")
+    named = {AHEAD_VARIABLE: str(ahead)}
+    return {
+        "first_hit_cpu": cold.cpu,
+        "first_hit_again_cpu": again.cpu,
+        "first_float32_hit_after_it_cpu": max(0.0, other.cpu - again.cpu),
+        "first_picture_wall": picture.wall,
+        "first_picture_cpu": picture.cpu,
+        "first_hit_ahead_cpu": _spend(hit, NUMBA_CACHE_DIR=f"{cache}/none1", **named).cpu,
+        "first_picture_ahead_wall": _spend(render, NUMBA_CACHE_DIR=f"{cache}/none2", **named).wall,
+    }
+
+
+def _spend(command: list[str], **more: str) -> Spent:
+    """Run a process; a child of ours, so that it counts to its last child."""
+    import resource  # only where ``supported``
+
+    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    environment = child.environment(OCTREE_RENDERER_QUIET="1", **more)
+    subprocess.run(command, env=environment, capture_output=True, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    wall = time.perf_counter() - began
+    return Spent(wall, after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+
+
+def _kernels_ahead(folder: Path) -> tuple[str, Path]:
+    """The best level that this machine runs but the last, and a folder of all kernels compiled for it."""
+    from renderer.kernel_store import runnable_levels
+
+    levels = runnable_levels()
+    # x86-64-v3 is what most machines of today have; where there is only one, that.
+    level = "x86-64-v3" if "x86-64-v3" in levels else levels[0]
+    ahead = folder / "ahead"
+    command = [sys.executable, "-P", "-m", "renderer", "compile", "--level", level, "-o", str(ahead), "--quiet"]
+    subprocess.run(command, env=child.environment(), capture_output=True, check=True)
+    return level, ahead
+
+
+def first_hit(size: str) -> None:
+    """In a process of its own: an octree over a small mesh of this size, and the hits of three rays."""
+    import numpy as np
+
+    from renderer import Octree
+    from renderer.shapes import icosphere
+
+    ball = icosphere(3)
+    octree = Octree(ball.vertices.astype(np.float32).astype(np.float64) * float(size), ball.faces)
+    origins, directions = np.eye(3) * 3.0, -np.eye(3)
+    assert octree.closest_hit(origins, directions).hit.all()
+
+
+def _level_speed(folder: Path, ahead: Path) -> dict[str, list[float]]:
+    """Seconds of native kernels over those for the level, ray by ray the same hits, in turn; 1 is as fast."""
+    command, rounds = child.command(f"{_HERE}:trace"), []
+    places = {"native": {"NUMBA_CACHE_DIR": f"{folder}/native"},
+              "level": {"NUMBA_CACHE_DIR": f"{folder}/empty", AHEAD_VARIABLE: str(ahead)}}  # fmt: skip
+    for _ in range(_RUNS):
+        said = {}
+        for name, more in places.items():
+            environment = child.environment(OCTREE_RENDERER_QUIET="1", **more)
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+            said[name] = json.loads(done.stdout.splitlines()[-1])
+        if said["native"]["digest"] != said["level"]["digest"]:
+            raise ValueError("kernels compiled for a level answer other bits than native ones")
+        rounds.append(said)
+    return {
+        f"level_speed_{family}_ratio": [r["native"][family] / r["level"][family] for r in rounds]
+        for family in ("camera", "random")
+    }
+
+
+def trace() -> None:
+    """In a process of its own: print seconds of camera and of random rays, and a digest of their hits."""
+    import hashlib
+
+    import numpy as np
+
+    from renderer import Octree
+    from validation.benchmark.families import families
+    from validation.benchmark.meshes import displaced_spheres
+
+    octree, digest, found = Octree.from_mesh(displaced_spheres(100_000)), hashlib.sha256(), {}
+    for family in families(octree, 200_000):
+        if family.name in ("camera", "random"):
+            times = []
+            for _ in range(5):
+                began = time.perf_counter()
+                hits = octree.closest_hit(family.origins, family.directions)
+                times.append(time.perf_counter() - began)
+            found[family.name] = statistics.median(times)
+            digest.update(np.concatenate([hits.t, hits.face, hits.u, hits.v]).tobytes())
+    print(json.dumps(found | {"digest": digest.hexdigest()}))
+
+
+def _calls(installed: set[str]) -> dict[str, list[float]]:
+    """Microseconds of a call with few rays, in our arrays and in the peers' own; all take turns."""
+    import numpy as np
+
+    from renderer.shapes import icosphere
+    from validation.benchmark import ours
+    from validation.benchmark.contender import Family
+    from validation.benchmark.systems import available
+
+    mesh = icosphere(5)
+    found: dict[str, list[float]] = {}
+    peers = {s.name: s.loaded(mesh.vertices, mesh.faces) for s in available()[0]
+             if s.name in ({ours.OURS, "embree", "open3d"} & {ours.OURS, *installed})}  # fmt: skip
+    for count in (1, 10, 100):
+        rays = Family("few", np.tile([0.1, 0.2, 3.0], (count, 1)), np.tile([0.0, 0.0, -1.0], (count, 1)))
+        queries = {name: peer.closest(rays).trace for name, peer in peers.items()}
+        for _ in range(_RUNS):
+            for name, query in queries.items():
+                query()
+                began = time.perf_counter()
+                for _ in range(_CALLS):
+                    query()
+                micros = 1e6 * (time.perf_counter() - began) / _CALLS
+                found.setdefault(f"call_of_{count}_{name}_us", []).append(micros)
+    return found
