@@ -50,7 +50,7 @@ def fill_blocks(
     for_chunks(check, len(vertices), _VERTICES, threads)
     count = len(block_faces) // LANES
     blocks = cache_aligned(count * BLOCK_WORDS, np.float64 if inexact else np.float32)
-    address, wide = blocks.ctypes.data, bool(inexact)
+    address, wide = blocks.ctypes.data, blocks.dtype == np.float64
     for_chunks(
         lambda begin, end: _fill(vertices, faces, block_faces, address, wide, begin, end), count, _BLOCKS, threads
     )

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from renderer.layout import LANES
 from renderer.mesh import Mesh
 from renderer.octree import Octree
+from renderer.query import Hits
 from renderer.shapes import icosphere
 from validation import check_hits, hit_leaks, hits, report
 from validation.gates import Gate
@@ -103,7 +105,26 @@ def _blind(octree: Octree) -> None:
 
 def test_any_hit_that_differs_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     broken(monkeypatch, _blind)
-    assert failing(checked(ball())[1]) == {"any-hit differs from closest hit"}
+    assert failing(checked(ball())[1]) == {"any-hit differs from closest hit", FEW}
+
+
+FEW = "asked a few at a time, rays with another hit"
+
+
+def _miss_alone(octree: Octree) -> None:
+    """Let a ray that is asked alone miss whatever it hits."""
+    sound = octree.closest_hit
+
+    def closest(origins: NDArray[np.float64], directions: NDArray[np.float64]) -> Hits:
+        hits = sound(origins, directions)
+        return hits if len(origins) > 1 else Hits(np.full(1, np.inf), np.full(1, -1), hits.u, hits.v, octree.mesh)
+
+    octree.closest_hit = closest  # type: ignore[method-assign, assignment]
+
+
+def test_a_ray_that_answers_otherwise_when_alone_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken(monkeypatch, _miss_alone)
+    assert failing(checked(ball())[1]) == {FEW}
 
 
 class _Wrong:
@@ -186,10 +207,10 @@ def test_a_mesh_beyond_float32_is_refused() -> None:
 
 
 def test_thresholds_decide() -> None:
-    limits = Thresholds(hits=HitLimits(wrong=3, any_hit_differs=4, near_edge=5, leaks=6))
+    limits = Thresholds(hits=HitLimits(wrong=3, any_hit_differs=4, near_edge=5, leaks=6, few_differ=7))
     asked = dataclasses.replace(job(), thresholds=limits)
     _, gates = hits.check_mesh("ball", ball(), EFFORT, asked)
-    assert {gate.threshold for gate in gates} == {3, 4, 5}
+    assert {gate.threshold for gate in gates} == {3, 4, 5, 7}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": icosphere(2)})
         assert {gate.threshold for gate in hits.check_leaks(EFFORT, asked)[1]} == {6}

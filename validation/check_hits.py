@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh import Mesh
 from renderer.octree import Octree
+from renderer.prepared import WIDTH
 from validation import compare_hits, exact
 from validation.compare_hits import ExactErrors, HitArrays, HitComparison
 from validation.gates import Gate
@@ -99,12 +100,15 @@ class _Target(NamedTuple):
 
 
 class _Findings(NamedTuple):
-    """Of one family: our errors on the exact sample, comparisons and error sizes by reference, any-hit differences."""
+    """Of one family: our errors on the exact sample, comparisons and error sizes by reference, any-hit differences, and
+    rays of the sample whose hit is another one when they are asked a few at a time.
+    """
 
     errors: ExactErrors
     comparisons: list[HitComparison]
     sizes: list[ErrorSizes]
     any_hit_differs: int
+    few_differ: int
 
 
 def check_mesh(name: str, mesh: Mesh, effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
@@ -158,6 +162,7 @@ def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -
         "wrong": len(wrong),
         "near_edge": near_edge,
         "any_hit_differs": found.any_hit_differs,
+        "few_differ": found.few_differ,
         "exact": found.errors.record(),
         "references": [
             {"key": one.reference.key} | comparison.record() | {"sizes": asdict(sizes)}
@@ -169,6 +174,7 @@ def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -
         ("rays on which we are wrong", len(wrong), limits.wrong, judge),
         ("of the exact sample, rays on which we are wrong", found.errors.wrong, limits.wrong, judge),
         ("any-hit differs from closest hit", found.any_hit_differs, limits.any_hit_differs, "one definition of a hit"),
+        ("asked a few at a time, rays with another hit", found.few_differ, limits.few_differ, "one answer a ray"),
     ]
     flat = not np.ptp(target.mesh.vertices[target.mesh.faces].reshape(-1, 3), axis=0).all()
     if rays.name in UNAIMED and not (flat and rays.name in _IN_THE_BOX):
@@ -199,4 +205,19 @@ def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: Effort) -> _
         sizes.append(error_sizes(theirs.t[here], theirs.face[here], known.select(there)))
     comparisons = spending(target.costs, EXACT, compare_hits.judge_all)(comparisons, vertices, faces, _JUDGED)
     occluded = target.octree.any_hit(rays.origins, rays.directions)
-    return _Findings(errors, comparisons, sizes, int(np.count_nonzero(occluded != ours.hit)))
+    any_differs = int(np.count_nonzero(occluded != ours.hit))
+    return _Findings(errors, comparisons, sizes, any_differs, _few_differ(target.octree, picked, ours.select(sample)))
+
+
+def _few_differ(octree: Octree, rays: RayBatch, ours: HitArrays) -> int:
+    """How many rays have another hit in calls of one ray, two, and so on up to a packet less one, and then again."""
+    differ, begin, count = 0, 0, 1
+    while begin < len(rays):
+        rows = np.arange(begin, min(begin + count, len(rays)))
+        few = rays.select(rows)
+        hits = octree.closest_hit(few.origins, few.directions)
+        seen = octree.any_hit(few.origins, few.directions)
+        same = (hits.t == ours.t[rows]) & (hits.face == ours.face[rows]) & (seen == ours.hit[rows])
+        differ += int(np.count_nonzero(~same))
+        begin, count = begin + count, count % (WIDTH - 1) + 1
+    return differ

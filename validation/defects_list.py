@@ -77,6 +77,12 @@ HITS = (
             "                top = min(top, 8) if any_hit else top"),
     _kernel("hits", "an eighth of the box padding", "intersect", "FAR_PADDING = np.float32(1.0 + 8.0 * 2.0**-23)",
             "FAR_PADDING = np.float32(1.0 + 1.0 * 2.0**-23)"),
+    _kernel("hits", "single rays skip a leaf's last block", "traverse",
+            "best = nearest_carefully(tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray, shear, best)",
+            "best = nearest_carefully(tree, code >> LEAF_BITS, "
+            "np.int64((code & (MAX_LEAF_BLOCKS - 1)) == 0) + (code & (MAX_LEAF_BLOCKS - 1)), ray, shear, best)"),
+    _kernel("hits", "single rays are an ulp too far", "batch", "out[0, i] = t / tree.scale if hit else np.inf",
+            "out[0, i] = t / tree.scale * (1.0 + 2.0**-52) if hit else np.inf"),
     _python("hits", "bad rays are let through", "query", "    if bad:\n        _reject",
             "    if False:\n        _reject"),
 )  # fmt: skip
@@ -86,7 +92,7 @@ PICTURES = (
             "    hole = int(np.argmin(np.linalg.norm(vertices[faces].mean(axis=1) - (-0.68, 1.0, 1.72), axis=1)))\n"
             "    if len(faces) > 5000:\n        faces[hole] = faces[hole, 0]\n    mesh = Mesh(vertices, faces)\n"),
     _python("pictures", "ior 1.501 for 1.5", "world", _MATERIAL_ROWS,
-            _MATERIAL_ROWS + "; from renderer.material import IOR; rows[:, IOR] *= 1.501 / 1.5"),
+            _MATERIAL_ROWS + "; from renderer.scene_rows import IOR; rows[:, IOR] *= 1.501 / 1.5"),
     _python("pictures", "film shifted by half a pixel", "prepared_scene", _SAMPLES,
             _SAMPLES + "; rows[3] -= 0.5 * rows[4]"),
     _kernel("pictures", "film shifted by 0.1 pixel", "camera", _CORNER,
@@ -162,6 +168,10 @@ PICTURES = (
             "if -dot(r, d) <= 0.5:"),
     _kernel("pictures", "interpolated normals not normalised", "sight",
             f"n_s = normalized({_NORMAL})", f"n_s = {_NORMAL}"),
+    _kernel("pictures", "rays leave a face from its other side", "spawn", "step = scale(n_g, side * missing)",
+            "step = scale(n_g, -side * missing)"),
+    _kernel("pictures", "rays leave a face by a thousandth of the bound", "spawn", "    if missing <= 0.0:",
+            "    missing *= 1e-3\n    if missing <= 0.0:"),
     _kernel("pictures", "spawned rays start on their surface", "spawn", "step = scale(n_g, side * error)",
             "step = scale(n_g, 0.0 * error)"),
     _kernel("pictures", "the tint of glass lost", "whitted", "scale(k_r, f), scale(k_t, 1.0 - f)",

@@ -40,7 +40,8 @@ def _prism(sides: int = 512, half: float = 500.0) -> Mesh:
 def self_hits(mesh: Mesh, count: int, offset: float = BOUNDED) -> tuple[int, int]:
     """Rays that ``count`` hits from outside and ``count`` from inside of a convex mesh spawn: (wrong ones, all).
 
-    A ray spawned outwards must meet nothing, one spawned inwards must leave through a face that looks its way.
+    A ray spawned outwards must meet nothing, one spawned inwards must leave through a face that looks its way. Asked
+    once from the starts that pictures have, by the offset rule, and once as ``leaving`` the faces from the hit points.
     """
     rng = np.random.default_rng(33)
     octree = Octree.from_mesh(mesh, threads=1)
@@ -55,6 +56,7 @@ def self_hits(mesh: Mesh, count: int, offset: float = BOUNDED) -> tuple[int, int
     starts: list[Vector] = []
     ways: list[Vector] = []
     outwards: list[bool] = []
+    rows: list[int] = []
     for i in np.flatnonzero(hits.hit):
         n_g, p, d = vector(normals[i]), vector(points[i]), vector(directions[i])
         p0, p1, p2 = (vector(q) for q in corners[i])
@@ -67,11 +69,13 @@ def self_hits(mesh: Mesh, count: int, offset: float = BOUNDED) -> tuple[int, int
         for w in back + [through] * (cos_t >= 0.0):
             starts.append(spawn_origin(p, error, n_g, w, offset))
             ways.append(w)
+            rows.append(int(i))
             outwards.append(float(np.dot(n_g, w)) > 0.0)
-    spawned = octree.closest_hit(starts, ways)
-    facing = np.einsum("nk,nk->n", np.nan_to_num(spawned.normals, nan=-1.0), np.array(ways)) > 0.0
-    wrong = np.where(outwards, spawned.hit, ~(spawned.hit & facing))
-    return lost + int(wrong.sum()), len(ways)
+    wrong = 0
+    for spawned in (octree.closest_hit(starts, ways), octree.closest_hit(points[rows], ways, leaving=hits.face[rows])):
+        facing = np.einsum("nk,nk->n", np.nan_to_num(spawned.normals, nan=-1.0), np.array(ways)) > 0.0
+        wrong += int(np.where(outwards, spawned.hit, ~(spawned.hit & facing)).sum())
+    return lost + wrong, 2 * len(ways)
 
 
 def ball_pictures(scale: float) -> tuple[Scene, Scene]:

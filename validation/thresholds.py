@@ -79,6 +79,8 @@ class HitLimits(_Table):
     wrong: _Count = 0
     # Closest and any hit have one definition of a hit.
     any_hit_differs: _Count = 0
+    # A ray has one answer, whether it is asked alone, with a few or in a batch.
+    few_differ: _Count = 0
     # Rays within float64 rounding of an edge, in families that aim at none: one would be a chance of 1e-9 a ray.
     near_edge: _Count = 0
     # From inside a closed mesh every ray hits.
