@@ -3,6 +3,7 @@
 import json
 import logging
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -168,3 +169,65 @@ print("\\roctree-render: compiling it\\n" in sys.stderr.getvalue().replace(" " *
 print(repr(sys.stderr.getvalue()))
 """
     assert output(script).splitlines()[0] == "True"
+
+
+def test_kernels_for_a_level_have_the_bits_of_native_ones_and_leave_nothing_to_compile(tmp_path):
+    """Compiled in one process for any machine of the level, found by another one that may not write anywhere near."""
+    from renderer.kernel_store import runnable_levels
+
+    folder, level = tmp_path / "kernels", runnable_levels()[-1]
+    command = [sys.executable, "-P", "-m", "renderer", "compile", "--queries", "--level", level, "-o", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
+    assert re.fullmatch(rf"compiled in \d+\.\d s; \d+ kernels in {re.escape(str(folder))}\n", done.stdout)
+    script = """
+import hashlib
+import numpy as np
+from renderer import Octree
+from renderer.compile_notice import compile_seconds
+from renderer.shapes import icosphere
+octree, rng = Octree.from_mesh(icosphere(5)), np.random.default_rng(1)
+origins, digest = 3.0 * rng.normal(size=(5000, 3)), hashlib.sha256()
+for count in (5, 5000):
+    for bent in (0.0, 1.0):
+        hits = octree.closest_hit(origins[:count], bent * rng.normal(size=(count, 3)) - origins[:count])
+        digest.update(np.concatenate([hits.t, hits.face, hits.u, hits.v]).tobytes())
+octree.refit(octree.mesh.vertices * [1.0, 2.0, 0.5])
+digest.update(octree.closest_hit(origins, -origins).t.tobytes())
+print(digest.hexdigest(), compile_seconds())
+"""
+    said = []
+    for more in ({}, {"OCTREE_RENDERER_KERNELS": str(folder), "NUMBA_CACHE_DIR": str(tmp_path / "empty")}):
+        options = {"cwd": ROOT, "env": {**os.environ, **more}, "timeout": 300}
+        out = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, **options)
+        said.append(out.stdout.split())
+    assert said[0][0] == said[1][0] and float(said[1][1]) == 0.0
+    assert not list((tmp_path / "empty").rglob("*.kernel"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--level", "x86-64-v3"], "--output: expected a folder, as kernels for a level are not this machine's"),
+        (["--level", "x86-64-v9", "-o", "x"], "invalid choice: 'x86-64-v9'"),
+        (["--queries", "--pictures"], "not allowed with argument"),
+    ],
+)
+def test_what_compile_does_not_take_is_one_line(arguments, told):
+    command = [sys.executable, "-P", "-m", "renderer", "compile", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2 and told in done.stderr.splitlines()[-1]
+
+
+def test_compile_shows_on_a_terminal_how_far_it_is():
+    script = """
+import io, sys
+class Terminal(io.StringIO):
+    def isatty(self): return True
+from renderer.cli import main
+sys.stderr = Terminal()
+assert main(["compile", "--queries"]) == 0
+shown = sys.stderr.getvalue()
+sys.stderr = sys.__stderr__
+print("brute force" in shown, "/5 " in shown)
+"""
+    assert output(script).split()[-2:] == ["True", "True"]

@@ -15,6 +15,7 @@ from renderer.files import write_atomically
 from renderer.mesh_io import load_mesh
 from renderer.scene import load_scene
 from validation import baseline, environment, junit, report, schema, summary
+from validation.cases import SCENES
 from validation.gates import Gate
 from validation.job import Job
 from validation.progress import steps
@@ -73,6 +74,10 @@ def run(asked: Request) -> dict[str, Any]:
 
 def _open(asked: Request) -> None:
     """Read every file that the user gave, so that a bad one is an error now and not minutes later."""
+    if not (asked.scenes or asked.meshes or SCENES.is_dir()):
+        raise ValueError(
+            f"expected --scene or --mesh, or the suite's own scenes in {SCENES}, which only a checkout has; got none"
+        )
     for scene in asked.scenes:
         _ = load_scene(scene).instances
     for mesh in asked.meshes:
