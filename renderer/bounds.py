@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.intersect import round_down, round_up
+from renderer.intersect import face_range
 from renderer.jit import inlined, kernel
-from renderer.simd import lane, larger, load8, select, smaller, splat8, store
+from renderer.simd import lane, load8, select, splat8, store
 
 # A box is eight 32-bit words: lower x, y, z, a face, and the negated upper x, y, z, and an unused one. The upper corner
 # is negated so that one vector minimum is the union of two boxes. The face is an int32 where a face has the box; of a
@@ -31,14 +31,13 @@ class Faces(NamedTuple):
 
 @kernel
 def face_boxes(vertices, faces, boxes, numbers, begin, end):
-    """The box of each face in ``begin:end``, rounded outwards."""
+    """The box of each face in ``begin:end``, as ``face_range`` has it."""
     for f in range(begin, end):
         a, b, c = faces[f]
         base = f * BOX
         for k in range(3):
-            x, y, z = vertices[a, k], vertices[b, k], vertices[c, k]
-            boxes[base + k] = round_down(smaller(x, smaller(y, z)))
-            boxes[base + 4 + k] = -round_up(larger(x, larger(y, z)))
+            low, high = face_range(vertices[a, k], vertices[b, k], vertices[c, k])
+            boxes[base + k], boxes[base + 4 + k] = low, -high
         numbers[base + FACE] = f
         boxes[base + 7] = 0.0
 

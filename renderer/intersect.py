@@ -17,10 +17,15 @@ FAR_PADDING = np.float32(1.0 + 8.0 * 2.0**-23)
 _LARGEST = np.float32(np.finfo(np.float32).max)
 _STEP = np.float32(2.0**-23)
 _TINY = np.float32(2.0**-149)
-# A sheared coordinate errs by 5 u of the distance to its vertex, so the determinant by some 20 u of ``across`` times
-# that distance. Above 2^-30 of it the barycentrics err by 2^-18 at most, of a face that is then no larger than its
-# distance: within what FAR_PADDING allows for, unless a ray starts that close to the rim of a very large face.
-_DOUBT = 2.0**-30
+# With A = ``across``, Z = ``along``, D = A + Z and u = 2^-53: a sheared coordinate errs by 4 u D, the edge functions
+# together by 9 u A D, their sum by 10 u A D and the numerator of t by 11 u A D Z. Where the numerator exceeds 2^-27 of
+# A D Z, and so the determinant 2^-27 of A D, t errs by 21 * 2^-26 = 2^-21.6 of itself, less than FAR_PADDING leaves
+# after a slab's own roundings (2^-20.4). The ray passes its plane beside the face by 9 * 2^-26 of the barycentrics at
+# most, 2^-21.8 of the width of the face's box: less than ``face_range`` adds. So such a hit lies at or behind the entry
+# of every box around its face, and a hit in doubt is moved there by ``settled``: the answer is the least t over all
+# faces, whatever the tree, the packet or the order.
+_DOUBT = 2.0**-27
+_ROOM = 2.0**-21
 
 
 @inlined
@@ -38,6 +43,18 @@ def round_down(x):
     y = smaller(np.float32(x), _LARGEST)
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) > x else np.float32(0.0)
     return np.float32(y - step)
+
+
+@inlined
+def face_range(a, b, c):
+    """The interval that the box of a face has on one axis, from its corners' coordinates: float32, rounded outwards.
+
+    Every box that claims to hold the face holds this one, which is wider than the corners by what a ray that hits the
+    face in float64 may pass beside it.
+    """
+    low, high = smaller(a, smaller(b, c)), larger(a, larger(b, c))
+    room = (high - low) * _ROOM
+    return round_down(low - room), round_up(high + room)
 
 
 @inlined
@@ -246,18 +263,19 @@ def see_triangles(tree, base, ray):
 
 @inlined
 def meet_planes(edges, ray):
-    """t of four triangles, and the mask of those in doubt: where rounding may have made the determinant."""
+    """t of four triangles, and the mask of those in doubt: where rounding may have made t, or the determinant."""
     x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant = edges
     across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
-    doubt = magnitude(determinant) <= across * (across + along) * splat4(_DOUBT)
-    return (e0 * z0 + e1 * z1 + e2 * z2) / (determinant * splat4(ray.direction_z)), doubt
+    numerator = e0 * z0 + e1 * z1 + e2 * z2
+    doubt = magnitude(numerator) <= across * (across + along) * along * splat4(_DOUBT)
+    return numerator / (determinant * splat4(ray.direction_z)), doubt
 
 
 @inlined
 def hit_triangles(tree, base, ray):
     """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt, t, and the
-    numerators of u and v with their denominator. Of a hit in doubt ``meets_face_box`` decides.
+    numerators of u and v with their denominator. Of a hit in doubt ``settled`` decides.
     """
     edges, seen = see_triangles(tree, base, ray)
     bits, zero = movemask(seen), splat4(0.0)
@@ -268,20 +286,21 @@ def hit_triangles(tree, base, ray):
 
 
 @kernel
-def meets_face_box(tree, at, ray, t):
-    """Whether the ray meets the box of the face at ``at`` no later than at t, and the face has an area.
+def settled(tree, at, ray, t):
+    """The t that counts of a hit in doubt of the face at ``at``: no less than where the ray enters the face's own box.
 
-    Of a face seen edge-on the edge functions are noise, and so are the hit and its t. Such a hit counts only if the
-    face's own box is entered no later than at its t; then every box around it is, and no tree can lose it.
-    The arithmetic is that of ``enter_boxes``; it starts from the ray, because keeping ``Slabs`` for it costs every ray.
+    NaN, which is no hit, where the ray misses that box or the face has no area: of a face seen edge-on the edge
+    functions are noise. The arithmetic is that of ``enter_boxes``, and monotone: boxes around this one are entered no
+    later. It starts from the ray, because keeping ``Slabs`` for it costs every ray.
     """
     largest = largest_of(ray)
-    limit = box_limit(t, largest)
-    t0, t1 = round_down(ray.t_min * largest), limit
+    t0, t1 = round_down(ray.t_min * largest), np.float32(np.inf)
     t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
     t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
     t0, t1 = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
-    return t0 <= np.float32(t1 * FAR_PADDING) and t0 <= limit and _has_area(tree, at)
+    if not (t0 <= np.float32(t1 * FAR_PADDING) and t0 <= _LARGEST and _has_area(tree, at)):
+        return np.nan
+    return t if t0 <= box_limit(t, largest) else np.float64(t0) / largest
 
 
 @inlined
@@ -294,8 +313,7 @@ def _coordinate(tree, at):
 def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
     """Narrow [t0, t1] to one axis of a face's own box."""
     row = at + 4 * axis
-    a, b, c = _coordinate(tree, row), _coordinate(tree, row + 12), _coordinate(tree, row + 24)
-    near, far = round_down(smaller(a, smaller(b, c))), round_up(larger(a, larger(b, c)))
+    near, far = face_range(_coordinate(tree, row), _coordinate(tree, row + 12), _coordinate(tree, row + 24))
     near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = _slab(axis, o, d, largest)
     if near_row > far_row:
         near, far = far, near

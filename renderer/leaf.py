@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.intersect import hit_triangles, make_shear, meets_face_box
+from renderer.intersect import hit_triangles, make_shear, settled
 from renderer.jit import inlined, kernel
 from renderer.layout import BLOCK_COUNT, BLOCK_WORDS, BLOCKS, DEPTH, FACES, LANES, NODES, SCALE, WIDE
 from renderer.simd import (
@@ -15,8 +15,10 @@ from renderer.simd import (
     int32_pointer,
     lane,
     lowest_bit,
+    movemask,
     pointer,
     smaller,
+    splat4,
 )
 
 
@@ -72,8 +74,10 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
     doubtful = np.int64(0)
     for block in range(first, first + count):
         bits, doubts, t4, u4, v4, w4 = hit_triangles(tree, block * BLOCK_WORDS, shear)
-        doubtful |= doubts
-        bits &= ~doubts
+        if doubts != 0:
+            # What lies beyond the best hit matters no more, in doubt or not.
+            doubtful |= doubts & movemask((t4 >= splat4(t_min)) & (t4 <= splat4(t)))
+            bits &= ~doubts
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
@@ -86,7 +90,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
 
 @kernel
 def nearest_carefully(tree, first, count, ray, shear, best):
-    """``nearest_in_blocks`` with the hits in doubt that the boxes of their own faces confirm."""
+    """``nearest_in_blocks`` with the hits in doubt too, at the t at which they count."""
     t, face, u, v, w = best
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
@@ -96,8 +100,9 @@ def nearest_carefully(tree, first, count, ray, shear, best):
             bits &= bits - 1
             ti = lane(t4, i)
             fi = get(tree.faces, block * LANES + i)
-            better = ti >= ray.t_min and (ti < t or (ti == t and fi < face))
-            if better and ((doubts >> i) & 1 == 0 or meets_face_box(tree, base + i, ray, ti)):
+            if (doubts >> i) & 1 != 0 and ray.t_min <= ti <= t:
+                ti = settled(tree, base + i, ray, ti)
+            if ti >= ray.t_min and (ti < t or (ti == t and fi < face)):
                 t, face, u, v, w = ti, fi, lane(u4, i), lane(v4, i), lane(w4, i)
     return t, face, u, v, w
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.blocks import fill_blocks
-from renderer.intersect import round_down, round_up
+from renderer.intersect import face_range
 from renderer.jit import kernel
 from renderer.layout import CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, cache_aligned
 from renderer.parallel import for_chunks
@@ -28,18 +28,18 @@ def _fit_leaves(vertices, faces, block_faces, nodes, links, begin, end):
 
 @kernel
 def _fit_leaf(vertices, faces, block_faces, leaf, nodes, at):
-    """Set the box whose words are ``at``, ``at + 8``, ... to that of the faces in the places ``leaf`` = (first, last),
-    rounded outwards.
+    """Set the box whose words are ``at``, ``at + 8``, ... to the union of those of the faces in the places ``leaf`` =
+    (first, last).
     """
     for axis in range(3):
-        low, high = np.inf, -np.inf
+        low, high = np.float32(np.inf), np.float32(-np.inf)
         for i in range(leaf[0], leaf[1]):
             face = block_faces[i]
             if face >= 0:
-                for corner in range(3):
-                    x = vertices[faces[face, corner], axis]
-                    low, high = smaller(low, x), larger(high, x)
-        nodes[at + 16 * axis], nodes[at + 16 * axis + 8] = round_down(low), round_up(high)
+                a, b, c = faces[face]
+                bottom, top = face_range(vertices[a, axis], vertices[b, axis], vertices[c, axis])
+                low, high = smaller(low, bottom), larger(high, top)
+        nodes[at + 16 * axis], nodes[at + 16 * axis + 8] = low, high
 
 
 @kernel

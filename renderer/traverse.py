@@ -32,6 +32,7 @@ from renderer.stream import (
 # Rays whose slopes against their dominant axis differ by more than this from the first one's are no packet. It only
 # spares rays that point anywhere the attempt: how far a packet goes, its budget tells.
 _SPREAD = 0.125
+_MOST = np.finfo(np.float64).max
 
 
 class Rays(NamedTuple):
@@ -126,7 +127,8 @@ def ray_at(rays, i):
         s * get(o, 0), s * get(o, 1), s * get(o, 2), get(d, 0), get(d, 1), get(d, 2),
         s * get(rays.t_min, i * rays.min_step),
     )  # fmt: skip
-    return ray, s * get(rays.t_max, i * rays.max_step)
+    # A hit beyond the largest number, in either unit, is none.
+    return ray, smaller(s * smaller(get(rays.t_max, i * rays.max_step), _MOST), _MOST)
 
 
 @kernel
@@ -184,7 +186,8 @@ def _write(found, i, scale, best, any_hit):
     if any_hit:
         put(found.hit, i, hit)
         return
-    put(found.t, i, t / scale if hit else np.inf)
+    # No hit is at -0.0.
+    put(found.t, i, t / scale + 0.0 if hit else np.inf)
     put(found.face, i, np.int64(face if hit else -1))
     put(found.u, i, u / w if hit else np.nan)
     put(found.v, i, v / w if hit else np.nan)

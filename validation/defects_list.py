@@ -67,6 +67,9 @@ HITS = (
     _kernel("hits", "faces are culled from behind", "intersect", "seen = (not_negative | not_positive)",
             "seen = (not_negative & not_negative)"),
     _kernel("hits", "hits in doubt are not settled", "traverse", "    if doubtful:\n", "    if False:\n"),
+    _kernel("hits", "hits in doubt may lie before their boxes", "intersect",
+            "return t if t0 <= box_limit(t, largest) else np.float64(t0) / largest", "return t"),
+    _kernel("hits", "hits are in doubt too late", "intersect", "_DOUBT = 2.0**-27", "_DOUBT = 2.0**-40"),
     _kernel("hits", "stale boxes of inner nodes after a refit", "refit", "    _fit_nodes(nodes, links)\n", ""),
     _python("hits", "stale triangles after a refit", "refit", "fill_blocks(vertices, faces, tree.faces, threads)",
             "tree.blocks"),
@@ -81,8 +84,8 @@ HITS = (
             "best = nearest_carefully(tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray, shear, best)",
             "best = nearest_carefully(tree, code >> LEAF_BITS, "
             "np.int64((code & (MAX_LEAF_BLOCKS - 1)) == 0) + (code & (MAX_LEAF_BLOCKS - 1)), ray, shear, best)"),
-    _kernel("hits", "single rays are an ulp too far", "batch", "out[0, i] = t / tree.scale if hit else np.inf",
-            "out[0, i] = t / tree.scale * (1.0 + 2.0**-52) if hit else np.inf"),
+    _kernel("hits", "single rays are an ulp too far", "batch", "out[0, i] = t / tree.scale + 0.0 if hit",
+            "out[0, i] = t / tree.scale * (1.0 + 2.0**-52) if hit"),
     _python("hits", "bad rays are let through", "query", "    if bad:\n        _reject",
             "    if False:\n        _reject"),
 )  # fmt: skip

@@ -1,0 +1,231 @@
+"""One answer whatever the order: every tree, brute force, a refit, any threads, any batch and any order of the rays.
+
+Rays beside planes and edge-on to faces, where the t of a hit errs by more than a box is wide.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from meshes import assert_same_hits, make_mesh, options, rays_at, separate
+from numba import njit
+from numpy.random import Generator
+
+from renderer.intersect import Ray, hit_triangles, make_shear, settled
+from renderer.layout import BLOCK_WORDS, LANES
+from renderer.leaf import tree_pointers
+from renderer.octree import BruteForce, Octree
+from renderer.query import Hits
+from renderer.simd import lane
+
+SIDE = 100
+
+
+def flat_overlapping(count):
+    """Triangles with x = 0 that overlap, and where all float32 boxes are flat."""
+    corners = np.random.default_rng(0).uniform(-0.5, 0.5, (count, 3, 3))
+    corners[..., 0] = 0.0
+    return separate(corners)
+
+
+def beside(distance):
+    """Rays from a grid beside the plane x = 0, nearly along it."""
+    y, z = np.meshgrid(np.linspace(-0.5, 0.5, SIDE), np.linspace(-0.5, 0.5, SIDE))
+    origins = np.stack([np.full(y.size, distance), y.ravel(), z.ravel()], axis=1)
+    return origins, np.tile([-0.1, 1.0, 0.3], (y.size, 1))
+
+
+@pytest.fixture(scope="module")
+def flat():
+    return flat_overlapping(2000)
+
+
+@pytest.fixture(scope="module")
+def expected(flat):
+    """The hits of rays that begin 1e-12 beside the triangles, one at a time."""
+    octree = Octree(*flat, threads=1)
+    origins, directions = beside(1e-12)
+    rows = [octree.closest_hit(origins[i : i + 1], directions[i : i + 1]) for i in range(SIDE**2)]
+    return Hits(
+        *(np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "face", "u", "v")), octree.mesh
+    )
+
+
+def test_most_rays_beside_the_plane_hit_near_it(expected):
+    assert expected.hit.sum() > SIDE**2 // 2
+    assert abs(expected.t[expected.hit] - 1e-11).max() < 1e-15
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("split", ["midpoint", "sah"])
+def test_rays_beside_a_plane_hit_the_same_with_any_threads(flat, expected, threads, split):
+    assert_same_hits(Octree(*flat, split=split, threads=threads).closest_hit(*beside(1e-12)), expected)
+
+
+def test_rays_beside_a_plane_hit_the_same_by_brute_force(flat, expected):
+    assert_same_hits(BruteForce(*flat).closest_hit(*beside(1e-12)), expected)
+
+
+def test_rays_beside_a_plane_hit_the_same_after_a_refit(flat, expected):
+    vertices, faces = flat
+    octree = Octree(vertices[:, [0, 2, 1]] * [1.0, 3.0, 0.5], faces)
+    octree.refit(vertices)
+    assert_same_hits(octree.closest_hit(*beside(1e-12)), expected)
+
+
+def test_rays_beside_a_plane_hit_the_same_without_the_first_eight(flat, expected):
+    origins, directions = beside(1e-12)
+    hits = Octree(*flat).closest_hit(origins[8:], directions[8:])
+    for name in ("t", "face", "u", "v"):
+        np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name)[8:])
+
+
+@pytest.mark.parametrize("factor", [1 - 1e-6, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-6])
+@pytest.mark.parametrize("bound", ["t_min", "t_max"])
+def test_bounds_close_to_a_hit_mean_the_same_to_all(flat, expected, bound, factor):
+    bounds = {bound: np.where(expected.hit, expected.t, 1.0) * factor}
+    rays = beside(1e-12)
+    octree = Octree(*flat, threads=1)
+    hits = octree.closest_hit(*rays, **bounds)
+    if bound == "t_max":
+        np.testing.assert_array_equal(hits.hit, expected.hit & (factor >= 1.0))
+    for other in (Octree(*flat, threads=3), Octree(*flat, split="sah", leaf_size=32), BruteForce(*flat)):
+        assert_same_hits(other.closest_hit(*rays, **bounds), hits)
+        np.testing.assert_array_equal(other.any_hit(*rays, **bounds), hits.hit)
+
+
+def near_plane(rng: Generator, count: int):
+    """Rays that begin near the plane of a face, at it or at an edge of it, and go nearly along it or anywhere."""
+
+    def rays_near(vertices, faces):
+        if not len(faces):
+            return rng.normal(size=(2, count, 3))
+        corners = vertices[faces[rng.integers(0, len(faces), count)]]
+        size = np.abs(corners).max(axis=(1, 2), keepdims=True)[:, 0] + 1e-300
+        weights = rng.dirichlet(np.ones(3), (2, count))
+        weights[:, :, 0] *= rng.choice([1.0, 0.0, -1e-12], (2, count))
+        weights[0] *= rng.choice([1.0, 3.0], (count, 1))
+        origins, targets = np.einsum("mnk,nkj->mnj", weights, corners)
+        tiny = size * 10.0 ** rng.uniform(-18, 0, (count, 1)) * rng.choice([0.0, 1.0], (count, 1))
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        origins = origins + tiny * normals / (np.linalg.norm(normals, axis=1, keepdims=True) + 1e-300)
+        directions = targets - origins
+        directions[np.abs(directions).max(axis=1) < 1e-280] = [0.0, 0.0, 1.0]
+        same = rng.random(count) < 0.3  # so that packets form
+        directions[same] = directions[0]
+        return origins, directions
+
+    return rays_near
+
+
+def flattened(seed, count, kind):
+    """A mesh in one plane: across an axis at a float32, at no float32, or tilted."""
+    rng = np.random.default_rng(seed)
+    vertices, faces = make_mesh(kind, seed, count)
+    if not len(vertices):
+        return vertices, faces
+    axis = rng.integers(3)
+    vertices = vertices.copy()
+    style = seed % 5
+    if style < 3:
+        vertices[:, axis] = (0.0, 1.0, 0.1)[style]
+    elif style == 3:
+        vertices[:, axis] = vertices[:, (axis + 1) % 3] * 0.3 + vertices[:, (axis + 2) % 3] * 0.7
+    return vertices, faces
+
+
+@settings(max_examples=400)
+@given(
+    st.sampled_from(["soup", "soup_float32", "lattice", "duplicates", "sizes", "flat", "far_away", "scaled"]),
+    st.integers(0, 2**20),
+    st.integers(0, 60),
+    options,
+)
+def test_every_way_to_ask_has_the_same_answer(kind, seed, count, chosen):
+    rng = np.random.default_rng(seed)
+    vertices, faces = flattened(seed, count, kind)
+    origins, directions = near_plane(rng, 64)(vertices, faces)
+    first = BruteForce(vertices, faces, threads=1)
+    t_min = rng.choice([0.0, 1e-16, 1e-9])
+    expected = first.closest_hit(origins, directions, t_min)
+    close = np.where(expected.hit, expected.t * rng.choice([1 - 1e-7, 1.0, 1 + 1e-7], 64), np.inf)
+    asked = t_min, np.where(rng.random(64) < 0.5, close, np.inf)
+    expected = first.closest_hit(origins, directions, *asked)
+
+    octree = Octree(vertices, faces, **chosen)
+    moved = Octree(vertices[::-1] * 2.0, faces, **chosen)
+    moved.refit(vertices)
+    for accelerator in (octree, moved):
+        assert_same_hits(accelerator.closest_hit(origins, directions, *asked), expected)
+        np.testing.assert_array_equal(accelerator.any_hit(origins, directions, *asked), expected.hit)
+    np.testing.assert_array_equal(first.any_hit(origins, directions, *asked), expected.hit)
+    order = rng.permutation(64)
+    turned = octree.closest_hit(origins[order], directions[order], t_min, asked[1][order])
+    parts = [octree.closest_hit(origins[a:b], directions[a:b], t_min, asked[1][a:b]) for a, b in ((0, 8), (8, 64))]
+    for name in ("t", "face", "u", "v"):
+        np.testing.assert_array_equal(getattr(turned, name), getattr(expected, name)[order])
+        np.testing.assert_array_equal(np.concatenate([getattr(p, name) for p in parts]), getattr(expected, name))
+
+
+@njit(error_model="numpy")
+def judged(words, origins, directions, out):
+    """Of the ray i at the face i: 0 for a miss, 1 for a hit and 2 for one in doubt; its t, and the t that counts."""
+    tree = tree_pointers(words)
+    for i in range(len(origins)):
+        o, d = origins[i], directions[i]
+        ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
+        base, place = (i // LANES) * BLOCK_WORDS, i % LANES
+        bits, doubts, t4 = hit_triangles(tree, base, make_shear(ray))[:3]
+        t = lane(t4, place)
+        if (bits >> place) & 1 == 1 and t >= 0.0:
+            out[i, 0], out[i, 1] = 1 + ((doubts >> place) & 1), t
+            out[i, 2] = settled(tree, base + place, ray, t)
+
+
+def rays_close_to_planes(rng, count):
+    """Faces of all sizes and distances, flat in an axis at times, and a ray at each, many nearly in its plane."""
+    size = 10.0 ** rng.uniform(-9, 3, (count, 1, 1))
+    middle = rng.normal(size=(count, 1, 3)) * 10.0 ** rng.uniform(-3, 3, (count, 1, 1))
+    corners = middle + size * rng.normal(size=(count, 3, 3))
+    flat, axis = np.arange(0, count, 2), rng.integers(0, 3, (count + 1) // 2)
+    corners[flat, :, axis] = rng.choice([0.0, 1.0, 0.1, -3.3], (len(flat), 1))
+    targets = np.einsum("nk,nkj->nj", rng.dirichlet(np.full(3, 0.3), count), corners)
+    within = rng.normal(size=(count, 3))
+    along = np.einsum("nk,nkj->nj", within / within.sum(axis=1, keepdims=True), corners) - targets
+    slope = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-12, 0, (count, 1))
+    directions = np.where(rng.random((count, 1)) < 0.7, along + slope, rng.normal(size=(count, 3)))
+    return corners, targets - 10.0 ** rng.uniform(-10, 2, (count, 1)) * directions, directions
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_hit_beyond_doubt_lies_within_its_own_box_and_so_within_all(seed):
+    """The law of the order: see ``_DOUBT``. Sure hits satisfy it by the bound of their error, others are moved."""
+    corners, origins, directions = rays_close_to_planes(np.random.default_rng(seed), 100_000)
+    brute = BruteForce(*separate(corners))
+    assert brute.tree.scale == 1.0
+    np.testing.assert_array_equal(brute.tree.faces[: len(corners)], np.arange(len(corners)))
+    found = np.zeros((len(corners), 3))
+    judged(brute.tree.words, origins, directions, found)
+    sure, doubtful = found[:, 0] == 1, found[:, 0] == 2
+    assert sure.sum() > 20_000
+    assert doubtful.sum() > 2_000
+    np.testing.assert_array_equal(found[sure, 1], found[sure, 2])
+    counted = doubtful & ~np.isnan(found[:, 2])
+    assert (found[counted, 2] >= found[counted, 1]).all()
+    assert (found[counted, 2] > found[counted, 1]).any()
+
+
+def test_threads_share_such_rays_in_any_way(flat):
+    rays = [np.tile(part, (2, 1)) for part in beside(1e-9)]
+    octree = Octree(*flat, threads=2)
+    expected = Octree(*flat, threads=1).closest_hit(*rays)
+    with ThreadPoolExecutor(3) as callers:
+        for hits in callers.map(lambda _: octree.closest_hit(*rays), range(4)):
+            assert_same_hits(hits, expected)
+
+
+def test_rays_at_meshes_still_agree(flat):
+    rays = rays_at(*flat, 3, 400)
+    assert_same_hits(Octree(*flat).closest_hit(*rays), BruteForce(*flat).closest_hit(*rays))

@@ -1,0 +1,106 @@
+"""Row 46 of the extreme cases: rays whose hits err by more than the boxes are wide, asked in every order."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from renderer import BruteForce, Hits, Mesh, Octree
+from validation.compare_hits import HitArrays
+from validation.extreme import ExtremeCase, Outcome
+from validation.extreme_judgement import (
+    SEED,
+    against_exact,
+    as_exact,
+    count_hits,
+    embree_says,
+    of,
+    ray_batch,
+    same_bits,
+)
+from validation.rays import RayBatch, float32_exact
+
+# Exact arithmetic takes 20 ms a ray with 2,000 faces that all overlap.
+JUDGED = 64
+
+
+def sheets(count: int) -> Mesh:
+    """Triangles in the plane x = 0 that overlap: every float32 box around them is flat."""
+    corners = float32_exact(np.random.default_rng(SEED).uniform(-0.5, 0.5, (count, 3, 3)))
+    corners[..., 0] = 0.0
+    return Mesh(corners.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3))
+
+
+def beside_sheets(side: int) -> RayBatch:
+    """Rays from a square grid 1e-12 beside that plane, nearly along it."""
+    y, z = np.meshgrid(np.linspace(-0.5, 0.5, side), np.linspace(-0.5, 0.5, side))
+    return ray_batch(np.stack([np.full(y.size, 1e-12), y.ravel(), z.ravel()], axis=1), (-0.1, 1.0, 0.3))
+
+
+def _refitted(mesh: Mesh) -> Octree:
+    octree = Octree(mesh.vertices[:, [0, 2, 1]] * [1.0, 3.0, 0.5], mesh.faces)
+    octree.refit(mesh.vertices)
+    return octree
+
+
+def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tuple[str, Hits]]:
+    """The closest hits of the same rays by brute force, trees of all kinds, and batches cut and turned in many ways."""
+
+    def ask(accelerator: Octree | BruteForce, *pieces: np.ndarray) -> Hits:
+        far = np.broadcast_to(t_max, len(rays))
+        parts = [accelerator.closest_hit(rays.origins[p], rays.directions[p], t_max=far[p]) for p in pieces]
+        back = np.argsort(np.concatenate(pieces), kind="stable")
+        names = ("t", "face", "u", "v")
+        t, face, u, v = (np.concatenate([getattr(part, name) for part in parts])[back] for name in names)
+        return Hits(t, face, u, v, accelerator.mesh)
+
+    rows = np.arange(len(rays))
+    octree = Octree.from_mesh(mesh, threads=1)
+    builds: dict[str, Callable[[], Octree | BruteForce]] = {
+        "2 threads": lambda: Octree.from_mesh(mesh, threads=2),
+        "3 threads": lambda: Octree.from_mesh(mesh, threads=3),
+        "SAH": lambda: Octree.from_mesh(mesh, split="sah"),
+        "large leaves": lambda: Octree.from_mesh(mesh, leaf_size=32),
+        "a refit": lambda: _refitted(mesh),
+        "one thread": lambda: octree,
+    }
+    yield "brute force", ask(BruteForce.from_mesh(mesh), rows)
+    for name, build in builds.items():
+        yield name, ask(build(), rows)
+    yield "without the first eight", ask(octree, rows[8:], rows[:8])
+    yield "turned", ask(octree, rows[::-1])
+    yield "few at a time", ask(octree, *np.array_split(rows, len(rows) // 7))
+
+
+def differing(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray = np.inf) -> tuple[np.ndarray, Hits, list[str]]:
+    """The rays that some order answers otherwise than the first one, its hits, and which orders those are."""
+    asked = orders(mesh, rays, t_max)
+    _, first = next(asked)
+    differs, names = np.zeros(len(rays), dtype=np.bool_), []
+    for name, hits in asked:
+        other = ~same_bits(hits, first)
+        differs |= other
+        names += [name] * bool(other.any())
+    return differs, first, names
+
+
+def _order(quick: bool) -> Outcome:
+    mesh, rays = sheets(2000), beside_sheets(80 if quick else 200)
+    differs, hits, names = differing(mesh, rays)
+    # Half the limits cut the hit off by less than its error is large, half leave it.
+    close = np.where(hits.hit, hits.t, 1.0) * np.where(np.arange(len(rays)) % 2, 1 - 1e-9, 1 + 1e-9)
+    differs_close, _, names_close = differing(mesh, rays, close)
+    judged = np.linspace(0, len(rays) - 1, JUDGED).astype(int)
+    few = hits.t[judged], hits.face[judged]
+    right = as_exact(against_exact(mesh, rays.select(judged), HitArrays(*few)))
+    both = differs | differs_close
+    said = f"{of(both, 'rays')} differ" + (f": {', '.join(sorted({*names, *names_close}))}" if both.any() else "")
+    return Outcome(f"{said}; {of(hits.hit)}", right and not both.any(), *embree_says(mesh, rays, count_hits))
+
+
+CASES: tuple[ExtremeCase, ...] = (
+    ExtremeCase(
+        46, "2,000 overlapping faces in the plane x = 0, rays from 1e-12 beside it",
+        "the same bits by brute force, every tree, a refit, any threads, batch and order, with any t_max; as exact",
+        ("exact",), "none between orders; the derived bound of t", _order,
+    ),
+)  # fmt: skip
