@@ -4,13 +4,10 @@ import numpy as np
 
 from renderer.jit import inlined, kernel
 from renderer.leaf import NO_FACE, tree_pointers
+from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.simd import LOCAL_WORDS, get, larger, local_words, pointer
 from renderer.traverse import Found, Rays, depth_of_stack, make_scratch, ray_at, search_blocks, search_singly, trace
 
-# Origins as far as float32 boxes can tell from infinity, and directions whose product with a determinant, at most
-# 2^254 there, stays a normal float64 number, as does one of 2^-300 with the shortest.
-FARTHEST = 2.0**126
-SHORTEST, LONGEST = 2.0**-600, 2.0**700
 # The deepest tree whose stack fits into a kernel's own frame.
 FEW_DEPTH = depth_of_stack(LOCAL_WORDS)
 

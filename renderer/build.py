@@ -42,7 +42,9 @@ class _Subtree(NamedTuple):
 def build_tree(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, scale: float = 1.0, threads: int = 1
 ) -> Tree:
-    """Build the tree over all faces of vertices that were multiplied by ``scale``."""
+    """Build the tree over all faces of vertices that were multiplied by ``scale``; without faces it has no nodes."""
+    if not len(faces):
+        return build_blocks(vertices, faces, scale, threads)
     top, subtrees = _build_parts(vertices, faces, rule, threads)
     if len(subtrees) == 1:
         built = next(iter(subtrees.values()))

@@ -12,10 +12,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from renderer.errors import expect
 from renderer.fields import Fields, FiniteVector
+from renderer.limits import FARTHEST
 
 
 def unit(vector: ArrayLike) -> NDArray[np.float64]:
@@ -45,6 +46,13 @@ class _Camera(Fields):
             raise ValueError("expected target != eye and up not parallel to the view direction")
         return self
 
+    @field_validator("eye")
+    @classmethod
+    def _is_near_enough(cls, eye: tuple[float, float, float]) -> tuple[float, float, float]:
+        if max(map(abs, eye)) > FARTHEST:
+            raise ValueError(f"expected coordinates within {FARTHEST:.3g}, as far as rays are traced")
+        return eye
+
     def frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Unit vectors (right, up, forward) in world space, each (3,) float64."""
         forward = unit(np.subtract(self.target, self.eye))
@@ -68,10 +76,10 @@ class PerspectiveCamera(_Camera):
 
 
 class OrthographicCamera(_Camera):
-    """Parallel rays; ``height`` is the height of the film in scene units."""
+    """Parallel rays; ``height`` is the height of the film in scene units, up to ``limits.FARTHEST``."""
 
     type: Literal["orthographic"] = "orthographic"
-    height: Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
+    height: Annotated[float, Field(gt=0.0, le=FARTHEST, strict=True)]
 
     def rows(self, width: int, height: int) -> NDArray[np.float64]:
         """The affine map of the module's docstring, (6, 3) float64."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from renderer.bounds import BOX, FACE
 from renderer.jit import kernel
-from renderer.layout import CHILDREN, LANES, LEAF_BITS, NODE_WORDS
+from renderer.layout import CHILDREN, LANES, LEAF_BITS, NODE_WORDS, UNUSED
 from renderer.simd import larger
 
 # Parts that wait to become nodes: at most seven a level. Levels of cuts end at 3 * 64 by ``max_depth``, even halves
@@ -74,11 +74,11 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
 
 @kernel
 def _first_shares(tree, part, shares):
-    """Start to hand out a node's places; a whole part has itself as its only child, and none when it is empty."""
+    """Start to hand out a node's places; a whole part has itself as its only child."""
     if tree.choices[8 * part] > 0:
         return _share_out(tree, part, tree.choices[8 * part], 8, shares, 0)
     shares[0, 0], shares[0, 1] = part, 1
-    return 1 if tree.ranges[part, 1] > tree.ranges[part, 0] else 0
+    return 1
 
 
 @kernel
@@ -117,6 +117,7 @@ def _clear_node(nodes, links, base):
         for axis in range(3):
             nodes[base + 16 * axis + k] = np.inf
             nodes[base + 16 * axis + 8 + k] = -np.inf
+        links[base + CHILDREN + k] = UNUSED
 
 
 @kernel
@@ -134,17 +135,13 @@ def moved_link(link, node, block):
 
 @kernel
 def place_subtree(words, block_faces, start, links, all_block_faces):
-    """Copy a subtree's nodes and the faces of its blocks to their ``start`` = (node, block) in the whole.
-
-    Nodes are copied as int32. No node links to the subtree's first, so a link of 0 is that of an unused octant.
-    """
+    """Copy a subtree's nodes, as int32, and the faces of its blocks to their ``start`` = (node, block) in the whole."""
     node, block = start
     base = node * NODE_WORDS
     for i in range(len(words)):
         links[base + i] = words[i]
     for at in range(base, base + len(words), NODE_WORDS):
         for k in range(at + CHILDREN, at + CHILDREN + 8):
-            if links[k] != 0:
-                links[k] = moved_link(links[k], node, block)
+            links[k] = moved_link(links[k], node, block)
     for i in range(len(block_faces)):
         all_block_faces[block * LANES + i] = block_faces[i]

@@ -75,7 +75,7 @@ _WORDS = (
     (r"^expected (greater|less) ", r"expected a number \1 "),
     (r"^expected (tuple|list)\b", "expected a list"),
     (r"^expected integer", "expected an integer"),
-    (r"^expected (number|string|dictionary|boolean)", r"expected a \1"),
+    (r"^expected (number|string|dictionary|boolean)\b", r"expected a \1"),
 )
 
 

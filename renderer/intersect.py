@@ -25,22 +25,22 @@ _TINY = np.float32(2.0**-149)
 # of every box around its face, and a hit in doubt is moved there by ``settled``: the answer is the least t over all
 # faces, whatever the tree, the packet or the order.
 _DOUBT = 2.0**-27
-_ROOM = 2.0**-21
+ROOM = 2.0**-21
 
 
 @inlined
 def round_up(x):
-    """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN."""
+    """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN. Of a NaN the least one."""
     # No branch, here and below: whether a random ray takes it cannot be predicted.
-    y = larger(np.float32(x), -_LARGEST)
+    y = larger(-_LARGEST, np.float32(x))
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) < x else np.float32(0.0)
     return np.float32(y + step)
 
 
 @inlined
 def round_down(x):
-    """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN."""
-    y = smaller(np.float32(x), _LARGEST)
+    """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN. Of a NaN the largest."""
+    y = smaller(_LARGEST, np.float32(x))
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) > x else np.float32(0.0)
     return np.float32(y - step)
 
@@ -53,7 +53,7 @@ def face_range(a, b, c):
     face in float64 may pass beside it.
     """
     low, high = smaller(a, smaller(b, c)), larger(a, larger(b, c))
-    room = (high - low) * _ROOM
+    room = (high - low) * ROOM
     return round_down(low - room), round_up(high + room)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.intersect import ROOM
 from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 from renderer.mesh import Mesh
 
@@ -10,15 +11,15 @@ from renderer.mesh import Mesh
 def faults(tree: Tree, mesh: Mesh) -> list[str]:
     """What is wrong with ``tree`` as the octree of ``mesh``, in words; empty when all of these hold.
 
-    Every node and block is reached exactly once. A child's box contains its descendants' and every vertex of its
-    faces. Every face with its own vertices stands in exactly one place. No path is longer than ``tree.depth``. Unused
+    Every node and block is reached exactly once; without faces there is none. A child's box contains its descendants'
+    and the boxes of its faces, see ``intersect.face_range``. Every face with its own vertices stands in exactly one place. No path is longer than ``tree.depth``. Unused
     places hold no face and no area; unused octants have inverted boxes.
     """
     found = _block_faults(tree, mesh)
     nodes = len(tree.nodes) // NODE_WORDS
     reached, blocks_reached = np.zeros(nodes, np.int64), np.zeros(len(tree.faces) // LANES, np.int64)
     infinite = (np.full(3, -np.inf), np.full(3, np.inf))
-    pending = [(0, 1, *infinite)]
+    pending = [(0, 1, *infinite)] if nodes or len(mesh.faces) else []
     while pending:
         node, level, lower, upper = pending.pop()
         if not 0 <= node < nodes:
@@ -66,8 +67,10 @@ def _leaf_faults(
     blocks_reached[first : first + count] += 1
     faces = tree.faces[first * LANES : (first + count) * LANES]
     faces = faces[(faces >= 0) & (faces < len(mesh.faces))]
-    corners = mesh.vertices[mesh.faces[faces]].reshape(-1, 3)
-    outside = (corners < box[0]).any() or (corners > box[1]).any()
+    corners = mesh.vertices[mesh.faces[faces]]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    room = (high - low) * ROOM
+    outside = (low - room < box[0]).any() or (high + room > box[1]).any()
     return [f"{where}: a face reaches outside the leaf's box"] if outside else []
 
 

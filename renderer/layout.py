@@ -12,7 +12,7 @@ CACHE_LINE = 64
 # A node is NODE_WORDS 32-bit words, four cache lines. Words 0-47 are six rows of eight float32, one value an octant:
 # lower x, upper x, lower y, upper y, lower z, upper z. Words CHILDREN to CHILDREN + 7 are its children as int32 (the
 # same memory seen through ``links``); the last eight are unused. An empty octant has lower = +inf and upper = -inf,
-# which no ray enters.
+# which no ray enters, and the link UNUSED.
 NODE_WORDS = 64
 CHILDREN = 48
 
@@ -20,6 +20,10 @@ CHILDREN = 48
 # of blocks less one.
 LEAF_BITS = 3
 MAX_LEAF_BLOCKS = 1 << LEAF_BITS
+
+# A ray of numbers that are none (NaN) may enter an empty octant all the same. It finds a leaf of one block there, the
+# tree's first, or its subtree's: then every path through a tree is finite, and what is hit is a face of the mesh.
+UNUSED = -1
 
 # A block is nine rows of four values, one a triangle: p0 x, p0 y, p0 z, p1 x, ... p2 z. An unused place repeats
 # one vertex three times, which nothing hits, and has face -1.

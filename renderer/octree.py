@@ -149,11 +149,11 @@ class _Accelerator:
     def stats(self) -> Stats:
         """Counts and bytes of the built arrays, those of the mesh left out."""
         mesh, tree = self._built
-        children = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
+        children, used = _octants(tree)
         return Stats(
             faces=len(mesh.faces),
             nodes=len(children),
-            leaves=int((children < 0).sum()),
+            leaves=int((used & (children < 0)).sum()),
             depth=tree.depth,
             blocks=len(tree.faces) // LANES,
             references=int((tree.faces >= 0).sum()),
@@ -277,13 +277,18 @@ def _moved(mesh: Mesh, vertices: ArrayLike) -> Mesh:
     return replace(mesh, **changed)
 
 
+def _octants(tree: Tree) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """The children of all nodes, (n, 8), and which octants are not empty."""
+    words = tree.nodes.reshape(-1, NODE_WORDS)
+    return tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8], words[:, :8] <= words[:, 8:16]
+
+
 def _cost(tree: Tree) -> float:
     """``Stats.cost``; every box counts whole where the root's has no area, and every block where there is no node."""
     if not len(tree.nodes):
         return float(len(tree.faces) // LANES)
     rows = tree.nodes.reshape(-1, NODE_WORDS)[:, :CHILDREN].reshape(-1, 3, 2, 8)
-    children = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
-    used = children != 0
+    children, used = _octants(tree)
     extents = np.where(used[:, None], np.float64(rows[:, :, 1]) - rows[:, :, 0], 0.0)
     areas = (extents * np.roll(extents, 1, axis=1)).sum(axis=1)
     lower, upper = rows[0, :, 0].min(axis=1), rows[0, :, 1].max(axis=1)

@@ -189,8 +189,10 @@ def _middle_entry(nodes, base, beam, rays, t0):
 def _push_sorted(node, bits, t0, key, stack, top):
     """Push the octants in ``bits`` of a node, the one with the least key last: t0 over the octant's number.
 
-    Each one's place is the number of those behind it, so that no branch depends on the keys.
+    Each one's place is the number of those behind it, so that no branch depends on the keys. A NaN counts as -inf:
+    compared as it is, it would leave places unwritten.
     """
+    key = select(key > splat8(np.float32(-np.inf)), key, splat8(np.float32(-np.inf)))
     for i in range(8):
         k = splat8(lane(key, i))
         before, after = movemask(key >= k) & ((1 << i) - 1), movemask(key > k) & (0xFF << (i + 1))

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.batch import FARTHEST, FEW_DEPTH, LONGEST, SHORTEST, search_chunk, trace_chunk, trace_few
+from renderer.batch import FEW_DEPTH, search_chunk, trace_chunk, trace_few
 from renderer.errors import expect
 from renderer.layout import Tree
+from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh import Mesh, face_normals
 from renderer.parallel import for_chunks
 from renderer.prepared import WIDTH

@@ -16,14 +16,15 @@ _NODES = 1 << 10
 
 @kernel
 def _fit_leaves(vertices, faces, block_faces, nodes, links, begin, end):
-    """Set the boxes of all leaves of the nodes ``begin:end``."""
+    """Set the boxes of all leaves of the nodes ``begin:end``; empty octants, told by their boxes, stay empty."""
     for node in range(begin, end):
         for place in range(8):
-            code = ~links[node * NODE_WORDS + CHILDREN + place]
-            if code >= 0:
+            at = node * NODE_WORDS + place
+            code = ~links[at + CHILDREN]
+            if code >= 0 and nodes[at] <= nodes[at + 8]:
                 first = (code >> LEAF_BITS) * LANES
                 last = first + ((code & (MAX_LEAF_BLOCKS - 1)) + 1) * LANES
-                _fit_leaf(vertices, faces, block_faces, (first, last), nodes, node * NODE_WORDS + place)
+                _fit_leaf(vertices, faces, block_faces, (first, last), nodes, at)
 
 
 @kernel
@@ -44,13 +45,11 @@ def _fit_leaf(vertices, faces, block_faces, leaf, nodes, at):
 
 @kernel
 def _fit_nodes(nodes, links):
-    """Set the boxes of all nodes to the union of their children's. A child comes after its parent in memory, and no
-    node links to node 0.
-    """
+    """Set the boxes of all nodes to the union of their children's. A child comes after its parent in memory."""
     for node in range(len(nodes) // NODE_WORDS - 1, -1, -1):
         for place in range(8):
             child = links[node * NODE_WORDS + CHILDREN + place]
-            if child > 0:
+            if child >= 0:
                 for axis in range(3):
                     row, at = child * NODE_WORDS + 16 * axis, node * NODE_WORDS + 16 * axis + place
                     low, high = nodes[row], nodes[row + 8]

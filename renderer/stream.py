@@ -31,8 +31,10 @@ from renderer.simd import (
 )
 
 _LOW_WORD = 0xFFFFFFFF
-# What lies at the bottom of a ray's stack: no leaf's code, and at distance 0, so that nothing is beyond it.
+# What lies at the bottom of a ray's stack: no leaf's code, and at distance -inf, which is beyond no limit, not even a
+# NaN. So no ray, whatever its numbers, goes below its stack.
 END = -(1 << 31)
+_BOTTOM = (-0x800000 << 32) | (END & _LOW_WORD)
 _LINE = CACHE_LINE // 4
 
 
@@ -107,7 +109,7 @@ def begin_ray(lanes, r):
     """Let the prepared ray ``r`` start at the root."""
     put(lanes.child, r, 0)
     put(lanes.top, r, 1)
-    put(lanes.stacks, r * lanes.stack_size, END & _LOW_WORD)
+    put(lanes.stacks, r * lanes.stack_size, _BOTTOM)
 
 
 @inlined

@@ -76,7 +76,7 @@ def test_frame_is_orthonormal_right_handed_and_upright(seed: int) -> None:
 @pytest.mark.parametrize("scale", [1e-300, 1e-160, 1e-6, 1e6, 1e160, 1e300])
 def test_frame_does_not_depend_on_the_distance(scale: float) -> None:
     """Squares of such numbers overflow and vanish; the directions they stand for do neither."""
-    camera = perspective(eye=(0, 0, scale), target=(0, 0, 0), up=(0, 1 / scale, 0))
+    camera = perspective(eye=(0, 0, 0), target=(0, 0, -scale), up=(0, 1 / scale, 0))
     assert np.array(camera.frame()).tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, -1]]
 
 

@@ -258,7 +258,8 @@ def test_options_shape_the_tree(split):
     for size in (1, 3, 4, 7, 32):
         octree = Octree.from_mesh(mesh, split=split, leaf_size=size)
         links = octree.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
-        for code in ~links[links < 0]:
+        used = octree.tree.nodes.reshape(-1, NODE_WORDS)[:, :8] < np.inf
+        for code in ~links[used & (links < 0)]:
             first, count = code >> 3, (code & 7) + 1
             assert (octree.tree.faces[first * LANES : (first + count) * LANES] >= 0).sum() <= size
 

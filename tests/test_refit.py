@@ -239,4 +239,4 @@ def test_the_cost_of_what_has_no_area_counts_all():
     octree = Octree(point, [[0, 1, 2]] * 40)
     assert octree.stats.cost == octree.stats.blocks + octree.stats.nodes
     assert BruteForce(point, [[0, 1, 2]] * 40).stats.cost == 10
-    assert Octree([], []).stats.cost == 1
+    assert Octree([], []).stats.cost == 0

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from renderer.intersect import ROOM
 from renderer.layout import CHILDREN, LANES, NODE_WORDS
 from renderer.octree import BruteForce, Octree
 from renderer.shapes import icosphere, torus
@@ -79,8 +80,8 @@ class TestLevels:
         found = places(octree)
         (root,) = boxes_at(octree, 0)
         used = octree.mesh.vertices[octree.mesh.faces].reshape(-1, 3)
-        # Rounded outwards to float32: less than two of its ulp, a share of 2^-23 each.
-        slack = 2.0**-22 * np.abs(used).max()
+        # Wider by ROOM of the faces' widths, and rounded outwards to float32: less than two of its ulp, 2^-23 each.
+        slack = (2.0**-22 + 2.0 * ROOM) * np.abs(used).max()
         assert (root[:3] <= used.min(axis=0)).all() and (root[3:] >= used.max(axis=0)).all()
         assert (root[:3] >= used.min(axis=0) - slack).all() and (root[3:] <= used.max(axis=0) + slack).all()
         for place in found:
@@ -181,7 +182,8 @@ def test_a_ray_that_misses_the_root_visits_nothing() -> None:
     vertices = np.concatenate([icosphere(2).vertices - 5.0, icosphere(2).vertices + 5.0])
     faces = np.concatenate([icosphere(2).faces, icosphere(2).faces + len(icosphere(2).vertices)])
     (root,) = visited(Octree(vertices, faces), (0, 5, 9), (0, 0, -1))
-    assert root.level == 0 and root.lower.tolist() == [-6, -6, -6] and root.upper.tolist() == [6, 6, 6]
+    assert root.level == 0
+    np.testing.assert_allclose([root.lower, root.upper], [[-6.0] * 3, [6.0] * 3], rtol=2.0**-22 + ROOM)
 
 
 def test_without_a_tree_there_is_nothing_to_show() -> None:

@@ -8,7 +8,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from pydantic import ValidationError
 
 from renderer.camera import PerspectiveCamera
 from renderer.errors import expect
@@ -24,13 +23,7 @@ def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0) -> Perspec
     expect(rest == [0.0, 0.0, 0.0, 1.0], "m", "a last row of 0, 0, 0, 1", rest)
     up, back, eye = columns[1, :3], columns[2, :3], columns[3, :3]
     target = eye - distance * back
-    try:
-        return PerspectiveCamera(
-            eye=_vector(eye), target=_vector(target), up=_vector(up), fov=math.degrees(fovy), type="perspective"
-        )
-    except ValidationError as error:
-        fault = error.errors()[0]
-        raise ValueError(f"m and fovy: {fault['msg']}, got {list(m)} and {fovy}") from None
+    return PerspectiveCamera(eye=_vector(eye), target=_vector(target), up=_vector(up), fov=math.degrees(fovy))
 
 
 def camera_toml(camera: PerspectiveCamera) -> str:

@@ -1,0 +1,160 @@
+"""Kernels given rays of any float64 at all: they end, stay within their memory, and spoil no good ray beside them."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from meshes import make_mesh
+from numba import njit
+from numpy.typing import NDArray
+
+from renderer import (
+    Mesh,
+    OrthographicCamera,
+    PerspectiveCamera,
+    Phong,
+    Scene,
+    SceneError,
+    SceneObject,
+    load_scene,
+    render,
+)
+from renderer.batch import _found_pointers, _ray_pointers
+from renderer.leaf import tree_pointers
+from renderer.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.octree import Octree
+from renderer.shapes import icosphere
+from renderer.simd import bits_float
+from renderer.stream import _BOTTOM
+from renderer.traverse import make_memory, make_scratch, search_blocks, stack_size, trace
+
+# What arithmetic may end in, or begin with when nobody looked.
+WORST = np.array([0.0, 1.0, 0.3, 5e-324, 1e-310, 1e-30, 1e30, FARTHEST, 2.0**127, 3.5e38, 1e40, 1e300, 1.7e308, np.inf])
+ANY = np.concatenate([WORST, -WORST, [np.nan]])
+# Written around the memory of a search, and looked for afterwards.
+GUARD = 0x7EADBEEF
+
+
+@njit(error_model="numpy")
+def unchecked(words, rays, out, any_hit, memory, by_blocks):
+    """``trace_chunk`` without its check of the rays."""
+    tree = tree_pointers(words)
+    source, found, count = _ray_pointers(rays, tree.scale), _found_pointers(out), len(rays[1])
+    if by_blocks:
+        search_blocks(tree, source, found, 0, count, any_hit)
+    else:
+        trace(tree, source, found, 0, count, make_scratch(memory), any_hit)
+
+
+def answers(octree, rays, any_hit, by_blocks=False):
+    """t, face, u, v, hit of rays that nobody checked; and that the words around the scratch are as they were."""
+    count, memory = len(rays[1]), make_memory(octree.tree.depth, len(rays[1]))
+    padded = np.full(len(memory.integers) + 128, GUARD, np.int64)
+    memory = memory._replace(integers=padded[64:-64])
+    out = (
+        np.full(count, -7.0), np.full(count, -7), np.full(count, -7.0), np.full(count, -7.0), np.zeros(count, np.bool_)
+    )  # fmt: skip
+    unchecked(octree.tree.words, rays, out, any_hit, memory, by_blocks)
+    assert (padded[:64] == GUARD).all()
+    assert (padded[-64:] == GUARD).all()
+    return out
+
+
+def any_rays(rng, count, alike):
+    """Rays of the worst numbers, each alone or in sixteens with nearly one direction; and bounds as bad as they."""
+    origins, directions = rng.normal(size=(2, count, 3))
+    if alike:
+        directions = np.repeat(rng.normal(size=(-(-count // 16), 3)), 16, axis=0)[:count]
+        directions = directions * rng.choice([1.0, 1.0, 1e-300, 1e300, 5e-324], (count, 1))
+    for array, share in ((origins, 0.2), (directions, 0.0 if alike else 0.3)):
+        bad = rng.random(array.shape) < share
+        array[bad] = rng.choice(ANY, bad.sum())
+    t_min = np.where(rng.random(count) < 0.1, rng.choice(ANY, count), 0.0)
+    t_max = np.where(rng.random(count) < 0.1, rng.choice(ANY, count), np.inf)
+    return origins, directions, t_min, t_max
+
+
+def in_range(origins, directions, t_min, t_max):
+    """The rays that queries would take."""
+    largest = np.abs(directions).max(axis=1)
+    near, fits = (np.abs(origins) <= FARTHEST).all(axis=1), (largest >= SHORTEST) & (largest <= LONGEST)
+    return near & fits & np.isfinite(directions).all(axis=1) & (t_min >= 0.0) & (t_min < np.inf) & (t_max >= 0.0)
+
+
+@pytest.mark.parametrize("alike", [False, True], ids=["streams", "packets"])
+@pytest.mark.parametrize("kind", ["soup", "lattice", "sphere", "flat"])
+@pytest.mark.parametrize("any_hit", [False, True])
+def test_no_ray_leaves_its_stack_or_spoils_another(kind, alike, any_hit):
+    rng = np.random.default_rng([1, len(kind), alike])
+    mesh = icosphere(3) if kind == "sphere" else Mesh(*make_mesh(kind, 5, 500))
+    octree = Octree.from_mesh(mesh, leaf_size=4)
+    assert octree.tree.depth > 1
+    with np.errstate(all="ignore"):
+        rays = any_rays(rng, 6000, alike)
+        found, right = answers(octree, rays, any_hit), answers(octree, rays, any_hit, by_blocks=True)
+    good = in_range(*rays)
+    assert 500 < good.sum() < 5500
+    if any_hit:
+        np.testing.assert_array_equal(found[4][good], right[4][good])
+        return
+    assert (right[1][good] >= 0).sum() > 20
+    for ours, brute in zip(found[:4], right[:4], strict=True):
+        np.testing.assert_array_equal(ours[good], brute[good])
+    assert (found[1] >= -1).all()
+    assert (found[1] < len(mesh.faces)).all()
+
+
+def test_the_bottom_of_a_stack_is_beyond_no_limit():
+    """The invariant that keeps a ray on its stack: an entry is passed over only where its distance > the limit."""
+
+    @njit
+    def bottom():
+        return bits_float(_BOTTOM >> 32)
+
+    with np.errstate(over="ignore"):
+        limits = np.concatenate([ANY, [-0.0, -np.inf]]).astype(np.float32)
+    assert not (bottom() > limits).any()
+
+
+def test_a_stack_has_room_for_seven_octants_a_level_and_the_eight_of_the_last():
+    for depth in range(64):
+        assert stack_size(depth) >= 7 * depth + 8 + 1 + 8
+
+
+def scene_before(camera: Any) -> Scene:
+    ball = SceneObject(mesh=icosphere(2), material="grey")
+    return Scene(camera=camera, materials={"grey": Phong()}, objects=[ball], ambient=1)
+
+
+@pytest.mark.parametrize("far", [1e38, 3.5e38, 1e40, 1e60, 1e300])
+@pytest.mark.parametrize("camera", [PerspectiveCamera, OrthographicCamera])
+def test_an_eye_too_far_away_is_refused_by_name(camera: Any, far: float, tmp_path: Any) -> None:
+    lens = {"height": 4.0} if camera is OrthographicCamera else {"fov": 1e-9}
+    with pytest.raises(SceneError, match=r"eye: expected coordinates within 8.51e\+37.* got \[0, 0, "):
+        camera(eye=[0, 0, far], target=[0, 0, 0], **lens)
+    kind = "orthographic" if camera is OrthographicCamera else "perspective"
+    ((key, value),) = lens.items()
+    path = tmp_path / "far.toml"
+    path.write_text(f'[camera]\ntype = "{kind}"\neye = [0, 0, {far}]\ntarget = [0, 0, 0]\n{key} = {value}\n')
+    with pytest.raises(SceneError, match=r"far.toml: .*camera.*eye: expected coordinates within"):
+        load_scene(path)
+
+
+def film(image: Any) -> list[NDArray[Any]]:
+    return [image.radiance, image.depth, image.face, image.normal]
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [{"height": h} for h in (5e-324, 1e-300, 1e30, FARTHEST)] + [{"fov": f} for f in (5e-324, 1e-9, 179.99999999999997)],
+    ids=str,
+)
+def test_any_camera_ends_and_sees_what_brute_force_sees(lens: Any) -> None:
+    kind: Any = OrthographicCamera if "height" in lens else PerspectiveCamera
+    for x, z in itertools.product((0.0, -FARTHEST, 3e-310), (2.0, -1e37, FARTHEST)):
+        scene = scene_before(kind(eye=(x, 0, z), target=(0, 0, 0), **lens))
+        found, right = (render(scene, accelerator=a, resolution=(40, 24)) for a in ("octree", "brute"))
+        for ours, brute in zip(film(found), film(right), strict=True):
+            np.testing.assert_array_equal(ours, brute)
+        assert np.isfinite(found.radiance).all()
