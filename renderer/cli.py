@@ -3,6 +3,7 @@
 import argparse
 import logging
 import os
+import platform
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -13,9 +14,10 @@ from renderer import __version__
 from renderer.errors import expect
 from renderer.interrupt import interruptible
 from renderer.levels import AHEAD_VARIABLE, LEVELS
+from renderer.terminal import on_terminal
 
 
-@interruptible("octree-render: interrupted, nothing written")
+@interruptible("octree-render: interrupted")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``octree-render``; returns the exit code: 0, 2 for bad input, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
@@ -26,7 +28,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _hide_scipy_from_numba()
         with _compile_notices(getattr(options, "quiet", False)):
             options.command(options)
-    except (ValueError, OSError, ModuleNotFoundError) as error:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read our words, as ``| head`` does, has had enough of them. The picture is written.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (ValueError, OSError, ImportError) as error:
         print(f"octree-render: {_one_line(error)}", file=sys.stderr)
         return 2
     return 0
@@ -164,12 +171,12 @@ def _compile(options: argparse.Namespace) -> None:
     from tqdm import tqdm
 
     from renderer.compile_notice import compile_seconds
-    from renderer.kernel_store import stored_in
+    from renderer.kernel_store import lost, stored_in
     from renderer.precompile import PARTS, compile_ahead, compile_into
 
     if options.output is not None:
         compile_into(options.output)
-    visible = not options.quiet and sys.stderr.isatty()
+    visible = not options.quiet and on_terminal()
     with tqdm(total=len(PARTS[options.what]), unit="part", leave=False, disable=not visible) as bar:
 
         def began(name: str) -> None:
@@ -177,6 +184,8 @@ def _compile(options: argparse.Namespace) -> None:
             bar.update()
 
         compile_ahead(options.what, began)
+    if lost():
+        raise OSError(f"{lost()} kernels were compiled but could not be kept: {options.output or 'no cache folder'}")
     if not options.quiet:
         where = f"; {stored_in(options.output)} kernels in {options.output}" if options.output else ""
         print(f"compiled in {compile_seconds():.1f} s{where}")
@@ -185,6 +194,8 @@ def _compile(options: argparse.Namespace) -> None:
 def _choose_processor(level: str, output: Path | None) -> None:
     """Let Numba, which reads the environment when it is imported, compile for a level."""
     expect(output is not None, "--output", "a folder, as kernels for a level are not this machine's", "none")
+    own = platform.machine().lower()
+    expect((own in ("aarch64", "arm64")) == (level == "aarch64"), "--level", f"one of this processor's, {own}", level)
     expect("numba" not in sys.modules, "--level", "a process that has not imported Numba yet", "one that has")
     os.environ["NUMBA_CPU_NAME"] = LEVELS[level]
     os.environ["NUMBA_CPU_FEATURES"] = ""

@@ -30,7 +30,7 @@ ROOM = 2.0**-21
 
 @inlined
 def round_up(x):
-    """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN. Of a NaN the least one."""
+    """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN; of a NaN the least."""
     # No branch, here and below: whether a random ray takes it cannot be predicted.
     y = larger(-_LARGEST, np.float32(x))
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) < x else np.float32(0.0)
@@ -39,7 +39,7 @@ def round_up(x):
 
 @inlined
 def round_down(x):
-    """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN. Of a NaN the largest."""
+    """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN; of a NaN the largest."""
     y = smaller(_LARGEST, np.float32(x))
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) > x else np.float32(0.0)
     return np.float32(y - step)

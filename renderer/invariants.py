@@ -12,8 +12,9 @@ def faults(tree: Tree, mesh: Mesh) -> list[str]:
     """What is wrong with ``tree`` as the octree of ``mesh``, in words; empty when all of these hold.
 
     Every node and block is reached exactly once; without faces there is none. A child's box contains its descendants'
-    and the boxes of its faces, see ``intersect.face_range``. Every face with its own vertices stands in exactly one place. No path is longer than ``tree.depth``. Unused
-    places hold no face and no area; unused octants have inverted boxes.
+    and the boxes of its faces, see ``intersect.face_range``. Every face with its own vertices stands in exactly one
+    place. No path is longer than ``tree.depth``. Unused places hold no face and no area; unused octants have inverted
+    boxes.
     """
     found = _block_faults(tree, mesh)
     nodes = len(tree.nodes) // NODE_WORDS

@@ -45,6 +45,8 @@ def _decorated(function: Callable[..., Any], forceinline: bool) -> Any:
 @cache
 def _compiler() -> Any:
     """The module ``compiler``, or None where it does not fit this version of Numba; that is said once."""
+    if numba.config.DISABLE_JIT:
+        raise ImportError("renderer: NUMBA_DISABLE_JIT is set, but kernels run only compiled: unset it")
     try:
         from renderer import compiler
 

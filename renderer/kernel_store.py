@@ -13,9 +13,10 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from logging import getLogger
 from pathlib import Path
+from types import CodeType, ModuleType
 from typing import Any
 
 import llvmlite  # type: ignore[import-untyped]
@@ -27,7 +28,7 @@ from numba.core.serialize import dumps
 
 from renderer.files import write_atomically
 from renderer.levels import AHEAD_VARIABLE, FEATURES, LEVELS
-from renderer.source_digest import source_digest
+from renderer.source_digest import is_ours, source_digest
 
 # Where a wheel for one platform carries its own.
 _CARRIED = Path(__file__).parent / "compiled"
@@ -47,6 +48,7 @@ class KernelStore:
     """The files of one kernel, with the interface that Numba's dispatchers expect of a cache."""
 
     def __init__(self, function: Any) -> None:
+        self._function = function
         self._source = Path(function.__code__.co_filename)
         self._name = f"{self._source.stem}.{function.__qualname__}".replace("<", "").replace(">", "")
 
@@ -54,7 +56,23 @@ class KernelStore:
     def cache_path(self) -> str | None:
         """The folder that new kernels go to, or None."""
         written = _folders(self._source.parent).written
-        return None if written is None else str(written)
+        return None if written is None or self._digest is None else str(written)
+
+    @cached_property
+    def _digest(self) -> str | None:
+        """Of all that the kernel's code depends on; None where that is not known.
+
+        Of our own files the text is enough. Elsewhere one name may stand for many functions: what a function is made
+        of, and the values that it finds around it, count too.
+        """
+        digest = source_digest(self._source)
+        if digest is None or is_ours(self._source):
+            return digest
+        try:
+            return digest + _fingerprint(self._function)
+        except Exception as error:  # whatever pickling may raise
+            _warn_once("unknown", f"{self._name} is not kept: {type(error).__name__}: {error}")
+            return None
 
     def is_stored(self) -> bool:
         """Whether a file of these sources is there for any types of arguments, so that a later run need not compile.
@@ -62,13 +80,17 @@ class KernelStore:
         True, too, where nothing can be written: then no process can help another.
         """
         folders = _folders(self._source.parent)
-        begin = f"{self._prefix()}{source_digest(self._source)[:16]}-"
-        return folders.written is None or any(
+        if folders.written is None or self._digest is None:
+            return True
+        begin = f"{self._prefix()}{_short(self._digest)}-"
+        return any(
             name.startswith(begin) for folder in (*folders.read, *ahead_folders()) for name in _names(folder)
         )
 
     def load_overload(self, signature: Any, context: Any) -> CompileResult | None:
         """The kernel compiled for the types in ``signature``, or None where it must be compiled."""
+        if self._digest is None:
+            return None
         for path, key in self._places(signature, context.codegen().magic_tuple()):
             payload = _read(path, key)
             if payload is not None:
@@ -79,16 +101,18 @@ class KernelStore:
     def save_overload(self, signature: Any, compiled: CompileResult) -> None:
         """Keep a kernel for later processes, and remove what was compiled of other sources."""
         folder = _folders(self._source.parent).written
-        if folder is None or compiled.library.has_dynamic_globals:
+        if folder is None or self._digest is None or compiled.library.has_dynamic_globals:
+            _Count.lost += 1
             return
         key = self._key(signature, compiled.library.codegen.magic_tuple())
         path = folder / self._file(key)
         try:
             _write(path, key, dumps(compiled._reduce()))
         except OSError as error:
+            _Count.lost += 1
             _warn_once("unwritable", f"compiled kernels cannot be kept: {path}: {error.strerror}")
             return
-        current = f"{self._prefix()}{key[1][:16]}-"
+        current = f"{self._prefix()}{_of_sources(key[1])}"
         for name in _names(folder):
             if name.startswith(self._prefix()) and not name.startswith(current):
                 with suppress(OSError):
@@ -106,14 +130,14 @@ class KernelStore:
                 yield folder / self._file(key), key
 
     def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
-        return (str(signature), source_digest(self._source), _versions(), *machine, f"svml {config.USING_SVML}")
+        return (str(signature), str(self._digest), _versions(), *machine, f"svml {config.USING_SVML}")
 
     def _prefix(self) -> str:
         short = hashlib.sha256(_versions().encode()).hexdigest()[:8]
         return f"{self._name}-{short}-"
 
     def _file(self, key: tuple[str, ...]) -> str:
-        return f"{self._prefix()}{key[1][:16]}-{_hash(key)}{_SUFFIX}"
+        return f"{self._prefix()}{_short(key[1])}-{_hash(key)}{_SUFFIX}"
 
 
 def keep_in(folder: Path) -> None:
@@ -126,6 +150,17 @@ def ahead_folders() -> tuple[Path, ...]:
     return () if _Chosen.folders else _named_folders()
 
 
+def lost() -> int:
+    """How many kernels this process compiled and could not keep."""
+    return _Count.lost
+
+
+class _Count:
+    """Kernels that could not be kept."""
+
+    lost = 0
+
+
 class _Chosen:
     """The folders that ``keep_in`` chose, None for the usual ones."""
 
@@ -135,7 +170,7 @@ class _Chosen:
 @cache
 def _named_folders() -> tuple[Path, ...]:
     named = [Path(text) for text in os.environ.get(AHEAD_VARIABLE, "").split(os.pathsep) if text]
-    return tuple(folder for folder in (*named, _CARRIED) if folder.is_dir())
+    return tuple(folder for folder in (*named, _CARRIED) if _is_folder(folder))
 
 
 @cache
@@ -153,11 +188,35 @@ def stored_in(folder: Path) -> int:
     return len(_names(folder))
 
 
+def _fingerprint(function: Any) -> str:
+    """What tells a function from others of its name: its code, what it encloses, and the values of globals it names."""
+    code = function.__code__
+    enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
+    named = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
+    values = {name: value for name, value in named.items() if not (callable(value) or isinstance(value, ModuleType))}
+    return hashlib.sha256(dumps((_shape(code), enclosed, values))).hexdigest()
+
+
+def _shape(code: CodeType) -> tuple[object, ...]:
+    """A function's code less what an edit elsewhere in its file changes."""
+    constants = tuple(_shape(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts)
+    return code.co_code, constants, code.co_names, code.co_varnames, code.co_freevars
+
+
 @cache
 def _versions() -> str:
     tag = sys.implementation.cache_tag or sys.implementation.name
     flags = getattr(sys, "abiflags", "")
     return f"{tag}{flags} numba {numba.__version__} llvmlite {llvmlite.__version__}"
+
+
+def _of_sources(digest: str) -> str:
+    """The part of a file's name by which the files of other sources are told."""
+    return digest[:8]
+
+
+def _short(digest: str) -> str:
+    return _of_sources(digest) + digest[-8:]
 
 
 def _hash(key: tuple[str, ...]) -> str:
@@ -172,9 +231,9 @@ def _folders(sources: Path) -> Folders:
 @cache
 def _usual_folders(sources: Path) -> Folders:
     """The folder that NUMBA_CACHE_DIR names, alone if it can be written; else the sources' own and the user's too."""
-    own, places = f"{sources.name}_{hashlib.sha256(str(sources).encode()).hexdigest()[:16]}", []
+    own, places = f"{sources.name}_{hashlib.sha256(os.fsencode(sources)).hexdigest()[:16]}", []
     if config.CACHE_DIR:
-        chosen = Path(config.CACHE_DIR) / own
+        chosen = Path(config.CACHE_DIR).absolute() / own
         if _can_write(chosen):
             return Folders(chosen, (chosen,))
         places.append(chosen)
@@ -182,7 +241,7 @@ def _usual_folders(sources: Path) -> Folders:
     with suppress(RuntimeError):  # no home
         places.append(_user_cache() / "octree-renderer" / own)
     written = next((place for place in places if _can_write(place)), None)
-    return Folders(written, tuple(place for place in places if place.is_dir()))
+    return Folders(written, tuple(place for place in places if _is_folder(place)))
 
 
 def _user_cache() -> Path:
@@ -191,6 +250,14 @@ def _user_cache() -> Path:
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches"
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+
+
+def _is_folder(path: Path) -> bool:
+    """``path.is_dir()``, and False for what this user may not even look at."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
 
 
 def _can_write(folder: Path) -> bool:

@@ -67,6 +67,20 @@ class Tree:
         words[SCALE] = np.float64(self.scale).view(np.int64)
         return words
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How it is copied and pickled: without the addresses, which are those of this object's arrays."""
+        return _restored, (self.nodes, self.blocks, self.faces, self.depth, self.scale)
+
+
+def _restored(nodes: NDArray[Any], blocks: NDArray[Any], faces: NDArray[np.int32], depth: int, scale: float) -> Tree:
+    return Tree(_aligned(nodes), _aligned(blocks), faces, depth, scale)
+
+
+def _aligned(array: NDArray[Any]) -> NDArray[Any]:
+    copy = cache_aligned(len(array), array.dtype.type)
+    copy[:] = array
+    return copy
+
 
 def cache_aligned(count: int, dtype: type[np.generic]) -> NDArray[Any]:
     """An uninitialised array of ``count`` values that begins on a cache line, as every record of 64 bytes then does."""

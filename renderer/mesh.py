@@ -112,6 +112,10 @@ class Mesh:
             outside = (self.colors < 0) | (self.colors > 1)
             self._reject_rows("colors", self.colors, outside, "values in [0, 1]")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How it is copied and pickled: by the constructor, which checks, and makes arrays that cannot be written."""
+        return Mesh, (self.vertices, self.faces, self.normals, self.colors, self.texcoords, self.name)
+
     def _error(self, message: str) -> MeshError:
         return _error(self.name, message)
 

@@ -101,7 +101,7 @@ class _Accelerator:
         mesh, tree = self._built
         rays = check_rays(origins, directions, t_min, t_max)
         if leaving is not None:
-            rays = left(rays, leaving, mesh, self.threads)
+            rays = left(rays, leaving, mesh, tree.scale, self.threads)
         return closest_hits(tree, rays, mesh, self.threads)
 
     def any_hit(
@@ -121,7 +121,7 @@ class _Accelerator:
         mesh, tree = self._built
         rays = check_rays(origins, directions, t_min, t_max)
         if leaving is not None:
-            rays = left(rays, leaving, mesh, self.threads)
+            rays = left(rays, leaving, mesh, tree.scale, self.threads)
         return any_hits(tree, rays, self.threads)
 
     def refit(self, vertices: ArrayLike) -> None:
@@ -206,7 +206,7 @@ class Octree(_Accelerator):
         threads: int | None = None,
     ) -> "Octree":
         """Build over a mesh that is already checked; options as in the class."""
-        _expect_mesh(mesh)
+        mesh = _checked_mesh(mesh)
         octree = cls.__new__(cls)
         octree._build(mesh, split, leaf_size, max_depth, threads)
         return octree
@@ -236,7 +236,7 @@ class BruteForce(_Accelerator):
     @classmethod
     def from_mesh(cls, mesh: Mesh, *, threads: int | None = None) -> "BruteForce":
         """The same over a mesh that is already checked."""
-        _expect_mesh(mesh)
+        mesh = _checked_mesh(mesh)
         brute = cls.__new__(cls)
         _Accelerator.__init__(brute, mesh, _all_blocks(mesh, checked_threads(threads)), threads)
         return brute
@@ -249,10 +249,12 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike, repair: bool) -> tuple[Mesh, Re
     return Mesh(vertices, faces), None
 
 
-def _expect_mesh(mesh: object) -> None:
+def _checked_mesh(mesh: Mesh) -> Mesh:
+    """``mesh``, checked again if its arrays have been made writable since it was."""
     arrays = hasattr(mesh, "vertices") and hasattr(mesh, "faces")  # as a trimesh.Trimesh, or Open3D's mesh, has them
     hint = ", whose arrays Octree(mesh.vertices, mesh.faces) takes" if arrays else ""
     expect(isinstance(mesh, Mesh), "mesh", "a renderer.Mesh", f"{type(mesh).__module__}.{type(mesh).__name__}{hint}")
+    return replace(mesh) if mesh.vertices.flags.writeable or mesh.faces.flags.writeable else mesh
 
 
 def _expect_range(argument: str, value: object, largest: int) -> None:

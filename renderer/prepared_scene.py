@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -43,6 +43,10 @@ class PreparedScene:
     world: World
     tree: Tree
     build_seconds: float
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How it is copied and pickled: what kernels read is made anew, of the kinds that they were compiled for."""
+        return _restored, (self.scene, self.octree, self.needs, self.build_seconds)
 
     def picture(
         self,
@@ -89,6 +93,11 @@ def prepare_scene(
     octree = build_octree(mesh, accelerator, split, needs, threads)
     tree = tree_for(octree, needs)
     return PreparedScene(scene, mesh, octree, needs, world, tree, clock.seconds())
+
+
+def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_seconds: float) -> PreparedScene:
+    _, world = pack(scene, needs)
+    return PreparedScene(scene, octree.mesh, octree, needs, world, tree_for(octree, needs), build_seconds)
 
 
 def tiles(resolution: tuple[int, int]) -> int:

@@ -144,10 +144,10 @@ def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
     return type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2 and values.shape[1] == 3
 
 
-def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, threads: int) -> RayBatch:
-    """The rays with their starts moved off the faces ``leaving``, see ``spawn.leave_faces``.
+def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: int) -> RayBatch:
+    """The rays with their starts moved off the faces ``leaving``, see ``spawn.leave_faces``; ``scale`` is the tree's.
 
-    Raises ``ValueError`` naming the argument and, for a face that is not there, its row.
+    Raises ``ValueError`` naming the argument and, for a face that is not there or an origin out of bounds, its row.
     """
     count = len(rays.directions)
     array = _array("leaving", leaving)
@@ -158,6 +158,10 @@ def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, threads: int) -> RayBat
         row = int((~np.atleast_1d(good)).argmax())
         expected = f"faces from 0 to {len(mesh.faces) - 1}, or -1"
         expect(False, "leaving", expected, f"{np.atleast_1d(array)[row]} in row {row}")
+    near = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1)
+    if not near.all():
+        # As it was given: moved, it would be told by numbers that nobody knows.
+        _reject(rays, int((~near).argmax()), scale)
     faces = np.array(np.broadcast_to(array, (count,)), np.int64)
     starts = np.empty((count, 3))
 

@@ -1,6 +1,5 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
-import sys
 from typing import Any, Literal
 
 from renderer.build import SPLITS
@@ -9,6 +8,7 @@ from renderer.errors import expect
 from renderer.image import Image
 from renderer.needs import Needs, checked_needs
 from renderer.parallel import checked_threads
+from renderer.terminal import on_terminal
 from renderer.prepared_scene import PreparedScene, prepare_scene, tiles
 from renderer.scene import Scene, checked_settings
 from renderer.spawn import BOUNDED, MITSUBA_EPSILON
@@ -125,4 +125,4 @@ def _offset(offset: str | float) -> float:
 def _bar(count: int, progress: bool) -> Any:
     from tqdm import tqdm  # only a picture needs it
 
-    return tqdm(total=count, unit="tile", leave=False, disable=not (progress and sys.stderr.isatty()))
+    return tqdm(total=count, unit="tile", leave=False, disable=not (progress and on_terminal()))

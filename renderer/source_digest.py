@@ -3,31 +3,51 @@
 import hashlib
 import re
 from functools import cache
+from logging import getLogger
 from pathlib import Path
+
+from renderer import _LOADED_AT
 
 _PACKAGE = Path(__file__).resolve().parent
 _IMPORT = re.compile(rf"^from ({_PACKAGE.name}(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 
+def is_ours(path: Path) -> bool:
+    """Whether a source file belongs to this package."""
+    return path.resolve().is_relative_to(_PACKAGE)
+
+
 @cache
-def source_digest(path: Path) -> str:
+def source_digest(path: Path) -> str | None:
     """Hex digest of a source file and of everything it imports from this package, directly or not, at any depth.
 
-    For a file outside the package: of that file and of the whole package.
+    For a file outside the package: of that file and of the whole package. None, which is said once, where the file
+    cannot be read, as in a zip, or where one has been written since this process loaded the package: what runs is then
+    not known to be what stands there.
     """
     path = path.resolve()
     seen: set[Path] = set()
-    pending = [path] if path.is_relative_to(_PACKAGE) else [path, *_PACKAGE.rglob("*.py")]
+    pending = [path] if is_ours(path) else [path, *_PACKAGE.rglob("*.py")]
     while pending:
         found = pending.pop()
         if found not in seen and found.exists():
             seen.add(found)
             pending += _imports(found)
+    newer = sorted(found for found in seen if found.stat().st_mtime > _LOADED_AT)
+    if path not in seen or newer:
+        why = f"{newer[0]} was written after this process began" if newer else f"{path} cannot be read"
+        _say_once(f"renderer: compiled kernels are neither kept nor looked for: {why}")
+        return None
     digest = hashlib.sha256()
     for found in sorted(seen):
         name = found.relative_to(_PACKAGE).as_posix() if found.is_relative_to(_PACKAGE) else found.name
         digest.update(name.encode() + b"\0" + _source(found) + b"\0")
     return digest.hexdigest()
+
+
+@cache
+def _say_once(message: str) -> None:
+    getLogger("renderer.jit").warning(message)
 
 
 @cache
@@ -39,7 +59,7 @@ def _source(path: Path) -> bytes:
 def _imports(path: Path) -> list[Path]:
     """The files of the package that a source imports by ``from renderer.a.b import c``, c a module or a name in b."""
     found = []
-    for module, names in _IMPORT.findall(_source(path).decode()):
+    for module, names in _IMPORT.findall(_source(path).decode(errors="replace")):
         base = _PACKAGE.joinpath(*module.split(".")[1:])
         below = [base / f"{name}.py" for name in re.findall(r"\w+", names)]
         candidates = [base.with_suffix(".py"), base / "__init__.py", *below]

@@ -40,7 +40,8 @@ def write_package(parent: Path) -> Path:
     (folder / "below" / "deep").mkdir(parents=True)
     for module in _COMPILER:
         shutil.copy(PACKAGE / f"{module}.py", folder)
-    for package in (folder, folder / "below", folder / "below" / "deep"):
+    shutil.copy(PACKAGE / "__init__.py", folder)
+    for package in (folder / "below", folder / "below" / "deep"):
         (package / "__init__.py").touch()
     (folder / "upper.py").write_text(UPPER)
     (folder / "middle.py").write_text(MIDDLE)

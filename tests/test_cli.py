@@ -225,7 +225,59 @@ def test_control_c_stops_within_seconds_and_writes_nothing(tmp_path: Path, threa
         waited = time.perf_counter() - sent
     finally:
         running.kill()
-    assert running.returncode == 130 and out == "" and err == "octree-render: interrupted, nothing written\n"
+    assert running.returncode == 130 and out == "" and err == "octree-render: interrupted\n"
     assert list(tmp_path.iterdir()) == []
     # A tile of 1,024 pixels by brute force takes about a second here; twice that, for machines with other work.
     assert waited < 5.0
+
+
+def shell(line: str, **more: str) -> "subprocess.CompletedProcess[str]":
+    """A line of shell, with ``octree`` for the command."""
+    command = f"{sys.executable} -P -m renderer"
+    environment = {**os.environ, **more}
+    return subprocess.run(
+        ["bash", "-c", line.replace("octree", command)],
+        capture_output=True, text=True, cwd=ROOT, env=environment, timeout=120, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&-", ">&- 2>&- <&-"])
+def test_a_closed_stream_stops_no_picture(tmp_path: Path, closed: str) -> None:
+    path = tmp_path / "a.png"
+    done = shell(f"octree render {STAIRS} -o {path} --resolution 8x8 {closed}")
+    assert done.returncode == 0, done.stderr
+    assert path.exists()
+
+
+def test_who_stops_reading_gets_no_error(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    done = shell(f"octree render {STAIRS} -o {path} --resolution 8x8 | true; exit ${{PIPESTATUS[0]}}")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert path.exists()
+
+
+def test_compile_fails_where_nothing_can_be_kept(tmp_path: Path) -> None:
+    """A folder that is no folder: an image build must not go on with an empty one."""
+    (tmp_path / "file").touch()
+    nowhere = str(tmp_path / "file" / "cache")
+    script = (
+        "import sys, renderer.kernel_store as store, renderer.precompile as ahead\n"
+        "store._folders = lambda sources: store.Folders(None, ())\n"
+        "ahead.PARTS['queries'] = ahead.PARTS['queries'][-1:]\n"
+        "from renderer.cli import main; sys.exit(main(['compile', '--queries', '--quiet']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", script], capture_output=True, text=True, timeout=120, check=False,
+        env={**os.environ, "NUMBA_CACHE_DIR": nowhere}, cwd=ROOT,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert re.search(r"octree-render: \d+ kernels were compiled but could not be kept", done.stderr)
+
+
+def test_kernels_for_another_architecture_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import platform
+
+    other = "x86-64-v3" if platform.machine() in ("aarch64", "arm64") else "aarch64"
+    said = fails(capsys, "compile", "--level", other, "-o", tmp_path / "kernels")
+    assert said.startswith("--level: expected one of this processor's, ")
+    assert not (tmp_path / "kernels").exists()

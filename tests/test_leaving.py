@@ -106,7 +106,7 @@ def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_dis
         face, points, directions = on_faces(vertices, ball.faces, 5, 300)
         # Some lie off the plane, on either side, by more than rounding.
         points[::3] += 1e-6 * ball.face_normals()[face[::3]] * np.random.default_rng(0).choice([-1, 1], (100, 1))
-        rays = left(check_rays(points, directions, 0.0, np.inf), face, octree.mesh, 1)
+        rays = left(check_rays(points, directions, 0.0, np.inf), face, octree.mesh, 1.0, 1)
         normals = ball.face_normals()[face]
         for k in range(len(face)):
             side = 1 if directions[k] @ normals[k] >= 0 else -1
@@ -153,3 +153,11 @@ def test_rays_that_are_no_good_are_errors_all_the_same():
         octree.closest_hit([[np.nan, 0, 0]], [[0, 0, 1]], leaving=0)
     with pytest.raises(ValueError, match=r"^directions: expected finite, non-zero"):
         octree.closest_hit([[0, 0, 0]], [[0, 0, 0]], leaving=0)
+
+
+@pytest.mark.parametrize("origin", [[1e30, 0.0, 1e300], [np.inf, 0.0, 0.0], [0.0, np.nan, 0.0]])
+def test_an_origin_out_of_bounds_is_told_as_it_was_given(origin):
+    octree = Octree.from_mesh(icosphere(1))
+    with pytest.raises(ValueError, match=r"origins: .*row 1") as told:
+        octree.any_hit([[0.0, 0.0, 3.0], origin], [[0.0, 0.0, 1.0]] * 2, leaving=0)
+    assert str(origin) in str(told.value)

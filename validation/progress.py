@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from renderer.terminal import on_terminal
+
 
 @contextmanager
 def steps(total: int | None = None) -> Iterator[Callable[[str], None]]:
@@ -14,7 +16,7 @@ def steps(total: int | None = None) -> Iterator[Callable[[str], None]]:
     """
     from tqdm import tqdm  # here, because --help need not wait for it
 
-    if sys.stderr.isatty():
+    if on_terminal():
         shape = "{bar:24} {n}/{total}  {elapsed}  {desc}" if total else "{n} steps, {elapsed}  {desc}"
         bar = tqdm(total=total, bar_format=shape)
         begun = False

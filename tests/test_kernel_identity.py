@@ -1,0 +1,169 @@
+"""Whose kernel a kept kernel is: never that of other sources, another function of its name, or other values."""
+
+import os
+import shutil
+import zipapp
+import zipfile
+
+import pytest
+from kernel_package import COMPILED, LOADED, RUN, bottom_of, run, start, write_package
+
+# A package's own loggers say what is not kept.
+UNKNOWN = "compiled kernels are neither kept nor looked for"
+
+
+@pytest.fixture
+def package(tmp_path):
+    return write_package(tmp_path)
+
+
+def mine(package, text, arguments=""):
+    """What a script with kernels of its own prints, run from its own file."""
+    path = package.parent / "mine.py"
+    path.write_text(f"import sys\nfrom renderer.jit import kernel\n{text}")
+    return run(
+        package, f"import runpy, sys; sys.argv = ['mine.py', *'{arguments}'.split()]; runpy.run_path({str(path)!r})"
+    )
+
+
+def test_sources_edited_after_they_were_loaded_are_not_taken_for_those_that_run(package):
+    """An editor saves, or git pulls, between the import and the first call."""
+    edit = (
+        "import renderer.upper, time; time.sleep(0.1)\n"
+        + f"open({str(bottom_of(package))!r}, 'w').write('STEP = 20')\n"
+    )
+    done = start(package, edit + RUN)
+    assert done.stdout.split() == COMPILED
+    assert "bottom.py was written after this process began" in done.stderr
+    assert done.stderr.count(UNKNOWN) == 1
+    # Of the edited sources no other process finds the old code.
+    assert run(package) == ["27", "0", "1"]
+
+
+def test_a_file_from_the_future_stops_nothing(package):
+    os.utime(bottom_of(package), (2e9, 2e9))
+    for _ in range(2):
+        assert run(package) == COMPILED
+
+
+def zipped(package, target):
+    zipapp.create_archive(
+        package.parent, target, main="renderer.upper:answer", filter=lambda p: p.parts[0] == "renderer"
+    )
+    with zipfile.ZipFile(target) as archive:
+        assert "renderer/upper.py" in archive.namelist()
+
+
+def test_code_without_readable_sources_is_never_kept(package, tmp_path):
+    """In a zip no source can be read, so two versions cannot be told apart."""
+    aside = tmp_path / "aside"
+    for step, answer in ((10, "17"), (20, "27")):
+        bottom_of(package).write_text(f"STEP = {step}\n")
+        zipped(package, tmp_path / "renderer.zip")
+        package.rename(aside)
+        done = start(package, RUN, PYTHONPATH=str(tmp_path / "renderer.zip"), XDG_CACHE_HOME=str(tmp_path / "cache"))
+        assert done.stdout.split() == [answer, "0", "1"]
+        assert done.stderr.count(UNKNOWN) == 1
+        aside.rename(package)
+    assert not list(tmp_path.rglob("*.kernel"))
+
+
+def test_kernels_of_a_factory_are_told_apart(package):
+    text = """
+def make(factor):
+    @kernel
+    def scaled(x):
+        return factor * x
+    return scaled
+print(make(2)(10), make(3)(10), make(2)(10))
+"""
+    for _ in range(2):
+        assert mine(package, text) == ["20", "30", "20"]
+    assert len(list(package.parent.glob("__pycache__/mine.*.kernel"))) == 2
+
+
+def test_definitions_that_depend_on_a_condition_are_told_apart(package):
+    text = """
+if sys.argv[1] == "a":
+    @kernel
+    def moved(x): return x + 1
+else:
+    @kernel
+    def moved(x): return x - 1
+print(moved(10))
+"""
+    assert [mine(package, text, which) for which in "abab"] == [["11"], ["9"], ["11"], ["9"]]
+
+
+def test_values_of_globals_are_told_apart(package):
+    text = """
+STEP = float(sys.argv[1])
+@kernel
+def moved(x): return x + STEP
+print(moved(10))
+"""
+    assert [mine(package, text, which) for which in "121"] == [["11.0"], ["12.0"], ["11.0"]]
+
+
+def test_kernels_of_no_file_are_not_kept(package):
+    """Every ``python -c`` is called <string>."""
+    for step in (1, 200):
+        script = f"from renderer.jit import _decorated as d\nexec('def f(x): return x + {step}')\nprint(d(f, False)(1))"
+        assert run(package, script) == [str(1 + step)]
+    assert not list(package.parent.rglob("*.kernel"))
+
+
+def test_an_edit_elsewhere_in_the_file_keeps_a_kernel_and_removes_none_of_its_name(package):
+    text = "@kernel\ndef moved(x): return x + 1\nprint(moved(1), sum(moved.entry.stats.cache_hits.values()))\n"
+    assert mine(package, text) == ["2", "0"]
+    assert mine(package, text) == ["2", "1"]
+    # The text of a file from elsewhere counts whole.
+    assert mine(package, text + "# edited\n") == ["2", "0"]
+    assert len(list(package.parent.glob("__pycache__/mine.*.kernel"))) == 1
+
+
+@pytest.mark.parametrize("folder", ["locked/cache", "n" * 300])
+@pytest.mark.parametrize("variable", ["HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "OCTREE_RENDERER_KERNELS"])
+def test_a_folder_that_may_not_be_looked_at_counts_as_absent(package, tmp_path, variable, folder):
+    """A service that inherits the home of root; root itself may look everywhere, so its refusal is faked."""
+    refuse = """
+import pathlib
+sound = pathlib.Path.stat
+def stat(path, **options):
+    if "locked" in path.parts: raise PermissionError(13, "Permission denied", str(path))
+    return sound(path, **options)
+pathlib.Path.stat = stat
+"""
+    chosen = {"XDG_CACHE_HOME": "", variable: str(tmp_path / folder)}
+    assert run(package, refuse + RUN, **chosen) == COMPILED
+
+
+def test_a_relative_cache_folder_stays_where_it_was_when_the_process_moves(package, tmp_path):
+    (tmp_path / "other").mkdir()
+    script = f"import os, renderer.middle as m\nassert m.doubled(3) == 16\nos.chdir({str(tmp_path / 'other')!r})\n"
+    assert run(package, script + RUN, NUMBA_CACHE_DIR="kept") == COMPILED
+    assert run(package, script + RUN, NUMBA_CACHE_DIR="kept") == LOADED
+    assert not list((tmp_path / "other").iterdir())
+
+
+def test_a_source_that_is_no_utf_8_is_read_all_the_same(package):
+    path = package.parent / "latin.py"
+    path.write_bytes(
+        b"# -*- coding: latin-1 -*-\n# \xe9t\xe9\nfrom renderer.jit import kernel\n@kernel\ndef one(): return 1\n"
+    )
+    assert run(package, "import latin; print(latin.one())") == ["1"]
+
+
+def test_a_path_that_is_no_text_is_a_path_like_any_other(tmp_path):
+    odd = tmp_path / os.fsdecode(b"b\xff")
+    odd.mkdir()
+    package = write_package(odd)
+    assert run(package) == COMPILED
+    assert run(package) == LOADED
+    shutil.rmtree(odd)
+
+
+def test_numba_without_its_compiler_is_said_in_one_line(package):
+    script = "try:\n    import renderer.upper\nexcept ImportError as error:\n    print(error)"
+    said = " ".join(run(package, script, NUMBA_DISABLE_JIT="1"))
+    assert said == "renderer: NUMBA_DISABLE_JIT is set, but kernels run only compiled: unset it"
