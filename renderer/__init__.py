@@ -7,10 +7,11 @@ kept on disk; ``octree-render compile`` compiles them ahead. The line comes from
 """
 
 import sys as _sys
-import time as _time
 from importlib import import_module as _import_module
 from types import ModuleType as _ModuleType
 from typing import TYPE_CHECKING
+
+from renderer import loaded as _loaded  # noqa: F401  # before all others, to look at the clock
 
 if TYPE_CHECKING:
     from typing import Any
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
     from renderer.viewer.view import view
 
 __version__ = "0.1.0"
-
-# What is newer on disk is not what this process runs: see ``source_digest``.
-_LOADED_AT = _time.time()
 
 __all__ = [
     "BruteForce",

@@ -8,10 +8,10 @@ from renderer.errors import expect
 from renderer.image import Image
 from renderer.needs import Needs, checked_needs
 from renderer.parallel import checked_threads
-from renderer.terminal import on_terminal
 from renderer.prepared_scene import PreparedScene, prepare_scene, tiles
 from renderer.scene import Scene, checked_settings
 from renderer.spawn import BOUNDED, MITSUBA_EPSILON
+from renderer.terminal import on_terminal
 
 
 def render(

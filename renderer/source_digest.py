@@ -6,7 +6,7 @@ from functools import cache
 from logging import getLogger
 from pathlib import Path
 
-from renderer import _LOADED_AT
+from renderer import loaded
 
 _PACKAGE = Path(__file__).resolve().parent
 _IMPORT = re.compile(rf"^from ({_PACKAGE.name}(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
@@ -33,7 +33,7 @@ def source_digest(path: Path) -> str | None:
         if found not in seen and found.exists():
             seen.add(found)
             pending += _imports(found)
-    newer = sorted(found for found in seen if found.stat().st_mtime > _LOADED_AT)
+    newer = sorted(found for found in seen if found.stat().st_mtime > loaded.AT)
     if path not in seen or newer:
         why = f"{newer[0]} was written after this process began" if newer else f"{path} cannot be read"
         _say_once(f"renderer: compiled kernels are neither kept nor looked for: {why}")

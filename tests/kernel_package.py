@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "renderer"
-_COMPILER = ("jit", "compiler", "compile_notice", "kernel_store", "source_digest", "files", "levels")
+_COMPILER = ("jit", "compiler", "compile_notice", "kernel_store", "source_digest", "files", "levels", "loaded")
 
 # One small kernel two imports away from the constant it uses, so that each run compiles in a second.
 UPPER = """

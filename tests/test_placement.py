@@ -80,3 +80,17 @@ def test_a_mesh_from_no_file_is_left_out(tmp_path: Path) -> None:
     made = scene.objects[0].model_copy(update={"mesh": icosphere(1)})
     record, gates = placement.check("small", scene.model_copy(update={"objects": (made,)}))
     assert gates == [] and "no file" in record["left_out"]["objects.0"]
+
+
+def test_quads_whose_triangles_trimesh_puts_elsewhere_are_judged_by_their_places(tmp_path: Path) -> None:
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 2)]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f 1 2 4 3", "f 1 2 6", "f 5 6 8 7", "f 3 4 8"]
+    (tmp_path / "ball.ply").unlink(missing_ok=True)
+    (tmp_path / "box.obj").write_text("\n".join(lines) + "\n")
+    text = SCENE.format(scale="[1, 0.5, 2]").replace("ball.ply", "box.obj").replace('normals = "smooth"\n', "")
+    (tmp_path / "scene.toml").write_text(text)
+    scene = load_scene(tmp_path / "scene.toml")
+    assert verdicts(scene) == [True]
+    # A face that names another corner is seen all the same.
+    (tmp_path / "box.obj").write_text("\n".join([*lines[:-1], "f 3 4 7"]) + "\n")
+    assert verdicts(scene) == [False]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from trimesh import transformations
 
 from renderer.mesh import Mesh
@@ -44,9 +45,12 @@ def check(name: str, scene: Scene) -> tuple[dict[str, Any], list[Gate]]:
         elif placed.triangles.shape != instance.mesh.triangles.shape:
             left_out[where] = f"trimesh makes {len(placed.faces)} triangles of it, and we {len(instance.mesh.faces)}"
         else:
-            apart = np.abs(_extents(placed.triangles) - _extents(instance.mesh.triangles)).max(initial=0.0)
-            vertices.append(float(apart) / radius)
-            open_to_choice = _normals_open(placed, instance.mesh, thing) if instance.smooth else None
+            theirs, ours = _extents(placed.triangles), _extents(instance.mesh.triangles)
+            apart = _apart(theirs, ours) if len(ours) else 0.0
+            vertices.append(apart / radius)
+            # One by one they are hardly farther apart then.
+            in_order = bool(np.abs(theirs - ours).max(initial=0.0) <= 4.0 * apart + _VERTICES * radius)
+            open_to_choice = _normals_open(placed, instance.mesh, thing, in_order) if instance.smooth else None
             if open_to_choice is not None:
                 left_out[f"{where}, normals"] = open_to_choice
             elif instance.smooth:
@@ -79,12 +83,23 @@ def _placed(thing: SceneObject) -> trimesh.Trimesh | None:
 
 
 def _extents(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Means and bounds of the corners (F, 3, 3), whose order in a face says nothing about its place."""
-    return np.stack([triangles.mean(axis=1), triangles.min(axis=1), triangles.max(axis=1)])
+    """Means and bounds of the corners (F, 3, 3), (F, 9): their order in a face says nothing about its place."""
+    return np.concatenate([triangles.mean(axis=1), triangles.min(axis=1), triangles.max(axis=1)], axis=1)
 
 
-def _normals_open(placed: trimesh.Trimesh, mesh: Mesh, thing: SceneObject) -> str | None:
-    """Why two programs may have other vertex normals, both rightly; None where they may not."""
+def _apart(theirs: NDArray[np.float64], ours: NDArray[np.float64]) -> float:
+    """How far the farthest triangle of either side is from the nearest of the other, by their extents.
+
+    The order of the triangles says nothing either: trimesh puts those of a file's quads behind the others.
+    """
+    pairs = ((theirs, ours), (ours, theirs))
+    return max(float(cKDTree(a).query(b, p=np.inf)[0].max(initial=0.0)) for a, b in pairs)
+
+
+def _normals_open(placed: trimesh.Trimesh, mesh: Mesh, thing: SceneObject, in_order: bool) -> str | None:
+    """Why two programs may have other vertex normals, both rightly, or in another order; None where they may not."""
+    if not in_order:
+        return "trimesh has its faces in another order"
     if mesh.normals is not None:
         return "its file brings them along"
     if not (placed.area_faces > 0.0).all():

@@ -1,6 +1,5 @@
 """Where a run is: a bar on a terminal, a line for each step elsewhere."""
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
