@@ -54,14 +54,17 @@ def first_fault(error: ValidationError, member: Callable[[Keys], int | None] = l
 
     Of a union pydantic puts the name of a member, which is ours, among the keys; ``member`` tells where.
     """
-    faults = error.errors()
+    # An unknown key is likely what the missing one was meant to be.
+    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     first = faults[0]
     keys = first["loc"]
     where = ".".join(shown(k) for i, k in enumerate(keys) if i != member(keys))
     # It may quote what was given, line breaks and all.
     message = _in_our_words(" ".join(first["msg"].split()))
     says_it = (first["type"] == "value_error" and ", got" in message) or isinstance(first["input"], dict)
-    got = "" if says_it else f", got {shown(first['input'])}"
+    got = "" if says_it else f", got {_value(first['input'])}"
+    if first["type"] in ("union_tag_not_found", "union_tag_invalid"):
+        message, got = _type_message(first["ctx"]), ""
     if first["type"] == "extra_forbidden":
         message, got = "unknown key", f" (its value is {shown(first['input'])})"
     others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
@@ -83,6 +86,18 @@ def _in_our_words(message: str) -> str:
     for theirs, ours in _WORDS:
         message = re.sub(theirs, ours, message)
     return message
+
+
+def _type_message(told: dict[str, Any]) -> str:
+    """What is wrong with the key by which the members of a union are told."""
+    key, known = told["discriminator"], told.get("expected_tags", "")
+    got = f", got {told['tag']!r}" if "tag" in told else ", got none"
+    return f"expected {key} to be one of {known}{got}" if known else f"expected the key {key}{got}"
+
+
+def _value(value: object) -> str:
+    """A value on one line, text within quotes: "40" is no number."""
+    return repr(value) if isinstance(value, str) else shown(value)
 
 
 def shown(value: object) -> str:

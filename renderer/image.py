@@ -67,7 +67,7 @@ class Image:
     normal    (h, w, 3) float32, unit shading normal of the surface; 0 where nothing was hit
     face      (h, w) int32, face of the merged mesh; -1 where nothing was hit
     rays      (h, w) int32, rays traced for the pixel, shadow rays included
-    seconds   build and render time
+    build_seconds, render_seconds  what it took, without compiling; the first is the prepared scene's
     """
 
     radiance: NDArray[np.float32]
