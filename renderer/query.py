@@ -178,7 +178,7 @@ def _reject(rays: RayBatch, row: int, scale: float) -> None:
     if not (np.abs(origin) * scale <= FARTHEST).all():
         near = f"finite numbers within {FARTHEST / scale:.3g}"
         expect(False, "origins", near, f"{origin.tolist()} in row {row}")
-    expected = f"finite vectors whose largest component is {SHORTEST:.3g} to {LONGEST:.3g}"
+    expected = f"finite, non-zero vectors, the largest component from {SHORTEST:.3g} to {LONGEST:.3g}"
     expect(False, "directions", expected, f"{rays.directions[row].tolist()} in row {row}")
 
 
