@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from renderer.camera import OrthographicCamera, PerspectiveCamera
     from renderer.errors import MeshError, SceneError
-    from renderer.image import Image, srgb
+    from renderer.image import CutWarning, Image, srgb
     from renderer.light import DirectionalLight, PointLight
     from renderer.material import Dielectric, Mirror, Phong
     from renderer.mesh import Mesh, Repairs, RepairWarning
@@ -35,6 +35,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BruteForce",
+    "CutWarning",
     "Dielectric",
     "DirectionalLight",
     "Floor",
@@ -68,6 +69,7 @@ __all__ = [
 
 _HOMES = {
     "BruteForce": "octree",
+    "CutWarning": "image",
     "Dielectric": "material",
     "DirectionalLight": "light",
     "Floor": "scene",

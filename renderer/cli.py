@@ -5,6 +5,7 @@ import logging
 import os
 import platform
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -89,6 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
     render.add_argument("--samples", type=int, metavar="N", help="samples a pixel: 1, 4, 9, ...")
     render.add_argument("--min-weight", type=float, metavar="W", help="end rays that weigh less")
+    render.add_argument("--max-rays", type=int, metavar="N", help="rays of a sample of a pixel after which it is cut")
     render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto")
     render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help="how the octree is cut")
     render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
@@ -137,7 +139,7 @@ def _resolution(text: str) -> tuple[int, int]:
 
 def _render(options: argparse.Namespace) -> None:
     # Imported here so that --help and --version need no compiler.
-    from renderer.image import check_picture_path
+    from renderer.image import CutWarning, check_picture_path
     from renderer.precompile import compile_in_two
     from renderer.render import render
     from renderer.scene import load_scene
@@ -145,18 +147,22 @@ def _render(options: argparse.Namespace) -> None:
     check_picture_path(options.output)
     scene = load_scene(options.scene)
     compile_in_two()
+    warnings.simplefilter("ignore", CutWarning)  # said below, in a line of ours
     image = render(
         scene,
         resolution=options.resolution,
         samples=options.samples,
         max_depth=options.max_depth,
         min_weight=options.min_weight,
+        max_rays=options.max_rays,
         accelerator=options.accelerator,
         split=options.split,
         threads=options.threads,
         progress=not options.quiet,
     )
     image.save(options.output)
+    if image.cut:
+        print(f"octree-render: {image.cut_message(options.max_rays or scene.render.max_rays)}", file=sys.stderr)
     if not options.quiet:
         height, width = image.depth.shape
         rays = int(image.rays.sum())

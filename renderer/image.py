@@ -58,6 +58,10 @@ def _table() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     return _encoded(np.nan_to_num(zeros, nan=0.0)), np.append(steps, np.float32(np.nan))
 
 
+class CutWarning(UserWarning):
+    """A picture has pixels that miss rays for ``max_rays``; says how many."""
+
+
 @dataclass(frozen=True, eq=False)
 class Image:
     """A picture of height h and width w; row 0 is the top.
@@ -67,6 +71,7 @@ class Image:
     normal    (h, w, 3) float32, unit shading normal of the surface; 0 where nothing was hit
     face      (h, w) int32, face of the merged mesh; -1 where nothing was hit
     rays      (h, w) int32, rays traced for the pixel, shadow rays included
+    cut       (pixels) how many miss rays for ``max_rays``, 0 in most pictures
     build_seconds, render_seconds  what it took, without compiling; the first is the prepared scene's
     """
 
@@ -77,6 +82,14 @@ class Image:
     rays: NDArray[np.int32]
     build_seconds: float
     render_seconds: float
+    cut: int = 0
+
+    def cut_message(self, max_rays: int) -> str:
+        """What ``CutWarning`` says."""
+        return (
+            f"{self.cut:,} of {self.face.size:,} pixels miss rays: they took max_rays = {max_rays:,} a sample. More "
+            "max_rays trace all; a min_weight, such as 0.001, ends those that hardly show"
+        )
 
     def save(self, path: str | Path) -> None:
         """Write ``.png`` (8-bit sRGB), ``.exr`` or ``.npy`` (the linear radiance, float32), whole or not at all.

@@ -4,13 +4,17 @@ Safe for concurrent callers, which Numba's ``prange`` on its default layer is no
 """
 
 import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from functools import cache
 from numbers import Integral
 from threading import Event, Lock
 
 from renderer.errors import expect
+
+# The pool's threads at least, and as many times the processors: whoever asks for more gets the same result from these.
+_LEAST_POOL, _PER_PROCESSOR = 16, 4
 
 
 def available_threads() -> int:
@@ -28,8 +32,9 @@ def checked_threads(threads: int | None) -> int:
 
 
 @cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads, thread_name_prefix="renderer")
+def _pool() -> ThreadPoolExecutor:
+    """The one pool. It starts a thread only where none is idle, so it has no more than were ever busy at once."""
+    return ThreadPoolExecutor(max(_LEAST_POOL, _PER_PROCESSOR * available_threads()), thread_name_prefix="renderer")
 
 
 if hasattr(os, "register_at_fork"):
@@ -38,7 +43,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def for_chunks(
-    work: Callable[[int, int], None],
+    work: Callable[[int, int], Iterator[None] | None],
     count: int,
     size: int,
     threads: int,
@@ -46,12 +51,18 @@ def for_chunks(
 ) -> None:
     """Call ``work(begin, end)`` for every chunk of ``range(count)``, on up to ``threads`` threads.
 
-    Chunks must write to places of their own; then the result does not depend on who ran what. ``finished(items)``
-    is called after each chunk, by one thread at a time. On an exception, Ctrl-C included, no further chunk starts,
-    the running ones end, and it is raised here. ``work`` must not call ``for_chunks``: it would wait for itself.
+    Chunks must write to places of their own; then the result does not depend on who ran what. Long work is a generator
+    that yields where it can be stopped. ``finished(items)`` is called after each chunk, and with 0 where one yields, by
+    one thread at a time. On an exception, Ctrl-C included, no further chunk starts, the running ones end or stop, and
+    it is raised here. ``work`` must not call ``for_chunks``: it might wait for itself.
     """
     begins = iter(range(0, count, size))
     taking, stop = Lock(), Event()
+
+    def tell(items: int) -> None:
+        if finished is not None:
+            with taking:
+                finished(items)
 
     def take_chunks() -> None:
         while not stop.is_set():
@@ -61,17 +72,17 @@ def for_chunks(
                 return
             end = min(begin + size, count)
             try:
-                work(begin, end)
-                if finished is not None:
-                    with taking:
-                        finished(end - begin)
+                for _ in work(begin, end) or ():
+                    if stop.is_set():
+                        return
+                    tell(0)
+                tell(end - begin)
             except BaseException:
                 stop.set()
                 raise
 
     # The caller's own thread is one of them, so the work starts without waiting for another to wake up.
-    others = min(threads, -(-count // size)) - 1
-    running = [_pool(others).submit(take_chunks) for _ in range(others)]
+    running = _started(take_chunks, min(threads, -(-count // size)) - 1)
     try:
         take_chunks()
         for future in running:
@@ -82,3 +93,13 @@ def for_chunks(
         stop.set()
         for future in running:
             future.cancel() or future.exception()
+
+
+def _started(work: Callable[[], None], count: int) -> list[Future[None]]:
+    """``work`` begun on ``count`` threads of the pool, or on fewer: the caller does what nobody else does."""
+    running: list[Future[None]] = []
+    # Raised where the main thread has ended, or the system gives no more threads.
+    with suppress(RuntimeError):
+        for _ in range(count):
+            running.append(_pool().submit(work))
+    return running

@@ -1,23 +1,24 @@
 """A scene made ready: what its pictures share is worked out once, and each camera then costs its rays alone."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
+from renderer.bundle import SIZE
 from renderer.camera import Camera, sample_offsets
 from renderer.compile_notice import Stopwatch
 from renderer.errors import expect
 from renderer.image import Image
-from renderer.layout import Tree, cache_aligned
+from renderer.layout import LANES, Tree, cache_aligned
 from renderer.mesh import Mesh
 from renderer.needs import Needs
 from renderer.octree import BruteForce, Octree
 from renderer.parallel import for_chunks
 from renderer.scene import RenderSettings, Scene
 from renderer.sight import MAX_MEDIA, World
-from renderer.tile import Film, render_tile, tile_memory
+from renderer.tile import CUT, Film, render_tile, tile_memory
 from renderer.whitted import Settings
 from renderer.world import media_around, pack
 
@@ -58,8 +59,8 @@ class PreparedScene:
     ) -> Image:
         """The picture that ``camera`` takes, by checked settings; see ``render``.
 
-        ``finished(tiles)`` is called after each tile, by one thread at a time. What it raises stops the others and is
-        raised here.
+        ``finished(tiles)`` is called after each tile, and with 0 every few thousand rays of a long one, by one thread
+        at a time. What it raises stops the others and is raised here.
         """
         clock = Stopwatch()
         width, height = chosen.resolution
@@ -68,16 +69,18 @@ class PreparedScene:
         world = self.world
         if self.needs.refraction and camera is not self.scene.camera:
             world = world._replace(media=media_around(self.scene, camera))
-        across = -(-width // TILE)
+        across, cut = -(-width // TILE), np.zeros(tiles(chosen.resolution), np.int64)
 
-        def render_one(first: int, _end: int) -> None:
+        def render_one(first: int, _end: int) -> Iterator[None]:
             x, y = first % across * TILE, first // across * TILE
             tile = (x, y, min(x + TILE, width), min(y + TILE, height))
-            memory = tile_memory(self.tree.depth, settings)
-            render_tile(self.tree.words, world, settings, rows, samples, film, tile, memory)
+            memory = tile_memory(self.tree.depth, settings, _bundles_in_a_row(self.tree))
+            while not render_tile(self.tree.words, world, settings, rows, samples, film, tile, memory):
+                yield
+            cut[first] = memory.state[CUT]
 
-        for_chunks(render_one, tiles(chosen.resolution), 1, threads, finished)
-        return Image(*film, build_seconds=self.build_seconds, render_seconds=clock.seconds())
+        for_chunks(render_one, len(cut), 1, threads, finished)
+        return Image(*film, build_seconds=self.build_seconds, render_seconds=clock.seconds(), cut=int(cut.sum()))
 
 
 def prepare_scene(
@@ -93,6 +96,14 @@ def prepare_scene(
     octree = build_octree(mesh, accelerator, split, needs, threads)
     tree = tree_for(octree, needs)
     return PreparedScene(scene, mesh, octree, needs, world, tree, clock.seconds())
+
+
+def _bundles_in_a_row(tree: Tree) -> int:
+    """After how many bundles a kernel returns, so that Ctrl-C and others are heard: some 10 ms of tracing."""
+    if tree.depth > 0:
+        return 256
+    # Every ray meets every block, at some nanoseconds each.
+    return max(1, (1 << 22) // (SIZE * max(1, len(tree.faces) // LANES)))
 
 
 def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_seconds: float) -> PreparedScene:
@@ -135,7 +146,7 @@ def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: float) -> S
     """The kernel's settings: no bounces where nothing bounces, and no media where nothing refracts."""
     bounces = chosen.max_depth if needs.reflection or needs.refraction else 0
     media = MAX_MEDIA if needs.refraction else 0
-    return Settings(bounces, chosen.min_weight, offset, media, chosen.shadows)
+    return Settings(bounces, chosen.min_weight, offset, media, chosen.shadows, chosen.max_rays)
 
 
 def _film(width: int, height: int) -> Film:

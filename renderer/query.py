@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.batch import FEW_DEPTH, search_chunk, trace_chunk, trace_few
 from renderer.errors import expect
-from renderer.layout import Tree
+from renderer.layout import LANES, Tree
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh import Mesh, face_normals
 from renderer.parallel import for_chunks
@@ -22,6 +22,8 @@ from renderer.traverse import Memory, make_memory, stack_size
 CHUNK = 8192
 # Few rays go in smaller chunks, sixteen a thread, so that no thread has much more to do than another.
 _LEAST_CHUNK = 1024
+# Of brute force, whose rays meet every block at some nanoseconds each, so many tests are a chunk.
+_BLOCK_TESTS = 1 << 22
 # Fewer rays than a packet holds go one by one, by a kernel that compiles in a fraction of the time.
 FEW = WIDTH - 1
 
@@ -218,6 +220,8 @@ def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
 def _run(tree: Tree, rays: RayBatch, out: Any, threads: int, any_hit: bool) -> None:
     count = len(rays.directions)
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
+    if tree.depth == 0:
+        size = max(1, min(size, _BLOCK_TESTS * LANES // max(1, len(tree.faces))))
     bad: list[int] = []
 
     def trace(begin: int, end: int) -> None:

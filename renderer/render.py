@@ -1,11 +1,12 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
+import warnings
 from typing import Any, Literal
 
 from renderer.build import SPLITS
 from renderer.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.errors import expect
-from renderer.image import Image
+from renderer.image import CutWarning, Image
 from renderer.needs import Needs, checked_needs
 from renderer.parallel import checked_threads
 from renderer.prepared_scene import PreparedScene, prepare_scene, tiles
@@ -26,8 +27,8 @@ def render(
     progress: bool = False,
     **settings: Any,
 ) -> Image:
-    """Render ``scene``; ``resolution``, ``samples``, ``max_depth``, ``min_weight`` and ``shadows`` override the scene's
-    own.
+    """Render ``scene``; ``resolution``, ``samples``, ``max_depth``, ``min_weight``, ``max_rays`` and ``shadows``
+    override the scene's own, see ``RenderSettings``.
 
     scene        a ``Scene``, or what ``prepare`` made of one: its pictures then share the tree and all else that does
                  not depend on the camera or these settings
@@ -42,7 +43,8 @@ def render(
     threads      None takes all processors
     progress     a bar on standard error when that is a terminal
 
-    The same bits for any number of threads. Raises ``ValueError`` naming the argument. Ctrl-C stops between tiles.
+    The same bits for any number of threads. Raises ``ValueError`` naming the argument. Warns with ``CutWarning``
+    of pixels that ``max_rays`` cut. Ctrl-C stops it at once.
 
     >>> from renderer import Mesh, PerspectiveCamera, Phong, SceneObject
     >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
@@ -63,7 +65,10 @@ def render(
     else:
         prepared = _prepared(scene, chosen.max_depth, accelerator, split, needs, threads)
     with _bar(tiles(chosen.resolution), progress) as bar:
-        return prepared.picture(eye, chosen, rule, threads, bar.update)
+        image = prepared.picture(eye, chosen, rule, threads, bar.update)
+    if image.cut:
+        warnings.warn(image.cut_message(chosen.max_rays), CutWarning, stacklevel=2)
+    return image
 
 
 def prepare(

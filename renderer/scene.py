@@ -53,18 +53,26 @@ def _uniform(value: Any) -> Any:
     return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
+# As many as a count can hold, for ``max_rays``.
+UNLIMITED_RAYS = 2**62 - 1
+
+
 class RenderSettings(Fields):
     """Defaults of ``render``; each can be given there instead.
 
     ``max_depth`` is the number of bounces: 0 shows what the eye sees directly. ``min_weight`` ends a ray whose
-    largest weight is below it; it bounds no error when rays branch, because the cut ones may be many. Without
-    ``shadows`` nothing hides a light from the surfaces that face it, and no shadow ray is traced.
+    largest weight is below it; it bounds no error when rays branch, because the cut ones may be many. Once a sample of
+    a pixel has taken ``max_rays`` its surfaces leave no more rays, and ``render`` warns of the pixels that miss some:
+    mirrors that halve their light, or glass in glass, may double the rays with each bounce. The default is more than
+    full branching makes in ten bounces under three lights. Without ``shadows`` nothing hides a light from the surfaces
+    that face it, and no shadow ray is traced.
     """
 
     resolution: tuple[_Pixels, _Pixels] = (512, 512)
     samples: Annotated[int, Field(le=65536, strict=True)] = 1
     max_depth: Annotated[int, Field(ge=0, le=64, strict=True)] = 6
     min_weight: Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] = 0.0
+    max_rays: Annotated[int, Field(ge=1, le=UNLIMITED_RAYS, strict=True)] = 16384
     shadows: Annotated[bool, Field(strict=True)] = True
 
     @model_validator(mode="after")

@@ -14,7 +14,7 @@ from renderer.sight import look_at
 from renderer.simd import at, get, pointer, put, smaller
 from renderer.traverse import Memory, make_memory, make_scratch
 from renderer.vec3 import add, normalized, row3, scale, three
-from renderer.whitted import Settings, make_work, push_children, slot, trace_bundle, work_lengths
+from renderer.whitted import Settings, begin_work, make_work, push_children, slot, trace_bundle, work_lengths
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
 # Pixels a side of the squares that become packets.
@@ -77,56 +77,121 @@ def _write_first_hits(film, bundle, work, x0, y0):
                 film.normal[y, x, k] = n[k]
 
 
+@inlined
+def _middle(count):
+    """The sample that depth, face and normal are taken from: the pixel's centre where there is one."""
+    return count // 2 if count % 2 == 1 else (count + int(np.sqrt(count))) // 2
+
+
 @kernel
-def _render_block(tree, world, settings, camera, film, block, work, total):
-    """Fill the pixels of one block."""
+def _end_sample(film, block, work, total):
+    """Add what a sample brought to the sums of its block."""
     x0, y0, x1, y1 = block
-    for k in range(SIZE):
-        put(work.traced, k, 0)
-        put3(total, 3 * k, (0.0, 0.0, 0.0))
-    count = camera.count
-    middle = count // 2 if count % 2 == 1 else (count + int(np.sqrt(count))) // 2
-    for sample in range(count):
-        for k in range(SIZE):
-            put3(work.color, 3 * k, (0.0, 0.0, 0.0))
-        _shoot(camera, world, slot(work, settings, 0), sample, block)
-        top, first = 1, True
-        while top > 0:
-            top -= 1
-            bundle = slot(work, settings, top)
-            trace_bundle(tree, world, settings, bundle, work)
-            if first and sample == middle:
-                _write_first_hits(film, bundle, work, x0, y0)
-            first = False
-            top = push_children(world, settings, work, bundle, top)
-        for k in range(SIZE):
-            put3(total, 3 * k, add(row3(total, k), row3(work.color, k)))
     for y in range(y0, y1):
         for x in range(x0, x1):
             pixel = (y - y0) * SIDE + x - x0
+            put3(total, 3 * pixel, add(row3(total, pixel), row3(work.color, pixel)))
+            film.rays[y, x] += get(work.traced, pixel)
+
+
+@kernel
+def _end_block(film, block, work, total, count):
+    """Write the radiance of a block. Returns how many of its pixels were cut."""
+    x0, y0, x1, y1 = block
+    cut = 0
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            pixel = (y - y0) * SIDE + x - x0
+            cut += get(work.cut, pixel)
             # The brightest float32 stands for anything brighter: a light within 1e-15 of a surface.
             for k in range(3):
                 film.radiance[y, x, k] = smaller(get(total, 3 * pixel + k) / count, _BRIGHTEST)
-            film.rays[y, x] = get(work.traced, pixel)
+    return cut
+
+
+@inlined
+def _clear_block(work, total):
+    for k in range(SIZE):
+        put(work.cut, k, 0)
+        put3(total, 3 * k, (0.0, 0.0, 0.0))
+
+
+@inlined
+def _block_of(tile, k):
+    """The k-th block of a tile, row by row; below the tile after the last."""
+    x0, y0, x1, y1 = tile
+    across = (x1 - x0 + SIDE - 1) // SIDE
+    x, y = x0 + k % across * SIDE, y0 + k // across * SIDE
+    return x, y, smaller(x + SIDE, x1), smaller(y + SIDE, y1)
+
+
+# Where a tile stands, int64: its block, how many samples of that were begun, the bundles that wait, whether the next
+# one has the camera's rays, and how many pixels were cut.
+_BLOCK, _BEGUN, _WAITING, _FROM_CAMERA, CUT, _STATE = range(6)
+
+
+@kernel
+def _next_sample(world, settings, camera, film, tile, work, total, state):
+    """End the sample under way and begin the next one, of the next block where that was the last. Returns whether there
+    is one.
+    """
+    block, begun = _block_of(tile, get(state, _BLOCK)), get(state, _BEGUN)
+    if begun > 0:
+        _end_sample(film, block, work, total)
+    if begun == camera.count:
+        put(state, CUT, get(state, CUT) + _end_block(film, block, work, total, camera.count))
+        put(state, _BLOCK, get(state, _BLOCK) + 1)
+        block, begun = _block_of(tile, get(state, _BLOCK)), 0
+    if block[1] >= tile[3]:
+        return False
+    if begun == 0:
+        _clear_block(work, total)
+    for k in range(SIZE):
+        put(work.traced, k, 0)
+        put3(work.color, 3 * k, (0.0, 0.0, 0.0))
+    _shoot(camera, world, slot(work, settings, 0), begun, block)
+    put(state, _BEGUN, begun + 1)
+    put(state, _WAITING, 1)
+    put(state, _FROM_CAMERA, 1)
+    return True
 
 
 class TileMemory(NamedTuple):
-    """Memory of one thread that renders tiles: for tracing, for a bundle's ``Work``, and for the sums of a block."""
+    """Memory of a tile that is rendered: for tracing, for a bundle's ``Work``, for the sums of a block and for where it
+    stands; and how many bundles are traced in a row.
+    """
 
     trace: Memory
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     hits: NDArray[np.bool_]
     total: NDArray[np.float64]
+    state: NDArray[np.int64]
+    bundles: int
 
 
-def tile_memory(depth: int, settings: Settings) -> TileMemory:
-    """What ``render_tile`` needs beside its film, for a tree of ``depth`` levels."""
+def tile_memory(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileMemory:
+    """What ``render_tile`` needs beside its film, for one tile and a tree of ``depth`` levels."""
     doubles, integers = work_lengths(settings)
     trace, hits = make_memory(depth, SIZE), np.empty(SIZE, np.bool_)
     return TileMemory(
-        trace, cache_aligned(doubles, np.float64), cache_aligned(integers, np.int64), hits, np.empty(3 * SIZE)
-    )
+        trace, cache_aligned(doubles, np.float64), cache_aligned(integers, np.int64), hits, np.empty(3 * SIZE),
+        np.zeros(_STATE, np.int64), bundles,
+    )  # fmt: skip
+
+
+@inlined
+def _trace_next(tree, world, settings, camera, film, tile, work, state):
+    """Trace the bundle that was left last, and let it leave its own."""
+    top = get(state, _WAITING) - 1
+    bundle = slot(work, settings, top)
+    trace_bundle(tree, world, settings, bundle, work)
+    if get(state, _FROM_CAMERA) != 0:
+        put(state, _FROM_CAMERA, 0)
+        if get(state, _BEGUN) == _middle(camera.count) + 1:
+            block = _block_of(tile, get(state, _BLOCK))
+            _write_first_hits(film, bundle, work, block[0], block[1])
+    put(state, _WAITING, push_children(world, settings, work, bundle, top))
 
 
 @kernel
@@ -134,14 +199,18 @@ def render_tile(words, world, settings, camera, samples, film, tile, memory):
     """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
 
     ``words`` are the tree's. Depth, face and normal come from the middle sample (the pixel's centre for one sample),
-    radiance from the mean.
+    radiance from the mean, rays are added up from 0. Returns whether the tile is done. If not, so many bundles were
+    traced that the caller may want to look around: called again with the same memory, it goes on.
     """
-    x0, y0, x1, y1 = tile
     doubles, integers, hits = pointer(memory.doubles), pointer(memory.integers), pointer(memory.hits)
+    state, total = pointer(memory.state), pointer(memory.total)
     work = make_work(doubles, integers, hits, settings, make_scratch(memory.trace))
     tree, seen = tree_pointers(words), look_at(world)
     shooting = Camera(pointer(camera), pointer(samples), len(samples))
-    for y in range(y0, y1, SIDE):
-        for x in range(x0, x1, SIDE):
-            block = x, y, smaller(x + SIDE, x1), smaller(y + SIDE, y1)
-            _render_block(tree, seen, settings, shooting, film, block, work, pointer(memory.total))
+    if get(state, _BLOCK) == 0 and get(state, _BEGUN) == 0:
+        begin_work(work, settings)
+    for _ in range(memory.bundles):
+        if get(state, _WAITING) == 0 and not _next_sample(seen, settings, shooting, film, tile, work, total, state):
+            return True
+        _trace_next(tree, seen, settings, shooting, film, tile, work, state)
+    return False

@@ -47,7 +47,8 @@ from renderer.vec3 import add, dot, largest_component, normalized, row3, scale, 
 
 class Settings(NamedTuple):
     """Bounces, the weight below which a ray ends, the offset rule of ``spawn.spawn_origin``, how many media a ray
-    remembers (``sight.MAX_MEDIA``, or 0 where nothing refracts), and whether surfaces hide lights.
+    remembers (``sight.MAX_MEDIA``, or 0 where nothing refracts), whether surfaces hide lights, and after how many rays
+    of a sample of a pixel no more are left.
     """
 
     max_depth: int
@@ -55,6 +56,7 @@ class Settings(NamedTuple):
     offset: float
     media: int
     shadows: bool
+    max_rays: int
 
 
 class Work(NamedTuple):
@@ -62,7 +64,8 @@ class Work(NamedTuple):
 
     The bundles and the order in which their places are used: first those that wait, then the free ones. What tracing
     needs and finds, a zero and an infinity for its bounds. Of the bundle under way the surfaces, its shadow rays, the
-    list of its lit rays, and one ray's media beyond a surface. Of each pixel its colour and the rays traced.
+    list of its lit rays, and one ray's media beyond a surface. Of each pixel its colour, the rays traced, and whether
+    it left fewer than it would have without ``Settings.max_rays``.
     """
 
     bundles: Any
@@ -78,6 +81,7 @@ class Work(NamedTuple):
     beyond: Any
     color: Any
     traced: Any
+    cut: Any
 
 
 def work_lengths(settings: Settings) -> tuple[int, int]:
@@ -87,13 +91,13 @@ def work_lengths(settings: Settings) -> tuple[int, int]:
     """
     slots = settings.max_depth + 4
     doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE
-    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + settings.media + SIZE
+    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + settings.media + 2 * SIZE
     return doubles, integers
 
 
 @inlined
 def make_work(doubles, integers, hits, settings, scratch):
-    """A ``Work`` in memory of ``work_lengths``, SIZE bools and a scratch for tracing."""
+    """A ``Work`` in memory of ``work_lengths``, SIZE bools and a scratch for tracing; ``begin_work`` comes first."""
     slots = settings.max_depth + 4
     t = at(doubles, slots * BUNDLE_DOUBLES)
     u, v, zero = at(t, SIZE), at(t, 2 * SIZE), at(t, 3 * SIZE)
@@ -103,15 +107,21 @@ def make_work(doubles, integers, hits, settings, scratch):
     face = at(order, slots)
     lit = at(face, SIZE)
     beyond = at(lit, 1 + 2 * SIZE)
-    put(zero, 0, 0.0)
-    put(infinity, 0, np.inf)
-    for slot in range(slots):
-        put(order, slot, slot)
+    traced = at(beyond, settings.media)
     found = Found(t, face, u, v, hits)
     return Work(
         doubles, integers, order, scratch, found, zero, infinity, surfaces, shadows, lit, beyond,
-        at(shadows, SHADOW_DOUBLES), at(beyond, settings.media),
+        at(shadows, SHADOW_DOUBLES), traced, at(traced, SIZE),
     )  # fmt: skip
+
+
+@inlined
+def begin_work(work, settings):
+    """Set what every bundle takes for granted."""
+    put(work.zero, 0, 0.0)
+    put(work.infinity, 0, np.inf)
+    for slot in range(settings.max_depth + 4):
+        put(work.order, slot, slot)
 
 
 @inlined
@@ -205,13 +215,23 @@ def _refract(world, bundle, surface, i, settings, beyond):
 
 
 @inlined
-def _leave(bundle, surface, i, w, weight, children, media, count, settings):
-    """Add the ray in direction ``w`` from the surface that ray ``i`` met, if its weight counts, to ``children``."""
-    if _goes_on(weight, settings.min_weight):
-        w = normalized(w)
-        p, n_g = three(surface, POINT), three(surface, GEOMETRIC)
-        o = spawn_origin(p, get(surface, BOUND), n_g, w, settings.offset)
-        append(children, o, w, weight, get(bundle.pixels, i), media, count)
+def _leave(surface, pixel, w, weight, children, media, count, settings):
+    """Add the ray in direction ``w`` from the surface that a ray of ``pixel`` met to ``children``."""
+    w = normalized(w)
+    p, n_g = three(surface, POINT), three(surface, GEOMETRIC)
+    o = spawn_origin(p, get(surface, BOUND), n_g, w, settings.offset)
+    append(children, o, w, weight, pixel, media, count)
+
+
+@inlined
+def _may_leave(work, pixel, weight, settings):
+    """Whether a ray of this weight is traced. A pixel's own recursion decides, whichever pixels travel with it."""
+    if not _goes_on(weight, settings.min_weight):
+        return False
+    if get(work.traced, pixel) >= settings.max_rays:
+        put(work.cut, pixel, 1)
+        return False
+    return True
 
 
 @kernel
@@ -222,15 +242,16 @@ def _bounce(world, bundle, settings, work, refracted, reflected):
         if get(work.found.face, i) < 0:
             continue
         surface = at(work.surfaces, i * SURFACE_DOUBLES)
-        m, weight = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i)
+        m, weight, pixel = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i), get(bundle.pixels, i)
         k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
         if largest_component(k_t) > 0.0 or get(materials, m + KIND) == DIELECTRIC:
             w, passes, k_r, k_t, left = _refract(world, bundle, surface, i, settings, work.beyond)
-            if passes:
-                _leave(bundle, surface, i, w, times(weight, k_t), refracted, work.beyond, left, settings)
-        media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
-        w = reflect(row3(bundle.directions, i), three(surface, NORMAL))
-        _leave(bundle, surface, i, w, times(weight, k_r), reflected, media, count, settings)
+            if passes and _may_leave(work, pixel, times(weight, k_t), settings):
+                _leave(surface, pixel, w, times(weight, k_t), refracted, work.beyond, left, settings)
+        if _may_leave(work, pixel, times(weight, k_r), settings):
+            media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
+            w = reflect(row3(bundle.directions, i), three(surface, NORMAL))
+            _leave(surface, pixel, w, times(weight, k_r), reflected, media, count, settings)
 
 
 @inlined

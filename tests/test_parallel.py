@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -28,7 +30,11 @@ def test_every_item_is_worked_on_once(count, size, threads):
 
 def test_chunks_run_side_by_side():
     together = threading.Barrier(3)
-    for_chunks(lambda begin, end: together.wait(timeout=10), 3, 1, 3)
+
+    def work(begin, end):
+        together.wait(timeout=10)
+
+    for_chunks(work, 3, 1, 3)
 
 
 def test_one_thread_works_in_the_caller_and_in_order():
@@ -163,3 +169,74 @@ def test_threads():
     for bad in (0, -1, 1.5, "2"):
         with pytest.raises(ValueError, match="threads: expected an integer >= 1 or None, got"):
             checked_threads(bad)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_long_work_tells_that_it_goes_on_and_may_be_stopped_there(threads):
+    told, ended = [], []
+
+    def work(begin, end):
+        for _ in range(10**6):
+            yield
+        ended.append(begin)
+
+    def finished(items):
+        told.append(items)
+        if len(told) == 20:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        for_chunks(work, 4, 1, threads, finished)
+    assert told == [0] * 20
+    assert not ended
+
+
+def test_long_work_that_ends_is_told_like_any_other():
+    told = []
+
+    def work(begin, end):
+        yield
+        yield
+
+    for_chunks(work, 6, 2, 1, told.append)
+    assert told == [0, 0, 2] * 3
+
+
+def test_there_is_one_pool_however_many_threads_are_asked_for():
+    def helpers():
+        return sum(thread.name.startswith("renderer") for thread in threading.enumerate())
+
+    for threads in (2, 3, 5, 8, 700, 7, 2):
+        for_chunks(lambda begin, end: time.sleep(0.001), 1000, 1, threads)
+    assert 1 <= helpers() <= max(16, 4 * available_threads())
+
+
+AFTER_THE_END = """
+import threading, atexit, sys
+import numpy as np
+from renderer import Octree
+from renderer.shapes import icosphere
+rays = np.random.default_rng(1).normal(size=(40_000, 3)) * 3
+octree = Octree.from_mesh(icosphere(3), threads=2)
+def ask():
+    print(int(octree.closest_hit(rays, -rays).hit.sum()), Octree.from_mesh(icosphere(5), threads=2).stats.faces)
+def late():
+    threading.main_thread().join()
+    ask()
+{how}
+"""
+
+
+@pytest.mark.parametrize(
+    "how", ["threading.Thread(target=late).start()", "atexit.register(ask)", "ask(); atexit.register(ask)"]
+)
+def test_queries_work_after_the_main_thread_has_ended(how):
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", AFTER_THE_END.format(how=how)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert set(done.stdout.splitlines()) == {"40000 20480"}
+    assert "Error" not in done.stderr

@@ -43,7 +43,7 @@ def test_shapes_and_dtypes() -> None:
         array = getattr(image, name)
         assert array.shape == shape and array.dtype == dtypes[name], name
     assert image.build_seconds > 0 and image.render_seconds > 0
-    assert {f.name for f in dataclasses.fields(image)} == {*expected, "build_seconds", "render_seconds"}
+    assert {f.name for f in dataclasses.fields(image)} == {*expected, "build_seconds", "render_seconds", "cut"}
 
 
 def test_the_scenes_settings_hold_unless_others_are_given() -> None:
@@ -143,12 +143,13 @@ def test_the_bar_shows_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> No
 def test_an_exception_in_a_tile_stops_the_rest(monkeypatch: pytest.MonkeyPatch, threads: int, error: type) -> None:
     tiles, lock = [], threading.Lock()
 
-    def interrupted(*arguments: Any) -> None:
+    def interrupted(*arguments: Any) -> bool:
         with lock:
             tiles.append(arguments[-1])
             count = len(tiles)
         if count == 5:
             raise error
+        return True
 
     monkeypatch.setattr(stage, "render_tile", interrupted)
     with pytest.raises(error):
@@ -162,9 +163,10 @@ def test_an_exception_in_a_tile_stops_the_rest(monkeypatch: pytest.MonkeyPatch, 
 def test_each_tile_is_rendered_once_and_they_cover_the_film(monkeypatch: pytest.MonkeyPatch) -> None:
     covered = np.zeros((2 * TILE + 7, 3 * TILE + 1), int)
 
-    def count(*arguments: Any) -> None:
+    def count(*arguments: Any) -> bool:
         x0, y0, x1, y1 = arguments[-2]
         covered[y0:y1, x0:x1] += 1
+        return True
 
     monkeypatch.setattr(stage, "render_tile", count)
     render(ball(), resolution=covered.shape[::-1], threads=1)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from renderer import Image, Mesh, Scene, render
 from renderer.camera import PerspectiveCamera
 from renderer.material import Material, Mirror, Phong
-from renderer.scene import SceneObject
+from renderer.scene import UNLIMITED_RAYS, SceneObject
 from renderer.shapes import icosphere
 
 Vector = tuple[float, float, float]
@@ -52,7 +52,7 @@ def eye_at(eye: Vector, target: Vector, up: Vector = (0.0, 1.0, 0.0), fov: float
 
 def one(scene: Scene, **options: Any) -> Image:
     """The one ray from the eye to the camera's target."""
-    return render(scene, resolution=(1, 1), threads=1, **options)
+    return render(scene, resolution=(1, 1), threads=1, **{"max_rays": UNLIMITED_RAYS, **options})
 
 
 def pixel(scene: Scene, **options: Any) -> float:

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 from renderer.image import Image, srgb
 from renderer.render import render
-from renderer.scene import Scene, load_scene
+from renderer.scene import UNLIMITED_RAYS, Scene, load_scene
 from validation import (
     check_picture,
     compare_aovs,
@@ -235,7 +235,7 @@ def _rung_record(task: _Task, own: Image, comparisons: list[dict[str, Any]]) -> 
 
 
 def _ours(scene: Scene, resolution: tuple[int, int], offset: _Offset) -> Image:
-    return render(scene, resolution=resolution, samples=1, min_weight=0.0, offset=offset)
+    return render(scene, resolution=resolution, samples=1, min_weight=0.0, max_rays=UNLIMITED_RAYS, offset=offset)
 
 
 def _costs(scenes: list[dict[str, Any]]) -> dict[str, float]:

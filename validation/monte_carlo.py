@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from renderer.camera import primary_rays
 from renderer.material import Dielectric, Phong
 from renderer.render import render
-from renderer.scene import Scene
+from renderer.scene import UNLIMITED_RAYS, Scene
 from validation import mitsuba_path, mitsuba_whitted
 from validation.compare_images import fragile_pixels
 from validation.gates import Gate
@@ -172,7 +172,7 @@ def _glass(scene: Scene) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
 
 def _picture(scene: Scene, size: int, offset: Any = "mitsuba") -> NDArray[np.float64]:
     """Ours through the pixels' centres, (size, size, 3); paths know no smallest weight, so neither do we here."""
-    image = render(scene, resolution=(size, size), samples=1, min_weight=0.0, offset=offset)
+    image = render(scene, resolution=(size, size), samples=1, min_weight=0.0, max_rays=UNLIMITED_RAYS, offset=offset)
     return image.radiance.astype(np.float64)
 
 

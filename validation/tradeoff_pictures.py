@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.render import render
-from renderer.scene import Scene
+from renderer.scene import UNLIMITED_RAYS, Scene
 from validation import mitsuba_path, mitsuba_scene
 from validation.compare_images import compare
 from validation.mitsuba_sampling import Film, Sampler
@@ -74,7 +74,7 @@ class Bench:
 
     def ours(self, samples: int = 1, max_depth: int = DEPTH, min_weight: float = 0.0, **settings: Any) -> Drawn:
         """Our picture; ``settings`` as for ``render``."""
-        settings |= {"samples": samples, "max_depth": max_depth, "min_weight": min_weight}
+        settings |= {"samples": samples, "max_depth": max_depth, "min_weight": min_weight, "max_rays": UNLIMITED_RAYS}
         image = render(self.scene, resolution=(self.effort.size, self.effort.size), **settings)
         return Drawn(image.radiance, image.render_seconds)
 

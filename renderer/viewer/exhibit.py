@@ -62,7 +62,8 @@ def prepare(scene: Scene, path: Path | None = None) -> Exhibit:
     # Mirrors and glass need no lights, and a scene of them alone has none packed; their colours a face do.
     stage = replace(stage, world=stage.world._replace(lights=light_rows(scene, replace(stage.needs, shadows=True))))
     # The first call of a kernel loads or compiles it, which the first picture should not wait for.
-    stage.picture(scene.camera, scene.render.model_copy(update={"resolution": (8, 8), "samples": 1}), BOUNDED, threads)
+    few = {"resolution": (8, 8), "samples": 1, "max_rays": 1}
+    stage.picture(scene.camera, scene.render.model_copy(update=few), BOUNDED, threads)
     touch_viewing(stage)
     return Exhibit(scene, path, stage, threads)
 
@@ -91,13 +92,23 @@ def varied(stage: PreparedScene, settings: ViewSettings) -> PreparedScene:
     return replace(stage, needs=needs, world=stage.world._replace(materials=materials, lights=lights, media=media))
 
 
-def render_settings(scene: Scene, settings: ViewSettings, size: tuple[int, int], samples: int) -> RenderSettings:
-    """The renderer's settings for a picture of ``size`` (w, h). Depth, normal and face need no light and no bounce."""
+# Rays a pixel of a first picture, of 16,384 pixels: a second of tracing at the most.
+SOON = 256
+
+
+def render_settings(
+    scene: Scene, settings: ViewSettings, size: tuple[int, int], samples: int, last: bool
+) -> RenderSettings:
+    """The renderer's settings for a picture of ``size`` (w, h). Depth, normal and face need no light and no bounce.
+
+    Pictures before the last must come soon, whatever the scene does to rays.
+    """
     seen_directly = settings.aov in ("depth", "normal", "face")
     return RenderSettings(
         resolution=size,
         samples=samples,
         max_depth=0 if seen_directly else settings.max_depth,
         min_weight=scene.render.min_weight,
+        max_rays=scene.render.max_rays if last else min(SOON, scene.render.max_rays),
         shadows=settings.shadows and not seen_directly,
     )

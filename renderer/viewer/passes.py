@@ -36,7 +36,7 @@ class Pass:
 def passes_of(view: View) -> list[Pass]:
     """What is sent for ``view``: nothing for "gl", face colours for "phong", one picture or growing ones.
 
-    Brute force takes one sample a pixel: nothing stops a tile under way, and of many samples it would take minutes.
+    Brute force takes one sample a pixel: of many samples it would take minutes.
     """
     if view.mode == "gl":
         return []
@@ -82,7 +82,7 @@ def answer(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], N
 def picture(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], None] | None = None) -> Image:
     """What ``render`` gives for the view's camera and settings."""
     stage = varied(shown.brute if view.mode == "brute" else shown.stage, view.settings)
-    settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples)
+    settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, wanted.last)
     return stage.picture(camera_of(view.m, view.fovy), settings, BOUNDED, shown.threads, finished)
 
 
