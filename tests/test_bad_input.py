@@ -629,8 +629,11 @@ def test_every_public_name_is_met_here() -> None:
 
 
 def test_repairs_say_what_was_dropped() -> None:
-    """RepairWarning is what load_mesh issues (test_repair.py); Repairs is what the arrays' road gives back."""
+    """RepairWarning is what load_mesh issues (test_repair.py); Repairs is what the arrays' road gives back; CutWarning
+    is what render issues (test_stopping.py).
+    """
     assert issubclass(renderer.RepairWarning, UserWarning)
+    assert issubclass(renderer.CutWarning, UserWarning)
     octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0], [np.nan, 0, 0]], [[0, 1, 2], [0, 1, 3]], repair=True)
     assert isinstance(octree.repairs, renderer.Repairs)
     assert octree.repairs.dropped_faces.tolist() == [1]

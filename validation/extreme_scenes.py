@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Image, Mesh, Scene, render
-from renderer.camera import PerspectiveCamera
+from renderer.camera import Camera, PerspectiveCamera
 from renderer.material import Material, Mirror, Phong
 from renderer.scene import UNLIMITED_RAYS, SceneObject
 from renderer.shapes import icosphere
@@ -23,7 +23,7 @@ WHITE = Phong(diffuse=1.0, ambient=0.0)
 MIRROR = Mirror(type="mirror")
 
 
-def scene_of(camera: PerspectiveCamera, *parts: tuple[Mesh, Material], smooth: bool = False, **more: Any) -> Scene:
+def scene_of(camera: Camera, *parts: tuple[Mesh, Material], smooth: bool = False, **more: Any) -> Scene:
     """A scene of meshes with their materials, ambient light 1 unless given."""
     normals = "smooth" if smooth else "flat"
     return Scene(
