@@ -5,6 +5,7 @@ import logging
 import os
 import platform
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -78,12 +79,28 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
+_SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb): camera, light and floor are then chosen to fit"
+_WRITE_SCENE = "of a mesh file: write the scene chosen for it, to be changed at will"
+
+
+def _scene_to_write(options: argparse.Namespace) -> None:
+    """Write the scene of a mesh file where that is asked for."""
+    from renderer.mesh_io import MESH_SUFFIXES
+    from renderer.scene import write_scene
+
+    if options.write_scene is not None:
+        is_mesh = options.scene.suffix.lower() in MESH_SUFFIXES
+        expect(is_mesh, "--write-scene", f"a mesh file ({', '.join(MESH_SUFFIXES)})", str(options.scene))
+        write_scene(options.scene, options.write_scene)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="octree-render", description="Octree ray tracer for triangle meshes.")
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
     render = commands.add_parser("render", help="render a scene file to a picture")
-    render.add_argument("scene", type=Path)
+    render.add_argument("scene", type=Path, help=_SCENE)
+    render.add_argument("--write-scene", type=Path, metavar="FILE", help=_WRITE_SCENE)
     formats = ".png, or .exr or .npy for linear radiance"
     render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=formats)
     render.add_argument("--resolution", type=_resolution, metavar="WxH", help="pixels, such as 512x512")
@@ -97,11 +114,12 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
     render.set_defaults(command=_render)
     info = commands.add_parser("info", help="say what a scene holds and what its octree looks like")
-    info.add_argument("scene", type=Path)
+    info.add_argument("scene", type=Path, help=_SCENE)
     info.add_argument("--split", choices=("midpoint", "sah"), default="midpoint")
     info.set_defaults(command=_info)
     view = commands.add_parser("view", help="show a scene in the browser, live")
-    view.add_argument("scene", type=Path)
+    view.add_argument("scene", type=Path, help=_SCENE)
+    view.add_argument("--write-scene", type=Path, metavar="FILE", help=_WRITE_SCENE)
     view.add_argument("--host", default="127.0.0.1", help="where to listen; beyond this machine it takes a token")
     view.add_argument("--port", type=int, default=0, help="default: 0, any free one")
     view.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
@@ -139,13 +157,14 @@ def _resolution(text: str) -> tuple[int, int]:
 
 def _render(options: argparse.Namespace) -> None:
     # Imported here so that --help and --version need no compiler.
-    from renderer.image import CutWarning, check_picture_path
+    from renderer.image import PLANES, CutWarning, check_picture_path
     from renderer.precompile import compile_in_two
     from renderer.render import render
     from renderer.scene import load_scene
 
     check_picture_path(options.output)
     scene = load_scene(options.scene)
+    _scene_to_write(options)
     compile_in_two()
     warnings.simplefilter("ignore", CutWarning)  # said below, in a line of ours
     image = render(
@@ -157,20 +176,34 @@ def _render(options: argparse.Namespace) -> None:
         max_rays=options.max_rays,
         accelerator=options.accelerator,
         split=options.split,
+        planes=PLANES if options.output.suffix.lower() == ".exr" else ("rays",),
         threads=options.threads,
         progress=not options.quiet,
     )
-    image.save(options.output)
+    _save(image, options.output)
     if image.cut:
         print(f"octree-render: {image.cut_message(options.max_rays or scene.render.max_rays)}", file=sys.stderr)
     if not options.quiet:
-        height, width = image.depth.shape
+        height, width = image.rays.shape
         rays = int(image.rays.sum())
         print(
             f"{options.output}: {width} x {height}, {rays} rays in {image.render_seconds:.2f} s "
             f"({rays / image.render_seconds / 1e6:.1f} million a second), scene ready in "
             f"{image.build_seconds:.2f} s"
         )
+
+
+def _save(image: Any, path: Path) -> None:
+    """Save a picture; where that fails after all its work, keep it elsewhere and say where."""
+    try:
+        image.save(path)
+    except OSError as error:
+        try:
+            kept = Path(tempfile.mkdtemp(prefix="octree-render-")) / path.name
+            image.save(kept)
+        except OSError:
+            raise error from None
+        raise OSError(f"{error}; the picture is kept as {kept}") from error
 
 
 def _compile(options: argparse.Namespace) -> None:
@@ -210,6 +243,7 @@ def _choose_processor(level: str, output: Path | None) -> None:
 def _view(options: argparse.Namespace) -> None:
     from renderer.viewer.view import view
 
+    _scene_to_write(options)
     with view(options.scene, host=options.host, port=options.port, browser=False) as viewing:
         print(f"{options.scene} is shown at {viewing.url} until Ctrl-C", flush=True)
         # The usual way to end it, so no failure.

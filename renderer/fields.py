@@ -4,7 +4,8 @@ import re
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from renderer.errors import SceneError
 
@@ -39,6 +40,12 @@ class Fields(BaseModel):
         except ValidationError as error:
             raise SceneError(f"{type(self).__name__}: {first_fault(error, self._union_member)}") from None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _plain(cls, values: Any) -> Any:
+        """NumPy's numbers and arrays as Python's own, which the fields' types know."""
+        return {key: _unpacked(value) for key, value in values.items()} if isinstance(values, dict) else values
+
     # Without it pydantic would call __init__ for each record within another, and lose where that stands.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
@@ -47,6 +54,14 @@ class Fields(BaseModel):
     def _union_member(keys: Keys) -> int | None:
         """Where ``keys`` hold the name of a union's member; see ``first_fault``."""
         return None
+
+
+def _unpacked(value: object) -> object:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, list):
+        return [_unpacked(entry) for entry in value]
+    return tuple(_unpacked(entry) for entry in value) if type(value) is tuple else value
 
 
 def first_fault(error: ValidationError, member: Callable[[Keys], int | None] = lambda keys: None) -> str:

@@ -5,13 +5,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect
 from renderer.exr import check_exr, exr_bytes
-from renderer.files import write_atomically
+from renderer.files import check_writable, write_atomically
+
+# The arrays of an ``Image``; radiance is always there.
+PLANES = ("radiance", "depth", "normal", "face", "rays")
+# Rows encoded together, so that a large picture is not held twice over.
+_ROWS = 64
 
 
 def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
@@ -71,6 +77,8 @@ class Image:
     normal    (h, w, 3) float32, unit shading normal of the surface; 0 where nothing was hit
     face      (h, w) int32, face of the merged mesh; -1 where nothing was hit
     rays      (h, w) int32, rays traced for the pixel, shadow rays included
+
+    Of those that ``render`` was not asked to keep, h and w are 0.
     cut       (pixels) how many miss rays for ``max_rays``, 0 in most pictures
     build_seconds, render_seconds  what it took, without compiling; the first is the prepared scene's
     """
@@ -87,8 +95,8 @@ class Image:
     def cut_message(self, max_rays: int) -> str:
         """What ``CutWarning`` says."""
         return (
-            f"{self.cut:,} of {self.face.size:,} pixels miss rays: they took max_rays = {max_rays:,} a sample. More "
-            "max_rays trace all; a min_weight, such as 0.001, ends those that hardly show"
+            f"{self.cut:,} of {self.radiance.size // 3:,} pixels miss rays: they took max_rays = {max_rays:,} a "
+            "sample. More max_rays trace all; a min_weight, such as 0.001, ends those that hardly show"
         )
 
     def save(self, path: str | Path) -> None:
@@ -102,33 +110,47 @@ class Image:
         if suffix == ".npy":
             write_atomically(path, lambda file: np.save(file, self.radiance))
         elif suffix == ".exr":
-            normal = {f"normal.{axis}": self.normal[..., i].copy() for i, axis in enumerate("XYZ")}
-            with np.errstate(over="ignore"):  # a depth beyond float32 becomes inf, as a miss is
-                write_exr(path, self.radiance, {"Z": self.depth.astype(np.float32), **normal})
+            write_exr(path, self.radiance, self._layers())
         else:
-            write_atomically(path, lambda file: file.write(self._repr_png_()))
+            write_atomically(path, self._write_png)
+
+    def _layers(self) -> dict[str, NDArray[np.float32]]:
+        """Depth and normal as an EXR file has them, where they were kept."""
+        normal = {f"normal.{axis}": self.normal[..., i].copy() for i, axis in enumerate("XYZ")}
+        with np.errstate(over="ignore"):  # a depth beyond float32 becomes inf, as a miss is
+            layers = {"Z": self.depth.astype(np.float32), **normal}
+        return {name: layer for name, layer in layers.items() if layer.size}
 
     @property
     def srgb(self) -> NDArray[np.uint8]:
         """The picture as (h, w, 3) uint8 sRGB, as a PNG file holds it."""
-        return srgb(self.radiance)
+        codes = np.empty(self.radiance.shape, np.uint8)
+        for begin in range(0, len(codes), _ROWS):
+            codes[begin : begin + _ROWS] = srgb(self.radiance[begin : begin + _ROWS])
+        return codes
 
     def _repr_png_(self) -> bytes:
         """The picture as PNG; notebooks show it."""
+        buffer = io.BytesIO()
+        self._write_png(buffer)
+        return buffer.getvalue()
+
+    def _write_png(self, file: BinaryIO) -> None:
         from PIL import Image as Pillow  # not needed to trace rays, and slow to import
 
-        expect(not np.isnan(self.radiance).any(), "radiance", "numbers that have a colour", "nan")
-        buffer = io.BytesIO()
-        Pillow.fromarray(self.srgb).save(buffer, "png")
-        return buffer.getvalue()
+        for begin in range(0, len(self.radiance), _ROWS):
+            rows = self.radiance[begin : begin + _ROWS]
+            expect(not np.isnan(rows).any(), "radiance", "numbers that have a colour", "nan")
+        Pillow.fromarray(self.srgb).save(file, "png")
 
 
 def check_picture_path(path: str | Path) -> None:
-    """Raise ``ValueError`` unless ``save`` can write there; worth asking before a long render."""
+    """Raise ``ValueError`` or ``OSError`` unless ``save`` can write there; worth asking before a long render."""
     path = Path(path)
     expect(path.suffix.lower() in (".png", ".exr", ".npy"), "output", "a .png, .exr or .npy file", repr(str(path)))
     expect(path.parent.is_dir(), "output", "a path in an existing folder", repr(str(path)))
     expect(not path.is_dir(), "output", "a file", f"the folder {str(path)!r}")
+    check_writable(path)
     if path.suffix.lower() == ".exr":
         check_exr()
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.arrays import plain_array, real_array
 from renderer.errors import MeshError
 
 Float64Array = NDArray[np.float64]
@@ -31,6 +32,8 @@ class Repairs:
     dropped_faces : rows of the given faces that name a vertex that is not finite or that is not there, (n,) int64.
     bad_vertices : rows of the given vertices that are not finite, named by a face or not, (n,) int64.
     kept_faces : the given row of each face that was kept, (F,) int64; it takes a hit's ``face`` to the given faces.
+    bad_normals : rows of the given normals that are not finite at a vertex that is, (n,) int64; the faces around it
+        say what they are instead.
 
     >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 9], [0, 1, 2]])
     >>> print(repairs)
@@ -42,13 +45,15 @@ class Repairs:
     dropped_faces: NDArray[np.int64]
     bad_vertices: NDArray[np.int64]
     kept_faces: NDArray[np.int64]
+    bad_normals: NDArray[np.int64]
 
     def __bool__(self) -> bool:
-        return len(self.dropped_faces) + len(self.bad_vertices) > 0
+        return len(self.dropped_faces) + len(self.bad_vertices) + len(self.bad_normals) > 0
 
     def __str__(self) -> str:
         dropped, bad = len(self.dropped_faces), len(self.bad_vertices)
-        return f"dropped {dropped} of {dropped + len(self.kept_faces)} faces; {bad} vertices are not finite"
+        normals = f"; {len(self.bad_normals)} normals are not finite" if len(self.bad_normals) else ""
+        return f"dropped {dropped} of {dropped + len(self.kept_faces)} faces; {bad} vertices are not finite{normals}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,9 +276,10 @@ class Mesh:
         """The mesh of the faces that are right, in their order, and what was left out.
 
         A face is dropped where it names a vertex with a NaN or infinite coordinate, or an index out of range. Such
-        a vertex stays in its row, so that indices keep their meaning, but at 0 with all its attributes. Arguments
-        as for the class. Whatever else is wrong is a ``MeshError`` as there: shapes, dtypes, attributes that are
-        not finite at a vertex that is. Right input gives the same mesh as the class does.
+        a vertex stays in its row, so that indices keep their meaning, but at 0 with all its attributes. A normal that
+        is not finite becomes the mean of the faces around its vertex. Arguments as for the class. Whatever else is
+        wrong is a ``MeshError`` as there: shapes, dtypes, colours and texture coordinates that are not finite at a
+        vertex that is. Right input gives the same mesh as the class does.
 
         >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, np.nan, 0]], [[0, 1, 3], [0, 1, 2]])
         >>> mesh.faces.tolist(), mesh.vertices[3].tolist(), repairs.bad_vertices.tolist()
@@ -295,8 +301,15 @@ class Mesh:
                 if len(rows) == len(positions):  # the constructor rejects any other length
                     rows[~finite] = 0.0
                 attributes[attribute] = rows
-        repairs = Repairs(*(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept)))
-        return cls(positions, indices[kept], name=name, **attributes), repairs
+        mesh_normals = attributes.pop("normals")
+        mesh, lost = cls(positions, indices[kept], name=name, **attributes), np.zeros(0, np.bool_)
+        if mesh_normals is not None:
+            if len(mesh_normals) == len(positions):
+                lost = ~np.isfinite(mesh_normals).all(axis=1)
+                mesh_normals[lost] = mesh.vertex_normals()[lost] if lost.any() else 0.0
+            mesh = replace(mesh, normals=mesh_normals)
+        masks = (~kept, ~finite, kept, lost)
+        return mesh, Repairs(*(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in masks))
 
 
 def face_normals(corners: Float64Array) -> Float64Array:
@@ -330,9 +343,9 @@ def _error(name: str, message: str) -> MeshError:
 
 def _rows(name: str, argument: str, values: Any, width: int) -> NDArray[Any]:
     try:
-        array = np.asarray(values)
-    except ValueError as error:  # a ragged list
-        raise _error(name, f"{argument}: expected an array of shape (n, {width}), got {error}") from error
+        array = plain_array(values) if argument == "faces" else real_array(values)
+    except ValueError as error:
+        raise _error(name, f"{argument}: {error}") from error
     if array.shape == (0,):
         array = array.reshape(0, width)
     if array.ndim != 2 or array.shape[1] != width:
@@ -343,8 +356,6 @@ def _rows(name: str, argument: str, values: Any, width: int) -> NDArray[Any]:
 def _real_rows(name: str, argument: str, values: Any, width: int, dtype: type[np.floating]) -> NDArray[Any]:
     """A new (n, width) array of ``dtype``; what it cannot hold is inf."""
     array = _rows(name, argument, values, width)
-    if array.size and array.dtype.kind not in "fiu":
-        raise _error(name, f"{argument}: expected real numbers, got dtype {array.dtype}")
     if not array.size:
         return np.empty((0, width), dtype)
     # Overflow gives inf and a signalling NaN gives NaN: the caller looks for both, so neither need warn.

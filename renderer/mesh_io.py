@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import warnings
+from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from renderer.errors import MeshError
+from renderer.files import write_atomically
 from renderer.mesh import Mesh, Repairs, RepairWarning, build_mesh
 from renderer.obj import parse_obj
 from renderer.ply import format_ply, parse_ply
@@ -63,6 +65,9 @@ def parse_mesh(content: bytes, suffix: str, repairs: list[Repairs] | None = None
 
     Raises ``MeshError`` as ``load_mesh`` does, without the file's name.
     """
+    # Some editors begin a text with a byte order mark, which is no part of it.
+    if content.startswith(BOM_UTF8) and (suffix != ".stl" or content[len(BOM_UTF8) :].lstrip().startswith(b"solid")):
+        content = content[len(BOM_UTF8) :]
     mesh = _PARSERS[suffix](content, repairs)
     if len(mesh.faces) == 0:
         raise MeshError(f"holds no good faces: {_total(repairs)}" if repairs and any(repairs) else "holds no faces")
@@ -71,8 +76,8 @@ def parse_mesh(content: bytes, suffix: str, repairs: list[Repairs] | None = None
 
 def _total(repairs: list[Repairs]) -> Repairs:
     """All meshes' repairs as if they were one mesh's; only the counts mean something."""
-    dropped, bad, kept = zip(*((r.dropped_faces, r.bad_vertices, r.kept_faces) for r in repairs), strict=True)
-    return Repairs(np.concatenate(dropped), np.concatenate(bad), np.concatenate(kept))
+    parts = ((r.dropped_faces, r.bad_vertices, r.kept_faces, r.bad_normals) for r in repairs)
+    return Repairs(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
 def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
@@ -80,13 +85,7 @@ def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
 
     The file appears whole or not at all. Raises ``OSError`` where it cannot be written.
     """
-    path = Path(path)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        unfinished.write_bytes(format_ply(mesh))
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    write_atomically(path, lambda file: file.write(format_ply(mesh)))
 
 
 def _parse_glb(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
@@ -111,6 +110,11 @@ def _parse_glb(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
         raise MeshError(f"malformed GLB: {type(error).__name__}: {fault}") from error
 
 
+# glTF 2.0, section 5.24.4, and the extensions that pack vertices.
+_TRIANGLES, _TRIANGLE_FAN = 4, 6
+_UNREAD_EXTENSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+
+
 def _check_glb_frame(content: bytes) -> None:
     """The 12-byte header and the JSON chunk (glTF 2.0, section 4.4): trimesh checks neither length nor encoding."""
     if content[:4] != b"glTF":
@@ -119,9 +123,30 @@ def _check_glb_frame(content: bytes) -> None:
     if len(content) < max(length, 20 + json_length):
         raise MeshError(f"truncated: expected {max(length, 20 + json_length)} bytes, got {len(content)}")
     try:
-        json.loads(content[20 : 20 + json_length].decode("utf-8"))
+        document = json.loads(content[20 : 20 + json_length].decode("utf-8"))
     except (ValueError, RecursionError) as error:
         raise MeshError(f"malformed GLB: its JSON chunk: {str(error)[:120]}") from error
+    _refuse_unread(document)
+
+
+def _refuse_unread(document: Any) -> None:
+    """Raise ``MeshError`` for what trimesh drops or reads wrongly without a word. Malformed entries it refuses."""
+
+    def dicts(owner: Any, key: str) -> list[dict[str, Any]]:
+        entries = owner.get(key) if isinstance(owner, dict) else None
+        return [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
+
+    required = document.get("extensionsRequired") if isinstance(document, dict) else None
+    for extension in required if isinstance(required, list) else []:
+        if extension in _UNREAD_EXTENSIONS:
+            raise MeshError(f"GLB: expected plain buffers, got the extension {extension}: save it without compression")
+    for number, mesh in enumerate(dicts(document, "meshes")):
+        for primitive in dicts(mesh, "primitives"):
+            if primitive.get("mode", _TRIANGLES) == _TRIANGLE_FAN:
+                raise MeshError(f"GLB: expected triangles or strips, got a TRIANGLE_FAN in mesh {number}")
+    for number, accessor in enumerate(dicts(document, "accessors")):
+        if "sparse" in accessor:
+            raise MeshError(f"GLB: expected plain accessors, got a sparse one, accessor {number}")
 
 
 def _from_trimesh(geometry: Any, repairs: list[Repairs] | None) -> Mesh:
@@ -140,3 +165,6 @@ _PARSERS: dict[str, Callable[[bytes, list[Repairs] | None], Mesh]] = {
     ".stl": parse_stl,
     ".glb": _parse_glb,
 }
+
+# What ``load_mesh`` reads.
+MESH_SUFFIXES = tuple(_PARSERS)

@@ -20,6 +20,11 @@ MAX_DEPTH = 64
 # Boxes are float32, whose products of two extents must neither overflow nor vanish. Meshes beyond these sizes are
 # scaled by a power of two, which is exact.
 _SMALLEST, _LARGEST = 2.0**-60, 2.0**60
+# t comes from products of two sides of a face and a third length, the ray's way to it. Where that is a side too,
+# 2^-330 cubed is 2^-990: 2^32 above the least normal number, so that t and barycentrics keep their digits.
+_LEAST_SIDE = 2.0**-330
+# Vertices or faces looked at together: so few that they stay in the cache.
+_ROWS = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -143,7 +148,9 @@ class _Accelerator:
         mesh, tree = self._built
         moved = _moved(mesh, vertices)
         scaled, scale = _scaled(moved)
-        self._built = (moved, refit_tree(tree, scaled, moved.faces, scale, self.threads))
+        refitted = refit_tree(tree, scaled, moved.faces, scale, self.threads)
+        _check_sides(moved, scaled, refitted)
+        self._built = (moved, refitted)
 
     @property
     def stats(self) -> Stats:
@@ -217,7 +224,9 @@ class Octree(_Accelerator):
         _expect_range("max_depth", max_depth, MAX_DEPTH)
         vertices, scale = _scaled(mesh)
         rule = Rule(SPLITS[split], int(leaf_size), int(max_depth))
-        super().__init__(mesh, build_tree(vertices, mesh.faces, rule, scale, checked_threads(threads)), threads)
+        tree = build_tree(vertices, mesh.faces, rule, scale, checked_threads(threads))
+        _check_sides(mesh, vertices, tree)
+        super().__init__(mesh, tree, threads)
 
 
 class BruteForce(_Accelerator):
@@ -264,7 +273,9 @@ def _expect_range(argument: str, value: object, largest: int) -> None:
 
 def _all_blocks(mesh: Mesh, threads: int) -> Tree:
     vertices, scale = _scaled(mesh)
-    return build_blocks(vertices, mesh.faces, scale, threads)
+    tree = build_blocks(vertices, mesh.faces, scale, threads)
+    _check_sides(mesh, vertices, tree)
+    return tree
 
 
 def _moved(mesh: Mesh, vertices: ArrayLike) -> Mesh:
@@ -318,6 +329,34 @@ def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
         got = mesh.vertices[row].tolist()
         raise MeshError(f"vertices: expected coordinates within 2^900 of each other, got {got} in row {row}")
     return scaled, 2.0**exponent
+
+
+def _check_sides(mesh: Mesh, vertices: NDArray[np.float64], tree: Tree) -> None:
+    """Raise ``MeshError`` for a face so small, beside the largest coordinate, that its products vanish."""
+    # Differences of float32 are 0 or no less than 2^-149, and those of larger float64 numbers no less than 2^-53 times.
+    if tree.blocks.dtype == np.float32 or _least_of(vertices) >= 2.0**53 * _LEAST_SIDE:
+        return
+    for begin in range(0, len(mesh.faces), _ROWS):
+        corners = vertices[mesh.faces[begin : begin + _ROWS]]
+        sides = np.sort(corners.max(axis=1) - corners.min(axis=1), axis=1)[:, 1]
+        bad = (sides > 0.0) & (sides < _LEAST_SIDE)
+        if bad.any():
+            row, least = int(bad.argmax()), _LEAST_SIDE / tree.scale
+            got = f"{sides[row] / tree.scale:.3g} in row {begin + row}"
+            raise MeshError(
+                f"faces: expected a second longest side of their bounds of 0 or, beside coordinates that large, at "
+                f"least {least:.3g}, got {got}"
+            )
+
+
+def _least_of(vertices: NDArray[np.float64]) -> float:
+    """The least size of a coordinate that is not 0."""
+    least = np.inf
+    for begin in range(0, len(vertices), _ROWS):
+        sizes = np.abs(vertices[begin : begin + _ROWS])
+        sizes[sizes == 0.0] = np.inf
+        least = min(least, float(sizes.min()))
+    return least
 
 
 def _is_extreme(mesh: Mesh) -> bool:

@@ -1,6 +1,6 @@
 """A scene made ready: what its pictures share is worked out once, and each camera then costs its rays alone."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -10,7 +10,7 @@ from renderer.bundle import SIZE
 from renderer.camera import Camera, sample_offsets
 from renderer.compile_notice import Stopwatch
 from renderer.errors import expect
-from renderer.image import Image
+from renderer.image import PLANES, Image
 from renderer.layout import LANES, Tree, cache_aligned
 from renderer.mesh import Mesh
 from renderer.needs import Needs
@@ -56,6 +56,7 @@ class PreparedScene:
         offset: float,
         threads: int,
         finished: Callable[[int], None] | None = None,
+        planes: Collection[str] = PLANES,
     ) -> Image:
         """The picture that ``camera`` takes, by checked settings; see ``render``.
 
@@ -65,7 +66,7 @@ class PreparedScene:
         clock = Stopwatch()
         width, height = chosen.resolution
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
-        settings, film = kernel_settings_of(self.needs, chosen, offset), _film(width, height)
+        settings, film = kernel_settings_of(self.needs, chosen, offset), _film(width, height, planes)
         world = self.world
         if self.needs.refraction and camera is not self.scene.camera:
             world = world._replace(media=media_around(self.scene, camera))
@@ -149,11 +150,12 @@ def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: float) -> S
     return Settings(bounces, chosen.min_weight, offset, media, chosen.shadows, chosen.max_rays)
 
 
-def _film(width: int, height: int) -> Film:
+def _film(width: int, height: int, planes: Collection[str]) -> Film:
+    depth, normal, face, rays = ((height, width) if name in planes else (0, 0) for name in PLANES[1:])
     return Film(
         radiance=np.zeros((height, width, 3), np.float32),
-        depth=np.full((height, width), np.inf),
-        normal=np.zeros((height, width, 3), np.float32),
-        face=np.full((height, width), -1, np.int32),
-        rays=np.zeros((height, width), np.int32),
+        depth=np.full(depth, np.inf),
+        normal=np.zeros((*normal, 3), np.float32),
+        face=np.full(face, -1, np.int32),
+        rays=np.zeros(rays, np.int32),
     )

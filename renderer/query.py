@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.arrays import real_array
 from renderer.batch import FEW_DEPTH, search_chunk, trace_chunk, trace_few
 from renderer.errors import expect
 from renderer.layout import LANES, Tree
@@ -71,18 +72,19 @@ class Hits:
 
 def _array(argument: str, values: ArrayLike) -> NDArray[Any]:
     try:
-        array = np.asarray(values)
-    except ValueError as error:  # a ragged list
-        raise ValueError(f"{argument}: expected an array, got {error}") from None
-    expect(array.dtype.kind in "fiu", argument, "real numbers", f"dtype {array.dtype}")
-    return array
+        return real_array(values)
+    except ValueError as error:
+        raise ValueError(f"{argument}: {error}") from None
 
 
 _MOST = float(np.finfo(np.float64).max)
 
 
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
+    """(n, 3); one vector (3,) is a row."""
     array = _array(argument, values)
+    if array.shape == (3,):
+        return array[None]
     expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
     return array
 
@@ -131,14 +133,24 @@ def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_ma
     """
     if not (_is_plain(origins) and _is_plain(directions)):
         origins, directions = _vectors("origins", origins), _vectors("directions", directions)
-    count = len(origins)
-    expect(count == len(directions), "directions", f"{count} rows as in origins", len(directions))
+    if len(origins) != len(directions):
+        origins, directions = _paired(origins, directions)
+    count = len(directions)
     # The usual bounds, by identity of the defaults or as other zeros and infinities, need no arrays of their own.
     low = _ZERO if type(t_min) is float and t_min == 0.0 else _bound("t_min", t_min, count, _MOST)
     high = _INFINITY if type(t_max) is float and t_max == np.inf else _bound("t_max", t_max, count, np.inf)
     # An eye broadcast to all rays, as of a camera, need not be copied for each.
     shared = count > 1 and origins.strides[0] == 0
     return RayBatch(_doubles(origins[:1] if shared else origins), _doubles(directions), low, high)
+
+
+def _paired(origins: NDArray[Any], directions: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Origins and directions row by row, where one of them may be a single row for all of the other."""
+    if len(origins) == 1:
+        return np.broadcast_to(origins, directions.shape), directions
+    one = len(directions) == 1
+    expect(one, "directions", f"{len(origins)} rows as in origins, or one for all", f"{len(directions)} rows")
+    return origins, np.broadcast_to(directions, origins.shape)
 
 
 def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:

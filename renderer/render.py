@@ -1,12 +1,13 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
 import warnings
+from collections.abc import Collection
 from typing import Any, Literal
 
 from renderer.build import SPLITS
 from renderer.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.errors import expect
-from renderer.image import CutWarning, Image
+from renderer.image import PLANES, CutWarning, Image
 from renderer.needs import Needs, checked_needs
 from renderer.parallel import checked_threads
 from renderer.prepared_scene import PreparedScene, prepare_scene, tiles
@@ -23,6 +24,7 @@ def render(
     split: Literal["midpoint", "sah"] = "midpoint",
     needs: Needs | None = None,
     offset: Literal["bounded", "mitsuba"] | float = "bounded",
+    planes: Collection[str] = PLANES,
     threads: int | None = None,
     progress: bool = False,
     **settings: Any,
@@ -40,6 +42,8 @@ def render(
                  radiance, depth, normal or face, and costs time and memory
     offset       how spawned rays leave a surface: "bounded" by their rounding error, or Mitsuba's rule with its
                  epsilon or another one
+    planes       which arrays of the ``Image`` to keep, of "depth", "normal", "face" and "rays": 28 of 40 bytes a pixel;
+                 "radiance" is always kept
     threads      None takes all processors
     progress     a bar on standard error when that is a terminal
 
@@ -59,13 +63,15 @@ def render(
     eye = source.camera if camera is None else camera
     expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
     chosen = checked_settings(source.render, settings)
+    known = not isinstance(planes, str) and set(planes) <= set(PLANES)
+    expect(known, "planes", f"some of {', '.join(PLANES)}", repr(planes))
     if isinstance(scene, PreparedScene):
         _expect_usual(accelerator, split, needs)
         prepared = scene
     else:
         prepared = _prepared(scene, chosen.max_depth, accelerator, split, needs, threads)
     with _bar(tiles(chosen.resolution), progress) as bar:
-        image = prepared.picture(eye, chosen, rule, threads, bar.update)
+        image = prepared.picture(eye, chosen, rule, threads, bar.update, planes)
     if image.cut:
         warnings.warn(image.cut_message(chosen.max_rays), CutWarning, stacklevel=2)
     return image

@@ -18,10 +18,12 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from renderer.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.errors import MeshError, SceneError, expect
 from renderer.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
+from renderer.files import write_atomically
 from renderer.light import DirectionalLight, PointLight
 from renderer.material import Dielectric, Material, Mirror, Phong
 from renderer.mesh import Mesh
-from renderer.mesh_io import load_mesh
+from renderer.mesh_io import MESH_SUFFIXES, load_mesh
+from renderer.showcase import showcase_text
 
 
 def _typed(default: str) -> BeforeValidator:
@@ -191,14 +193,34 @@ class Scene(Fields):
 
 
 def load_scene(path: str | Path) -> Scene:
-    """Read and check a scene file, and load its meshes. Raises ``SceneError`` or ``MeshError``."""
+    """Read and check a scene file, and load its meshes; of a mesh file, the scene that ``showcase`` puts around it.
+
+    Raises ``SceneError`` or ``MeshError``.
+    """
     path = Path(path)
+    if path.suffix.lower() in MESH_SUFFIXES:
+        mesh = load_mesh(path)
+        table = tomllib.loads(showcase_text(mesh, path.name))
+        table["objects"][0]["mesh"] = mesh
+        return _checked(table, path)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, a null byte, too many digits
         raise SceneError(f"{path}: expected TOML, got a syntax error: {error}") from None
+    return _checked(table, path)
+
+
+def write_scene(mesh_file: str | Path, path: str | Path) -> None:
+    """Write the scene that ``load_scene(mesh_file)`` gives as a scene file, to be changed at will."""
+    inside = os.path.relpath(Path(mesh_file).resolve(), Path(path).resolve().parent)
+    text = showcase_text(load_mesh(mesh_file), Path(inside).as_posix())
+    write_atomically(path, lambda file: file.write(text.encode()))
+
+
+def _checked(table: dict[str, Any], path: Path) -> Scene:
+    """The scene in a file's table, whose meshes are loaded."""
     for entry in table.get("objects") or [] if isinstance(table.get("objects"), list) else []:
         if isinstance(entry, dict) and isinstance(entry.get("mesh"), str):
             entry["mesh"] = path.parent / entry["mesh"]

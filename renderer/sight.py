@@ -10,7 +10,7 @@ from renderer.scene_rows import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
 from renderer.shading import specular
 from renderer.simd import get, pointer
 from renderer.spawn import offset_distance
-from renderer.vec3 import add, barycentric, cross, dot, normalized, row3, scale, sub, three
+from renderer.vec3 import add, barycentric, cross, dot, largest_component, normalized, row3, scale, sub, three
 
 # Media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8
@@ -93,7 +93,9 @@ def surface_at(world, face, u, v):
     p = barycentric(p0, p1, p2, u, v)
     n_s = n_g
     if world.has_smooth and get(world.smooth, face):
-        n_s = normalized(barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v))
+        n = barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v)
+        # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
+        n_s = normalized(n) if largest_component(n) > 0.0 else n_g
     error = offset_distance(p, p0, p1, p2, u, v, n_g)
     return Surface(p, error, n_g, n_s, get(world.material, face))
 

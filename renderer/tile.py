@@ -22,7 +22,9 @@ _SQUARE = 4
 
 
 class Film(NamedTuple):
-    """What a tile writes: radiance and normal (h, w, 3), depth (h, w), face and rays (h, w)."""
+    """What a tile writes: radiance and normal (h, w, 3), depth, face and rays (h, w). Of those that are not kept, which
+    radiance always is, h and w are 0.
+    """
 
     radiance: NDArray[np.float32]
     depth: NDArray[np.float64]
@@ -69,8 +71,11 @@ def _write_first_hits(film, bundle, work, x0, y0):
     for i in range(count_of(bundle)):
         pixel, surface = get(bundle.pixels, i), at(work.surfaces, i * SURFACE_DOUBLES)
         x, y, face = x0 + pixel % SIDE, y0 + pixel // SIDE, get(work.found.face, i)
-        film.depth[y, x], film.face[y, x] = get(work.found.t, i), face
-        if face >= 0:
+        if len(film.depth) > 0:
+            film.depth[y, x] = get(work.found.t, i)
+        if len(film.face) > 0:
+            film.face[y, x] = face
+        if face >= 0 and len(film.normal) > 0:
             n = three(surface, NORMAL)
             n = scale(n, -1.0) if get(surface, INSIDE) != 0.0 else n
             for k in range(3):
@@ -91,7 +96,8 @@ def _end_sample(film, block, work, total):
         for x in range(x0, x1):
             pixel = (y - y0) * SIDE + x - x0
             put3(total, 3 * pixel, add(row3(total, pixel), row3(work.color, pixel)))
-            film.rays[y, x] += get(work.traced, pixel)
+            if len(film.rays) > 0:
+                film.rays[y, x] += get(work.traced, pixel)
 
 
 @kernel

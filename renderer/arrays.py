@@ -1,0 +1,42 @@
+"""What users hand over as arrays: lists, NumPy's, those of tables; as NumPy arrays of real numbers, or an error."""
+
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.ma import MaskedArray, getmaskarray
+from numpy.typing import NDArray
+
+# Beyond it float64 skips whole numbers.
+_LARGEST_WHOLE = 2**53
+
+
+def real_array(values: Any) -> NDArray[Any]:
+    """``values`` as an array of real numbers of any type that float64 holds.
+
+    Columns of tables that may lack values come as Python objects: they are numbers if each one is. Raises
+    ``ValueError`` that tells what was expected, and what was got.
+    """
+    array = plain_array(values)
+    if array.dtype.kind == "O" and all(isinstance(x, Real) for x in array.flat):
+        array = array.astype(np.float64)
+    if array.size and array.dtype.kind not in "fiu":
+        raise ValueError(f"expected real numbers, got dtype {array.dtype}")
+    if array.dtype.kind in "iu" and array.dtype.itemsize == 8 and array.size:
+        largest = max(int(array.max()), -int(array.min()))
+        if largest > _LARGEST_WHOLE:
+            raise ValueError(f"expected numbers that float64 holds, got the integer {largest}, beyond 2^53")
+    return array
+
+
+def plain_array(values: Any) -> NDArray[Any]:
+    """``values`` as an array of any dtype. Raises ``ValueError`` for ragged lists and masked values."""
+    if isinstance(values, MaskedArray):
+        masked = int(getmaskarray(values).sum())
+        if masked:
+            raise ValueError(f"expected no masked values, got {masked}")
+        return np.asarray(values.data)
+    try:
+        return np.asarray(values)
+    except ValueError as error:  # a ragged list
+        raise ValueError(f"expected an array, got {error}") from None

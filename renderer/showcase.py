@@ -1,0 +1,72 @@
+"""A scene for a mesh alone: a camera that sees all of it, a light, and a floor under it."""
+
+import json
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from renderer.mesh import Mesh
+
+# The ball around the mesh, seen from a little above and to the right, fills the picture's height less a tenth.
+_TOWARDS_EYE, _FOV, _MARGIN = (0.5, 0.4, 1.0), 40.0, 1.1
+# Half sides of the floor, in radii, and its squares a side.
+_FLOOR, _SQUARES = 4.0, 16
+
+
+def showcase_text(mesh: Mesh, path: str) -> str:
+    """The scene file, as TOML, that shows ``mesh``; ``path`` is its file's, as the scene file says it.
+
+    The mesh is moved so that it stands in the middle of the floor, y up. It is smooth where its file has normals.
+    """
+    lower, upper = mesh.bounds
+    radius = float(np.linalg.norm(mesh.extent)) / 2.0 or 1.0
+    middle, target = (lower + upper) / 2.0, np.array([0.0, float(mesh.extent[1]) / 2.0, 0.0])
+    towards = np.array(_TOWARDS_EYE) / np.linalg.norm(_TOWARDS_EYE)
+    eye = target + towards * (_MARGIN * radius / math.sin(math.radians(_FOV) / 2.0))
+    half = _FLOOR * radius
+    return f"""# Made for {path}: change what you like.
+
+[camera]
+eye = {_list(eye)}
+target = {_list(target)}
+fov = {_FOV}
+
+[[objects]]
+mesh = {json.dumps(path)}
+material = "model"
+normals = "{"flat" if mesh.normals is None else "smooth"}"
+translate = {_list((-middle[0], -lower[1], -middle[2]))}
+
+[floor]
+min = {_list((-half, -half))}
+max = {_list((half, half))}
+squares = [{_SQUARES}, {_SQUARES}]
+materials = ["light", "dark"]
+
+[materials.model]
+diffuse = [0.72, 0.68, 0.62]
+specular = 0.15
+shininess = 40.0
+
+[materials.light]
+diffuse = 0.75
+
+[materials.dark]
+diffuse = 0.6
+
+[[lights]]
+type = "directional"
+direction = [-0.6, -1.0, -0.5]
+irradiance = 0.75
+
+[[lights]]
+type = "directional"
+direction = [1.0, -0.6, -0.8]
+irradiance = 0.25
+"""
+
+
+def _list(values: Iterable[float]) -> str:
+    # A zero without its sign.
+    return repr([float(value) + 0.0 for value in values])

@@ -1,0 +1,116 @@
+"""Files that are written: whole or not at all, where links lead, refused before the work, kept after it."""
+
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from renderer import cli, files, load_scene, render
+from renderer.cli import main
+from renderer.files import check_writable, write_atomically
+from renderer.image import PLANES, Image
+
+STAIRS = Path(__file__).parents[1] / "scenes" / "stairs.toml"
+
+
+def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    target, link = tmp_path / "there" / "a.bin", tmp_path / "link.bin"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    write_atomically(link, lambda file: file.write(b"new"))
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["a.bin", "link.bin", "there"]
+    # One that leads nowhere yet, too.
+    (tmp_path / "other").symlink_to(tmp_path / "there" / "b.bin")
+    write_atomically(tmp_path / "other", lambda file: file.write(b"b"))
+    assert (tmp_path / "there" / "b.bin").read_bytes() == b"b"
+
+
+@pytest.mark.parametrize("failing", ["write", "replace"])
+def test_an_error_names_the_file_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"old")
+
+    def refuse(*arguments: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    if failing == "replace":
+        monkeypatch.setattr(files.os, "replace", refuse)
+    with pytest.raises(OSError, match="No space left on device") as told:
+        write_atomically(path, refuse if failing == "write" else lambda file: file.write(b"new"))
+    assert told.value.filename == str(path)
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"old"]
+
+
+def test_whether_a_folder_can_be_written_is_found_out_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    """Root may write everywhere, so the refusal is faked."""
+
+    def refuse(*arguments: Any, **options: Any) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(files.Path, "touch", refuse)
+    monkeypatch.setattr(cli, "_save", lambda *a: pytest.fail("rendered in vain"))
+    with pytest.raises(PermissionError, match="Permission denied"):
+        check_writable(tmp_path / "a.png")
+    assert main(["render", str(STAIRS), "-o", str(tmp_path / "a.png"), "--resolution", "8x8"]) == 2
+    assert capsys.readouterr().err == f"octree-render: [Errno 13] Permission denied: '{tmp_path / 'a.png'}'\n"
+    assert not list(tmp_path.iterdir())
+
+
+def test_asking_leaves_nothing_and_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    check_writable(path)
+    assert not list(tmp_path.iterdir())
+    path.write_bytes(b"old")
+    check_writable(path)
+    assert path.read_bytes() == b"old"
+
+
+def test_a_picture_that_cannot_be_written_is_kept_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    """The disk is full when the picture is ready."""
+    full, spare = tmp_path / "full", tmp_path / "spare"
+    full.mkdir()
+    spare.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(spare))
+    sound = Image.save
+
+    def save(image: Image, path: Path) -> None:
+        if Path(path).parent == full:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        sound(image, path)
+
+    monkeypatch.setattr(Image, "save", save)
+    assert main(["render", str(STAIRS), "-o", str(full / "a.npy"), "--resolution", "8x8", "--quiet"]) == 2
+    (kept,) = spare.rglob("a.npy")
+    said = capsys.readouterr().err
+    assert f"No space left on device: '{full / 'a.npy'}'; the picture is kept as {kept}" in said
+    np.testing.assert_array_equal(np.load(kept), render(load_scene(STAIRS), resolution=(8, 8)).radiance)
+
+
+@pytest.mark.parametrize("planes", [(), ("rays",), ("depth", "face"), ("normal",), PLANES])
+def test_planes_that_are_not_kept_have_no_pixels_and_others_the_same(tmp_path: Path, planes: tuple[str, ...]) -> None:
+    scene = load_scene(STAIRS)
+    whole, image = render(scene, resolution=(20, 16)), render(scene, resolution=(20, 16), planes=planes)
+    for name in PLANES:
+        kept = name in planes or name == "radiance"
+        array = getattr(image, name)
+        np.testing.assert_array_equal(array, getattr(whole, name) if kept else getattr(whole, name)[:0, :0])
+    for suffix in ("png", "npy"):
+        image.save(tmp_path / f"a.{suffix}")
+
+
+@pytest.mark.parametrize("planes", ["depth", ["color"], ["depth", 3]])
+def test_unknown_planes_are_refused(planes: Any) -> None:
+    with pytest.raises(ValueError, match=r"^planes: expected some of radiance, depth, normal, face, rays, got "):
+        render(load_scene(STAIRS), resolution=(4, 4), planes=planes)

@@ -1,0 +1,73 @@
+"""A mesh file in place of a scene: seen whole, lit, on a floor; and the scene file that is written for it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from renderer import Mesh, SceneError, load_scene, render
+from renderer.cli import main
+from renderer.mesh_io import save_ply
+from renderer.scene import write_scene
+from renderer.shapes import box, icosphere, torus
+
+SHAPES = {
+    "ball": icosphere(3),
+    "ring": torus(),
+    "box": box(),
+    "sheet": Mesh([[0, 0, 0], [2, 0, 0], [0, 3, 0]], [[0, 1, 2]]),
+}
+
+
+def file_of(folder: Path, mesh: Mesh, scale: float = 1.0, offset: Any = (0, 0, 0), name: str = "model.ply") -> Path:
+    path = folder / name
+    save_ply(Mesh(mesh.vertices * scale + np.asarray(offset) * scale, mesh.faces), path)
+    return path
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("offset", [(0, 0, 0), (30, -20, 10)])
+def test_the_whole_mesh_is_seen_and_lit_and_large_enough(tmp_path: Path, shape: str, scale: float, offset: Any) -> None:
+    mesh = SHAPES[shape]
+    image = render(load_scene(file_of(tmp_path, mesh, scale, offset)), resolution=(80, 80))
+    model = (image.face >= 0) & (image.face < len(mesh.faces))
+    rows, columns = np.flatnonzero(model.any(axis=1)), np.flatnonzero(model.any(axis=0))
+    assert rows[0] > 0 and columns[0] > 0 and rows[-1] < 79 and columns[-1] < 79
+    assert max(rows[-1] - rows[0], columns[-1] - columns[0]) > 30
+    assert np.median(image.radiance[model]) > 0.05
+    # It stands on the floor, which is seen before it.
+    assert (image.face[rows[-1] + 2] >= len(mesh.faces)).any()
+
+
+def test_the_written_scene_is_the_one_that_is_rendered(tmp_path: Path) -> None:
+    (tmp_path / "models").mkdir()
+    (tmp_path / "scenes").mkdir()
+    path, written = file_of(tmp_path / "models", icosphere(2), name='a "b".ply'), tmp_path / "scenes" / "it.toml"
+    write_scene(path, written)
+    found, expected = (render(load_scene(p), resolution=(30, 20)) for p in (written, path))
+    assert found.radiance.tobytes() == expected.radiance.tobytes()
+
+
+@pytest.mark.parametrize("command", ["render", "info"])
+def test_the_command_line_takes_a_mesh(tmp_path: Path, capsys: Any, command: str) -> None:
+    path, out, written = file_of(tmp_path, icosphere(2)), tmp_path / "out.png", tmp_path / "it.toml"
+    more = ["-o", str(out), "--resolution", "16x16", "--write-scene", str(written)] if command == "render" else []
+    assert main([command, str(path), *more]) == 0
+    assert capsys.readouterr().err == ""
+    assert command == "info" or (out.exists() and load_scene(written).floor)
+
+
+def test_only_of_a_mesh_a_scene_is_written(tmp_path: Path, capsys: Any) -> None:
+    scene = Path(__file__).parents[1] / "scenes" / "stairs.toml"
+    arguments = ["render", str(scene), "-o", str(tmp_path / "a.png"), "--write-scene", str(tmp_path / "b.toml")]
+    assert main(arguments) == 2
+    assert "--write-scene: expected a mesh file" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_neither_is_said_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="expected TOML"):
+        (tmp_path / "a.txt").write_text("no scene")
+        load_scene(tmp_path / "a.txt")

@@ -1,0 +1,83 @@
+"""Faces of very different sizes in one mesh: traced right as far as products reach, and refused beyond."""
+
+import numpy as np
+import pytest
+
+from renderer import BruteForce, MeshError, Octree
+from renderer.octree import _LEAST_SIDE
+from renderer.shapes import icosphere
+from validation import exact
+
+BALL = icosphere(2)
+UNIT = np.array([[3.0, 0.0, 0.0], [4.0, 0.0, 0.0], [3.0, 1.0, 0.0]])
+
+
+def beside_a_triangle(radius):
+    """A ball about the origin of that radius, beside a triangle of size 1."""
+    vertices = np.concatenate([BALL.vertices * radius, UNIT])
+    return vertices, np.concatenate([BALL.faces, [[len(vertices) - 3, len(vertices) - 2, len(vertices) - 1]]])
+
+
+def directions(count=300):
+    return np.random.default_rng(7).normal(size=(count, 3))
+
+
+@pytest.mark.parametrize("radius", [1.0, 1e-20, 1e-40, 1e-80, 1e-98])
+@pytest.mark.parametrize("kind", [Octree, BruteForce])
+def test_a_closed_ball_of_any_size_that_is_taken_leaks_nowhere(kind, radius):
+    vertices, faces = beside_a_triangle(radius)
+    hits = kind(vertices, faces).closest_hit([0, 0, 0], directions())
+    assert (hits.face >= 0).all()
+    assert (hits.face < len(BALL.faces)).all()
+    truth = exact.closest_hits(vertices, faces, np.zeros((300, 3)), directions())
+    t = np.array([float(hit.t) for hit in truth])
+    # As elsewhere: some tens of roundings, of t itself.
+    np.testing.assert_allclose(hits.t, t, rtol=64 * 2.0**-53)
+
+
+@pytest.mark.parametrize("radius", [1e-101, 1e-108, 1e-165, 1e-300])
+@pytest.mark.parametrize("kind", [Octree, BruteForce])
+def test_smaller_ones_beside_it_are_refused_by_row(kind, radius):
+    with pytest.raises(MeshError, match=r"faces: expected a second longest side .* 4.57e-100, got .* in row \d+"):
+        kind(*beside_a_triangle(radius))
+
+
+def test_alone_a_ball_of_any_size_is_taken():
+    for radius in (1e-108, 1e-165, 1e-300, 1e300):
+        assert Octree(BALL.vertices * radius, BALL.faces).closest_hit([0, 0, 0], directions()).hit.all()
+
+
+def test_lines_and_points_of_any_size_are_taken_and_never_hit():
+    vertices = np.concatenate([[[0, 0, 0], [1e-200, 0, 0], [1e-300, 0, 0]], UNIT])
+    octree = Octree(vertices, [[0, 1, 2], [0, 0, 0], [3, 4, 5]])
+    assert octree.closest_hit([3.1, 0.1, 1], [0, 0, -1]).face.tolist() == [2]
+    assert not octree.any_hit([0, 0, 1], [[0, 0, -1], [1e-201, 0, -1]]).any()
+
+
+def test_a_refit_to_such_faces_is_refused_and_changes_nothing():
+    vertices, faces = beside_a_triangle(1.0)
+    octree = Octree(vertices, faces)
+    with pytest.raises(MeshError, match="second longest side"):
+        octree.refit(beside_a_triangle(1e-165)[0])
+    assert octree.closest_hit([0, 0, 0], directions()).hit.all()
+
+
+def test_the_bound_is_where_it_says():
+    side = _LEAST_SIDE
+    for factor, taken in ((1.0, True), (1 - 2.0**-52, False)):
+        vertices = np.concatenate([[[0, 0, 0], [1, 0, 0], [0, side * factor, 0]], UNIT])
+        if taken:
+            Octree(vertices, [[0, 1, 2], [3, 4, 5]])
+        else:
+            with pytest.raises(MeshError):
+                Octree(vertices, [[0, 1, 2], [3, 4, 5]])
+
+
+@pytest.mark.parametrize("exponent", [-320, -200, -108, -40])
+def test_no_hit_is_at_infinity_or_minus_zero(exponent):
+    octree = Octree(UNIT * [1, 1, 0], [[0, 1, 2]])
+    z = 10.0**exponent
+    hits = octree.closest_hit([[3.2, 0.2, z], [3.2, 0.2, -z], [3.2, 0.2, 0.0]], [0.0, 0.0, -1.0])
+    assert hits.face[0] == 0
+    assert not np.signbit(hits.t).any()
+    assert np.isfinite(hits.t[hits.hit]).all()
