@@ -18,7 +18,7 @@ def real_array(values: Any) -> NDArray[Any]:
     ``ValueError`` that tells what was expected, and what was got.
     """
     array = plain_array(values)
-    if array.dtype.kind == "O" and all(isinstance(x, Real) for x in array.flat):
+    if array.dtype.kind == "O" and array.ndim and all(_is_number(x) for x in array.flat):
         array = array.astype(np.float64)
     if array.size and array.dtype.kind not in "fiu":
         raise ValueError(f"expected real numbers, got dtype {array.dtype}")
@@ -27,6 +27,16 @@ def real_array(values: Any) -> NDArray[Any]:
         if largest > _LARGEST_WHOLE:
             raise ValueError(f"expected numbers that float64 holds, got the integer {largest}, beyond 2^53")
     return array
+
+
+def _is_number(value: object) -> bool:
+    """Whether float64 holds an object of Python."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        return float(value) == value or value != value  # NaN, which is refused where its row is known
+    except OverflowError:
+        return False
 
 
 def plain_array(values: Any) -> NDArray[Any]:

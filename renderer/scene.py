@@ -195,11 +195,14 @@ class Scene(Fields):
 def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file, and load its meshes; of a mesh file, the scene that ``showcase`` puts around it.
 
-    Raises ``SceneError`` or ``MeshError``.
+    Raises ``SceneError``.
     """
     path = Path(path)
     if path.suffix.lower() in MESH_SUFFIXES:
-        mesh = load_mesh(path)
+        try:
+            mesh = load_mesh(path)
+        except MeshError as error:
+            raise SceneError(str(error)) from None
         table = tomllib.loads(showcase_text(mesh, path.name))
         table["objects"][0]["mesh"] = mesh
         return _checked(table, path)

@@ -1,6 +1,7 @@
 """Mesh files: every format and fault, each from a fixture that the test writes itself."""
 
 import itertools
+import os
 import re
 import struct
 import time
@@ -223,12 +224,11 @@ def test_save_ply_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytes
     save_ply(box(), path)
     before = path.read_bytes()
 
-    def disk_full(self: Path, content: bytes) -> int:
-        with self.open("wb") as file:
-            file.write(content[:100])
+    def disk_full(source: Path, target: Path) -> None:
+        assert source.exists()
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_bytes", disk_full)
+    monkeypatch.setattr(os, "replace", disk_full)
     with pytest.raises(OSError, match="No space"):
         save_ply(torus(), path)
     assert [p.name for p in tmp_path.iterdir()] == ["pot.ply"] and path.read_bytes() == before

@@ -115,11 +115,11 @@ def test_the_given_arrays_stay() -> None:
     [
         ({"vertices": [[0, 0], [1, 1]]}, "vertices: expected shape"),
         ({"vertices": [["a", "b", "c"]]}, "vertices: expected real numbers"),
-        ({"vertices": None}, "vertices: expected shape"),
+        ({"vertices": None}, "vertices: expected real numbers"),
         ({"faces": [[0.0, 1.0, 2.0]]}, "faces: expected integers"),
         ({"faces": [[0, 1]]}, "faces: expected shape"),
         ({"normals": [[0, 0, 1]]}, "normals: expected a row a vertex, 5, got 1"),
-        ({"normals": [[0, 0, np.nan]] * 5}, "normals: expected finite values"),
+        ({"texcoords": [[0, np.nan]] * 5}, "texcoords: expected finite values"),
         ({"colors": [[0, 0, 2]] * 5}, "colors: expected values in [0, 1]"),
     ],
 )  # fmt: skip
