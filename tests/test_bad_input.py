@@ -173,7 +173,10 @@ def test_values_that_are_not_finite_are_refused(name: str, argument: str, row: i
 
 
 @pytest.mark.parametrize("value", [np.longdouble("1e4000"), np.longdouble("-1e4000")])
-@pytest.mark.parametrize(("name", "argument"), [pair for pair in ARRAYS if pair[1] not in {"faces", "t_max"}])
+@pytest.mark.parametrize(
+    ("name", "argument"),
+    [pair for pair in ARRAYS if pair[1] not in {"faces", "t_max"} and pair != ("Mesh.repaired", "normals")],
+)
 def test_numbers_beyond_float64_are_refused_without_a_warning(name: str, argument: str, value: Any) -> None:
     if np.finfo(np.longdouble).max <= np.finfo(np.float64).max:
         assert np.isinf(value)  # here they are plain infinities, and the test above has them
