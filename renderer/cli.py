@@ -16,7 +16,7 @@ from renderer import __version__
 from renderer.errors import expect
 from renderer.interrupt import interruptible
 from renderer.levels import AHEAD_VARIABLE, LEVELS
-from renderer.terminal import on_terminal
+from renderer.terminal import on_terminal, spell_everything
 
 
 @interruptible("octree-render: interrupted")
@@ -27,6 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if getattr(options, "level", None):
             _choose_processor(options.level, options.output)
         if arguments is None:
+            spell_everything()
             _hide_scipy_from_numba()
         with _compile_notices(getattr(options, "quiet", False)):
             options.command(options)

@@ -87,7 +87,7 @@ class _Accelerator:
     ) -> Hits:
         """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
 
-        origins, directions  (n, 3), finite; directions are not zero and of any length
+        origins, directions  (n, 3), finite, or one (3,) for all of the other; directions are not zero, of any length
         t_min, t_max         >= 0, one number or (n,), in units of |direction|
         leaving              faces that the rays start on, one or (n,), -1 for none: each start is moved off its face by
                              more than rounding errors, to the side that the direction points to, so that the ray

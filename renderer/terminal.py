@@ -1,8 +1,15 @@
-"""Whether anybody watches."""
+"""The streams of a command's own process: whether anybody watches, and names that they cannot spell."""
 
 import sys
+from io import TextIOWrapper
 
 
 def on_terminal() -> bool:
     """Whether standard error is a terminal; it may be closed, too, or replaced."""
     return sys.stderr is not None and sys.stderr.isatty()
+
+
+def spell_everything() -> None:
+    """Let standard output write what its encoding lacks, as an accent in a path, by escapes: an error otherwise."""
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")

@@ -281,3 +281,11 @@ def test_kernels_for_another_architecture_are_refused(tmp_path: Path, capsys: py
     said = fails(capsys, "compile", "--level", other, "-o", tmp_path / "kernels")
     assert said.startswith("--level: expected one of this processor's, ")
     assert not (tmp_path / "kernels").exists()
+
+
+def test_a_path_that_the_terminal_cannot_spell_ends_well(tmp_path: Path) -> None:
+    path = tmp_path / "été.png"
+    done = shell(f"octree render {STAIRS} -o '{path}' --resolution 8x8", PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "\\xe9t\\xe9.png: 8 x 8" in done.stdout
+    assert path.exists()

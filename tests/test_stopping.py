@@ -216,3 +216,22 @@ def test_brute_force_in_small_chunks_has_the_same_bits(monkeypatch: pytest.Monke
     found = brute.closest_hit(rays, -rays)
     for name in ("t", "face", "u", "v"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+
+
+def test_the_viewers_first_picture_comes_soon_and_any_can_be_cancelled() -> None:
+    """On a scene whose whole picture takes hours."""
+    from renderer.viewer.exhibit import prepare as exhibit
+    from renderer.viewer.passes import Pass, picture
+    from renderer.viewer.protocol import View, ViewSettings
+
+    shown = exhibit(half_mirrors().altered(render=RenderSettings(max_depth=64, max_rays=2**61)))
+    m = (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1)
+    view = View(type="view", seq=1, mode="octree", m=m, fovy=0.8, w=64, h=48, settings=ViewSettings(max_depth=64))
+    first = picture(shown, view, Pass(0, False, (32, 24), 1))
+    assert 256 <= first.rays.max() <= 256 + 2 * 65
+
+    def cancelled(tiles: int) -> None:
+        raise TimeoutError
+
+    with pytest.raises(TimeoutError):
+        picture(shown, view, Pass(1, True, (64, 48), 1), cancelled)

@@ -42,6 +42,7 @@ _VIEWS = {
 KEPT = {
     "extreme case": "each is a promise for one construct, and says in words what broke",
     "ssim": "others publish it, and it tells broken structure from wrong brightness; FLIP and the maximum see more",
+    "asked a few at a time": "few rays go by a kernel of their own, which other gates ask by chance only",
     "references that judge it": "guards the others: without it a rung that nobody judges would pass",
     "rays within float64 rounding": "guards the count of wrong rays, which excuses what float64 cannot decide",
     "slope of log RMSE": _PATHS,

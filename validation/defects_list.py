@@ -78,8 +78,6 @@ HITS = (
     _kernel("hits", "a packet of any hits drops what waits beyond eight octants", "packet",
             "                limit = _most(floats, LIMIT)", "                limit = _most(floats, LIMIT)\n"
             "                top = min(top, 8) if any_hit else top"),
-    _kernel("hits", "an eighth of the box padding", "intersect", "FAR_PADDING = np.float32(1.0 + 8.0 * 2.0**-23)",
-            "FAR_PADDING = np.float32(1.0 + 1.0 * 2.0**-23)"),
     _kernel("hits", "single rays skip a leaf's last block", "traverse",
             "best = nearest_carefully(tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray, shear, best)",
             "best = nearest_carefully(tree, code >> LEAF_BITS, "
