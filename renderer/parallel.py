@@ -81,9 +81,10 @@ def for_chunks(
                 stop.set()
                 raise
 
-    # The caller's own thread is one of them, so the work starts without waiting for another to wake up.
-    running = _started(take_chunks, min(threads, -(-count // size)) - 1)
+    running: list[Future[None]] = []
     try:
+        # The caller's own thread is one of them, so the work starts without waiting for another to wake up.
+        _start(take_chunks, min(threads, -(-count // size)) - 1, running)
         take_chunks()
         for future in running:
             # One that has not begun, in a pool that others keep busy, has nothing left to take.
@@ -95,11 +96,12 @@ def for_chunks(
             future.cancel() or future.exception()
 
 
-def _started(work: Callable[[], None], count: int) -> list[Future[None]]:
-    """``work`` begun on ``count`` threads of the pool, or on fewer: the caller does what nobody else does."""
-    running: list[Future[None]] = []
+def _start(work: Callable[[], None], count: int, running: list[Future[None]]) -> None:
+    """Begin ``work`` on ``count`` threads of the pool, or on fewer: the caller does what nobody else does.
+
+    Adds to ``running`` one by one, so that Ctrl-C in the midst of it leaves none that nobody knows.
+    """
     # Raised where the main thread has ended, or the system gives no more threads.
     with suppress(RuntimeError):
         for _ in range(count):
             running.append(_pool().submit(work))
-    return running

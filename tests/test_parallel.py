@@ -240,3 +240,36 @@ def test_queries_work_after_the_main_thread_has_ended(how):
     )
     assert set(done.stdout.splitlines()) == {"40000 20480"}
     assert "Error" not in done.stderr
+
+
+@pytest.mark.parametrize("submitted", [0, 1, 2])
+def test_control_c_while_threads_start_stops_those_that_did(monkeypatch, submitted):
+    """A thread that nobody stops would go on for hours, and the process with it."""
+    begun, released = threading.Event(), threading.Event()
+    sound, count = ThreadPoolExecutor.submit, [0]
+
+    def submit(pool, work):
+        future = sound(pool, work)
+        if count[0] == submitted:
+            assert begun.wait(10)
+            raise KeyboardInterrupt
+        count[0] += 1
+        return future
+
+    def work(begin, end):
+        begun.set()
+        while not released.wait(0.001):
+            yield
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", submit)
+    with pytest.raises(KeyboardInterrupt):
+        for_chunks(work, 100, 1, 5)
+    monkeypatch.undo()
+    # Whoever is still at it holds a thread of the pool: all of them are free again.
+    together = threading.Barrier(4)
+
+    def meet(begin, end):
+        together.wait(timeout=10)
+
+    for_chunks(meet, 4, 1, 4)
+    released.set()

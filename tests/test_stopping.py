@@ -159,8 +159,8 @@ scene, rays = half_mirrors(), np.random.default_rng(1).normal(size=(10**6, 3)) *
 for accelerator in ("octree", "brute"):
     render(scene, resolution=(4, 4), max_rays=1, accelerator=accelerator)
 BruteForce.from_mesh(icosphere(1)).closest_hit(rays[:20000], -rays[:20000])
-print("begins", flush=True)
 try:
+    print("begins", flush=True)
     {SCRIPTS[what]}
 except KeyboardInterrupt:
     print("stopped", flush=True)
@@ -225,7 +225,7 @@ def test_the_viewers_first_picture_comes_soon_and_any_can_be_cancelled() -> None
     from renderer.viewer.protocol import View, ViewSettings
 
     shown = exhibit(half_mirrors().altered(render=RenderSettings(max_depth=64, max_rays=2**61)))
-    m = (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1)
+    m = [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]
     view = View(type="view", seq=1, mode="octree", m=m, fovy=0.8, w=64, h=48, settings=ViewSettings(max_depth=64))
     first = picture(shown, view, Pass(0, False, (32, 24), 1))
     assert 256 <= first.rays.max() <= 256 + 2 * 65
