@@ -29,7 +29,7 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
     repair : leave out the triangles that name a vertex that is not finite or an index out of range, keep the rest
         as ``Mesh.repaired`` does, and issue one ``RepairWarning`` that names the file and the counts.
 
-    Polygons are cut into fans, right for convex ones. Normals, colours and texture coordinates of vertices
+    Polygons are cut into triangles, concave ones too. Normals, colours and texture coordinates of vertices
     are kept. Positions are float64 whatever the file holds. An STL file shares no vertices between its faces.
 
     Raises ``MeshError`` that names the file and the fault: not there, not a file, unknown suffix, malformed

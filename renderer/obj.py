@@ -7,14 +7,16 @@ face uses (NaN among them), and reorders faces by material.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh import Mesh, Repairs, build_mesh
+from renderer.mesh import Float64Array, Mesh, Repairs, build_mesh
+from renderer.polygons import triangulate
 
 # Statements that say nothing about surfaces made of polygons. Free-form surfaces are refused, not dropped.
 _IGNORED = {
@@ -23,31 +25,198 @@ _IGNORED = {
 }
 
 
-@dataclass
-class _Statements:
-    keeps_bad_faces: bool
-    positions: list[list[float]] = field(default_factory=list)
-    colors: list[list[float]] = field(default_factory=list)
-    texcoords: list[list[float]] = field(default_factory=list)
-    normals: list[list[float]] = field(default_factory=list)
-    # One (position, texcoord, normal) a corner, three corners a triangle; -1 where a corner has none, or, for
-    # positions, where an index is out of range and bad faces are to be dropped.
-    corners: list[tuple[int, int, int]] = field(default_factory=list)
+@dataclass(frozen=True)
+class _Content:
+    """What a file says, whichever reader read it."""
+
+    positions: Float64Array  # (V, 3)
+    colors: Float64Array | None  # (V, 3)
+    texcoords: Float64Array  # (T, 2)
+    normals: Float64Array  # (N, 3)
+    # (C, 3): a position, texcoord and normal a corner; -1 where a corner has none, or, for positions, where an index
+    # is out of range and bad faces are to be dropped.
+    corners: NDArray[np.int64]
+    starts: NDArray[np.int64]  # polygon p has corners[starts[p] : starts[p + 1]]
 
 
 def parse_obj(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     """The mesh in an OBJ file's content.
 
-    Polygons are cut into fans from their first corner, right for convex ones. A vertex is split where its
-    faces differ in texture coordinate or normal. Where only some faces have texture coordinates, the others
-    get (0, 0); where only some have normals, the normals are left out, since they follow from the faces.
-    Vertex colours after the position are kept where every vertex has them. Lines, points, groups and
-    materials are ignored. ``repairs`` as for ``build_mesh``; faces are then dropped for any index out of range.
+    Polygons are cut as ``polygons.triangulate`` says. A face may stand before what it names; a negative index counts
+    back from what stands before the face. A vertex is split where its faces differ in texture coordinate or normal.
+    Where only some faces have texture coordinates, the others get (0, 0); where only some have normals, the normals
+    are left out, since they follow from the faces. Vertex colours after the position are kept where every vertex has
+    them. Lines, points, groups and materials are ignored. ``repairs`` as for ``build_mesh``; faces are then dropped
+    for any index out of range.
 
     Raises ``MeshError`` with the line's number; it does not know the file's name.
     """
-    statements = _Statements(keeps_bad_faces=repairs is not None)
-    for number, line in _logical_lines(content.decode("utf-8", "replace")):
+    read = _read_common(content)
+    return _mesh(_read_any(content, repairs is not None) if read is None else read, repairs)
+
+
+def _mesh(content: _Content, repairs: list[Repairs] | None) -> Mesh:
+    triangles = triangulate(content.positions, content.corners[:, 0], content.starts)
+    corners = content.corners[triangles.ravel()]
+    positions, colors = content.positions, content.colors
+    by_position = build_mesh(repairs, positions, corners[:, 0].reshape(-1, 3).astype(np.int32), colors=colors)
+    if repairs:
+        corners = corners.reshape(-1, 9)[repairs[-1].kept_faces].reshape(-1, 3)
+    if (corners[:, 1:] == -1).all():
+        return by_position
+    distinct, faces = _distinct(corners, len(positions))
+    position, texcoord, normal = distinct.T
+    normals, texcoords = None, None
+    if (normal >= 0).all():
+        normals = content.normals[normal]
+    if (texcoord >= 0).any():
+        # The row of zeros comes last, where -1 finds it.
+        texcoords = np.concatenate([content.texcoords, [[0.0, 0.0]]])[texcoord]
+    return Mesh(
+        by_position.vertices[position],
+        faces.reshape(-1, 3).astype(np.int32),
+        normals=normals,
+        colors=None if by_position.colors is None else by_position.colors[position],
+        texcoords=texcoords,
+    )
+
+
+def _distinct(corners: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The distinct rows in rising order, and each corner's row among them, for positions below ``count``."""
+    position = corners[:, 0]
+    row_of = np.full(count, -1)
+    row_of[position] = np.arange(len(corners))
+    if (corners[row_of[position]] == corners).all():  # no vertex is split: no need to sort
+        used = row_of >= 0
+        return corners[row_of[used]], (np.cumsum(used) - 1)[position]
+    distinct, inverse = np.unique(corners, axis=0, return_inverse=True)
+    return distinct, inverse.ravel()
+
+
+# --- files of the common shape: all lines of a keyword at once ------------------------------------------------
+
+
+def _read_common(content: bytes) -> _Content | None:
+    """What a right file of the common shape says, as ``_read_any`` would; None for any other.
+
+    Left to the other are: faults of any kind, lines that end in a backslash or a bare carriage return, that begin with
+    a blank or differ in how many numbers follow ``v``, ``vt`` or ``vn``; corners that are negative, or not of one form
+    throughout.
+    """
+    if content.count(b"\r") != content.count(b"\r\n") or re.search(rb"\\(\r|\n|\Z)", content):
+        return None
+    blocks = _blocks(content + b"\n")
+    if blocks is None or not blocks["v"] or not blocks["f"]:
+        return None
+    try:
+        position = _table(blocks["v"], b"v", 3)
+        texcoord = _table(blocks["vt"], b"vt", 1)
+        normal = _table(blocks["vn"], b"vn", 3)
+    except ValueError:
+        return None
+    faces = _faces(blocks["f"], [len(position), len(texcoord), len(normal)])
+    if faces is None:
+        return None
+    colors = position[:, 3:6] if position.shape[1] >= 6 else None
+    texcoord = np.pad(texcoord, ((0, 0), (0, 1)))[:, :2]
+    return _Content(np.ascontiguousarray(position[:, :3]), colors, texcoord, normal[:, :3], *faces)
+
+
+def _blocks(content: bytes) -> dict[str, bytes] | None:
+    """All lines of each keyword that matters, one after the other; None if any line is not plainly to be ignored."""
+    letters = np.frombuffer(content, np.uint8)
+    ends = np.flatnonzero(letters == ord("\n")) + 1
+    starts = np.concatenate([[0], ends[:-1]])
+    first, second, third = (letters[np.minimum(starts + k, ends - 1)] for k in range(3))
+    blank, blank_third = ((letter == ord(" ")) | (letter == ord("\t")) for letter in (second, third))
+    is_vertex = first == ord("v")
+    rows = {
+        "v": is_vertex & blank,
+        "vt": is_vertex & (second == ord("t")) & blank_third,
+        "vn": is_vertex & (second == ord("n")) & blank_third,
+        "f": (first == ord("f")) & blank,
+    }
+    rest = ~np.logical_or.reduce([*rows.values(), first == ord("#"), first == ord("\n")])
+    for start, end in zip(starts[rest].tolist(), ends[rest].tolist(), strict=True):
+        keyword = content[start:end].split(None, 1)[:1]
+        if content[start : start + 1] != b"\r" and (not keyword or keyword[0].decode("latin-1") not in _IGNORED):
+            return None
+    blocks = {}
+    for name, chosen in rows.items():
+        # Runs of lines begin and end where the choice changes.
+        changes = np.flatnonzero(np.diff(chosen, prepend=False, append=False))
+        edges = np.append(starts, len(content))[changes].tolist()
+        blocks[name] = b"".join([content[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)])
+    return blocks
+
+
+def _table(block: bytes, keyword: bytes, least: int) -> Float64Array:
+    """The numbers after the keyword, a row a line. Raises ``ValueError`` unless lines have equally many."""
+    lines, words = block.count(b"\n"), block.split()
+    if not lines:
+        return np.empty((0, least))
+    width = len(words) // lines
+    # Where each of these is a keyword, none is elsewhere, or float() would not take it.
+    if width * lines != len(words) or width <= least or set(words[::width]) != {keyword} or b"_" in block:
+        raise ValueError
+    del words[::width]
+    return np.fromiter(map(float, words), np.float64, len(words)).reshape(lines, width - 1)
+
+
+_NOT_IN_FACES = bytes(set(range(256)) - set(b"f0123456789/ \t\r\n"))
+
+
+def _faces(block: bytes, counts: list[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """``corners`` and ``starts``, for polygons whose corners all are a, a/b, a//c or a/b/c."""
+    lines = block.count(b"\n")
+    if len(block.translate(None, _NOT_IN_FACES)) < len(block) or block.count(b"f") != lines:
+        return None
+    letters = np.frombuffer(block, np.uint8)
+    blank = letters <= ord(" ")
+    words = np.flatnonzero(blank[:-1] & ~blank[1:] & (letters[1:] != ord("f"))) + 1
+    starts = np.concatenate([[0], np.searchsorted(words, np.flatnonzero(letters == ord("\n")))])
+    slashes = np.flatnonzero(letters == ord("/"))
+    each, rest = divmod(len(slashes), max(len(words), 1))
+    if (np.diff(starts) < 3).any() or rest or each > 2:
+        return None
+    columns = [0, 1, 2][: each + 1]
+    if each:
+        of_word = slashes.reshape(-1, each)
+        if (of_word[:, 0] < words).any() or (of_word[:-1, -1] > words[1:]).any():
+            return None
+        if each == 2 and (of_word[:, 1] == of_word[:, 0] + 1).all():
+            columns = [0, 2]
+    # As there are as many numbers as could be, none is missing anywhere.
+    numbers = np.fromstring(block.translate(bytes.maketrans(b"f/", b"  ")), np.int64, sep=" ")
+    if len(numbers) != len(words) * len(columns):
+        return None
+    corners = np.full((len(words), 3), -1)
+    corners[:, columns] = numbers.reshape(-1, len(columns)) - 1
+    most = np.array(counts)[columns]
+    if ((corners[:, columns] < 0) | (corners[:, columns] >= most)).any():
+        return None
+    return corners, starts
+
+
+# --- any file: line by line -----------------------------------------------------------------------------------
+
+
+@dataclass
+class _Statements:
+    keeps_bad_faces: bool
+    totals: Counter[str]  # of statements in the whole file, by keyword
+    positions: list[list[float]] = field(default_factory=list)
+    colors: list[list[float]] = field(default_factory=list)
+    texcoords: list[list[float]] = field(default_factory=list)
+    normals: list[list[float]] = field(default_factory=list)
+    corners: list[tuple[int, int, int]] = field(default_factory=list)
+    lengths: list[int] = field(default_factory=list)
+
+
+def _read_any(content: bytes, keeps_bad_faces: bool) -> _Content:
+    lines = list(_logical_lines(content.decode("utf-8", "replace")))
+    statements = _Statements(keeps_bad_faces, Counter(word for _, line in lines for word in line.split(None, 1)[:1]))
+    for number, line in lines:
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
@@ -57,7 +226,15 @@ def parse_obj(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
             _read_statement(words[0], words[1:], statements)
         except ValueError as error:
             raise MeshError(f"line {number}: {str(error)[:100]}, got {line.strip()[:80]!r}") from error
-    return _mesh(statements, repairs)
+    has_colors = len(statements.colors) == len(statements.positions)
+    return _Content(
+        np.array(statements.positions, np.float64).reshape(-1, 3),
+        np.array(statements.colors, np.float64) if has_colors else None,
+        np.array(statements.texcoords, np.float64).reshape(-1, 2),
+        np.array(statements.normals, np.float64).reshape(-1, 3),
+        np.array(statements.corners, np.int64).reshape(-1, 3),
+        np.cumsum([0, *statements.lengths]),
+    )
 
 
 def _logical_lines(text: str) -> Iterator[tuple[int, str]]:
@@ -87,9 +264,8 @@ def _read_statement(keyword: str, words: list[str], statements: _Statements) -> 
         case "f":
             if len(words) < 3:
                 raise ValueError("expected a face of at least 3 vertices")
-            corners = [_corner(word, statements) for word in words]
-            for second, third in pairwise(corners[1:]):
-                statements.corners += corners[0], second, third
+            statements.corners += [_corner(word, statements) for word in words]
+            statements.lengths.append(len(words))
         case _ if keyword not in _IGNORED:
             raise ValueError("expected a statement of a polygon mesh")
 
@@ -107,9 +283,9 @@ def _corner(word: str, statements: _Statements) -> tuple[int, int, int]:
     position, texcoord, normal = [*parts, "", ""][:3]
     try:
         return (
-            _index(int(position), len(statements.positions)),
-            _index(int(texcoord), len(statements.texcoords)) if texcoord else -1,
-            _index(int(normal), len(statements.normals)) if normal else -1,
+            _index(int(position), len(statements.positions), statements.totals["v"]),
+            _index(int(texcoord), len(statements.texcoords), statements.totals["vt"]) if texcoord else -1,
+            _index(int(normal), len(statements.normals), statements.totals["vn"]) if normal else -1,
         )
     except IndexError as error:
         if statements.keeps_bad_faces:
@@ -117,38 +293,8 @@ def _corner(word: str, statements: _Statements) -> tuple[int, int, int]:
         raise ValueError(str(error)) from error
 
 
-def _index(index: int, count: int) -> int:
-    """From 1 .. count, or -1 .. -count for the latest back to the first, to 0 .. count - 1."""
-    if not 1 <= abs(index) <= count:
-        raise IndexError(f"face index out of range: expected 1 to {count} or -{count} to -1")
-    return index - 1 if index > 0 else count + index
-
-
-def _mesh(statements: _Statements, repairs: list[Repairs] | None) -> Mesh:
-    corners = np.array(statements.corners, np.int64).reshape(-1, 3)
-    colors = statements.colors if len(statements.colors) == len(statements.positions) else None
-    by_position = build_mesh(
-        repairs,
-        np.array(statements.positions, np.float64),
-        corners[:, 0].reshape(-1, 3).astype(np.int32),
-        colors=None if colors is None else np.array(colors, np.float64),
-    )
-    if repairs:
-        corners = corners.reshape(-1, 9)[repairs[-1].kept_faces].reshape(-1, 3)
-    if (corners[:, 1:] == -1).all():
-        return by_position
-    distinct, faces = np.unique(corners, axis=0, return_inverse=True)
-    position, texcoord, normal = distinct.T
-    normals, texcoords = None, None
-    if (normal >= 0).all():
-        normals = np.array(statements.normals)[normal]
-    if (texcoord >= 0).any():
-        # The row of zeros comes last, where -1 finds it.
-        texcoords = np.array([*statements.texcoords, [0.0, 0.0]])[texcoord]
-    return Mesh(
-        by_position.vertices[position],
-        faces.reshape(-1, 3).astype(np.int32),
-        normals=normals,
-        colors=None if by_position.colors is None else by_position.colors[position],
-        texcoords=texcoords,
-    )
+def _index(index: int, so_far: int, total: int) -> int:
+    """From 1 .. total, or -1 .. -so_far for the latest back to the first, to 0 .. total - 1."""
+    if not (1 <= index <= total or 1 <= -index <= so_far):
+        raise IndexError(f"face index out of range: expected 1 to {total} or -{so_far} to -1")
+    return index - 1 if index > 0 else so_far + index

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from renderer.errors import MeshError
 from renderer.mesh import Float64Array, Mesh, Repairs, build_mesh
+from renderer.polygons import triangulate
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -63,9 +64,9 @@ _Columns = dict[str, _Column]
 def parse_ply(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     """The mesh in a PLY file's content.
 
-    Faces come from the elements ``face`` (polygons are cut into fans from their first corner, right for
-    convex ones) and ``tristrips`` (-1 restarts a strip; every second triangle is turned; stitching triangles
-    without area stay), in the file's order. Vertex normals, colours (red, green, blue; unsigned integers are
+    Faces come from the elements ``face`` (polygons are cut as ``polygons.triangulate`` says) and ``tristrips``
+    (-1 restarts a strip; every second triangle is turned; stitching triangles without area stay), in the file's
+    order. Vertex normals, colours (red, green, blue; unsigned integers are
     divided by their type's maximum) and texture coordinates (s t, u v or texture_u texture_v) are kept; other
     properties and elements are ignored. ``repairs`` as for ``build_mesh``.
 
@@ -82,8 +83,8 @@ def parse_ply(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     positions = _vertex_columns(vertex, ("x", "y", "z"))
     if positions is None:
         raise MeshError(f"element vertex: expected properties x, y and z, got {', '.join(vertex) or 'none'}")
-    readers = {"face": _fans, "tristrips": _strips}
-    faces = [readers[e.name](_corners(e.name, columns[e.name])) for e in elements if e.name in readers]
+    lists = [(e.name, _corners(e.name, columns[e.name])) for e in elements if e.name in ("face", "tristrips")]
+    faces = [_strips(corners) if name == "tristrips" else _polygons(corners, positions) for name, corners in lists]
     texcoords = (_vertex_columns(vertex, names) for names in _TEXCOORD_NAMES)
     return build_mesh(
         repairs,
@@ -318,16 +319,13 @@ def _corners(element: str, columns: _Columns) -> _Column:
     return replace(lists[0], values=values.astype(np.int64))
 
 
-def _fans(polygons: _Column) -> NDArray[np.int64]:
-    """(F, 3) triangles; polygon a b c d ... becomes abc, acd, ..."""
+def _polygons(polygons: _Column, positions: Float64Array) -> NDArray[np.int64]:
+    """(F, 3) triangles."""
     lengths = np.diff(polygons.starts)
     if (lengths < 3).any():
         row = int((lengths < 3).argmax())
         raise MeshError(f"element face: expected at least 3 vertices, got {lengths[row]} in row {row}")
-    cuts = lengths - 2
-    firsts = np.repeat(polygons.starts[:-1], cuts)
-    steps = np.arange(cuts.sum()) - np.repeat(np.cumsum(cuts) - cuts, cuts) + 1
-    triangles: NDArray[np.int64] = polygons.values[np.stack([firsts, firsts + steps, firsts + steps + 1], axis=1)]
+    triangles: NDArray[np.int64] = polygons.values[triangulate(positions, polygons.values, polygons.starts)]
     return triangles
 
 

@@ -53,8 +53,8 @@ def test_finds_an_exception_that_is_let_through(folder: Path, monkeypatch: pytes
 
 @pytest.mark.parametrize("name", ["ascii.ply", "little.ply", "big.ply"])
 def test_finds_a_face_that_is_dropped_silently(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    fans = ply._fans
-    monkeypatch.setattr(ply, "_fans", lambda polygons: fans(polygons)[:-1])
+    cut = ply._polygons
+    monkeypatch.setattr(ply, "_polygons", lambda *given: cut(*given)[:-1])
     with pytest.raises(AssertionError, match="a silent drop"):
         fuzz.check(folder / name, fuzz.SEEDS[name], 0)
 
