@@ -1,360 +1,101 @@
-"""Mutated mesh and scene files: each is one clear error or a valid object that rays can be shot at.
+"""Inputs at the ends of what there is: each gives one clear error or a sound result.
 
-Structure-aware: text is mutated by tokens and lines, binary bodies by numbers, everything by bytes. Input ``i`` of a
-seed is the same on every machine with the same packages. The long run, with its findings kept as files:
+Kinds, each input the same again by its seed and number:
 
-    python tests/fuzz.py --inputs 100000 --seed 1 [--kinds ascii.ply scene.toml] [--keep folder]
+files       mutated mesh and scene files (ascii.ply ... scene.toml), fuzz_files.py
+camera, light, transform, settings    scenes at the ends of numbers, fuzz_scenes.py
+query       rays at the ends of numbers, of odd shapes and types, fuzz_rays.py
+output      files that cannot be written, fuzz_faults.py
+cache       damaged folders of compiled kernels, each in a process of its own, fuzz_faults.py
+
+The long run, with its findings kept as files, and one input of it again:
+
+    python tests/fuzz.py --inputs 100000 --seed 1 [--kinds ascii.ply camera] [--keep folder]
+    python tests/fuzz.py --inputs 1 --first 4711 --kinds camera
 """
 
 import argparse
 import faulthandler
-import re
-import signal
-import struct
 import sys
 import tempfile
 import time
 import traceback
-import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from io import BytesIO
 from pathlib import Path
-from random import Random
+from typing import Any
 
-import numpy as np
-import plyfile
-import trimesh
+import fuzz_faults
+import fuzz_files
+import fuzz_rays
+import fuzz_scenes
+from fuzz_values import SECONDS, Kind
 
-from renderer import BruteForce, Mesh, MeshError, Octree, Scene, SceneError, load_mesh, load_scene
-from renderer.mesh import RepairWarning
 from renderer.ply import format_ply
-from renderer.shapes import box, torus
+from renderer.shapes import box
 
-# A hundred times what the slowest valid input takes; beyond it something does not end.
-SECONDS = 2.0
-RAYS = 16
-# Meshes beyond this are checked but not traced, so that one floor of a million squares does not fill the run.
-MOST_TRACED = 20_000
-
-NUMBERS = [
-    *(b"0", b"-0", b"1", b"-1", b"2", b"3", b"255", b"256", b"65535", b"2147483647", b"2147483648", b"-2147483648"),
-    *(b"4294967295", b"9223372036854775808", b"99999999999999999999", b"1" + b"0" * 30, b"9" * 400, b"0x10", b"1_0"),
-    *(b"nan", b"-nan", b"inf", b"-inf", b"1e38", b"1e39", b"-1e308", b"1e309", b"1e-45", b"1e-320", b"0.5", b"1e"),
-    *(b".", b"", b"x", b"\xff", b"\0", b"true", b"[]", b"{}", b'""', b"1/1/1", b"1//1", b"/", b"#"),
-    *(b"\\", b"list", b"end_header", b"[1, 2, 3]", b"-0.25", b"1e3"),
-]  # fmt: skip
-WORDS = [
-    *(struct.pack("<f", x) for x in (np.nan, np.inf, -np.inf, 3e38, 1e-45, -0.0)),
-    *(struct.pack("<d", x) for x in (np.nan, np.inf, 1e308, 5e-324)),
-    *(struct.pack(f"{order}{code}", x) for order in "<>" for code, x in
-      (("i", -1), ("i", 2**31 - 1), ("i", -(2**31)), ("I", 0), ("I", 7), ("H", 65535), ("H", 4), ("B", 0), ("B", 255))),
-]  # fmt: skip
-
-SCENE = """
-ambient = 0.1
-background = [0.5, 0.6, 0.8]
-[render]
-resolution = [8, 8]
-samples = 4
-max_depth = 3
-min_weight = 0.01
-[camera]
-type = "perspective"
-eye = [0, 1.5, 5]
-target = [0, 0.5, 0]
-up = [0, 1, 0]
-fov = 40
-[materials.glass]
-type = "dielectric"
-ior = 1.5
-transmittance = [0.75, 0.95, 0.8]
-[materials.silver]
-type = "mirror"
-reflectance = 0.9
-[materials.red]
-diffuse = [0.7, 0.1, 0.1]
-specular = 0.5
-shininess = 60
-[[lights]]
-type = "directional"
-direction = [0.5, -1.3, -0.6]
-irradiance = 0.6
-[[lights]]
-type = "point"
-position = [-2.5, 3.5, 3]
-intensity = 8.0
-[[objects]]
-mesh = "box.ply"
-material = "glass"
-normals = "smooth"
-scale = [1, 2, 1]
-rotate = [0, 30, 0]
-translate = [0, 0.1, 0]
-[floor]
-min = [-4, -4]
-max = [4, 4]
-materials = ["red", "silver"]
-squares = [4, 4]
-"""
-
-
-def _ply(text: bool, byte_order: str) -> bytes:
-    """Triangles, a quadrilateral and a pentagon, colours and normals, written by plyfile."""
-    shape = torus(around=5, across=3)
-    vertex = np.zeros(
-        len(shape.vertices),
-        [(n, "f4") for n in ("x", "y", "z", "nx", "ny", "nz")] + [(n, "u1") for n in ("red", "green", "blue")],
-    )
-    for k, name in enumerate("xyz"):
-        vertex[name], vertex["n" + name] = shape.vertices[:, k], shape.vertex_normals()[:, k]
-    face = np.empty(len(shape.faces) + 2, [("vertex_indices", object)])
-    for row, polygon in enumerate([*shape.faces.tolist(), [0, 1, 2, 3], [4, 5, 6, 7, 8]]):
-        face["vertex_indices"][row] = np.array(polygon, np.int32)
-    kinds = {"val_types": {"vertex_indices": "i4"}, "len_types": {"vertex_indices": "u1"}}
-    elements = [plyfile.PlyElement.describe(vertex, "vertex"), plyfile.PlyElement.describe(face, "face", **kinds)]
-    out = BytesIO()
-    plyfile.PlyData(elements, text=text, byte_order=byte_order).write(out)
-    return out.getvalue()
-
-
-def _seeds() -> dict[str, bytes]:
-    cube = box()
-    foreign = trimesh.Trimesh(cube.vertices, cube.faces, process=False)
-    obj = "".join(f"v {x} {y} {z}\n" for x, y, z in cube.vertices.tolist()) + "vt 0 0\nvt 1 0.5\nvn 0 0 1\n"
-    obj += "g side\nusemtl red\nf 1/1/1 2/2/1 3/1/1 4/2/1\nf -1//1 -2//1 -3//1\n# a comment\n"
-    obj += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in cube.faces.tolist())
-    return {
-        "ascii.ply": _ply(True, "="),
-        "little.ply": _ply(False, "<"),
-        "big.ply": _ply(False, ">"),
-        "saved.ply": format_ply(cube),
-        "plain.obj": obj.encode(),
-        "binary.stl": foreign.export(file_type="stl"),
-        "text.stl": foreign.export(file_type="stl_ascii").encode(),
-        "a.glb": trimesh.Scene(foreign).export(file_type="glb"),
-        "scene.toml": SCENE.encode(),
-    }
-
-
-SEEDS = _seeds()
-# GLB goes through trimesh's reader, ten times slower than ours.
-SHARES = {name: 1 if name == "a.glb" else 4 for name in SEEDS}
-
-
-# --- mutations ------------------------------------------------------------------------------------------------
-
-
-def _mutate_list(rng: Random, parts: list[bytes], replacements: list[bytes]) -> None:
-    """Replace, delete, duplicate, swap or insert one of ``parts``, in place."""
-    if not parts:
-        return
-    at, other = rng.randrange(len(parts)), rng.randrange(len(parts))
-    match rng.randrange(10):
-        case 0 | 1 | 2 | 3 | 4:
-            parts[at] = rng.choice(replacements)
-        case 5:
-            del parts[at]
-        case 6:
-            parts.insert(other, parts[at])
-        case 7 | 8:
-            parts[at], parts[other] = parts[other], parts[at]
-        case _:
-            parts.insert(at, rng.choice(replacements))
-
-
-def mutate_text(rng: Random, content: bytes) -> bytes:
-    """One token or one line, with extreme numbers among the replacements."""
-    if rng.random() < 0.3:
-        lines = content.split(b"\n")
-        _mutate_list(rng, lines, [rng.choice(lines), rng.choice(NUMBERS)])
-        return b"\n".join(lines)
-    pieces = re.split(rb"([\s,=\[\]]+)", content)
-    tokens = pieces[::2]
-    # A deleted token leaves its separator behind, which text formats skip.
-    _mutate_list(rng, tokens, [rng.choice(tokens), rng.choice(NUMBERS), rng.choice(NUMBERS)])
-    gaps = [*pieces[1::2], *[b" "] * 2]
-    return b"".join(piece for pair in zip(tokens, gaps, strict=False) for piece in pair)
-
-
-def mutate_bytes(rng: Random, content: bytes) -> bytes:
-    """Flip, overwrite, delete, duplicate, insert, swap or cut off."""
-    at = rng.randrange(len(content) + 1)
-    size = rng.choice([1, 1, 2, 4, 8, 12, 13, 50, 100])
-    before, span, after = content[:at], content[at : at + size], content[at + size :]
-    match rng.randrange(7):
-        case 0:
-            return before + bytes(b ^ (1 << rng.randrange(8)) for b in span[:1]) + span[1:] + after
-        case 1:
-            word = rng.choice(WORDS)
-            return before + word + content[at + len(word) :]
-        case 2:
-            return before + after
-        case 3:
-            return before + span + span + after
-        case 4:
-            return before + rng.randbytes(size) + span + after
-        case 5:
-            other = rng.randrange(len(content) + 1)
-            moved = content[other : other + size]
-            return before + moved + content[at + len(moved) :]
-        case _:
-            return before if rng.random() < 0.3 else before + rng.randbytes(len(span)) + after
-
-
-def mutated(name: str, seed: int, index: int) -> bytes:
-    """Input ``index`` of ``seed``: the seed file ``name`` with one to four mutations."""
-    rng = Random(f"{name} {seed} {index}")
-    content = SEEDS[name]
-    for _ in range(rng.choice([1, 1, 1, 2, 4])):
-        head, mark, body = content.partition(b"end_header\n")
-        if name in ("ascii.ply", "plain.obj", "text.stl", "scene.toml"):
-            content = (mutate_text if rng.random() < 0.8 else mutate_bytes)(rng, content)
-        elif mark and rng.random() < 0.3:
-            content = mutate_text(rng, head) + mark + body
-        elif name == "binary.stl" and rng.random() < 0.5 and len(content) > 84:
-            at = rng.randrange(84, len(content))
-            word = rng.choice(WORDS)
-            content = (content[:at] + word + content[at + len(word) :])[: len(content)]
-        elif name == "a.glb" and rng.random() < 0.5:
-            content = _mutate_glb_text(rng, content)
-        else:
-            content = mutate_bytes(rng, content)
-    return content
-
-
-def _mutate_glb_text(rng: Random, content: bytes) -> bytes:
-    """Mutate the JSON chunk and mend the lengths, so that the reader comes as far as what the JSON says."""
-    length = int.from_bytes(content[12:16], "little")
-    text, rest = content[20 : 20 + length], content[20 + length :]
-    pieces = re.split(rb"([,:\[\]{}]+)", text)
-    _mutate_list(rng, pieces, [rng.choice(NUMBERS), rng.choice(pieces)])
-    text = b"".join(pieces)
-    text += b" " * (-len(text) % 4)
-    return content[:8] + struct.pack("<II", 20 + len(text) + len(rest), len(text)) + content[16:20] + text + rest
-
-
-# --- checks ---------------------------------------------------------------------------------------------------
-
-
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Raise ``TimeoutError`` after this many seconds; main thread only."""
-
-    def stop(*_: object) -> None:
-        raise TimeoutError(f"expected an end within {seconds} s")
-
-    previous = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, previous)
-
-
-def check_mesh(mesh: Mesh, rng: np.random.Generator) -> bool:
-    """Valid arrays, and the octree's hits are brute force's, each finite or a miss. False: no octree may be built."""
-    assert len(mesh.faces) > 0 and mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)
-    assert np.isfinite(mesh.vertices).all()
-    if len(mesh.faces) > MOST_TRACED:
-        return True
-    try:
-        octree = Octree.from_mesh(mesh, threads=1)
-    except MeshError:
-        return False
-    # Half at vertices and half at middles of faces, from anywhere within the mesh's largest coordinate.
-    corners = mesh.triangles[rng.integers(0, len(mesh.faces), RAYS)]
-    size = max(float(np.abs(corners).max()), 1e-300)
-    weights = np.where(np.arange(RAYS)[:, None] % 2, [1 / 3, 1 / 3, 1 / 3], [1.0, 0.0, 0.0])
-    # A rounding may carry size times a number near 1 past the largest float64.
-    origins = rng.uniform(-0.99, 0.99, (RAYS, 3)) * size
-    directions = np.einsum("nk,nkj->nj", weights, corners / size) - origins / size
-    directions[~directions.any(axis=1)] = [0.0, 0.0, 1.0]
-    hits = octree.closest_hit(origins, directions)
-    assert (np.isfinite(hits.t) == hits.hit).all() and (hits.t >= 0).all() and (hits.face < len(mesh.faces)).all()
-    brute = BruteForce.from_mesh(mesh, threads=1).closest_hit(origins, directions)
-    assert np.array_equal(hits.face, brute.face) and np.array_equal(hits.t, brute.t)
-    assert np.array_equal(octree.any_hit(origins, directions), hits.hit)
-    return True
-
-
-def triangles_by_plyfile(content: bytes) -> int | None:
-    """How many triangles plyfile counts; None where it cannot read the file."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            read = plyfile.PlyData.read(BytesIO(content))
-            if any(element.name == "tristrips" for element in read.elements):
-                return None
-            return sum(
-                sum(len(polygon) - 2 for polygon in element[name])
-                for element in read.elements
-                if element.name == "face"
-                for name in [next(p.name for p in element.properties if p.name in ("vertex_indices", "vertex_index"))]
-            )
-    except Exception:  # a foreign reader on malformed input raises anything
-        return None
-
-
-def triangles_by_lines(content: bytes) -> int | None:
-    """How many triangles the f lines of an OBJ file make; None where lines are joined."""
-    if b"\\" in content:
-        return None
-    lines = map(str.split, re.split(r"[\r\n]", content.decode("utf-8", "replace")))
-    return sum(len(words) - 3 for words in lines if words[:1] == ["f"])
-
-
-def check_repair(path: Path, rng: np.random.Generator) -> str:
-    """A refused mesh file with ``repair``: refused again, or a valid mesh and one warning."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            mesh = load_mesh(path, repair=True)
-        except MeshError:
-            return "refused"
-    assert [w.category for w in caught] == [RepairWarning], "a repair without its warning, or another warning"
-    check_mesh(mesh, rng)
-    return "repaired"
-
-
-COUNTERS: dict[str, Callable[[bytes], int | None]] = {".ply": triangles_by_plyfile, ".obj": triangles_by_lines}
-
-
-def check(path: Path, content: bytes, index: int) -> str:
-    """Load ``content`` from ``path`` and check what comes.
-
-    'refused', 'repaired' (refused without ``repair``), 'loaded', or 'counted' (loaded, and by another reader too).
-
-    Anything wrong is an exception: AssertionError, TimeoutError, or whatever the reader let through.
-    """
-    path.write_bytes(content)
-    rng = np.random.default_rng(index)
-    with warnings.catch_warnings(), time_limit(SECONDS):
-        warnings.simplefilter("error")
-        try:
-            loaded: Mesh | Scene = load_scene(path) if path.suffix == ".toml" else load_mesh(path)
-        except (MeshError, SceneError) as error:
-            assert str(error).startswith(f"{path}: ") and "\n" not in str(error) and len(str(error)) < 5000
-            return "refused" if path.suffix == ".toml" else check_repair(path, rng)
-        if isinstance(loaded, Scene):
-            for instance in loaded.instances[:4]:
-                check_mesh(instance.mesh, rng)
-            return "loaded"
-        check_mesh(loaded, rng)
-    count = COUNTERS.get(path.suffix, lambda _: None)(content)
-    assert count in (None, len(loaded.faces)), f"a silent drop: {len(loaded.faces)} triangles of {count}"
-    return "loaded" if count is None else "counted"
+KINDS: dict[str, Kind] = {**fuzz_files.KINDS, **fuzz_scenes.KINDS, **fuzz_rays.KINDS, **fuzz_faults.KINDS}
+# A kind whose share is 0 comes once in so many inputs, so often at most.
+RARE, MOST_RARE = 3500, 30
 
 
 def prepare(folder: Path) -> None:
     """Put beside the inputs what they refer to, and compile the kernels before a clock starts."""
-    check_mesh(box(), np.random.default_rng(0))
+    fuzz_files.prepare(folder)
+    for kinds in (fuzz_scenes, fuzz_rays, fuzz_faults):
+        kinds.prepare_kinds()
     (folder / "box.ply").write_bytes(format_ply(box()))
 
 
-# --- the long run ---------------------------------------------------------------------------------------------
+class Turns:
+    """Which kind has which number."""
+
+    def __init__(self, kinds: list[str]) -> None:
+        self._rare = [name for name in kinds if KINDS[name].share == 0]
+        self._turn = [name for name in kinds for _ in range(KINDS[name].share)]
+
+    def __getitem__(self, index: int) -> str:
+        turn, place = divmod(index, RARE)
+        if not self._turn:
+            return self._rare[index % len(self._rare)]
+        if self._rare and place == RARE - 1 and turn < MOST_RARE:
+            return self._rare[turn % len(self._rare)]
+        return self._turn[index % len(self._turn)]
+
+
+class Log:
+    """What came of the inputs."""
+
+    def __init__(self, keep: Path | None) -> None:
+        self._keep = keep
+        self.outcomes: dict[str, Counter[str]] = {}
+        self.findings: Counter[str] = Counter()
+        self.slowest = (0.0, "")
+
+    def count(self, name: str, outcome: str) -> None:
+        self.outcomes.setdefault(name, Counter())[outcome] += 1
+
+    def find(self, name: str, index: int, given: Any, error: Exception) -> None:
+        """Count a finding, and tell and keep the first of its place."""
+        self.count(name, "WRONG")
+        finding = f"{name}: {_place(error)}"
+        self.findings[finding] += 1
+        if self.findings[finding] > 1:
+            return
+        print(f"input {index} of {finding}: {str(error)[:300]!r}", flush=True)
+        if self._keep:
+            self._keep.mkdir(parents=True, exist_ok=True)
+            text = isinstance(given, bytes)
+            path = self._keep / (f"{index}.{name}" if text else f"{index}.{name}.txt")
+            path.write_bytes(given if text else f"{given!r}\n".encode("utf-8", "backslashreplace"))
+
+    def print(self, done: int, seconds: float) -> None:
+        """Kinds, then findings."""
+        for name, outcomes in self.outcomes.items():
+            print(f"{name:12} {', '.join(f'{count} {outcome}' for outcome, count in sorted(outcomes.items()))}")
+        slow, where = self.slowest
+        print(f"{done} inputs in {seconds:.0f} s, slowest {slow:.2f} s ({where}); {len(self.findings)} findings")
+        for finding, times in self.findings.most_common():
+            print(f"  {times} x {finding}")
 
 
 def _place(error: BaseException) -> str:
@@ -363,52 +104,48 @@ def _place(error: BaseException) -> str:
     return f"{type(error).__name__} in {Path(frame.filename).name}:{frame.lineno} {frame.name}"
 
 
-def main() -> int:
+def judge(name: str, folder: Path, seed: int, index: int, log: Log) -> None:
+    """Make one input, check it and log what came."""
+    kind = KINDS[name]
+    given = kind.make(seed, index)
+    # The alarm waits for a kernel's end; this one does not.
+    faulthandler.dump_traceback_later(20 * max(SECONDS, kind.seconds), exit=True)
+    start = time.perf_counter()
+    try:
+        log.count(name, kind.judge(folder, given, index))
+    except Exception as error:
+        log.find(name, index, given, error)
+    seconds = time.perf_counter() - start
+    if kind.share:
+        log.slowest = max(log.slowest, (seconds, f"input {index} of {name}"))
+
+
+def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--inputs", type=int, default=100_000)
+    parser.add_argument("--first", type=int, default=0, help="the number of the first input")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--kinds", nargs="+", choices=list(SEEDS), default=list(SEEDS))
+    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
     parser.add_argument("--keep", type=Path, help="a folder for the first input of each finding")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after this long")
-    given = parser.parse_args()
-    turns = [name for name in given.kinds for _ in range(SHARES[name])]
-    outcomes: Counter[tuple[str, str]] = Counter()
-    findings: Counter[str] = Counter()
-    slowest, began = (0.0, ""), time.perf_counter()
-    done = 0
+    return parser.parse_args()
+
+
+def main() -> int:
+    given = _arguments()
+    turns, log = Turns(given.kinds), Log(given.keep)
     with tempfile.TemporaryDirectory() as name_of_folder:
         folder = Path(name_of_folder)
         prepare(folder)
-        for index in range(given.inputs):
-            name = turns[index % len(turns)]
-            content = mutated(name, given.seed, index)
-            # The alarm waits for a kernel's end; this one does not.
-            faulthandler.dump_traceback_later(20 * SECONDS, exit=True)
-            start = time.perf_counter()
-            try:
-                outcomes[name, check(folder / name, content, index)] += 1
-            except Exception as error:
-                outcomes[name, "WRONG"] += 1
-                finding = f"{name}: {_place(error)}"
-                findings[finding] += 1
-                if findings[finding] == 1:
-                    print(f"input {index} of {finding}: {str(error)[:200]!r}", flush=True)
-                    if given.keep:
-                        given.keep.mkdir(parents=True, exist_ok=True)
-                        (given.keep / f"{index}.{name}").write_bytes(content)
-            slowest = max(slowest, (time.perf_counter() - start, f"input {index} of {name}"))
-            done = index + 1
+        began, done = time.perf_counter(), 0
+        for index in range(given.first, given.first + given.inputs):
+            judge(turns[index], folder, given.seed, index, log)
+            done += 1
             if time.perf_counter() - began > given.seconds:
                 break
     faulthandler.cancel_dump_traceback_later()
-    for name in given.kinds:
-        parts = ", ".join(f"{outcomes[name, o]} {o}" for o in ("refused", "repaired", "loaded", "counted", "WRONG"))
-        print(f"{name:12} {parts}")
-    seconds = time.perf_counter() - began
-    print(f"{done} inputs in {seconds:.0f} s, slowest {slowest[0]:.2f} s ({slowest[1]}); {len(findings)} findings")
-    for finding, times in findings.most_common():
-        print(f"  {times} x {finding}")
-    return 1 if findings else 0
+    log.print(done, time.perf_counter() - began)
+    return 1 if log.findings else 0
 
 
 if __name__ == "__main__":
