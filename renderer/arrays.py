@@ -20,7 +20,7 @@ def real_array(values: Any) -> NDArray[Any]:
     array = plain_array(values)
     if array.dtype.kind == "O" and array.ndim and all(_is_number(x) for x in array.flat):
         array = array.astype(np.float64)
-    if array.size and array.dtype.kind not in "fiu":
+    if array.dtype.kind not in "fiu":
         raise ValueError(f"expected real numbers, got dtype {array.dtype}")
     if array.dtype.kind in "iu" and array.dtype.itemsize == 8 and array.size:
         largest = max(int(array.max()), -int(array.min()))

@@ -91,7 +91,7 @@ def trace_few(words, origins, directions, t_min, t_max, out):
         t, face, u, v, w = search_singly(tree, ray, limit, stack)
         hit = face != NO_FACE
         out[0, i] = t / tree.scale + 0.0 if hit else np.inf
-        out[1, i] = u / w if hit else np.nan
-        out[2, i] = v / w if hit else np.nan
+        out[1, i] = u / w + 0.0 if hit else np.nan
+        out[2, i] = v / w + 0.0 if hit else np.nan
         out[3, i] = np.int64(face if hit else -1).view(np.float64)
     return -1

@@ -51,7 +51,10 @@ def fill_blocks(
     count = len(block_faces) // LANES
     blocks = cache_aligned(count * BLOCK_WORDS, np.float64 if inexact else np.float32)
     address, wide = blocks.ctypes.data, blocks.dtype == np.float64
-    for_chunks(
-        lambda begin, end: _fill(vertices, faces, block_faces, address, wide, begin, end), count, _BLOCKS, threads
-    )
+
+    # Whoever fills the blocks holds them, which their address alone does not.
+    def fill(begin: int, end: int, _held: NDArray[Any] = blocks) -> None:
+        _fill(vertices, faces, block_faces, address, wide, begin, end)
+
+    for_chunks(fill, count, _BLOCKS, threads)
     return blocks

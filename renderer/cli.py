@@ -77,7 +77,9 @@ class _Notices(logging.Handler):
 
 
 def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
+    """Its words without what a terminal obeys: they may quote a file."""
+    words = " ".join(str(error).split())
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
 
 
 _SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb): camera, light and floor are then chosen to fit"

@@ -1,9 +1,11 @@
 """Files written whole or not at all."""
 
+import errno
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from stat import S_IMODE, S_ISBLK, S_ISCHR
 from typing import BinaryIO
 from uuid import uuid4
 
@@ -11,25 +13,49 @@ from uuid import uuid4
 def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> None:
     """Let ``write`` fill a temporary file beside ``path``, then rename it: never a half-written file.
 
-    A symbolic link is followed. An ``OSError`` names ``path``, whatever failed.
+    A symbolic link is followed, and a device or pipe is written to. An ``OSError`` names ``path``, whatever failed.
     """
     with _temporary_beside(path) as (temporary, target):
-        with open(temporary, "xb") as file:
+        if _is_special(target):
+            temporary = target
+        with open(temporary, "wb") as file:
             write(file)
-        os.replace(temporary, target)
+        if temporary != target:
+            with suppress(FileNotFoundError):
+                temporary.chmod(S_IMODE(target.stat().st_mode))
+            os.replace(temporary, target)
+
+
+def read_whole(path: Path) -> bytes:
+    """The bytes of a file. Raises ``OSError`` for a device too, which need not end."""
+    mode = path.stat().st_mode
+    if S_ISCHR(mode) or S_ISBLK(mode):
+        raise OSError(errno.EINVAL, "expected a file, got a device", str(path))
+    return path.read_bytes()
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raise the ``OSError`` of ``write_atomically``, as far as can be told before there is anything to write."""
-    with _temporary_beside(path) as (temporary, _):
-        temporary.touch(exist_ok=False)
-        temporary.unlink()
+    with _temporary_beside(path) as (temporary, target):
+        if not _is_special(target):
+            temporary.touch(exist_ok=False)
+            temporary.unlink()
+
+
+def _is_special(target: Path) -> bool:
+    """Whether it is there and no file, nor a folder, which is an error in any case."""
+    return target.exists() and not (target.is_file() or target.is_dir())
 
 
 @contextmanager
 def _temporary_beside(path: str | os.PathLike[str]) -> Iterator[tuple[Path, Path]]:
     """A new name in the folder of the file behind ``path``, and that file; nothing of that name is left on errors."""
-    target = Path(os.path.realpath(path))
+    try:
+        target = Path(os.path.realpath(path))
+    except ValueError as error:  # a null byte
+        raise ValueError(f"path: expected a name of a file, got {os.fspath(path)!r}: {error}") from None
+    if target.is_symlink():  # after all were followed
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     # Created by open(), so that it gets the permissions that any new file would.
     temporary = target.with_name(f".{target.name[:100]}.{uuid4().hex[:12]}")
     try:
@@ -39,4 +65,6 @@ def _temporary_beside(path: str | os.PathLike[str]) -> Iterator[tuple[Path, Path
             temporary.unlink()
         if isinstance(error, OSError) and error.errno is not None:
             raise OSError(error.errno, error.strerror, str(path)) from error
+        if isinstance(error, OSError):  # NumPy's own words
+            raise OSError(f"{path}: {error}") from error
         raise

@@ -228,7 +228,8 @@ class Mesh:
         if not np.isfinite(affine).all() or affine[3].tolist() != [0, 0, 0, 1]:
             raise self._error(f"{expected}, got {affine.tolist()}")
         linear = affine[:3, :3]
-        mirrors = np.linalg.slogdet(linear).sign < 0  # the determinant itself may overflow or vanish
+        with np.errstate(divide="ignore"):  # of a singular map
+            mirrors = np.linalg.slogdet(linear).sign < 0  # the determinant itself may overflow or vanish
         normals = None
         if self.normals is not None:
             # The cofactors are det times the inverse transpose, and exist for a singular map too.
@@ -317,8 +318,14 @@ def face_normals(corners: Float64Array) -> Float64Array:
 
     The edges are scaled by powers of two first, so that triangles of any size have one.
     """
-    first, second = (_columns(corners[:, k] - corners[:, 0]) for k in (1, 2))
-    return np.stack(_unit(_cross(*_scaled(first, second))), axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        first, second = (_columns(corners[:, k] - corners[:, 0]) for k in (1, 2))
+        normals = np.stack(_unit(_cross(*_scaled(first, second))), axis=1)
+    # Sides beyond float64: a quarter of such a triangle has the same normal.
+    beyond = ~np.isfinite(normals).all(axis=1)
+    if beyond.any():
+        normals[beyond] = face_normals(corners[beyond] * 0.25)
+    return normals
 
 
 def build_mesh(repairs: list[Repairs] | None, vertices: Any, faces: Any, **attributes: Any) -> Mesh:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from renderer.errors import MeshError
-from renderer.files import write_atomically
+from renderer.files import read_whole, write_atomically
 from renderer.mesh import Mesh, Repairs, RepairWarning, build_mesh
 from renderer.obj import parse_obj
 from renderer.ply import format_ply, parse_ply
@@ -45,7 +45,7 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
     if path.suffix.lower() not in _PARSERS:
         raise MeshError(f"{path}: expected a suffix of {', '.join(_PARSERS)}, got {path.suffix!r}")
     try:
-        content = path.read_bytes()
+        content = read_whole(path)
     except (OSError, ValueError) as error:  # ValueError: a null byte in the path
         raise MeshError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
     try:

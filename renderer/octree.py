@@ -322,8 +322,9 @@ def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
         return mesh.vertices, 1.0
     # Limited to what a float64 can be, for meshes of denormals.
     exponent = min(-int(np.frexp(largest)[1]), 1000)
-    scaled = np.ldexp(mesh.vertices, exponent)
-    exact = (np.ldexp(scaled, -exponent) == mesh.vertices).all(axis=1)
+    with np.errstate(over="ignore"):  # of a vertex that no face names; it comes back as inf
+        scaled = np.ldexp(mesh.vertices, exponent)
+        exact = (np.ldexp(scaled, -exponent) == mesh.vertices).all(axis=1)
     if not exact.all():
         row = int((~exact).argmax())
         got = mesh.vertices[row].tolist()

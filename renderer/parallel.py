@@ -4,17 +4,21 @@ Safe for concurrent callers, which Numba's ``prange`` on its default layer is no
 """
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import thread as pools
 from contextlib import suppress
 from functools import cache
 from numbers import Integral
-from threading import Event, Lock
+from threading import Lock, current_thread
 
 from renderer.errors import expect
 
 # The pool's threads at least, and as many times the processors: whoever asks for more gets the same result from these.
 _LEAST_POOL, _PER_PROCESSOR = 16, 4
+# Seconds between looks at helpers that have been told to stop, which take milliseconds.
+_MOMENT = 0.0005
 
 
 def available_threads() -> int:
@@ -57,7 +61,7 @@ def for_chunks(
     it is raised here. ``work`` must not call ``for_chunks``: it might wait for itself.
     """
     begins = iter(range(0, count, size))
-    taking, stop = Lock(), Event()
+    taking, shared = Lock(), _Shared()
 
     def tell(items: int) -> None:
         if finished is not None:
@@ -65,7 +69,7 @@ def for_chunks(
                 finished(items)
 
     def take_chunks() -> None:
-        while not stop.is_set():
+        while not shared.must_stop():
             with taking:
                 begin = next(begins, None)
             if begin is None:
@@ -73,27 +77,72 @@ def for_chunks(
             end = min(begin + size, count)
             try:
                 for _ in work(begin, end) or ():
-                    if stop.is_set():
+                    if shared.must_stop():
                         return
                     tell(0)
                 tell(end - begin)
             except BaseException:
-                stop.set()
+                shared.stopped = True
                 raise
+
+    def help_out() -> None:
+        with taking:
+            if shared.stopped:
+                return
+            shared.helpers.append(None)
+        try:
+            take_chunks()
+        finally:
+            shared.helpers.pop()
 
     running: list[Future[None]] = []
     try:
         # The caller's own thread is one of them, so the work starts without waiting for another to wake up.
-        _start(take_chunks, min(threads, -(-count // size)) - 1, running)
+        _start(help_out, min(threads, -(-count // size)) - 1, running)
         take_chunks()
         for future in running:
             # One that has not begun, in a pool that others keep busy, has nothing left to take.
             if not future.cancel():
                 future.result()
     finally:
-        stop.set()
-        for future in running:
-            future.cancel() or future.exception()
+        _stop_helpers(shared, taking)
+
+
+class _Shared:
+    """What the threads of one call tell each other: that all shall stop, and an entry for each helper at work.
+
+    A daemon's helpers stop when the interpreter ends, as the daemon does: it waits for all threads of pools.
+    """
+
+    def __init__(self) -> None:
+        self.stopped = False
+        self.helpers: list[None] = []
+        self._daemon = current_thread().daemon
+
+    def must_stop(self) -> bool:
+        # The flag by which pools refuse new work then. It is private: without it Ctrl-C waits for a daemon's helpers.
+        return self.stopped or (self._daemon and getattr(pools, "_shutdown", False))
+
+
+def _stop_helpers(shared: _Shared, taking: Lock) -> None:
+    """Return when no helper is at work any more, whatever Ctrl-C interrupts: they write to memory of the caller's.
+
+    By plain flags: interrupted at the wrong moment, an ``Event`` keeps its lock for good, and a future just submitted
+    is one that nobody knows.
+    """
+    interrupted = False
+    while True:
+        try:
+            shared.stopped = True
+            with taking:
+                pass  # from here on whoever begins sees it
+            while shared.helpers:
+                time.sleep(_MOMENT)
+            break
+        except KeyboardInterrupt:
+            interrupted = True
+    if interrupted:
+        raise KeyboardInterrupt
 
 
 def _start(work: Callable[[], None], count: int, running: list[Future[None]]) -> None:

@@ -189,9 +189,11 @@ def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: 
 def _reject(rays: RayBatch, row: int, scale: float) -> None:
     """Raise the error of a ray out of bounds."""
     origin = rays.origins[row if len(rays.origins) > 1 else 0]
-    if not (np.abs(origin) * scale <= FARTHEST).all():
-        near = f"finite numbers within {FARTHEST / scale:.3g}"
-        expect(False, "origins", near, f"{origin.tolist()} in row {row}")
+    with np.errstate(over="ignore"):
+        near = (np.abs(origin) * scale <= FARTHEST).all()
+    if not near:
+        expected = f"finite numbers within {FARTHEST / scale:.3g}"
+        expect(False, "origins", expected, f"{origin.tolist()} in row {row}")
     expected = f"finite, non-zero vectors, the largest component from {SHORTEST:.3g} to {LONGEST:.3g}"
     expect(False, "directions", expected, f"{rays.directions[row].tolist()} in row {row}")
 

@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from renderer.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.errors import MeshError, SceneError, expect
 from renderer.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
-from renderer.files import write_atomically
+from renderer.files import read_whole, write_atomically
 from renderer.light import DirectionalLight, PointLight
 from renderer.material import Dielectric, Material, Mirror, Phong
 from renderer.mesh import Mesh
@@ -203,11 +203,11 @@ def load_scene(path: str | Path) -> Scene:
             mesh = load_mesh(path)
         except MeshError as error:
             raise SceneError(str(error)) from None
-        table = tomllib.loads(showcase_text(mesh, path.name))
+        table = tomllib.loads(showcase_text(mesh, "model"))
         table["objects"][0]["mesh"] = mesh
         return _checked(table, path)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        table = tomllib.loads(read_whole(path).decode("utf-8-sig"))
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, a null byte, too many digits
@@ -217,7 +217,8 @@ def load_scene(path: str | Path) -> Scene:
 
 def write_scene(mesh_file: str | Path, path: str | Path) -> None:
     """Write the scene that ``load_scene(mesh_file)`` gives as a scene file, to be changed at will."""
-    inside = os.path.relpath(Path(mesh_file).resolve(), Path(path).resolve().parent)
+    # From beside the scene file as it is named, where ``load_scene`` looks, and not from where a link may lead.
+    inside = os.path.relpath(Path(mesh_file).resolve(), Path(path).parent.resolve())
     text = showcase_text(load_mesh(mesh_file), Path(inside).as_posix())
     write_atomically(path, lambda file: file.write(text.encode()))
 
@@ -255,7 +256,8 @@ def _place(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
     world = mesh.transformed(matrix)
     if not mesh.is_float32 or not len(world.vertices):
         return world
-    rounded = world.vertices.astype(np.float32).astype(np.float64)
+    with np.errstate(over="ignore"):  # beyond float32 it is inf, which is farther than any bound
+        rounded = world.vertices.astype(np.float32).astype(np.float64)
     if np.abs(rounded - world.vertices).max() > 2.0**-22 * np.max(world.extent):
         return world
     return Mesh(rounded, world.faces, world.normals, world.colors, world.texcoords, world.name)

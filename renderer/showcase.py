@@ -25,7 +25,8 @@ def showcase_text(mesh: Mesh, path: str) -> str:
     towards = np.array(_TOWARDS_EYE) / np.linalg.norm(_TOWARDS_EYE)
     eye = target + towards * (_MARGIN * radius / math.sin(math.radians(_FOV) / 2.0))
     half = _FLOOR * radius
-    return f"""# Made for {path}: change what you like.
+    quoted = json.dumps(path).replace("\x7f", "\\u007f")  # as TOML has it
+    return f"""# Made for {quoted}: change what you like.
 
 [camera]
 eye = {_list(eye)}
@@ -33,7 +34,7 @@ target = {_list(target)}
 fov = {_FOV}
 
 [[objects]]
-mesh = {json.dumps(path)}
+mesh = {quoted}
 material = "model"
 normals = "{"flat" if mesh.normals is None else "smooth"}"
 translate = {_list((-middle[0], -lower[1], -middle[2]))}

@@ -11,7 +11,7 @@ from renderer.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, ca
 from renderer.leaf import NO_FACE, nearest_carefully, search_all_blocks
 from renderer.packet import child_of, meet_octant, trace_packet
 from renderer.prepared import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare
-from renderer.simd import at, get, lowest_bit, pointer, put, smaller, splat8
+from renderer.simd import at, get, larger, lowest_bit, pointer, put, smaller, splat8
 from renderer.stream import (
     END,
     LANE_DOUBLES,
@@ -32,7 +32,7 @@ from renderer.stream import (
 # Rays whose slopes against their dominant axis differ by more than this from the first one's are no packet. It only
 # spares rays that point anywhere the attempt: how far a packet goes, its budget tells.
 _SPREAD = 0.125
-_MOST = np.finfo(np.float64).max
+_MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
 
 
 class Rays(NamedTuple):
@@ -123,10 +123,10 @@ def make_scratch(memory):
 def ray_at(rays, i):
     """Ray ``i`` in the tree's units, and its t_max."""
     o, d, s = at(rays.origins, i * rays.origin_step), at(rays.directions, 3 * i), rays.scale
-    ray = Ray(
-        s * get(o, 0), s * get(o, 1), s * get(o, 2), get(d, 0), get(d, 1), get(d, 2),
-        s * get(rays.t_min, i * rays.min_step),
-    )  # fmt: skip
+    least = get(rays.t_min, i * rays.min_step)
+    # Above 0 it stays so, that a hit at the start is still too near.
+    t_min = larger(s * least, _TINIEST) if least > 0.0 else least
+    ray = Ray(s * get(o, 0), s * get(o, 1), s * get(o, 2), get(d, 0), get(d, 1), get(d, 2), t_min)
     # A hit beyond the largest number, in either unit, is none.
     return ray, smaller(s * smaller(get(rays.t_max, i * rays.max_step), _MOST), _MOST)
 
@@ -186,11 +186,11 @@ def _write(found, i, scale, best, any_hit):
     if any_hit:
         put(found.hit, i, hit)
         return
-    # No hit is at -0.0.
+    # No t, u or v is -0.0.
     put(found.t, i, t / scale + 0.0 if hit else np.inf)
     put(found.face, i, np.int64(face if hit else -1))
-    put(found.u, i, u / w if hit else np.nan)
-    put(found.v, i, v / w if hit else np.nan)
+    put(found.u, i, u / w + 0.0 if hit else np.nan)
+    put(found.v, i, v / w + 0.0 if hit else np.nan)
 
 
 @inlined

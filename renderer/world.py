@@ -86,12 +86,13 @@ def _winding(mesh: Mesh, point: tuple[float, float, float]) -> float:
     lower, upper = mesh.bounds
     if (np.less(point, lower) | np.greater(point, upper)).any():
         return 0.0
-    a, b, c = (mesh.triangles - np.asarray(point)).transpose(1, 0, 2)
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    dots = [np.einsum("nk,nk->n", v, w) for v, w in ((a, b), (b, c), (c, a))]
-    denominator = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
-    volume = np.einsum("nk,nk->n", a, np.cross(b, c))
-    return float(2.0 * np.arctan2(volume, denominator).sum() / (4.0 * np.pi))
+    with np.errstate(over="ignore", invalid="ignore"):  # meshes of such sizes are refused when the tree is built
+        a, b, c = (mesh.triangles - np.asarray(point)).transpose(1, 0, 2)
+        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+        dots = [np.einsum("nk,nk->n", v, w) for v, w in ((a, b), (b, c), (c, a))]
+        denominator = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
+        volume = np.einsum("nk,nk->n", a, np.cross(b, c))
+        return float(2.0 * np.arctan2(volume, denominator).sum() / (4.0 * np.pi))
 
 
 def _normals(scene: Scene, count: int) -> NDArray[np.float64]:

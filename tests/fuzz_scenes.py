@@ -260,10 +260,7 @@ def check_transform(folder: Path, given: Values, index: int) -> str:
     except ValueError as error:
         expect_clear(error)
         return "refused"
-    with warnings.catch_warnings():
-        # Known: see test_fuzz.py.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        return by_both(scene)
+    return by_both(scene)
 
 
 # --- settings --------------------------------------------------------------------------------------------------

@@ -12,6 +12,9 @@ from renderer import cli, files, load_scene, render
 from renderer.cli import main
 from renderer.files import check_writable, write_atomically
 from renderer.image import PLANES, Image
+from renderer.mesh_io import save_ply
+from renderer.scene import write_scene
+from renderer.shapes import icosphere
 
 STAIRS = Path(__file__).parents[1] / "scenes" / "stairs.toml"
 
@@ -114,3 +117,54 @@ def test_planes_that_are_not_kept_have_no_pixels_and_others_the_same(tmp_path: P
 def test_unknown_planes_are_refused(planes: Any) -> None:
     with pytest.raises(ValueError, match=r"^planes: expected some of radiance, depth, normal, face, rays, got "):
         render(load_scene(STAIRS), resolution=(4, 4), planes=planes)
+
+
+def test_a_file_keeps_its_mode(tmp_path: Path) -> None:
+    path = tmp_path / "private.bin"
+    path.touch()
+    path.chmod(0o600)
+    write_atomically(path, lambda file: file.write(b"new"))
+    assert (path.stat().st_mode & 0o777, path.read_bytes()) == (0o600, b"new")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_atomically(tmp_path / "pipe", lambda file: file.write(b"new"))
+    assert os.read(reader, 9) == b"new"
+    assert (tmp_path / "pipe").is_fifo()
+    os.close(reader)
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.ply", "a.stl", "a.glb", "a.toml"])
+def test_a_device_without_an_end_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(ValueError, match=rf"{name}: cannot be read: expected a file, got a device"):
+        load_scene(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["a\x1bb.ply", "a\nb.ply", "a\x7fb.ply", 'a"b.ply'])
+def test_a_bare_mesh_of_any_name_is_shown(tmp_path: Path, name: str) -> None:
+    save_ply(icosphere(1), tmp_path / name)
+    assert load_scene(tmp_path / name).instances
+    write_scene(tmp_path / name, tmp_path / "it.toml")
+    assert load_scene(tmp_path / "it.toml").instances
+
+
+def test_an_error_tells_a_terminal_nothing(tmp_path: Path, capsys: Any) -> None:
+    (tmp_path / "a.ply").write_bytes(
+        b"ply\nformat ascii 1.0\nelement vert\x1b]0;PWN\x07ex 1\nproperty float x\nend_header\n"
+    )
+    assert main(["info", str(tmp_path / "a.ply")]) == 2
+    said = capsys.readouterr().err
+    assert "\\x1b" in said
+    assert said.rstrip("\n").isprintable()
+
+
+def test_numpys_own_words_of_a_full_disk_get_the_path(tmp_path: Path) -> None:
+    def short(file: Any) -> None:
+        raise OSError("786432 requested and 4064 written")
+
+    with pytest.raises(OSError, match=r"a\.npy: 786432 requested and 4064 written"):
+        write_atomically(tmp_path / "a.npy", short)

@@ -273,3 +273,20 @@ def test_control_c_while_threads_start_stops_those_that_did(monkeypatch, submitt
 
     for_chunks(meet, 4, 1, 4)
     released.set()
+
+
+DAEMON = """
+import threading
+from renderer.parallel import for_chunks
+begun = threading.Barrier(3)
+def work(begin, end):
+    begun.wait()
+    while True:
+        yield
+threading.Thread(target=for_chunks, args=(work, 2, 1, 2), daemon=True).start()
+begun.wait()
+"""
+
+
+def test_a_daemons_helpers_do_not_outlive_the_main_thread():
+    subprocess.run([sys.executable, "-P", "-c", DAEMON], check=True, timeout=60)
