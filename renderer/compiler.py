@@ -83,7 +83,9 @@ class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
         _link_all(module, self._linking_libraries)
         for function in module.functions:
             if not function.is_declaration and function.name not in outer:
-                function.linkage = "internal"  # so that what is inlined everywhere is dropped
+                # Dropped where it is inlined everywhere. And without a symbol: an internal function has one, by which
+                # another kernel's call of the same piece would find this one, with arguments as it was optimised.
+                function.linkage = "private"
         # Each function alone first, as Numba does: what is inlined then is small. Worth 2 % of tracing.
         for function in module.functions:
             passes, builder = self._codegen._function_pass_manager()

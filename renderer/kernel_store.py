@@ -34,6 +34,8 @@ from renderer.source_digest import is_ours, source_digest
 _CARRIED = Path(__file__).parent / "compiled"
 _SUFFIX = ".kernel"
 _HEADER = b"octree-renderer kernel 1\n"
+# Changes where older machine code will not do, for a reason that no digest of kernels' sources shows.
+_FORM = "private pieces"
 _LOG = getLogger("renderer.jit")
 
 @dataclass(frozen=True)
@@ -207,7 +209,7 @@ def _shape(code: CodeType) -> tuple[object, ...]:
 def _versions() -> str:
     tag = sys.implementation.cache_tag or sys.implementation.name
     flags = getattr(sys, "abiflags", "")
-    return f"{tag}{flags} numba {numba.__version__} llvmlite {llvmlite.__version__}"
+    return f"{tag}{flags} numba {numba.__version__} llvmlite {llvmlite.__version__} {_FORM}"
 
 
 def _of_sources(digest: str) -> str:

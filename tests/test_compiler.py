@@ -1,6 +1,7 @@
 """How kernels are compiled: pieces and entries, what other kernels may do with them, and other versions of Numba."""
 
 import gc
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -185,3 +186,35 @@ def test_another_numba_that_fits_is_used_without_a_word_and_keeps_its_kernels(tm
         assert done.stderr.count("compiling kernels") == told == len(done.stderr.splitlines())
         assert done.stdout.split()[1] == "True"
     assert len(list(tmp_path.rglob("*.kernel"))) == 1
+
+
+PLAIN_AFTER_OURS = """
+import numpy as np
+from numba import njit
+from renderer import Octree
+from renderer.batch import _found_pointers, _ray_pointers
+from renderer.leaf import tree_pointers
+from renderer.shapes import icosphere
+from renderer.traverse import make_memory, make_scratch, trace
+
+@njit(error_model="numpy")
+def mine(words, rays, out, memory):
+    tree = tree_pointers(words)
+    trace(tree, _ray_pointers(rays, tree.scale), _found_pointers(out), 0, len(rays[1]), make_scratch(memory), False)
+
+octree, rays = Octree.from_mesh(icosphere(3)), np.random.default_rng(0).normal(size=(50, 3)) * 3
+expected = octree.closest_hit(rays, -rays)
+octree.any_hit(rays, -rays)
+out = np.zeros(50), np.zeros(50, int), np.zeros(50), np.zeros(50), np.zeros(50, bool)
+mine(octree.tree.words, (rays, -rays, np.zeros(50), np.full(50, np.inf)), out, make_memory(octree.tree.depth, 50))
+print((out[0] == expected.t).all())
+"""
+
+
+def test_a_plain_kernel_calls_its_own_piece_and_not_one_that_was_optimised_within_another(tmp_path):
+    """Compiled in one process both have one name; with arguments left out, as LLVM does inside, a call crashed."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", PLAIN_AFTER_OURS], env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.stdout == "True\n", done.stderr
