@@ -19,10 +19,12 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], o
         if _is_special(target):
             temporary = target
         with open(temporary, "wb") as file:
+            if temporary != target:
+                # Before anything is in it: a private file stays one.
+                with suppress(FileNotFoundError):
+                    temporary.chmod(S_IMODE(target.stat().st_mode))
             write(file)
         if temporary != target:
-            with suppress(FileNotFoundError):
-                temporary.chmod(S_IMODE(target.stat().st_mode))
             os.replace(temporary, target)
 
 
@@ -66,5 +68,5 @@ def _temporary_beside(path: str | os.PathLike[str]) -> Iterator[tuple[Path, Path
         if isinstance(error, OSError) and error.errno is not None:
             raise OSError(error.errno, error.strerror, str(path)) from error
         if isinstance(error, OSError):  # NumPy's own words
-            raise OSError(f"{path}: {error}") from error
+            raise type(error)(f"{path}: {error}") from error
         raise

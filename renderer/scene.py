@@ -216,7 +216,12 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def write_scene(mesh_file: str | Path, path: str | Path) -> None:
-    """Write the scene that ``load_scene(mesh_file)`` gives as a scene file, to be changed at will."""
+    """Write the scene that ``load_scene(mesh_file)`` gives as a scene file, to be changed at will.
+
+    Raises ``ValueError`` unless ``path`` is that of a .toml file, and leads to no other kind.
+    """
+    for name in (Path(path), Path(os.path.realpath(path))):
+        expect(name.suffix.lower() == ".toml", "path", "a .toml file", str(path))
     # From beside the scene file as it is named, where ``load_scene`` looks, and not from where a link may lead.
     inside = os.path.relpath(Path(mesh_file).resolve(), Path(path).parent.resolve())
     text = showcase_text(load_mesh(mesh_file), Path(inside).as_posix())

@@ -168,3 +168,11 @@ def test_numpys_own_words_of_a_full_disk_get_the_path(tmp_path: Path) -> None:
 
     with pytest.raises(OSError, match=r"a\.npy: 786432 requested and 4064 written"):
         write_atomically(tmp_path / "a.npy", short)
+
+
+def test_a_private_file_is_private_while_it_is_written(tmp_path: Path) -> None:
+    path, modes = tmp_path / "private.bin", []
+    path.touch()
+    path.chmod(0o600)
+    write_atomically(path, lambda file: modes.append(os.fstat(file.fileno()).st_mode & 0o777))
+    assert modes == [0o600]

@@ -71,3 +71,15 @@ def test_what_is_neither_is_said_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="expected TOML"):
         (tmp_path / "a.txt").write_text("no scene")
         load_scene(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize("through_link", [False, True])
+def test_a_scene_is_written_over_no_mesh(tmp_path: Path, capsys: Any, through_link: bool) -> None:
+    path = file_of(tmp_path, icosphere(1))
+    before, target = path.read_bytes(), path
+    if through_link:
+        target = tmp_path / "it.toml"
+        target.symlink_to(path)
+    assert main(["render", str(path), "-o", str(tmp_path / "a.png"), "--write-scene", str(target)]) == 2
+    assert "path: expected a .toml file" in capsys.readouterr().err
+    assert path.read_bytes() == before

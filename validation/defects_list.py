@@ -31,7 +31,6 @@ _MATERIAL_ROWS = "own, kinds = needs_of(scene), rows[:, KIND]"
 _COLORS = "np.array([scene.ambient, scene.background])"
 _IMAGE = "return Image(*film,"
 _SETTINGS = "Settings(bounces, chosen.min_weight,"
-_NORMAL = "barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v)"
 _SAMPLES = "rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)"
 _CORNER = "corner = forward - right * (pixel * width / 2.0)"
 
@@ -172,7 +171,7 @@ PICTURES = (
     _kernel("pictures", "highlights left out below R.V = 0.5", "shading", "if -dot(r, d) <= 0.0:",
             "if -dot(r, d) <= 0.5:"),
     _kernel("pictures", "interpolated normals not normalised", "sight",
-            f"n_s = normalized({_NORMAL})", f"n_s = {_NORMAL}"),
+            "n_s = normalized(n) if largest", "n_s = n if largest"),
     _kernel("pictures", "rays leave a face from its other side", "spawn", "step = scale(n_g, side * missing)",
             "step = scale(n_g, -side * missing)"),
     _kernel("pictures", "rays leave a face by a thousandth of the bound", "spawn", "    if missing <= 0.0:",
