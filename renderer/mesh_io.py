@@ -31,7 +31,8 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
 
     Polygons are cut into triangles: by a fan from the first corner, concave ones by their ears. The fan stays, wrong as
     it may be, where a polygon touches or crosses itself, repeats a corner, has a hole by a bridge, more than 4096
-    corners, or strays from its plane. Normals, colours and texture coordinates of vertices are kept. Positions are float64 whatever the file holds. An STL file shares no vertices between its faces.
+    corners, or strays from its plane. Normals, colours and texture coordinates of vertices are kept. Positions are
+    float64 whatever the file holds. An STL file shares no vertices between its faces.
 
     Raises ``MeshError`` that names the file and the fault: not there, not a file, unknown suffix, malformed
     or truncated, no faces, a face index out of range, a face of fewer than three vertices, values that are

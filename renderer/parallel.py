@@ -51,7 +51,7 @@ def for_chunks(
     count: int,
     size: int,
     threads: int,
-    finished: Callable[[int], None] | None = None,
+    finished: Callable[[int], object] | None = None,
 ) -> None:
     """Call ``work(begin, end)`` for every chunk of ``range(count)``, on up to ``threads`` threads.
 
@@ -68,8 +68,8 @@ def for_chunks(
             with taking:
                 finished(items)
 
-    def take_chunks() -> None:
-        while not shared.must_stop():
+    def take_chunks(helps: bool = False) -> None:
+        while not (shared.stopped or (helps and shared.is_left())):
             with taking:
                 begin = next(begins, None)
             if begin is None:
@@ -77,8 +77,10 @@ def for_chunks(
             end = min(begin + size, count)
             try:
                 for _ in work(begin, end) or ():
-                    if shared.must_stop():
+                    if shared.stopped:
                         return
+                    if helps and shared.is_left():
+                        raise RuntimeError("the interpreter ends while a daemon's work is under way")
                     tell(0)
                 tell(end - begin)
             except BaseException:
@@ -91,7 +93,7 @@ def for_chunks(
                 return
             shared.helpers.append(None)
         try:
-            take_chunks()
+            take_chunks(helps=True)
         finally:
             shared.helpers.pop()
 
@@ -111,7 +113,8 @@ def for_chunks(
 class _Shared:
     """What the threads of one call tell each other: that all shall stop, and an entry for each helper at work.
 
-    A daemon's helpers stop when the interpreter ends, as the daemon does: it waits for all threads of pools.
+    A daemon's helpers leave it when the interpreter ends, which waits for all threads of pools. What they had begun is
+    an error then; a daemon that lives on, beside other threads, works alone.
     """
 
     def __init__(self) -> None:
@@ -119,9 +122,10 @@ class _Shared:
         self.helpers: list[None] = []
         self._daemon = current_thread().daemon
 
-    def must_stop(self) -> bool:
+    def is_left(self) -> bool:
+        """Whether helpers leave a daemon alone."""
         # The flag by which pools refuse new work then. It is private: without it Ctrl-C waits for a daemon's helpers.
-        return self.stopped or (self._daemon and getattr(pools, "_shutdown", False))
+        return self._daemon and getattr(pools, "_shutdown", False)
 
 
 def _stop_helpers(shared: _Shared, taking: Lock) -> None:

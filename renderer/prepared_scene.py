@@ -55,7 +55,7 @@ class PreparedScene:
         chosen: RenderSettings,
         offset: float,
         threads: int,
-        finished: Callable[[int], None] | None = None,
+        finished: Callable[[int], object] | None = None,
         planes: Collection[str] = PLANES,
     ) -> Image:
         """The picture that ``camera`` takes, by checked settings; see ``render``.

@@ -1,7 +1,8 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
 import warnings
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from typing import Any, Literal
 
 from renderer.build import SPLITS
@@ -70,8 +71,8 @@ def render(
         prepared = scene
     else:
         prepared = _prepared(scene, chosen.max_depth, accelerator, split, needs, threads)
-    with _bar(tiles(chosen.resolution), progress) as bar:
-        image = prepared.picture(eye, chosen, rule, threads, bar.update, planes)
+    with _bar(tiles(chosen.resolution), progress) as update:
+        image = prepared.picture(eye, chosen, rule, threads, update, planes)
     if image.cut:
         warnings.warn(image.cut_message(chosen.max_rays), CutWarning, stacklevel=2)
     return image
@@ -133,7 +134,16 @@ def _offset(offset: str | float) -> float:
     return float(offset)
 
 
-def _bar(count: int, progress: bool) -> Any:
-    from tqdm import tqdm  # only a picture needs it
+@contextmanager
+def _bar(count: int, progress: bool) -> Iterator[Callable[[int], object] | None]:
+    """What to tell of tiles that are done: a bar, or None where nobody watches.
 
-    return tqdm(total=count, unit="tile", leave=False, disable=not (progress and on_terminal()))
+    None, because a bar takes a lock that all of them share, and that Ctrl-C may leave taken for good.
+    """
+    if not (progress and on_terminal()):
+        yield None
+        return
+    from tqdm import tqdm  # only a bar needs it
+
+    with tqdm(total=count, unit="tile", leave=False) as bar:
+        yield bar.update

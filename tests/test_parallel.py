@@ -290,3 +290,28 @@ begun.wait()
 
 def test_a_daemons_helpers_do_not_outlive_the_main_thread():
     subprocess.run([sys.executable, "-P", "-c", DAEMON], check=True, timeout=60)
+
+
+DAEMON_LIVES_ON = """
+import threading, time
+import numpy as np
+from renderer import BruteForce, Octree
+from renderer.shapes import icosphere
+rays = np.random.default_rng(1).normal(size=(40_000, 3)) * 3
+octree = Octree.from_mesh(icosphere(3), threads=2)
+expected, done = octree.closest_hit(rays, -rays), threading.Event()
+def daemon():
+    threading.main_thread().join()
+    hits = octree.closest_hit(rays, -rays)
+    print((hits.t == expected.t).all(), Octree.from_mesh(icosphere(5), threads=2).stats.faces)
+    done.set()
+threading.Thread(target=daemon, daemon=True).start()
+threading.Thread(target=done.wait, args=(60,)).start()
+"""
+
+
+def test_a_daemon_that_outlives_the_main_thread_gets_right_answers():
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", DAEMON_LIVES_ON], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert done.stdout == "True 20480\n", done.stderr
