@@ -17,15 +17,15 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], o
     """
     with _temporary_beside(path) as (temporary, target):
         if _is_special(target):
-            temporary = target
-        with open(temporary, "wb") as file:
-            if temporary != target:
-                # Before anything is in it: a private file stays one.
-                with suppress(FileNotFoundError):
-                    temporary.chmod(S_IMODE(target.stat().st_mode))
+            with open(target, "wb") as file:
+                write(file)
+            return
+        with open(temporary, "xb") as file:
+            # Before anything is in it: a private file stays one.
+            with suppress(FileNotFoundError):
+                temporary.chmod(S_IMODE(target.stat().st_mode))
             write(file)
-        if temporary != target:
-            os.replace(temporary, target)
+        os.replace(temporary, target)
 
 
 def read_whole(path: Path) -> bytes:

@@ -302,15 +302,15 @@ class Mesh:
                 if len(rows) == len(positions):  # the constructor rejects any other length
                     rows[~finite] = 0.0
                 attributes[attribute] = rows
-        mesh_normals = attributes.pop("normals")
-        mesh, lost = cls(positions, indices[kept], name=name, **attributes), np.zeros(0, np.bool_)
-        if mesh_normals is not None:
-            if len(mesh_normals) == len(positions):
-                lost = ~np.isfinite(mesh_normals).all(axis=1)
-                mesh_normals[lost] = mesh.vertex_normals()[lost] if lost.any() else 0.0
-            mesh = replace(mesh, normals=mesh_normals)
-        masks = (~kept, ~finite, kept, lost)
-        return mesh, Repairs(*(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in masks))
+        lost, given = np.zeros(0, np.bool_), attributes["normals"]
+        if given is not None and len(given) == len(positions):
+            lost = ~np.isfinite(given).all(axis=1)
+            if lost.any():
+                given[lost] = cls(positions, indices[kept], name=name).vertex_normals()[lost]
+        repairs = Repairs(
+            *(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept, lost))
+        )
+        return cls(positions, indices[kept], name=name, **attributes), repairs
 
 
 def face_normals(corners: Float64Array) -> Float64Array:

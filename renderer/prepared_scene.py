@@ -11,11 +11,12 @@ from renderer.camera import Camera, sample_offsets
 from renderer.compile_notice import Stopwatch
 from renderer.errors import expect
 from renderer.image import PLANES, Image
-from renderer.layout import LANES, Tree, cache_aligned
+from renderer.layout import Tree, cache_aligned
 from renderer.mesh import Mesh
 from renderer.needs import Needs
 from renderer.octree import BruteForce, Octree
 from renderer.parallel import for_chunks
+from renderer.query import rays_against_blocks
 from renderer.scene import RenderSettings, Scene
 from renderer.sight import MAX_MEDIA, World
 from renderer.tile import CUT, Film, render_tile, tile_memory
@@ -101,10 +102,7 @@ def prepare_scene(
 
 def _bundles_in_a_row(tree: Tree) -> int:
     """After how many bundles a kernel returns, so that Ctrl-C and others are heard: some 10 ms of tracing."""
-    if tree.depth > 0:
-        return 256
-    # Every ray meets every block, at some nanoseconds each.
-    return max(1, (1 << 22) // (SIZE * max(1, len(tree.faces) // LANES)))
+    return 256 if tree.depth > 0 else max(1, rays_against_blocks(tree) // SIZE)
 
 
 def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_seconds: float) -> PreparedScene:

@@ -231,11 +231,16 @@ def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
     return out
 
 
+def rays_against_blocks(tree: Tree) -> int:
+    """How many rays, each against every block, are a chunk: some 10 ms, so that Ctrl-C and others are heard."""
+    return max(1, _BLOCK_TESTS * LANES // max(1, len(tree.faces)))
+
+
 def _run(tree: Tree, rays: RayBatch, out: Any, threads: int, any_hit: bool) -> None:
     count = len(rays.directions)
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     if tree.depth == 0:
-        size = max(1, min(size, _BLOCK_TESTS * LANES // max(1, len(tree.faces))))
+        size = min(size, rays_against_blocks(tree))
     bad: list[int] = []
 
     def trace(begin: int, end: int) -> None:
