@@ -16,7 +16,7 @@ from renderer import __version__
 from renderer.errors import expect
 from renderer.interrupt import interruptible
 from renderer.levels import AHEAD_VARIABLE, LEVELS
-from renderer.terminal import on_terminal, spell_everything
+from renderer.terminal import on_terminal, one_line, spell_everything
 
 
 @interruptible("octree-render: interrupted")
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read our words, as ``| head`` does, has had enough of them. The picture is written.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (ValueError, OSError, ImportError) as error:
-        print(f"octree-render: {_one_line(error)}", file=sys.stderr)
+        print(f"octree-render: {one_line(error)}", file=sys.stderr)
         return 2
     return 0
 
@@ -74,12 +74,6 @@ class _Notices(logging.Handler):
         from tqdm import tqdm
 
         tqdm.write(f"octree-render: {record.getMessage().removeprefix('renderer: ')}", file=sys.stderr)
-
-
-def _one_line(error: Exception) -> str:
-    """Its words without what a terminal obeys: they may quote a file."""
-    words = " ".join(str(error).split())
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
 
 
 _SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb): camera, light and floor are then chosen to fit"

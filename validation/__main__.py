@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from renderer.errors import extra_hint
 from renderer.interrupt import interruptible
+from renderer.terminal import one_line
 from validation.output import add_output, check_output
 from validation.sections import NAMES, choose
 
@@ -37,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _run(options, f"{_program()} {shlex.join(given)}".strip())
     except (ImportError, ValueError, OSError) as error:
         missing = f"; {extra_hint('validate')}" if isinstance(error, ImportError) else ""
-        print(f"validation: {' '.join(str(error).split())}{missing}", file=sys.stderr)
+        print(f"validation: {one_line(error)}{missing}", file=sys.stderr)
         return 2
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from renderer.errors import extra_hint
 from renderer.interrupt import interruptible
+from renderer.terminal import one_line
 from validation.output import add_output, check_output
 
 # Rays of a family, in full and in quick runs.
@@ -32,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _run(options, ("python -m validation.benchmark " + shlex.join(given)).strip())
     except (ValueError, OSError, ImportError) as error:
         missing = f"; {extra_hint('validate')}" if isinstance(error, ImportError) else ""
-        print(f"benchmark: {' '.join(str(error).split())}{missing}", file=sys.stderr)
+        print(f"benchmark: {one_line(error)}{missing}", file=sys.stderr)
         return 2
 
 
