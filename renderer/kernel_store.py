@@ -28,10 +28,10 @@ from numba.core.serialize import dumps
 
 from renderer.files import write_atomically
 from renderer.levels import AHEAD_VARIABLE, FEATURES, LEVELS
-from renderer.source_digest import is_ours, source_digest
+from renderer.source_digest import PACKAGE, is_ours, source_digest
 
 # Where a wheel for one platform carries its own.
-_CARRIED = Path(__file__).parent / "compiled"
+_CARRIED = PACKAGE / "compiled"
 _SUFFIX = ".kernel"
 _HEADER = b"octree-renderer kernel 1\n"
 # Changes where older machine code will not do, for a reason that no digest of kernels' sources shows.
@@ -52,12 +52,16 @@ class KernelStore:
     def __init__(self, function: Any) -> None:
         self._function = function
         self._source = Path(function.__code__.co_filename)
-        self._name = f"{self._source.stem}.{function.__qualname__}".replace("<", "").replace(">", "")
+        # Ours share a folder wherever they stand in the package, so the name tells their packages too.
+        ours = is_ours(self._source)
+        self._home = PACKAGE if ours else self._source.parent
+        module = function.__module__ if ours else self._source.stem
+        self._name = f"{module}.{function.__qualname__}".replace("<", "").replace(">", "")
 
     @property
     def cache_path(self) -> str | None:
         """The folder that new kernels go to, or None."""
-        written = _folders(self._source.parent).written
+        written = _folders(self._home).written
         return None if written is None or self._digest is None else str(written)
 
     @cached_property
@@ -81,7 +85,7 @@ class KernelStore:
 
         True, too, where nothing can be written: then no process can help another.
         """
-        folders = _folders(self._source.parent)
+        folders = _folders(self._home)
         if folders.written is None or self._digest is None:
             return True
         begin = f"{self._prefix()}{_short(self._digest)}-"
@@ -102,7 +106,7 @@ class KernelStore:
 
     def save_overload(self, signature: Any, compiled: CompileResult) -> None:
         """Keep a kernel for later processes, and remove what was compiled of other sources."""
-        folder = _folders(self._source.parent).written
+        folder = _folders(self._home).written
         if folder is None or self._digest is None or compiled.library.has_dynamic_globals:
             _Count.lost += 1
             return
@@ -122,7 +126,7 @@ class KernelStore:
 
     def _places(self, signature: Any, machine: tuple[str, ...]) -> Iterable[tuple[Path, tuple[str, ...]]]:
         own = self._key(signature, machine)
-        for folder in _folders(self._source.parent).read:
+        for folder in _folders(self._home).read:
             yield folder / self._file(own), own
         ahead = ahead_folders()
         for processor in ("", *runnable_levels()) if ahead else ():

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from renderer import loaded
 
-_PACKAGE = Path(__file__).resolve().parent
-_IMPORT = re.compile(rf"^from ({_PACKAGE.name}(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+PACKAGE = Path(__file__).resolve().parent
+_IMPORT = re.compile(rf"^from ({PACKAGE.name}(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 
 def is_ours(path: Path) -> bool:
     """Whether a source file belongs to this package."""
-    return path.resolve().is_relative_to(_PACKAGE)
+    return path.resolve().is_relative_to(PACKAGE)
 
 
 @cache
@@ -27,7 +27,7 @@ def source_digest(path: Path) -> str | None:
     """
     path = path.resolve()
     seen: set[Path] = set()
-    pending = [path] if is_ours(path) else [path, *_PACKAGE.rglob("*.py")]
+    pending = [path] if is_ours(path) else [path, *PACKAGE.rglob("*.py")]
     while pending:
         found = pending.pop()
         if found not in seen and found.exists():
@@ -40,7 +40,7 @@ def source_digest(path: Path) -> str | None:
         return None
     digest = hashlib.sha256()
     for found in sorted(seen):
-        name = found.relative_to(_PACKAGE).as_posix() if found.is_relative_to(_PACKAGE) else found.name
+        name = found.relative_to(PACKAGE).as_posix() if found.is_relative_to(PACKAGE) else found.name
         digest.update(name.encode() + b"\0" + _source(found) + b"\0")
     return digest.hexdigest()
 
@@ -60,8 +60,8 @@ def _imports(path: Path) -> list[Path]:
     """The files of the package that a source imports by ``from renderer.a.b import c``, c a module or a name in b."""
     found = []
     for module, names in _IMPORT.findall(_source(path).decode(errors="replace")):
-        base = _PACKAGE.joinpath(*module.split(".")[1:])
+        base = PACKAGE.joinpath(*module.split(".")[1:])
         below = [base / f"{name}.py" for name in re.findall(r"\w+", names)]
         candidates = [base.with_suffix(".py"), base / "__init__.py", *below]
-        found += [file for file in candidates if file != _PACKAGE.with_suffix(".py") and file.exists()]
+        found += [file for file in candidates if file != PACKAGE.with_suffix(".py") and file.exists()]
     return found

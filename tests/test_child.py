@@ -58,7 +58,7 @@ def test_a_first_picture_executes_nothing_that_lies_in_the_current_folder(folder
     (kernels,) = (tmp_path / "cache").iterdir()
     # Each kernel once, where this process looks for it.
     names = [path.name.split("-")[0] for path in kernels.glob("*.kernel")]
-    assert "tile.render_tile" in names and len(names) == len(set(names))
+    assert "renderer.tile.render_tile" in names and len(names) == len(set(names))
 
 
 def test_the_console_scripts_look_into_no_folder(folder):

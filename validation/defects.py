@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +100,7 @@ def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, c
     """Run the checks of ``groups`` in a new process with one replacement, or none; its kernels go to ``cache``."""
     began = time.perf_counter()
     cache.mkdir(parents=True, exist_ok=True)
-    asked = json.dumps([None if replacement is None else vars(replacement), groups, checks])
+    asked = json.dumps([None if replacement is None else asdict(replacement), groups, checks])
     command = child.command("validation.defects_answer:answer", asked)
     environment = child.environment(NUMBA_CACHE_DIR=str(cache))
     try:
@@ -143,9 +143,9 @@ def record(chosen: list[Defect], control: Answer, answers: list[Answer]) -> dict
 def _row(defect: Defect, answer: Answer) -> dict[str, Any]:
     return {
         "name": defect.name,
-        "file": f"renderer/{defect.replacement.module}.py",
-        "rule": defect.replacement.rule.strip(),
-        "broken": defect.replacement.broken.strip(),
+        "place": f"{defect.replacement.module}: {defect.replacement.place}",
+        "rule": defect.replacement.rule,
+        "broken": defect.replacement.broken,
         "group": defect.group,
         "caught": bool(answer.red),
         "red": list(answer.red),

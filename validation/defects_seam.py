@@ -1,43 +1,59 @@
-"""The one seam through which a defect enters: a module of ``renderer`` is loaded from altered text.
+"""Loads one module of ``renderer`` with one rule broken: the only way in which a seeded defect enters.
 
 The files stay as they are. A process that shall have a defect calls ``inject`` before anything imports the renderer;
-from then on the named module is compiled from its text with one piece replaced. The digest by which compiled kernels
-are found on disk sees that text too, so a defect gets kernels of its own, and those it does not reach are reused.
-Run it with a ``NUMBA_CACHE_DIR`` of its own all the same: saving a kernel removes those of other texts.
+from then on the module is compiled from altered text. The digest by which compiled kernels are found on disk sees that
+text too, so a defect gets kernels of its own, and those it does not reach are reused. Such a process needs a
+``NUMBA_CACHE_DIR`` of its own all the same: saving a kernel removes those of other texts.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
 
+from validation.defects_syntax import Place, find_place, replaced
+
 _PACKAGE = Path(__file__).resolve().parent.parent / "renderer"
 _DIGEST = "renderer.source_digest"
+_LOADED = "renderer.loaded"
 
 
 @dataclass(frozen=True)
 class Replacement:
-    """In ``module``, a name such as "leaf" for ``renderer.leaf``, the text ``rule`` becomes ``broken``."""
+    """The code ``rule``, which stands in ``place``, becomes ``broken``.
 
-    module: str
+    place   the end of a dotted name that one function, method or module-level constant has: "Mesh.normals", "_DOUBT";
+            with its module where the name alone is not unique: "spawn._leave"
+    rule    one expression, or one or more statements, that stand there once. They are compared as syntax: layout and
+            comments do not count, and local variables may have other names
+    broken  what stands there instead, with the rule's own names for local variables
+    """
+
+    place: str
     rule: str
     broken: str
+
+    @cached_property
+    def _found(self) -> Place:
+        return find_place(_PACKAGE, self.place)
 
     @property
     def path(self) -> Path:
         """The file, which is only read."""
-        return _PACKAGE / f"{self.module}.py"
+        return self._found.path
+
+    @property
+    def module(self) -> str:
+        """The module's full name."""
+        return ".".join(self.path.relative_to(_PACKAGE.parent).with_suffix("").parts)
 
     def text(self) -> str:
-        """The module's altered text. Raises ``ValueError`` unless ``rule`` stands there exactly once."""
-        original = self.path.read_text(encoding="utf-8")
-        found = original.count(self.rule)
-        if found != 1:
-            raise ValueError(f"rule: expected once in {self.path.name}, got {found} times: {self.rule!r}")
-        return original.replace(self.rule, self.broken)
+        """The module's altered text. Raises ``ValueError`` unless there is one place, with the rule in it once."""
+        return replaced(self._found, self.rule, self.broken)
 
 
 def inject(replacement: Replacement) -> None:
@@ -46,11 +62,17 @@ def inject(replacement: Replacement) -> None:
     Raises ``ValueError`` where the rule does not stand there exactly once, and ``RuntimeError`` where the renderer was
     imported already: what is loaded would stay sound.
     """
-    # The package itself loads one module, which looks at the clock.
-    loaded = sorted(name for name in sys.modules if name.startswith("renderer.") and name != "renderer.loaded")
+    loaded = sorted(_sound_modules())
     if loaded:
         raise RuntimeError(f"inject: expected a process without modules of renderer, got {loaded[0]}")
     sys.meta_path.insert(0, _Finder(replacement))
+
+
+def _sound_modules() -> Iterator[str]:
+    """Modules of the renderer that this process has, less the one that the package itself loads, for the time."""
+    for name in sys.modules:
+        if name.startswith("renderer.") and not _LOADED.startswith(name):
+            yield name
 
 
 class _Finder(MetaPathFinder):
@@ -62,7 +84,7 @@ class _Finder(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        altered = f"renderer.{self._replacement.module}"
+        altered = self._replacement.module
         if fullname not in (altered, _DIGEST):
             return None
         spec = PathFinder.find_spec(fullname, path, target)
@@ -74,7 +96,7 @@ class _Finder(MetaPathFinder):
 
 
 class _Loader(SourceFileLoader):
-    """Compiles a module from a given text, and tells the module that digests sources which were altered."""
+    """Compiles a module from a given text, and gives the altered text to the module that digests sources."""
 
     def __init__(self, fullname: str, path: str, text: str, altered: dict[Path, bytes]) -> None:
         super().__init__(fullname, path)
