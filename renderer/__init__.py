@@ -6,29 +6,27 @@ kept on disk; ``octree-render compile`` compiles them ahead. The line comes from
 ``logging.getLogger("renderer").setLevel("ERROR")`` or OCTREE_RENDERER_QUIET=1 in the environment turns it off.
 """
 
-import sys as _sys
 from importlib import import_module as _import_module
-from types import ModuleType as _ModuleType
 from typing import TYPE_CHECKING
 
-from renderer import loaded as _loaded  # noqa: F401  # before all others, to look at the clock
+from renderer.kernels import loaded as _loaded  # noqa: F401  # before all others, to look at the clock
 
 if TYPE_CHECKING:
     from typing import Any
 
-    from renderer.camera import OrthographicCamera, PerspectiveCamera
     from renderer.errors import MeshError, SceneError
-    from renderer.image import CutWarning, Image, srgb
-    from renderer.light import DirectionalLight, PointLight
-    from renderer.material import Dielectric, Mirror, Phong
-    from renderer.mesh import Mesh, Repairs, RepairWarning
-    from renderer.mesh_io import load_mesh
-    from renderer.needs import Needs, needs_of
+    from renderer.mesh.load import load_mesh
+    from renderer.mesh.mesh import Mesh, Repairs, RepairWarning
     from renderer.octree import BruteForce, Octree
-    from renderer.prepared_scene import PreparedScene
-    from renderer.query import Hits
-    from renderer.render import prepare, render
-    from renderer.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
+    from renderer.picture.image import CutWarning, Image, srgb
+    from renderer.picture.prepare import PreparedScene
+    from renderer.picture.render import prepare, render
+    from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
+    from renderer.scene.light import DirectionalLight, PointLight
+    from renderer.scene.material import Dielectric, Mirror, Phong
+    from renderer.scene.needs import Needs, needs_of
+    from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
+    from renderer.trace.query import Hits
     from renderer.viewer.view import view
 
 __version__ = "0.1.0"
@@ -69,55 +67,45 @@ __all__ = [
 
 _HOMES = {
     "BruteForce": "octree",
-    "CutWarning": "image",
-    "Dielectric": "material",
-    "DirectionalLight": "light",
-    "Floor": "scene",
-    "Hits": "query",
-    "Image": "image",
-    "Mesh": "mesh",
+    "CutWarning": "picture.image",
+    "Dielectric": "scene.material",
+    "DirectionalLight": "scene.light",
+    "Floor": "scene.scene",
+    "Hits": "trace.query",
+    "Image": "picture.image",
+    "Mesh": "mesh.mesh",
     "MeshError": "errors",
-    "Mirror": "material",
-    "Needs": "needs",
+    "Mirror": "scene.material",
+    "Needs": "scene.needs",
     "Octree": "octree",
-    "OrthographicCamera": "camera",
-    "PerspectiveCamera": "camera",
-    "Phong": "material",
-    "PointLight": "light",
-    "PreparedScene": "prepared_scene",
-    "RenderSettings": "scene",
-    "RepairWarning": "mesh",
-    "Repairs": "mesh",
-    "Scene": "scene",
+    "OrthographicCamera": "scene.camera",
+    "PerspectiveCamera": "scene.camera",
+    "Phong": "scene.material",
+    "PointLight": "scene.light",
+    "PreparedScene": "picture.prepare",
+    "RenderSettings": "scene.scene",
+    "RepairWarning": "mesh.mesh",
+    "Repairs": "mesh.mesh",
+    "Scene": "scene.scene",
     "SceneError": "errors",
-    "SceneObject": "scene",
-    "load_mesh": "mesh_io",
-    "load_scene": "scene",
-    "needs_of": "needs",
-    "prepare": "render",
-    "render": "render",
-    "srgb": "image",
+    "SceneObject": "scene.scene",
+    "load_mesh": "mesh.load",
+    "load_scene": "scene.scene",
+    "needs_of": "scene.needs",
+    "prepare": "picture.render",
+    "render": "picture.render",
+    "srgb": "picture.image",
     "view": "viewer.view",
 }
 
 
-class _Package(_ModuleType):
-    """This package, with its public names imported at their first use."""
-
-    def __getattr__(self, name: str) -> "Any":
-        if name not in _HOMES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(_import_module(f"{__name__}.{_HOMES[name]}"), name)
-        setattr(self, name, value)
-        return value
-
-    def __setattr__(self, name: str, value: object) -> None:
-        # Importing the module renderer.render must not hide the function of that name.
-        if not (name in _HOMES and isinstance(value, _ModuleType)):
-            super().__setattr__(name, value)
-
-    def __dir__(self) -> list[str]:
-        return sorted(__all__)
+def __getattr__(name: str) -> "Any":
+    """Import a public name at its first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(_import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return value
 
 
-_sys.modules[__name__].__class__ = _Package
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -14,9 +14,9 @@ from typing import Any
 
 from renderer import __version__
 from renderer.errors import expect
-from renderer.interrupt import interruptible
-from renderer.levels import AHEAD_VARIABLE, LEVELS
-from renderer.terminal import on_terminal, one_line, spell_everything
+from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS
+from renderer.process.interrupt import interruptible
+from renderer.process.terminal import on_terminal, one_line, spell_everything
 
 
 @interruptible("octree-render: interrupted")
@@ -82,8 +82,8 @@ _WRITE_SCENE = "of a mesh file: write the scene chosen for it, to be changed at 
 
 def _scene_to_write(options: argparse.Namespace) -> None:
     """Write the scene of a mesh file where that is asked for."""
-    from renderer.mesh_io import MESH_SUFFIXES
-    from renderer.scene import write_scene
+    from renderer.mesh.load import MESH_SUFFIXES
+    from renderer.scene.scene import write_scene
 
     if options.write_scene is not None:
         is_mesh = options.scene.suffix.lower() in MESH_SUFFIXES
@@ -154,10 +154,10 @@ def _resolution(text: str) -> tuple[int, int]:
 
 def _render(options: argparse.Namespace) -> None:
     # Imported here so that --help and --version need no compiler.
-    from renderer.image import PLANES, CutWarning, check_picture_path
+    from renderer.picture.image import PLANES, CutWarning, check_picture_path
+    from renderer.picture.render import render
     from renderer.precompile import compile_in_two
-    from renderer.render import render
-    from renderer.scene import load_scene
+    from renderer.scene.scene import load_scene
 
     check_picture_path(options.output)
     scene = load_scene(options.scene)
@@ -206,8 +206,8 @@ def _save(image: Any, path: Path) -> None:
 def _compile(options: argparse.Namespace) -> None:
     from tqdm import tqdm
 
-    from renderer.compile_notice import compile_seconds
-    from renderer.kernel_store import lost, stored_in
+    from renderer.kernels.notice import compile_seconds
+    from renderer.kernels.store import lost, stored_in
     from renderer.precompile import PARTS, compile_ahead, compile_into
 
     if options.output is not None:
@@ -251,10 +251,10 @@ def _view(options: argparse.Namespace) -> None:
 
 
 def _info(options: argparse.Namespace) -> None:
-    from renderer.needs import examine, needs_of
     from renderer.octree import Octree
-    from renderer.scene import load_scene
-    from renderer.world import pack
+    from renderer.picture.pack import pack
+    from renderer.scene.needs import examine, needs_of
+    from renderer.scene.scene import load_scene
 
     scene = load_scene(options.scene)
     expect(bool(scene.instances), "scene", "at least one object or a floor", "none")

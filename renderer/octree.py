@@ -6,14 +6,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.build import SPLITS, build_blocks, build_tree
 from renderer.errors import MeshError, expect
-from renderer.hierarchy import Rule
-from renderer.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
-from renderer.mesh import Mesh, Repairs
-from renderer.parallel import checked_threads
-from renderer.query import Hits, any_hits, check_rays, closest_hits, left
-from renderer.refit import refit_tree
+from renderer.mesh.mesh import Mesh, Repairs
+from renderer.process.parallel import checked_threads
+from renderer.trace.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.trace.query import Hits, any_hits, check_rays, closest_hits, left
+from renderer.tree.build import SPLITS, build_blocks, build_tree
+from renderer.tree.hierarchy import Rule
+from renderer.tree.refit import refit_tree
 
 MAX_LEAF_SIZE = LANES * MAX_LEAF_BLOCKS
 MAX_DEPTH = 64

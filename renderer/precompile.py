@@ -14,25 +14,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from renderer import child, kernel_store
-from renderer.camera import PerspectiveCamera
-from renderer.compile_notice import QUIET_VARIABLE
 from renderer.errors import expect
-from renderer.face_phong import face_colors
-from renderer.jit import is_on_disk
-from renderer.light import PointLight
-from renderer.material import Dielectric, Material, Phong
-from renderer.mesh import Mesh
-from renderer.needs import needs_of
+from renderer.inspect.face_phong import face_colors
+from renderer.inspect.ray_path import ray_path
+from renderer.inspect.tree_boxes import visited
+from renderer.kernels import store as kernel_store
+from renderer.kernels.jit import is_on_disk
+from renderer.kernels.notice import QUIET_VARIABLE
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
-from renderer.parallel import available_threads
-from renderer.prepared_scene import PreparedScene, prepare_scene
-from renderer.ray_path import ray_path
-from renderer.render import render
-from renderer.scene import Scene, SceneObject
-from renderer.shapes import icosphere
-from renderer.tile import render_tile
-from renderer.tree_boxes import visited
+from renderer.picture.prepare import PreparedScene, prepare_scene
+from renderer.picture.render import render
+from renderer.process import child
+from renderer.process.parallel import available_threads
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import PointLight
+from renderer.scene.material import Dielectric, Material, Phong
+from renderer.scene.needs import needs_of
+from renderer.scene.scene import Scene, SceneObject
+from renderer.shade.tile import render_tile
 
 _TRIANGLE = Mesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 # An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.

@@ -8,8 +8,8 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from renderer.child import load_package
 from renderer.errors import extra_hint
+from renderer.process.child import load_package
 
 _SUITE = Path(__file__).resolve().parent.parent / "validation"
 

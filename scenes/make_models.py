@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.mesh import Mesh
-from renderer.mesh_io import save_ply
-from renderer.shapes import box, icosphere, lattice_faces
+from renderer.mesh.load import save_ply
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere, lattice_faces
 
 Array = NDArray[np.float64]
 

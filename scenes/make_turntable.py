@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 from tqdm import trange
 
-from renderer.camera import PerspectiveCamera
-from renderer.image import Image, srgb
-from renderer.needs import needs_of
-from renderer.parallel import available_threads
-from renderer.prepared_scene import PreparedScene, prepare_scene
-from renderer.scene import load_scene
-from renderer.spawn import BOUNDED
-from renderer.tree_boxes import boxes_at
+from renderer.inspect.tree_boxes import boxes_at
+from renderer.picture.image import Image, srgb
+from renderer.picture.prepare import PreparedScene, prepare_scene
+from renderer.process.parallel import available_threads
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.needs import needs_of
+from renderer.scene.scene import load_scene
+from renderer.trace.spawn import BOUNDED
 
 Array = NDArray[np.float64]
 

@@ -30,8 +30,8 @@ import fuzz_rays
 import fuzz_scenes
 from fuzz_values import SECONDS, Kind
 
-from renderer.ply import format_ply
-from renderer.shapes import box
+from renderer.mesh.ply import format_ply
+from renderer.mesh.shapes import box
 
 KINDS: dict[str, Kind] = {**fuzz_files.KINDS, **fuzz_scenes.KINDS, **fuzz_rays.KINDS, **fuzz_faults.KINDS}
 # A kind whose share is 0 comes once in so many inputs, so often at most.

@@ -22,11 +22,12 @@ import numpy as np
 from fuzz_values import Kind
 from kernel_package import start, write_package
 
-from renderer import Image, files, load_mesh, load_scene
-from renderer.mesh_io import save_ply
-from renderer.ply import format_ply
-from renderer.scene import write_scene
-from renderer.shapes import box
+from renderer import Image, load_mesh, load_scene
+from renderer.mesh.load import save_ply
+from renderer.mesh.ply import format_ply
+from renderer.mesh.shapes import box
+from renderer.process import files
+from renderer.scene.scene import write_scene
 
 Values = dict[str, Any]
 

@@ -19,9 +19,9 @@ import trimesh
 from fuzz_values import SECONDS, Kind, time_limit
 
 from renderer import BruteForce, Mesh, MeshError, Octree, Scene, SceneError, load_mesh, load_scene
-from renderer.mesh import RepairWarning
-from renderer.ply import format_ply
-from renderer.shapes import box, torus
+from renderer.mesh.mesh import RepairWarning
+from renderer.mesh.ply import format_ply
+from renderer.mesh.shapes import box, torus
 
 RAYS = 16
 # Meshes beyond this are checked but not traced, so that one floor of a million squares does not fill the run.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from renderer import BruteForce, Hits, Mesh, MeshError, Octree
 from renderer.limits import LONGEST, SHORTEST
-from renderer.shapes import box
+from renderer.mesh.shapes import box
 
 Values = dict[str, Any]
 Point = tuple[float, ...]

@@ -32,9 +32,9 @@ from renderer import (
     prepare,
     render,
 )
-from renderer.image import PLANES
 from renderer.limits import FARTHEST
-from renderer.shapes import box, grid, icosphere
+from renderer.mesh.shapes import box, grid, icosphere
+from renderer.picture.image import PLANES
 
 Values = dict[str, Any]
 SMALL: Values = {"resolution": (8, 8), "threads": 1}

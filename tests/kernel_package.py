@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "renderer"
-_COMPILER = ("jit", "compiler", "compile_notice", "kernel_store", "source_digest", "files", "levels", "loaded")
+_NEEDED = ("__init__.py", "kernels/*.py", "process/__init__.py", "process/files.py")
 
 # One small kernel two imports away from the constant it uses, so that each run compiles in a second.
 UPPER = """
-from renderer.jit import kernel
+from renderer.kernels.jit import kernel
 from renderer.middle import (
     doubled,
 )
@@ -20,7 +20,7 @@ def answer(x):
     return doubled(x) + 1
 """
 MIDDLE = """
-from renderer.jit import kernel
+from renderer.kernels.jit import kernel
 from renderer.below.deep.bottom import STEP
 @kernel
 def doubled(x):
@@ -38,9 +38,10 @@ def write_package(parent: Path) -> Path:
     """Write it as ``renderer`` into ``parent``; the constant is two folders down."""
     folder = parent / "renderer"
     (folder / "below" / "deep").mkdir(parents=True)
-    for module in _COMPILER:
-        shutil.copy(PACKAGE / f"{module}.py", folder)
-    shutil.copy(PACKAGE / "__init__.py", folder)
+    for source in (path for pattern in _NEEDED for path in PACKAGE.glob(pattern)):
+        target = folder / source.relative_to(PACKAGE)
+        target.parent.mkdir(exist_ok=True)
+        shutil.copy(source, target)
     for package in (folder / "below", folder / "below" / "deep"):
         (package / "__init__.py").touch()
     (folder / "upper.py").write_text(UPPER)

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from renderer.errors import extra_hint
-from renderer.interrupt import interruptible
-from renderer.terminal import one_line
+from renderer.process.interrupt import interruptible
+from renderer.process.terminal import one_line
 from validation.output import add_output, check_output
 from validation.sections import NAMES, choose
 
@@ -133,7 +133,7 @@ def _defects_verdict(gates: Sequence["Gate"], asked: "Request") -> int:
 
 
 def _print_failures(gates: Sequence[Mapping[str, Any]]) -> None:
-    from validation import summary
+    from validation.report import summary
 
     for gate in gates:
         if not gate["passed"]:

@@ -17,10 +17,10 @@ class Section(NamedTuple):
 
 # In the order of the report.
 SECTIONS = (
-    Section("images", "validation.images", "scene"),
-    Section("hits", "validation.hits", "mesh"),
-    Section("stability", "validation.numerical"),
-    Section("efficiency", "validation.efficiency"),
+    Section("images", "validation.pictures.section", "scene"),
+    Section("hits", "validation.hits.section", "mesh"),
+    Section("stability", "validation.stability.section"),
+    Section("efficiency", "validation.efficiency.section"),
 )
 NAMES = tuple(section.name for section in SECTIONS)
 

@@ -11,14 +11,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from renderer.files import write_atomically
-from renderer.mesh_io import load_mesh
-from renderer.scene import load_scene
-from validation import baseline, environment, junit, report, schema, summary
-from validation.cases import SCENES
+from renderer.mesh.load import load_mesh
+from renderer.process.files import write_atomically
+from renderer.scene.scene import load_scene
+from validation import environment
 from validation.gates import Gate
 from validation.job import Job
 from validation.progress import steps
+from validation.report import baseline, junit, schema, summary
+from validation.report import page as report
+from validation.scenes import SCENES
 from validation.sections import Section, choose
 from validation.thresholds import Thresholds, load_thresholds
 
@@ -133,8 +135,8 @@ def run_defects(asked: Request) -> list[Gate]:
 
     A report that lies in the same folder is drawn again with it.
     """
-    from validation import defects
-    from validation.defects_list import DEFECTS
+    from validation.defects import run as defects
+    from validation.defects.list import DEFECTS
 
     began, started = time.perf_counter(), datetime.now(UTC)
     sources = environment.sources_sha256()

@@ -8,14 +8,23 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.camera import checked_vector
-from renderer.image import srgb, srgb_steps
-from renderer.jit import inlined, kernel
-from renderer.parallel import checked_threads, for_chunks
-from renderer.scene_rows import AMBIENT, DIFFUSE, DIRECTIONAL, KIND, LAMBERT, LIGHT_COLUMNS, REFLECTANCE, TRANSMITTANCE
-from renderer.sight import World, look_at, phong
-from renderer.simd import get, larger, pointer, smaller
-from renderer.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import get, larger, pointer, smaller
+from renderer.kernels.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
+from renderer.picture.image import srgb, srgb_steps
+from renderer.process.parallel import checked_threads, for_chunks
+from renderer.scene.camera import checked_vector
+from renderer.shade.records import (
+    AMBIENT,
+    DIFFUSE,
+    DIRECTIONAL,
+    KIND,
+    LAMBERT,
+    LIGHT_COLUMNS,
+    REFLECTANCE,
+    TRANSMITTANCE,
+)
+from renderer.shade.surface import World, look_at, phong
 
 # 1 to 2 ms of work: little beside a frame, much beside taking a chunk.
 _CHUNK = 8192

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
-from renderer.image import Image, srgb
+from renderer.picture.image import Image, srgb
 
 AOVS = "color", "depth", "normal", "face", "cost"
 Limits = tuple[float, float]

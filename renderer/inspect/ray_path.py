@@ -11,12 +11,14 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.camera import checked_vector
-from renderer.direct import SHORT_OF_LIGHT
 from renderer.errors import expect, is_count
-from renderer.jit import kernel
-from renderer.prepared_scene import PreparedScene
-from renderer.scene_rows import (
+from renderer.kernels.jit import kernel
+from renderer.kernels.vec3 import add, dot, normalized, scale, sub, times
+from renderer.picture.pack import media_around
+from renderer.picture.prepare import PreparedScene
+from renderer.scene.camera import checked_vector
+from renderer.shade.direct import SHORT_OF_LIGHT
+from renderer.shade.records import (
     AMBIENT,
     DIELECTRIC,
     DIRECTIONAL,
@@ -28,11 +30,9 @@ from renderer.scene_rows import (
     REFLECTANCE,
     TRANSMITTANCE,
 )
-from renderer.shading import fresnel, reflect, refract
-from renderer.sight import MAX_MEDIA, Surface, World, look_at, phong, surface_at
-from renderer.spawn import BOUNDED, spawn_origin
-from renderer.vec3 import add, dot, normalized, scale, sub, times
-from renderer.world import media_around
+from renderer.shade.shading import fresnel, reflect, refract
+from renderer.shade.surface import MAX_MEDIA, Surface, World, look_at, phong, surface_at
+from renderer.trace.spawn import BOUNDED, spawn_origin
 
 Vector = tuple[float, float, float]
 Kind = Literal["camera", "reflected", "refracted", "shadow"]

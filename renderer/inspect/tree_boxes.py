@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect, is_count
-from renderer.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.jit import kernel
-from renderer.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
-from renderer.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.kernels.jit import kernel
+from renderer.kernels.simd import splat8, store
 from renderer.octree import BruteForce, Octree
-from renderer.query import check_rays
-from renderer.simd import splat8, store
+from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
+from renderer.trace.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.trace.query import check_rays
 
 Boxes = NDArray[np.float64]
 

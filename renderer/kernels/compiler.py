@@ -32,8 +32,8 @@ from numba.core.typed_passes import (
 )
 from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
 
-from renderer.compile_notice import compiling
-from renderer.kernel_store import KernelStore
+from renderer.kernels.notice import compiling
+from renderer.kernels.store import KernelStore
 
 # No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
 # Each is said, because what is not said Numba inherits from the kernel whose compiling asked for this one.

@@ -6,9 +6,9 @@ from functools import cache
 from logging import getLogger
 from pathlib import Path
 
-from renderer import loaded
+from renderer.kernels import loaded
 
-PACKAGE = Path(__file__).resolve().parent
+PACKAGE = Path(__file__).resolve().parents[1]
 _IMPORT = re.compile(rf"^from ({PACKAGE.name}(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 

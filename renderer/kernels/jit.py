@@ -48,12 +48,12 @@ def _compiler() -> Any:
     if numba.config.DISABLE_JIT:
         raise ImportError("renderer: NUMBA_DISABLE_JIT is set, but kernels run only compiled: unset it")
     try:
-        from renderer import compiler
+        from renderer.kernels import compiler
 
         if not numba.__version__.startswith(_TESTED):
             compiler.probe()
     except Exception as error:
-        getLogger(__name__).warning(
+        getLogger("renderer.jit").warning(
             "renderer: Numba %s is not one of those that this version was made for (%s*): %s: %s. Kernels work, but "
             "every process compiles them anew, for a minute or more",
             numba.__version__,

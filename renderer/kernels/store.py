@@ -26,9 +26,9 @@ from numba.core import config
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from renderer.files import write_atomically
-from renderer.levels import AHEAD_VARIABLE, FEATURES, LEVELS
-from renderer.source_digest import PACKAGE, is_ours, source_digest
+from renderer.kernels.digest import PACKAGE, is_ours, source_digest
+from renderer.kernels.levels import AHEAD_VARIABLE, FEATURES, LEVELS
+from renderer.process.files import write_atomically
 
 # Where a wheel for one platform carries its own.
 _CARRIED = PACKAGE / "compiled"

@@ -2,8 +2,8 @@
 
 import math
 
-from renderer.jit import inlined, kernel
-from renderer.simd import get, larger
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import get, larger
 
 
 @kernel

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from renderer.errors import MeshError
-from renderer.files import read_whole, write_atomically
-from renderer.mesh import Mesh, Repairs, RepairWarning, build_mesh
-from renderer.obj import parse_obj
-from renderer.ply import format_ply, parse_ply
-from renderer.stl import parse_stl
+from renderer.mesh.mesh import Mesh, Repairs, RepairWarning, build_mesh
+from renderer.mesh.obj import parse_obj
+from renderer.mesh.ply import format_ply, parse_ply
+from renderer.mesh.stl import parse_stl
+from renderer.process.files import read_whole, write_atomically
 
 
 def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: bool = False) -> Mesh:

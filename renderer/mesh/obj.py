@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh import Float64Array, Mesh, Repairs, build_mesh
-from renderer.polygons import triangulate
+from renderer.mesh.mesh import Float64Array, Mesh, Repairs, build_mesh
+from renderer.mesh.polygons import triangulate
 
 # Statements that say nothing about surfaces made of polygons. Free-form surfaces are refused, not dropped.
 _IGNORED = {

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh import Float64Array, Mesh, Repairs, build_mesh
-from renderer.polygons import triangulate
+from renderer.mesh.mesh import Float64Array, Mesh, Repairs, build_mesh
+from renderer.mesh.polygons import triangulate
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",

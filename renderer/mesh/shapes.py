@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from renderer.errors import expect
-from renderer.mesh import Float64Array, Int32Array, Mesh
+from renderer.mesh.mesh import Float64Array, Int32Array, Mesh
 
 
 def icosphere(level: int = 3) -> Mesh:

@@ -11,7 +11,7 @@ import re
 import numpy as np
 
 from renderer.errors import MeshError
-from renderer.mesh import Mesh, Repairs, build_mesh
+from renderer.mesh.mesh import Mesh, Repairs, build_mesh
 
 _HEADER_BYTES = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

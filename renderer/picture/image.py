@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect
-from renderer.exr import check_exr, exr_bytes
-from renderer.files import check_writable, write_atomically
+from renderer.picture.exr import check_exr, exr_bytes
+from renderer.process.files import check_writable, write_atomically
 
 # The arrays of an ``Image``; radiance is always there.
 PLANES = ("radiance", "depth", "normal", "face", "rays")

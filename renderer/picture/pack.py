@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.camera import Camera
-from renderer.mesh import Mesh
-from renderer.needs import Needs, needs_of
-from renderer.scene import Scene
-from renderer.scene_rows import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
-from renderer.sight import MAX_MEDIA, World
+from renderer.mesh.mesh import Mesh
+from renderer.scene.camera import Camera
+from renderer.scene.needs import Needs, needs_of
+from renderer.scene.scene import Scene
+from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
+from renderer.shade.surface import MAX_MEDIA, World
 
 
 def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, World]:

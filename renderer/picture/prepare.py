@@ -6,22 +6,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-from renderer.bundle import SIZE
-from renderer.camera import Camera, sample_offsets
-from renderer.compile_notice import Stopwatch
 from renderer.errors import expect
-from renderer.image import PLANES, Image
-from renderer.layout import Tree, cache_aligned
-from renderer.mesh import Mesh
-from renderer.needs import Needs
+from renderer.kernels.notice import Stopwatch
+from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
-from renderer.parallel import for_chunks
-from renderer.query import rays_against_blocks
-from renderer.scene import RenderSettings, Scene
-from renderer.sight import MAX_MEDIA, World
-from renderer.tile import CUT, Film, render_tile, tile_memory
-from renderer.whitted import Settings
-from renderer.world import media_around, pack
+from renderer.picture.image import PLANES, Image
+from renderer.picture.pack import media_around, pack
+from renderer.process.parallel import for_chunks
+from renderer.scene.camera import Camera, sample_offsets
+from renderer.scene.needs import Needs
+from renderer.scene.scene import RenderSettings, Scene
+from renderer.shade.bundle import SIZE
+from renderer.shade.surface import MAX_MEDIA, World
+from renderer.shade.tile import CUT, Film, render_tile, tile_memory
+from renderer.shade.whitted import Settings
+from renderer.trace.layout import Tree, cache_aligned
+from renderer.trace.query import rays_against_blocks
 
 # Pixels a side: 256 tiles share a 512 x 512 picture evenly, and neighbouring rays find their nodes in the cache.
 TILE = 32

@@ -5,16 +5,16 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import Any, Literal
 
-from renderer.build import SPLITS
-from renderer.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.errors import expect
-from renderer.image import PLANES, CutWarning, Image
-from renderer.needs import Needs, checked_needs
-from renderer.parallel import checked_threads
-from renderer.prepared_scene import PreparedScene, prepare_scene, tiles
-from renderer.scene import Scene, checked_settings
-from renderer.spawn import BOUNDED, MITSUBA_EPSILON
-from renderer.terminal import on_terminal
+from renderer.picture.image import PLANES, CutWarning, Image
+from renderer.picture.prepare import PreparedScene, prepare_scene, tiles
+from renderer.process.parallel import checked_threads
+from renderer.process.terminal import on_terminal
+from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from renderer.scene.needs import Needs, checked_needs
+from renderer.scene.scene import Scene, checked_settings
+from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON
+from renderer.tree.build import SPLITS
 
 
 def render(

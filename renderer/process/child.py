@@ -30,7 +30,7 @@ def environment(**more: str) -> dict[str, str]:
 
 def _call(target: str, *arguments: str) -> object:
     """What the child does: load our packages from where this file lies, and call the target."""
-    home = Path(__file__).resolve().parent.parent
+    home = Path(__file__).resolve().parents[2]
     for name in _OUR_PACKAGES:
         if name not in sys.modules and (home / name).is_dir():
             load_package(name, home / name)

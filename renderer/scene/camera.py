@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, field_validator, model_validator
 
 from renderer.errors import expect
-from renderer.fields import Fields, FiniteVector
 from renderer.limits import FARTHEST
+from renderer.scene.fields import Fields, FiniteVector
 
 
 def unit(vector: ArrayLike) -> NDArray[np.float64]:

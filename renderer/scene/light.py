@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import field_validator
 
-from renderer.camera import unit
-from renderer.fields import Color, Fields, FiniteVector
-from renderer.scene_rows import DIRECTIONAL, POINT
+from renderer.scene.camera import unit
+from renderer.scene.fields import Color, Fields, FiniteVector
+from renderer.shade.records import DIRECTIONAL, POINT
 
 
 class DirectionalLight(Fields):

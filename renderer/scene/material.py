@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from renderer.fields import Color, Fields
-from renderer.scene_rows import DIELECTRIC, LAMBERT, MIRROR, PHONG, UNLIT
+from renderer.scene.fields import Color, Fields
+from renderer.shade.records import DIELECTRIC, LAMBERT, MIRROR, PHONG, UNLIT
 
 _Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 _BLACK = (0.0, 0.0, 0.0)

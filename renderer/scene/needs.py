@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
 from renderer.errors import expect, is_count
-from renderer.material import Phong
-from renderer.scene import Instance, Scene
+from renderer.scene.material import Phong
+from renderer.scene.scene import Instance, Scene
 
 # Whole frames of boxes and spheres on a floor, one thread, all blocks tested against the tree: 0.72 of its time with 2
 # faces, 0.88 with 14, 0.89 with 22, 0.96 with 26, 1.06 to 1.10 with 38, 1.28 with 50.
@@ -81,7 +81,7 @@ def needs_of(scene: Scene, max_depth: int | None = None) -> Needs:
 
     Raises ``ValueError`` naming the argument.
 
-    >>> from renderer.camera import PerspectiveCamera
+    >>> from renderer.scene.camera import PerspectiveCamera
     >>> empty = Scene(camera=PerspectiveCamera(eye=(0, 0, 1), target=(0, 0, 0)), materials={})
     >>> needs_of(empty).shadows
     False

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from renderer.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.errors import MeshError, SceneError, expect
-from renderer.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
-from renderer.files import read_whole, write_atomically
-from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Material, Mirror, Phong
-from renderer.mesh import Mesh
-from renderer.mesh_io import MESH_SUFFIXES, load_mesh
-from renderer.showcase import showcase_text
+from renderer.mesh.load import MESH_SUFFIXES, load_mesh
+from renderer.mesh.mesh import Mesh
+from renderer.process.files import read_whole, write_atomically
+from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
+from renderer.scene.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.scene.showcase import showcase_text
 
 
 def _typed(default: str) -> BeforeValidator:

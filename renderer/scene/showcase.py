@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
 
 # The ball around the mesh, seen from a little above and to the right, fills the picture's height less a tenth.
 _TOWARDS_EYE, _FOV, _MARGIN = (0.5, 0.4, 1.0), 40.0, 1.1

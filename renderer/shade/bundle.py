@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.jit import inlined
-from renderer.simd import at, get, put
+from renderer.kernels.jit import inlined
+from renderer.kernels.simd import at, get, put
 
 # Pixels a side of a block that one bundle begins with, and rays of a bundle.
 SIDE = 8

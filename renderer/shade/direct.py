@@ -5,14 +5,14 @@ k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light
 
 import numpy as np
 
-from renderer.bundle import SIZE
-from renderer.jit import inlined, kernel
-from renderer.scene_rows import DIELECTRIC, DIRECTIONAL, KIND, LIGHT_COLUMNS, MIRROR, UNLIT
-from renderer.sight import phong
-from renderer.simd import at, get, put
-from renderer.spawn import spawn_origin
-from renderer.traverse import Rays, search_blocks, trace
-from renderer.vec3 import add, dot, normalized, row3, scale, sub, three, times
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, get, put
+from renderer.kernels.vec3 import add, dot, normalized, row3, scale, sub, three, times
+from renderer.shade.bundle import SIZE
+from renderer.shade.records import DIELECTRIC, DIRECTIONAL, KIND, LIGHT_COLUMNS, MIRROR, UNLIT
+from renderer.shade.surface import phong
+from renderer.trace.spawn import spawn_origin
+from renderer.trace.traverse import Rays, search_blocks, trace
 
 # What a lit ray of a bundle leaves for its light and its children, one column of SURFACE_DOUBLES float64 a ray.
 POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT = 0, 3, 6, 9, 10, 11, 12

@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.jit import inlined
-from renderer.scene_rows import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
-from renderer.shading import specular
-from renderer.simd import get, pointer
-from renderer.spawn import offset_distance
-from renderer.vec3 import add, barycentric, cross, dot, largest_component, normalized, row3, scale, sub, three
+from renderer.kernels.jit import inlined
+from renderer.kernels.simd import get, pointer
+from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_component, normalized, row3, scale, sub, three
+from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
+from renderer.shade.shading import specular
+from renderer.trace.spawn import offset_distance
 
 # Media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8

@@ -5,16 +5,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bundle import SIDE, SIZE, append, clear, count_of
-from renderer.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
-from renderer.jit import inlined, kernel
-from renderer.layout import cache_aligned
-from renderer.leaf import tree_pointers
-from renderer.sight import look_at
-from renderer.simd import at, get, pointer, put, smaller
-from renderer.traverse import Memory, make_memory, make_scratch
-from renderer.vec3 import add, normalized, row3, scale, three
-from renderer.whitted import Settings, begin_work, make_work, push_children, slot, trace_bundle, work_lengths
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, get, pointer, put, smaller
+from renderer.kernels.vec3 import add, normalized, row3, scale, three
+from renderer.shade.bundle import SIDE, SIZE, append, clear, count_of
+from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
+from renderer.shade.surface import look_at
+from renderer.shade.whitted import Settings, begin_work, make_work, push_children, slot, trace_bundle, work_lengths
+from renderer.trace.layout import cache_aligned
+from renderer.trace.leaf import tree_pointers
+from renderer.trace.traverse import Memory, make_memory, make_scratch
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
 # Pixels a side of the squares that become packets.

@@ -10,7 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.bundle import (
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, get, put
+from renderer.kernels.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
+from renderer.shade.bundle import (
     BUNDLE_DOUBLES,
     BUNDLE_INTEGERS,
     SIZE,
@@ -20,7 +23,7 @@ from renderer.bundle import (
     count_of,
     depth_of,
 )
-from renderer.direct import (
+from renderer.shade.direct import (
     BOUND,
     GEOMETRIC,
     INSIDE,
@@ -35,14 +38,11 @@ from renderer.direct import (
     put3,
     trace_any,
 )
-from renderer.jit import inlined, kernel
-from renderer.scene_rows import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
-from renderer.shading import fresnel, reflect, refract
-from renderer.sight import surface_at
-from renderer.simd import at, get, put
-from renderer.spawn import spawn_origin
-from renderer.traverse import Found, Rays, Scratch
-from renderer.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
+from renderer.shade.records import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
+from renderer.shade.shading import fresnel, reflect, refract
+from renderer.shade.surface import surface_at
+from renderer.trace.spawn import spawn_origin
+from renderer.trace.traverse import Found, Rays, Scratch
 
 
 class Settings(NamedTuple):

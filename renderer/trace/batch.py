@@ -2,11 +2,20 @@
 
 import numpy as np
 
-from renderer.jit import inlined, kernel
-from renderer.leaf import NO_FACE, tree_pointers
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import LOCAL_WORDS, get, larger, local_words, pointer
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
-from renderer.simd import LOCAL_WORDS, get, larger, local_words, pointer
-from renderer.traverse import Found, Rays, depth_of_stack, make_scratch, ray_at, search_blocks, search_singly, trace
+from renderer.trace.leaf import NO_FACE, tree_pointers
+from renderer.trace.traverse import (
+    Found,
+    Rays,
+    depth_of_stack,
+    make_scratch,
+    ray_at,
+    search_blocks,
+    search_singly,
+    trace,
+)
 
 # The deepest tree whose stack fits into a kernel's own frame.
 FEW_DEPTH = depth_of_stack(LOCAL_WORDS)

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.jit import inlined, kernel
-from renderer.layout import NODE_WORDS
-from renderer.simd import get, larger, load4, load8, magnitude, movemask, select, smaller, splat4, splat8
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import get, larger, load4, load8, magnitude, movemask, select, smaller, splat4, splat8
+from renderer.trace.layout import NODE_WORDS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).

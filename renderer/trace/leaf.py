@@ -4,10 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.intersect import hit_triangles, make_shear, settled
-from renderer.jit import inlined, kernel
-from renderer.layout import BLOCK_COUNT, BLOCK_WORDS, BLOCKS, DEPTH, FACES, LANES, NODES, SCALE, WIDE
-from renderer.simd import (
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import (
     double_of,
     float32_pointer,
     float64_pointer,
@@ -20,6 +18,8 @@ from renderer.simd import (
     smaller,
     splat4,
 )
+from renderer.trace.intersect import hit_triangles, make_shear, settled
+from renderer.trace.layout import BLOCK_COUNT, BLOCK_WORDS, BLOCKS, DEPTH, FACES, LANES, NODES, SCALE, WIDE
 
 
 class TreePointers(NamedTuple):

@@ -10,24 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.intersect import FAR_PADDING
-from renderer.jit import inlined, kernel
-from renderer.layout import CHILDREN, NODE_WORDS
-from renderer.prepared import (
-    BLOCK_ROW,
-    DIRECTION_Z,
-    FAR_INVERSE,
-    FAR_ORIGIN,
-    LIMIT,
-    LOWER,
-    NEAR_INVERSE,
-    NEAR_ORIGIN,
-    SLOPE_U,
-    SLOPE_V,
-    WIDTH,
-    nearest_in_leaf,
-)
-from renderer.simd import (
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import (
     bits_float,
     count_bits,
     float_bits,
@@ -43,6 +27,22 @@ from renderer.simd import (
     select,
     smaller,
     splat8,
+)
+from renderer.trace.intersect import FAR_PADDING
+from renderer.trace.layout import CHILDREN, NODE_WORDS
+from renderer.trace.ray_lanes import (
+    BLOCK_ROW,
+    DIRECTION_Z,
+    FAR_INVERSE,
+    FAR_ORIGIN,
+    LIMIT,
+    LOWER,
+    NEAR_INVERSE,
+    NEAR_ORIGIN,
+    SLOPE_U,
+    SLOPE_V,
+    WIDTH,
+    nearest_in_leaf,
 )
 
 # A beam's slopes widen by 2^-18 of their size, four times the padding of a single ray's boxes, which covers that and

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import real_array
-from renderer.batch import FEW_DEPTH, search_chunk, trace_chunk, trace_few
 from renderer.errors import expect
-from renderer.layout import LANES, Tree
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
-from renderer.mesh import Mesh, face_normals
-from renderer.parallel import for_chunks
-from renderer.prepared import WIDTH
-from renderer.spawn import leave_faces
-from renderer.traverse import Memory, make_memory, stack_size
+from renderer.mesh.mesh import Mesh, face_normals
+from renderer.process.parallel import for_chunks
+from renderer.trace.batch import FEW_DEPTH, search_chunk, trace_chunk, trace_few
+from renderer.trace.layout import LANES, Tree
+from renderer.trace.ray_lanes import WIDTH
+from renderer.trace.spawn import leave_faces
+from renderer.trace.traverse import Memory, make_memory, stack_size
 
 # Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
 # taking a chunk costs nothing beside its 1 to 10 ms of tracing.

@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
-from renderer.jit import inlined
-from renderer.layout import LEAF_BITS, MAX_LEAF_BLOCKS
-from renderer.leaf import NO_FACE, nearest_in_blocks
-from renderer.simd import get, put
+from renderer.kernels.jit import inlined
+from renderer.kernels.simd import get, put
+from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
+from renderer.trace.layout import LEAF_BITS, MAX_LEAF_BLOCKS
+from renderer.trace.leaf import NO_FACE, nearest_in_blocks
 
 WIDTH = 16
 

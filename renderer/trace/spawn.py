@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
-from renderer.jit import inlined, kernel
-from renderer.simd import at, larger, pointer, put
-from renderer.vec3 import add, cross, dot, largest_component, length, normalized, row3, scale, sub, three
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, larger, pointer, put
+from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, row3, scale, sub, three
 
 _ROUNDOFF = 2.0**-53
 # gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).

@@ -9,11 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.intersect import box_limit, enter_boxes, meet_planes, see_triangles
-from renderer.jit import inlined, kernel
-from renderer.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
-from renderer.prepared import LARGEST, LIMIT, LOWER, T_MIN, WIDTH, T, best_of, put_best, shear_of, slabs_of
-from renderer.simd import (
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import (
     at,
     bits_float,
     count_bits,
@@ -29,6 +26,9 @@ from renderer.simd import (
     splat8,
     store,
 )
+from renderer.trace.intersect import box_limit, enter_boxes, meet_planes, see_triangles
+from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
+from renderer.trace.ray_lanes import LARGEST, LIMIT, LOWER, T_MIN, WIDTH, T, best_of, put_best, shear_of, slabs_of
 
 _LOW_WORD = 0xFFFFFFFF
 # What lies at the bottom of a ray's stack: no leaf's code, and at distance -inf, which is beyond no limit, not even a

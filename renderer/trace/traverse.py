@@ -5,14 +5,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.jit import inlined, kernel
-from renderer.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, cache_aligned
-from renderer.leaf import NO_FACE, nearest_carefully, search_all_blocks
-from renderer.packet import child_of, meet_octant, trace_packet
-from renderer.prepared import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare
-from renderer.simd import at, get, larger, lowest_bit, pointer, put, smaller, splat8
-from renderer.stream import (
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, get, larger, lowest_bit, pointer, put, smaller, splat8
+from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
+from renderer.trace.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, cache_aligned
+from renderer.trace.leaf import NO_FACE, nearest_carefully, search_all_blocks
+from renderer.trace.packet import child_of, meet_octant, trace_packet
+from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare
+from renderer.trace.stream import (
     END,
     LANE_DOUBLES,
     LANE_FLOATS,

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.jit import kernel
-from renderer.layout import BLOCK_WORDS, LANES, cache_aligned
-from renderer.parallel import for_chunks
-from renderer.simd import float32_pointer, float64_pointer, put
+from renderer.kernels.jit import kernel
+from renderer.kernels.simd import float32_pointer, float64_pointer, put
+from renderer.process.parallel import for_chunks
+from renderer.trace.layout import BLOCK_WORDS, LANES, cache_aligned
 
 # A tenth of a millisecond each, so that taking a chunk costs nothing beside it.
 _VERTICES, _BLOCKS = 1 << 16, 1 << 12

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.intersect import face_range
-from renderer.jit import inlined, kernel
-from renderer.simd import lane, load8, select, splat8, store
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import lane, load8, select, splat8, store
+from renderer.trace.intersect import face_range
 
 # A box is eight 32-bit words: lower x, y, z, a face, and the negated upper x, y, z, and an unused one. The upper corner
 # is negated so that one vector minimum is the union of two boxes. The face is an int32 where a face has the box; of a

@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.blocks import fill_blocks
-from renderer.bounds import BOX, Faces, face_boxes, fit
-from renderer.collapse import collapse
-from renderer.emit import emit_nodes, emit_room, moved_link, place_subtree
-from renderer.hierarchy import MIDPOINT, SAH, Hierarchy, Rule, add_part, first_parts, new_hierarchy
-from renderer.layout import LANES, NODE_WORDS, Tree, cache_aligned
-from renderer.parallel import for_chunks
-from renderer.subtree import Workspace, build_subtree, cut_once, new_room, new_workspace
+from renderer.process.parallel import for_chunks
+from renderer.trace.layout import LANES, NODE_WORDS, Tree, cache_aligned
+from renderer.tree.blocks import fill_blocks
+from renderer.tree.bounds import BOX, Faces, face_boxes, fit
+from renderer.tree.collapse import collapse
+from renderer.tree.emit import emit_nodes, emit_room, moved_link, place_subtree
+from renderer.tree.hierarchy import MIDPOINT, SAH, Hierarchy, Rule, add_part, first_parts, new_hierarchy
+from renderer.tree.subtree import Workspace, build_subtree, cut_once, new_room, new_workspace
 
 SPLITS = {"midpoint": MIDPOINT, "sah": SAH}
 

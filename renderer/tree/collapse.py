@@ -6,10 +6,10 @@ Compressed Wide BVHs, HPG 2017, sec. 3.1), with leaves counted in blocks.
 
 import numpy as np
 
-from renderer.bounds import BOX, half_area
-from renderer.jit import kernel
-from renderer.layout import LANES
-from renderer.simd import load8
+from renderer.kernels.jit import kernel
+from renderer.kernels.simd import load8
+from renderer.trace.layout import LANES
+from renderer.tree.bounds import BOX, half_area
 
 # What a ray pays for entering a node and for testing a block.
 NODE_COST = np.float32(1.0)

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bounds import BOX, FACE
-from renderer.jit import kernel
-from renderer.layout import CHILDREN, LANES, LEAF_BITS, NODE_WORDS, UNUSED
-from renderer.simd import larger
+from renderer.kernels.jit import kernel
+from renderer.kernels.simd import larger
+from renderer.trace.layout import CHILDREN, LANES, LEAF_BITS, NODE_WORDS, UNUSED
+from renderer.tree.bounds import BOX, FACE
 
 # Parts that wait to become nodes: at most seven a level. Levels of cuts end at 3 * 64 by ``max_depth``, even halves
 # within 31 more.

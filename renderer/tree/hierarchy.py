@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bounds import BOX
-from renderer.jit import kernel
-from renderer.layout import LANES
-from renderer.simd import smaller
+from renderer.kernels.jit import kernel
+from renderer.kernels.simd import smaller
+from renderer.trace.layout import LANES
+from renderer.tree.bounds import BOX
 
 MIDPOINT, SAH = 0, 1
 

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.intersect import ROOM
-from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.trace.intersect import ROOM
+from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 
 
 def faults(tree: Tree, mesh: Mesh) -> list[str]:

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bounds import BOX, double_centre, empty_box, united
-from renderer.hierarchy import add_part
-from renderer.jit import inlined, kernel
-from renderer.simd import larger, load8, smaller, store
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import larger, load8, smaller, store
+from renderer.tree.bounds import BOX, double_centre, empty_box, united
+from renderer.tree.hierarchy import add_part
 
 
 class OctantRoom(NamedTuple):

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.blocks import fill_blocks
-from renderer.intersect import face_range
-from renderer.jit import kernel
-from renderer.layout import CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, cache_aligned
-from renderer.parallel import for_chunks
-from renderer.simd import larger, smaller
+from renderer.kernels.jit import kernel
+from renderer.kernels.simd import larger, smaller
+from renderer.process.parallel import for_chunks
+from renderer.trace.intersect import face_range
+from renderer.trace.layout import CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, cache_aligned
+from renderer.tree.blocks import fill_blocks
 
 # Nodes whose leaves are one chunk: some tenths of a millisecond.
 _NODES = 1 << 10

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bounds import BOX, double_centre, empty_box, half_area, united
-from renderer.hierarchy import add_part
-from renderer.jit import inlined, kernel
-from renderer.layout import LANES
-from renderer.simd import larger, load8, smaller, store
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import larger, load8, smaller, store
+from renderer.trace.layout import LANES
+from renderer.tree.bounds import BOX, double_centre, empty_box, half_area, united
+from renderer.tree.hierarchy import add_part
 
 _MOST_BINS = 16
 

@@ -5,14 +5,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bounds import BOX, fit
-from renderer.collapse import collapse, leaf_cost
-from renderer.emit import EmitRoom, emit_leaf, emit_nodes, emit_room, leaf_link
-from renderer.hierarchy import SAH, Hierarchy, add_part, new_hierarchy, whole_size
-from renderer.jit import kernel
-from renderer.layout import LANES, NODE_WORDS
-from renderer.octants import OctantRoom, cut_octants, octant_room
-from renderer.sah import BinRoom, bin_room, cut_sah
+from renderer.kernels.jit import kernel
+from renderer.trace.layout import LANES, NODE_WORDS
+from renderer.tree.bounds import BOX, fit
+from renderer.tree.collapse import collapse, leaf_cost
+from renderer.tree.emit import EmitRoom, emit_leaf, emit_nodes, emit_room, leaf_link
+from renderer.tree.hierarchy import SAH, Hierarchy, add_part, new_hierarchy, whole_size
+from renderer.tree.midpoint import OctantRoom, cut_octants, octant_room
+from renderer.tree.sah import BinRoom, bin_room, cut_sah
 
 # Of so few faces the octants are mostly empty and their blocks half so: 72 % of the places are used. The surface area
 # heuristic for these last cuts uses 86 %, which saves a sixth of the memory and 2 % of the node visits, for a third

@@ -4,17 +4,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from renderer.camera import unit
 from renderer.errors import expect
-from renderer.needs import needs_of
-from renderer.parallel import available_threads
+from renderer.picture.pack import light_rows
+from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene, tree_for
 from renderer.precompile import touch_viewing
-from renderer.prepared_scene import PreparedScene, build_octree, prepare_scene, tree_for
-from renderer.scene import RenderSettings, Scene, load_scene
-from renderer.scene_rows import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
-from renderer.spawn import BOUNDED
+from renderer.process.parallel import available_threads
+from renderer.scene.camera import unit
+from renderer.scene.needs import needs_of
+from renderer.scene.scene import RenderSettings, Scene, load_scene
+from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
+from renderer.trace.spawn import BOUNDED
 from renderer.viewer.protocol import ViewSettings
-from renderer.world import light_rows
 
 
 @dataclass(frozen=True, eq=False)

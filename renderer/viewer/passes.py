@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.face_phong import face_colors
-from renderer.false_color import Limits, false_color, limits_of
-from renderer.image import Image
-from renderer.spawn import BOUNDED
+from renderer.inspect.face_phong import face_colors
+from renderer.inspect.false_color import Limits, false_color, limits_of
+from renderer.picture.image import Image
+from renderer.trace.spawn import BOUNDED
 from renderer.viewer.exhibit import Exhibit, render_settings, varied
 from renderer.viewer.protocol import FACE_COLORS, JPEG, RGBA, View, packed
 from renderer.viewer.viewpoint import camera_of

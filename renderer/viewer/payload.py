@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
-from renderer.light import DirectionalLight, Light
-from renderer.material import Material
-from renderer.mesh import face_normals
-from renderer.needs import examine
-from renderer.prepared_scene import PreparedScene
-from renderer.scene_rows import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
-from renderer.tree_boxes import boxes_at, levels
+from renderer.inspect.tree_boxes import boxes_at, levels
+from renderer.mesh.mesh import face_normals
+from renderer.picture.prepare import PreparedScene
+from renderer.scene.light import DirectionalLight, Light
+from renderer.scene.material import Material
+from renderer.scene.needs import examine
+from renderer.shade.records import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.viewer.exhibit import Exhibit
 from renderer.viewer.protocol import MODES
 

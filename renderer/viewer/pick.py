@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from renderer.prepared_scene import PreparedScene
-from renderer.query import Hits
-from renderer.ray_path import Segment, ray_path, surface_of
-from renderer.scene_rows import MATERIAL_COLUMNS
-from renderer.tree_boxes import visited
+from renderer.inspect.ray_path import Segment, ray_path, surface_of
+from renderer.inspect.tree_boxes import visited
+from renderer.picture.prepare import PreparedScene
+from renderer.shade.records import MATERIAL_COLUMNS
+from renderer.trace.query import Hits
 from renderer.viewer.exhibit import Exhibit, varied
 from renderer.viewer.protocol import Pick
 from renderer.viewer.viewpoint import camera_of

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator, model_validator
 
-from renderer.camera import sample_offsets
-from renderer.fields import FiniteVector
+from renderer.scene.camera import sample_offsets
+from renderer.scene.fields import FiniteVector
 
 # Of a picture's sides: four megabytes a picture, as much as a browser draws without a hitch.
 MAX_SIDE = 1024

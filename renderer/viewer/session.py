@@ -14,7 +14,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from renderer.prepared_scene import tiles
+from renderer.picture.prepare import tiles
 from renderer.viewer.exhibit import Exhibit
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked

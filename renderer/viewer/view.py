@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from renderer.errors import expect, extra_hint
-from renderer.scene import Scene
+from renderer.scene.scene import Scene
 
 if TYPE_CHECKING:
     from renderer.viewer.server import Viewing

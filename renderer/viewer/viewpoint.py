@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from renderer.camera import PerspectiveCamera
 from renderer.errors import expect
+from renderer.scene.camera import PerspectiveCamera
 
 
 def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0) -> PerspectiveCamera:

@@ -29,8 +29,8 @@ from renderer import (
     needs_of,
     render,
 )
-from renderer.mesh_io import save_ply
-from renderer.shapes import box
+from renderer.mesh.load import save_ply
+from renderer.mesh.shapes import box
 
 VERTICES, FACES = make_mesh("lattice", 5, 30)
 ORIGINS, DIRECTIONS = rays_at(VERTICES, FACES, 5, 8)

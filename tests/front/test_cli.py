@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from renderer.cli import main
+from renderer.picture.render import render
 from renderer.precompile import compile_ahead
-from renderer.render import render
-from renderer.scene import load_scene
+from renderer.scene.scene import load_scene
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 STAIRS = ROOT / "scenes" / "stairs.toml"
 
 
@@ -261,7 +261,7 @@ def test_compile_fails_where_nothing_can_be_kept(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     nowhere = str(tmp_path / "file" / "cache")
     script = (
-        "import sys, renderer.kernel_store as store, renderer.precompile as ahead\n"
+        "import sys, renderer.kernels.store as store, renderer.precompile as ahead\n"
         "store._folders = lambda sources: store.Folders(None, ())\n"
         "ahead.PARTS['queries'] = ahead.PARTS['queries'][-1:]\n"
         "from renderer.cli import main; sys.exit(main(['compile', '--queries', '--quiet']))"

@@ -8,7 +8,7 @@ import pytest
 
 from renderer.cli import _parser
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "reports" / "README.md"]
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
 COMMAND = re.compile(r"^    (?:\S*/)?octree-render (.*?)(?:\s+#.*)?$", re.MULTILINE)

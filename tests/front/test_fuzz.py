@@ -22,16 +22,16 @@ from renderer import (
     Scene,
     SceneObject,
     load_scene,
-    mesh_io,
     octree,
-    ply,
     render,
 )
 from renderer.errors import MeshError
-from renderer.mesh import Mesh
-from renderer.mesh_io import save_ply
-from renderer.scene import write_scene
-from renderer.shapes import box
+from renderer.mesh import load as mesh_io
+from renderer.mesh import ply
+from renderer.mesh.load import save_ply
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box
+from renderer.scene.scene import write_scene
 
 INPUTS = 400
 # Inputs of the other kinds, and two of the outcomes that must be among them.
@@ -268,7 +268,7 @@ def test_finds_a_file_that_is_left_or_cut_off(folder: Path, monkeypatch: pytest.
             raise OSError("no") from error
 
     monkeypatch.setattr(fuzz_faults.files, "open", open, raising=False)
-    for module in ("renderer.image", "renderer.scene", "renderer.mesh_io"):
+    for module in ("renderer.picture.image", "renderer.scene.scene", "renderer.mesh.load"):
         monkeypatch.setattr(f"{module}.write_atomically", careless)
     said = complaints(folder, "output", 100)
     assert all(text in said for text in ("left by a failure", "the path is not named", "a failure that is not told"))
@@ -290,7 +290,7 @@ def test_finds_a_process_that_damage_misleads(folder: Path, monkeypatch: pytest.
     if damage == "a wrong answer":
         (package / "below" / "deep" / "bottom.py").write_text("STEP = 11\n")
     elif damage == "not noticed":
-        store = package / "kernel_store.py"
+        store = package / "kernels" / "store.py"
         text = store.read_text()
         assert text.count("if head != _HEADER or ") == 1
         store.write_text(text.replace("if head != _HEADER or ", "if "))

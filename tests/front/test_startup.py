@@ -15,7 +15,7 @@ import pytest
 import renderer
 from renderer.cli import main
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 HEAVY = {
     "numba",
     "numpy",
@@ -74,10 +74,13 @@ import scipy.linalg
 
 
 def test_the_public_names_are_there_whatever_was_imported_first():
-    script = "import renderer, renderer.scene\nfrom renderer.render import prepare\nfrom renderer import *"
+    script = (
+        "import renderer, renderer.scene.scene\n"
+        "from renderer.picture.render import prepare\nfrom renderer import *"
+    )
     tell = "print(callable(render), *[f'{n}:{getattr(renderer, n).__module__}' for n in renderer._HOMES])"
     is_callable, *names = output(f"{script}\n{tell}").split()
-    assert is_callable == "True" and "render:renderer.render" in names and "Mesh:renderer.mesh" in names
+    assert is_callable == "True" and "render:renderer.picture.render" in names and "Mesh:renderer.mesh.mesh" in names
     assert {*renderer._HOMES, "__version__"} == set(renderer.__all__)
 
 
@@ -94,7 +97,7 @@ def test_compiling_ahead_leaves_nothing_to_compile():
     script = """
 import sys
 import numpy as np
-from renderer.compiler import Kernel
+from renderer.kernels.compiler import Kernel
 from renderer.precompile import compile_ahead
 def signatures():
     modules = [m for name, m in sys.modules.items() if name.startswith("renderer.")]
@@ -104,10 +107,10 @@ def signatures():
 compile_ahead()
 before = signatures()
 from renderer import BruteForce, Octree, load_scene, needs_of, render
-from renderer.face_phong import face_colors
-from renderer.ray_path import ray_path
-from renderer.prepared_scene import prepare_scene
-from renderer.tree_boxes import visited
+from renderer.inspect.face_phong import face_colors
+from renderer.inspect.ray_path import ray_path
+from renderer.picture.prepare import prepare_scene
+from renderer.inspect.tree_boxes import visited
 for name in ("three_models", "stairs", "glass"):
     for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
         render(load_scene(f"scenes/{name}.toml"), resolution=(3, 2), **options)
@@ -173,7 +176,7 @@ print(repr(sys.stderr.getvalue()))
 
 def test_kernels_for_a_level_have_the_bits_of_native_ones_and_leave_nothing_to_compile(tmp_path):
     """Compiled in one process for any machine of the level, found by another one that may not write anywhere near."""
-    from renderer.kernel_store import runnable_levels
+    from renderer.kernels.store import runnable_levels
 
     folder, level = tmp_path / "kernels", runnable_levels()[-1]
     command = [sys.executable, "-P", "-m", "renderer", "compile", "--queries", "--level", level, "-o", str(folder)]
@@ -183,8 +186,8 @@ def test_kernels_for_a_level_have_the_bits_of_native_ones_and_leave_nothing_to_c
 import hashlib
 import numpy as np
 from renderer import Octree
-from renderer.compile_notice import compile_seconds
-from renderer.shapes import icosphere
+from renderer.kernels.notice import compile_seconds
+from renderer.mesh.shapes import icosphere
 octree, rng = Octree.from_mesh(icosphere(5)), np.random.default_rng(1)
 origins, digest = 3.0 * rng.normal(size=(5000, 3)), hashlib.sha256()
 for count in (5, 5000):

@@ -25,8 +25,8 @@ from renderer import (
     load_scene,
     render,
 )
-from renderer.mesh_io import save_ply
-from renderer.shapes import grid, icosphere
+from renderer.mesh.load import save_ply
+from renderer.mesh.shapes import grid, icosphere
 
 BALL = Octree.from_mesh(icosphere(2))
 MANY = np.random.default_rng(1).normal(size=(20, 3))

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from renderer.camera import PerspectiveCamera
-from renderer.face_phong import face_colors
-from renderer.image import srgb
-from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Material, Mirror, Phong
-from renderer.mesh import Mesh
-from renderer.needs import needs_of
-from renderer.render import render
-from renderer.scene import Scene, SceneObject
-from renderer.shapes import box, icosphere, torus
-from renderer.world import pack
+from renderer.inspect.face_phong import face_colors
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.picture.image import srgb
+from renderer.picture.pack import pack
+from renderer.picture.render import render
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.scene.needs import needs_of
+from renderer.scene.scene import Scene, SceneObject
 
 EYE = (1.5, 2.0, 4.0)
 CAMERA = PerspectiveCamera(eye=EYE, target=(0, 0, 0))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from renderer.camera import PerspectiveCamera
-from renderer.false_color import AOVS, VIRIDIS, false_color, limits_of
-from renderer.image import Image, srgb
-from renderer.light import DirectionalLight
-from renderer.material import Phong
-from renderer.render import render
-from renderer.scene import Scene, SceneObject
-from renderer.shapes import icosphere
+from renderer.inspect.false_color import AOVS, VIRIDIS, false_color, limits_of
+from renderer.mesh.shapes import icosphere
+from renderer.picture.image import Image, srgb
+from renderer.picture.render import render
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight
+from renderer.scene.material import Phong
+from renderer.scene.scene import Scene, SceneObject
 
 BACKGROUND = (0.1, 0.2, 0.4)
 

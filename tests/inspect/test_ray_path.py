@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.camera import PerspectiveCamera
-from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Material, Mirror, Phong
-from renderer.mesh import Mesh
-from renderer.needs import needs_of
-from renderer.prepared_scene import PreparedScene, prepare_scene
-from renderer.ray_path import MAX_RAYS, Segment, ray_path
-from renderer.render import render
-from renderer.scene import Floor, Scene, SceneObject, load_scene
-from renderer.shapes import box, icosphere, torus
+from renderer.inspect.ray_path import MAX_RAYS, Segment, ray_path
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.picture.prepare import PreparedScene, prepare_scene
+from renderer.picture.render import render
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.scene.needs import needs_of
+from renderer.scene.scene import Floor, Scene, SceneObject, load_scene
 
-SCENES = Path(__file__).parents[1] / "scenes"
+SCENES = Path(__file__).parents[2] / "scenes"
 # Radiance is stored as float32: half an ulp, and as much again for the float64 sums before it.
 REL = 2.0**-23
 # Hit points of scenes some units wide: float64 rounding of a few operations each, with three digits to spare.

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.intersect import ROOM
-from renderer.layout import CHILDREN, LANES, NODE_WORDS
+from renderer.inspect.tree_boxes import boxes_at, levels, visited
+from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import BruteForce, Octree
-from renderer.shapes import icosphere, torus
-from renderer.tree_boxes import boxes_at, levels, visited
+from renderer.trace.intersect import ROOM
+from renderer.trace.layout import CHILDREN, LANES, NODE_WORDS
 from tests.meshes import KINDS, make_mesh, rays_at
 
 

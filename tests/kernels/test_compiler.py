@@ -10,10 +10,10 @@ import numba
 import numpy as np
 import pytest
 
-from renderer import compiler
-from renderer.compile_notice import Stopwatch, compile_seconds
+from renderer.kernels import compiler
+from renderer.kernels.notice import Stopwatch, compile_seconds
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def kernel(function, forceinline=False):
@@ -158,7 +158,7 @@ CHANGES = {
     "CompileResult._rebuild = lambda *a: None\n",
 }
 ASK = """
-from renderer.shading import fresnel
+from renderer.shade.shading import fresnel
 print(fresnel(1.0, 1.0, 1.0, 1.5), fresnel(1.0, 1.0, 1.0, 1.5) == fresnel.py_func(1.0, 1.0, 1.0, 1.5))
 """
 
@@ -192,10 +192,10 @@ PLAIN_AFTER_OURS = """
 import numpy as np
 from numba import njit
 from renderer import Octree
-from renderer.batch import _found_pointers, _ray_pointers
-from renderer.leaf import tree_pointers
-from renderer.shapes import icosphere
-from renderer.traverse import make_memory, make_scratch, trace
+from renderer.trace.batch import _found_pointers, _ray_pointers
+from renderer.trace.leaf import tree_pointers
+from renderer.mesh.shapes import icosphere
+from renderer.trace.traverse import make_memory, make_scratch, trace
 
 @njit(error_model="numpy")
 def mine(words, rays, out, memory):

@@ -9,8 +9,8 @@ import llvmlite.binding as llvm
 import pytest
 from kernel_package import COMPILED, LOADED, MIDDLE, PACKAGE, RUN, UPPER, bottom_of, run, start, write_package
 
-from renderer.kernel_store import runnable_levels
-from renderer.levels import FEATURES, LEVELS
+from renderer.kernels.levels import FEATURES, LEVELS
+from renderer.kernels.store import runnable_levels
 
 TELL = """
 import logging, sys
@@ -58,10 +58,11 @@ brute = BruteForce([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], threads=1)
 print(brute.any_hit([[0.25, 0.25, 1]], [[0, 0, -1]])[0])
 """
     assert run(folder, script) == ["True"]
-    source = (folder / "intersect.py").read_text()
+    path = folder / "trace" / "intersect.py"
+    source = path.read_text()
     edited = source.replace("determinant != zero", "determinant != determinant")
     assert edited != source
-    (folder / "intersect.py").write_text(edited)
+    path.write_text(edited)
     assert run(folder, script) == ["False"]
 
 
@@ -178,7 +179,7 @@ def test_without_a_home_kernels_are_compiled(package, tmp_path):
 
 def test_a_full_disk_stops_nothing_and_is_said_once(package):
     full = """
-import errno, renderer.kernel_store as store
+import errno, renderer.kernels.store as store
 def refuse(path, write): raise OSError(errno.ENOSPC, "No space left on device")
 store.write_atomically = refuse
 from renderer.middle import doubled
@@ -271,7 +272,7 @@ class TestAhead:
 
     def test_they_are_not_used_by_a_machine_that_lacks_the_level(self, package, tmp_path):
         folder = self.made(package, tmp_path, self.level())
-        pretend = "import renderer.kernel_store as store\nstore.runnable_levels = tuple\n"
+        pretend = "import renderer.kernels.store as store\nstore.runnable_levels = tuple\n"
         assert run(package, pretend + RUN, OCTREE_RENDERER_KERNELS=str(folder)) == COMPILED
 
     def test_they_are_never_written(self, package, tmp_path):

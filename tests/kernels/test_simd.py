@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from renderer.simd import (
+from renderer.kernels.simd import (
     bits_float,
     double_of,
     float32_pointer,

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from renderer import mesh as mesh_module
 from renderer.errors import MeshError
-from renderer.mesh import Mesh
-from renderer.shapes import box, grid, icosphere, torus
+from renderer.mesh import mesh as mesh_module
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, grid, icosphere, torus
 
 TRIANGLE: dict[str, Any] = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
 

@@ -16,13 +16,14 @@ import trimesh
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from renderer import mesh_io, obj
 from renderer.errors import MeshError
-from renderer.mesh import Mesh, RepairWarning
-from renderer.mesh_io import load_mesh, save_ply
-from renderer.obj import parse_obj
-from renderer.ply import format_ply, parse_ply
-from renderer.shapes import box, torus
+from renderer.mesh import load as mesh_io
+from renderer.mesh import obj
+from renderer.mesh.load import load_mesh, save_ply
+from renderer.mesh.mesh import Mesh, RepairWarning
+from renderer.mesh.obj import parse_obj
+from renderer.mesh.ply import format_ply, parse_ply
+from renderer.mesh.shapes import box, torus
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 FORMATS = ["ascii", "binary_little_endian", "binary_big_endian"]

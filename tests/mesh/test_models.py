@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import trimesh
 
-SCENES = Path(__file__).parents[1] / "scenes"
+SCENES = Path(__file__).parents[2] / "scenes"
 sys.path.insert(0, str(SCENES))
 
 import make_models  # noqa: E402
 
-from renderer.mesh import Mesh  # noqa: E402
-from renderer.mesh_io import load_mesh  # noqa: E402
+from renderer.mesh.load import load_mesh  # noqa: E402
+from renderer.mesh.mesh import Mesh  # noqa: E402
 
 NAMES = ["teapot", "torus_knot", "displaced_sphere", "sphere", "stairs", "block"]
 

@@ -9,8 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer import polygons
-from renderer.polygons import triangulate
+from renderer.mesh import polygons
+from renderer.mesh.polygons import triangulate
 
 Outline = list[tuple[float, float]]
 

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from meshes import assert_same_hits, make_mesh, rays_at
 
-from renderer import mesh as mesh_module
 from renderer.errors import MeshError
-from renderer.mesh import Mesh, Repairs, RepairWarning
-from renderer.mesh_io import load_mesh
+from renderer.mesh import mesh as mesh_module
+from renderer.mesh.load import load_mesh
+from renderer.mesh.mesh import Mesh, Repairs, RepairWarning
 from renderer.octree import BruteForce, Octree
 
 BAD = [np.nan, np.inf, -np.inf]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from renderer.mesh import Mesh
-from renderer.shapes import box, grid, icosphere, torus
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, grid, icosphere, torus
 
 
 def signed_volume(mesh: Mesh) -> float:

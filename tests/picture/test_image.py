@@ -10,8 +10,8 @@ import numpy as np
 import PIL.Image
 import pytest
 
-from renderer.files import write_atomically
-from renderer.image import Image, check_picture_path, srgb, srgb_steps
+from renderer.picture.image import Image, check_picture_path, srgb, srgb_steps
+from renderer.process.files import write_atomically
 
 
 def image(radiance: Any = None) -> Image:

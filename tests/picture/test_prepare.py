@@ -5,7 +5,7 @@ import pytest
 
 import renderer
 from renderer import OrthographicCamera, PerspectiveCamera, load_scene, prepare, render
-from renderer.prepared_scene import Octree
+from renderer.picture.prepare import Octree
 
 SCENES = ("glass", "stairs", "mirrors")
 CAMERAS = (
@@ -71,7 +71,7 @@ def test_no_time_says_what_compiling_took(tmp_path):
     script = """
 import json
 from renderer import load_scene, render
-from renderer.compile_notice import compile_seconds
+from renderer.kernels.notice import compile_seconds
 image = render(load_scene("scenes/stairs.toml"), resolution=(16, 16), accelerator="octree", threads=1)
 print(json.dumps([image.build_seconds, image.render_seconds, compile_seconds()]))
 """

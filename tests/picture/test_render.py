@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer import prepared_scene as stage
-from renderer.camera import PerspectiveCamera
-from renderer.light import DirectionalLight
-from renderer.material import Phong
-from renderer.needs import needs_of
-from renderer.prepared_scene import TILE
-from renderer.render import render
-from renderer.scene import Floor, RenderSettings, Scene, SceneObject, checked_settings, load_scene
-from renderer.shapes import icosphere
-from renderer.spawn import BOUNDED
+from renderer.mesh.shapes import icosphere
+from renderer.picture import prepare as stage
+from renderer.picture.prepare import TILE
+from renderer.picture.render import render
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight
+from renderer.scene.material import Phong
+from renderer.scene.needs import needs_of
+from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, checked_settings, load_scene
+from renderer.trace.spawn import BOUNDED
 
-SCENES = Path(__file__).parents[1] / "scenes"
+SCENES = Path(__file__).parents[2] / "scenes"
 
 
 def ball(**settings: Any) -> Scene:

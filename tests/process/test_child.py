@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 import renderer
-from renderer import child, precompile
+from renderer import precompile
+from renderer.process import child
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 # A command needs all of these; each writes its name where it is imported.
 PLANTED = ("renderer", "numba", "numpy", "validation", "json", "tqdm", "llvmlite", "pydantic", "site")
 TRAP = "import pathlib; pathlib.Path({folder!r}, 'executed').open('a').write('{name} ')\n"
@@ -58,7 +59,7 @@ def test_a_first_picture_executes_nothing_that_lies_in_the_current_folder(folder
     (kernels,) = (tmp_path / "cache").iterdir()
     # Each kernel once, where this process looks for it.
     names = [path.name.split("-")[0] for path in kernels.glob("*.kernel")]
-    assert "renderer.tile.render_tile" in names and len(names) == len(set(names))
+    assert "renderer.shade.tile.render_tile" in names and len(names) == len(set(names))
 
 
 def test_the_console_scripts_look_into_no_folder(folder):
@@ -72,7 +73,7 @@ def test_a_child_has_the_packages_of_its_parent_and_no_relative_path(folder, pat
     script = f"""
 import subprocess, sys
 sys.path.insert(0, {str(ROOT)!r})
-from renderer import child
+from renderer.process import child
 command = child.command("telling:tell", "a", "b c")
 print(subprocess.run(command, env=child.environment(), capture_output=True, text=True))
 """

@@ -8,15 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer import cli, files, load_scene, render
+from renderer import cli, load_scene, render
 from renderer.cli import main
-from renderer.files import check_writable, write_atomically
-from renderer.image import PLANES, Image
-from renderer.mesh_io import save_ply
-from renderer.scene import write_scene
-from renderer.shapes import icosphere
+from renderer.mesh.load import save_ply
+from renderer.mesh.shapes import icosphere
+from renderer.picture.image import PLANES, Image
+from renderer.process import files
+from renderer.process.files import check_writable, write_atomically
+from renderer.scene.scene import write_scene
 
-STAIRS = Path(__file__).parents[1] / "scenes" / "stairs.toml"
+STAIRS = Path(__file__).parents[2] / "scenes" / "stairs.toml"
 
 
 def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:

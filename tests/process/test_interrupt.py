@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from renderer.interrupt import INTERRUPTED, ends_while_compiling
+from renderer.process.interrupt import INTERRUPTED, ends_while_compiling
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 # A module of the given name that is interrupted where Python swallows what is raised, and then raises another error.
 SCRIPT = """
 import os, signal, sys
-from renderer.interrupt import ends_while_compiling
+from renderer.process.interrupt import ends_while_compiling
 code = '''
 class Swallows:
     def __del__(self):
@@ -44,7 +44,9 @@ def test_an_interrupt_in_the_compiler_ends_the_process_with_one_line(name):
     assert ended(name) == (INTERRUPTED, "it ends\n")
 
 
-@pytest.mark.parametrize(("name", "own"), [("renderer.tile", True), ("numbat", True), ("numba.core.typeinfer", False)])
+@pytest.mark.parametrize(
+    ("name", "own"), [("renderer.shade.tile", True), ("numbat", True), ("numba.core.typeinfer", False)]
+)
 def test_elsewhere_and_in_processes_of_others_it_does_not(name, own):
     code, err = ended(name, own)
     assert code == 1 and "it ends" not in err and "went on" in err

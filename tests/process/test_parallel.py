@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from renderer.parallel import available_threads, checked_threads, for_chunks
+from renderer.process.parallel import available_threads, checked_threads, for_chunks
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -215,7 +215,7 @@ AFTER_THE_END = """
 import threading, atexit, sys
 import numpy as np
 from renderer import Octree
-from renderer.shapes import icosphere
+from renderer.mesh.shapes import icosphere
 rays = np.random.default_rng(1).normal(size=(40_000, 3)) * 3
 octree = Octree.from_mesh(icosphere(3), threads=2)
 def ask():
@@ -277,7 +277,7 @@ def test_control_c_while_threads_start_stops_those_that_did(monkeypatch, submitt
 
 DAEMON = """
 import threading
-from renderer.parallel import for_chunks
+from renderer.process.parallel import for_chunks
 begun = threading.Barrier(3)
 def work(begin, end):
     begun.wait()
@@ -296,7 +296,7 @@ DAEMON_LIVES_ON = """
 import threading, time
 import numpy as np
 from renderer import BruteForce, Octree
-from renderer.shapes import icosphere
+from renderer.mesh.shapes import icosphere
 rays = np.random.default_rng(1).normal(size=(40_000, 3)) * 3
 octree = Octree.from_mesh(icosphere(3), threads=2)
 expected, done = octree.closest_hit(rays, -rays), threading.Event()

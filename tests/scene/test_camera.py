@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from renderer.camera import OrthographicCamera, PerspectiveCamera, primary_rays, sample_offsets
-from renderer.material import Phong
+from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
-from renderer.render import render
-from renderer.scene import Scene, SceneObject
-from renderer.shapes import icosphere, torus
-from renderer.world import pack
+from renderer.picture.pack import pack
+from renderer.picture.render import render
+from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, primary_rays, sample_offsets
+from renderer.scene.material import Phong
+from renderer.scene.scene import Scene, SceneObject
 
 U = 2.0**-53
 

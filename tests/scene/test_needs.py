@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 
 from renderer import Image, Mesh, Needs, Scene, load_scene, needs_of, render
-from renderer.camera import PerspectiveCamera
 from renderer.cli import main
-from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Mirror, Phong
-from renderer.needs import FEW_FACES, examine
-from renderer.prepared_scene import build_octree, kernel_settings_of, tree_for
-from renderer.scene import Floor, RenderSettings, SceneObject
-from renderer.scene_rows import KIND, PHONG
-from renderer.shapes import box, grid, icosphere
-from renderer.sight import MAX_MEDIA
-from renderer.world import pack
+from renderer.mesh.shapes import box, grid, icosphere
+from renderer.picture.pack import pack
+from renderer.picture.prepare import build_octree, kernel_settings_of, tree_for
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Dielectric, Mirror, Phong
+from renderer.scene.needs import FEW_FACES, examine
+from renderer.scene.scene import Floor, RenderSettings, SceneObject
+from renderer.shade.records import KIND, PHONG
+from renderer.shade.surface import MAX_MEDIA
 
-MODULE = importlib.import_module("renderer.prepared_scene")
-SCENES = Path(__file__).parents[1] / "scenes"
+MODULE = importlib.import_module("renderer.picture.prepare")
+SCENES = Path(__file__).parents[2] / "scenes"
 SUN = DirectionalLight(direction=(-1, -2, -1))
 DARK = PointLight(position=(0, 5, 0), intensity=0.0)
 GLASS = Dielectric(type="dielectric")

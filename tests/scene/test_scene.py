@@ -9,16 +9,16 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from renderer.camera import OrthographicCamera, PerspectiveCamera
 from renderer.errors import MeshError, SceneError
-from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Mirror, Phong
-from renderer.mesh import Mesh
-from renderer.mesh_io import save_ply
-from renderer.scene import Floor, Scene, SceneObject, load_scene
-from renderer.scene_rows import MATERIAL_COLUMNS
-from renderer.shapes import box, icosphere
-from renderer.world import pack
+from renderer.mesh.load import save_ply
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere
+from renderer.picture.pack import pack
+from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Dielectric, Mirror, Phong
+from renderer.scene.scene import Floor, Scene, SceneObject, load_scene
+from renderer.shade.records import MATERIAL_COLUMNS
 
 CAMERA = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n"
 MATERIAL = "[materials.clay]\ndiffuse = 0.5\n"

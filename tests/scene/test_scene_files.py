@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from renderer.camera import OrthographicCamera, primary_rays
-from renderer.render import render
-from renderer.scene import load_scene
+from renderer.picture.render import render
+from renderer.scene.camera import OrthographicCamera, primary_rays
+from renderer.scene.scene import load_scene
 
-SCENES = Path(__file__).parents[1] / "scenes"
+SCENES = Path(__file__).parents[2] / "scenes"
 FILES = sorted(SCENES.glob("*.toml"))
 
 

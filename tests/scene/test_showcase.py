@@ -8,9 +8,9 @@ import pytest
 
 from renderer import Mesh, SceneError, load_scene, render
 from renderer.cli import main
-from renderer.mesh_io import save_ply
-from renderer.scene import write_scene
-from renderer.shapes import box, icosphere, torus
+from renderer.mesh.load import save_ply
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.scene.scene import write_scene
 
 SHAPES = {
     "ball": icosphere(3),
@@ -60,7 +60,7 @@ def test_the_command_line_takes_a_mesh(tmp_path: Path, capsys: Any, command: str
 
 
 def test_only_of_a_mesh_a_scene_is_written(tmp_path: Path, capsys: Any) -> None:
-    scene = Path(__file__).parents[1] / "scenes" / "stairs.toml"
+    scene = Path(__file__).parents[2] / "scenes" / "stairs.toml"
     arguments = ["render", str(scene), "-o", str(tmp_path / "a.png"), "--write-scene", str(tmp_path / "b.toml")]
     assert main(arguments) == 2
     assert "--write-scene: expected a mesh file" in capsys.readouterr().err

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.shading import fresnel, reflect, refract, specular
-from renderer.shapes import icosphere
-from renderer.spawn import BOUNDED, MITSUBA_EPSILON, offset_distance, spawn_origin
+from renderer.shade.shading import fresnel, reflect, refract, specular
+from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, offset_distance, spawn_origin
 
 U = 2.0**-53
 UP = (0.0, 1.0, 0.0)

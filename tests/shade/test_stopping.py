@@ -23,11 +23,11 @@ from renderer import (
     SceneObject,
     load_scene,
     prepare,
-    prepared_scene,
     render,
 )
 from renderer.cli import main
-from renderer.shapes import icosphere
+from renderer.mesh.shapes import icosphere
+from renderer.picture import prepare as prepared_scene
 
 # Four half-mirrors one in another: a ray that meets one leaves two.
 TEXT = """
@@ -60,7 +60,7 @@ def half_mirrors(max_depth: int = 64) -> Scene:
 
 
 def file_of(folder: Path) -> Path:
-    from renderer.mesh_io import save_ply
+    from renderer.mesh.load import save_ply
 
     save_ply(icosphere(2), folder / "ball.ply")
     path = folder / "mirrors.toml"
@@ -153,7 +153,7 @@ sys.path.insert(0, {str(Path(__file__).parent)!r})
 import numpy as np
 from test_stopping import half_mirrors
 from renderer import BruteForce, render
-from renderer.shapes import icosphere
+from renderer.mesh.shapes import icosphere
 warnings.simplefilter("ignore")
 scene, rays = half_mirrors(), np.random.default_rng(1).normal(size=(10**6, 3)) * 3
 for accelerator in ("octree", "brute"):
@@ -208,7 +208,7 @@ def test_control_c_ends_a_command_whose_first_tile_never_ends(tmp_path: Path) ->
 
 
 def test_brute_force_in_small_chunks_has_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
-    from renderer import query
+    from renderer.trace import query
 
     brute, rays = BruteForce.from_mesh(icosphere(3), threads=2), np.random.default_rng(1).normal(size=(3000, 3)) * 2
     expected = brute.closest_hit(rays, -rays)

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from renderer.camera import OrthographicCamera, PerspectiveCamera
-from renderer.image import Image
-from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Mirror, Phong
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.octree import Octree
-from renderer.render import render
-from renderer.scene import Floor, Scene, SceneObject
-from renderer.shapes import box, grid, icosphere, torus
+from renderer.picture.image import Image
+from renderer.picture.render import render
+from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Dielectric, Mirror, Phong
+from renderer.scene.scene import Floor, Scene, SceneObject
 
 # Radiance is stored as float32: half an ulp, and as much again for the float64 sums before it.
 REL = 2.0**-23

@@ -20,14 +20,14 @@ from renderer import (
     load_scene,
     render,
 )
-from renderer.batch import _found_pointers, _ray_pointers
-from renderer.leaf import tree_pointers
+from renderer.kernels.simd import bits_float
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.shapes import icosphere
-from renderer.simd import bits_float
-from renderer.stream import _BOTTOM
-from renderer.traverse import make_memory, make_scratch, search_blocks, stack_size, trace
+from renderer.trace.batch import _found_pointers, _ray_pointers
+from renderer.trace.leaf import tree_pointers
+from renderer.trace.stream import _BOTTOM
+from renderer.trace.traverse import make_memory, make_scratch, search_blocks, stack_size, trace
 
 # What arithmetic may end in, or begin with when nobody looked.
 WORST = np.array([0.0, 1.0, 0.3, 5e-324, 1e-310, 1e-30, 1e30, FARTHEST, 2.0**127, 3.5e38, 1e40, 1e300, 1.7e308, np.inf])

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer import BruteForce, MeshError, Octree, PerspectiveCamera, Phong, Scene, SceneObject, child, prepare, render
-from renderer.compile_notice import compile_seconds
-from renderer.layout import CACHE_LINE
-from renderer.mesh import Mesh
-from renderer.shapes import icosphere
+from renderer import BruteForce, MeshError, Octree, PerspectiveCamera, Phong, Scene, SceneObject, prepare, render
+from renderer.kernels.notice import compile_seconds
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
+from renderer.process import child
+from renderer.trace.layout import CACHE_LINE
 
 COPIES = {"deepcopy": copy.deepcopy, "copy": copy.copy, "pickle": lambda thing: pickle.loads(pickle.dumps(thing))}
 by_any_way = pytest.mark.parametrize("way", COPIES)

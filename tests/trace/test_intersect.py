@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from meshes import make_mesh, rays_at
 from numba import njit
 
-from renderer.intersect import Ray, enter_boxes, make_slabs, round_down, round_up
-from renderer.layout import NODE_WORDS
+from renderer.kernels.simd import splat8, store
+from renderer.mesh.shapes import box, grid
 from renderer.octree import BruteForce, Octree
-from renderer.shapes import box, grid
-from renderer.simd import splat8, store
-from validation import exact
+from renderer.trace.intersect import Ray, enter_boxes, make_slabs, round_down, round_up
+from renderer.trace.layout import NODE_WORDS
+from validation.oracle import exact
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
 ONE = np.array([[0, 1, 2]])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from meshes import make_mesh
 
 from renderer import BruteForce, Octree
-from renderer.shapes import box, grid, icosphere, torus
+from renderer.mesh.shapes import box, grid, icosphere, torus
 
 SCALES = (1e-12, 1.0, 1e12)
 OFFSETS = (0.0, 1e3, 1e8)
@@ -97,7 +97,7 @@ def plane_distance(vertices, face, point):
 
 
 def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_distance():
-    from renderer.query import check_rays, left
+    from renderer.trace.query import check_rays, left
 
     ball = icosphere(2)
     for offset in OFFSETS:

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from meshes import arrays, assert_same_hits, make_mesh, rays_at
 
-from renderer.invariants import faults
-from renderer.layout import CHILDREN, LANES, NODE_WORDS
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import grid, icosphere
 from renderer.octree import MAX_DEPTH, MAX_LEAF_SIZE, BruteForce, Octree
-from renderer.shapes import grid, icosphere
+from renderer.trace.layout import CHILDREN, LANES, NODE_WORDS
+from renderer.tree.invariants import faults
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SPLIT = pytest.mark.parametrize("split", ["midpoint", "sah"])
 
 

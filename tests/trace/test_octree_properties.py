@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at, separate
 
+from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
-from renderer.shapes import icosphere
-from validation import exact
+from validation.oracle import exact
 
 SEEDS = st.integers(0, 2**20)
 

@@ -13,12 +13,12 @@ from meshes import assert_same_hits, make_mesh, options, rays_at, separate
 from numba import njit
 from numpy.random import Generator
 
-from renderer.intersect import Ray, hit_triangles, make_shear, settled
-from renderer.layout import BLOCK_WORDS, LANES
-from renderer.leaf import tree_pointers
+from renderer.kernels.simd import lane
 from renderer.octree import BruteForce, Octree
-from renderer.query import Hits
-from renderer.simd import lane
+from renderer.trace.intersect import Ray, hit_triangles, make_shear, settled
+from renderer.trace.layout import BLOCK_WORDS, LANES
+from renderer.trace.leaf import tree_pointers
+from renderer.trace.query import Hits
 
 SIDE = 100
 

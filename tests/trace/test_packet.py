@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at
 
-from renderer.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
-from renderer.jit import kernel
-from renderer.layout import NODE_WORDS
+from renderer.kernels.jit import kernel
+from renderer.kernels.simd import pointer, splat8
+from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
-from renderer.packet import enter_beam, make_beam
-from renderer.prepared import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare
-from renderer.shapes import icosphere
-from renderer.simd import pointer, splat8
-from renderer.traverse import Rays, are_coherent
+from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
+from renderer.trace.layout import NODE_WORDS
+from renderer.trace.packet import enter_beam, make_beam
+from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare
+from renderer.trace.traverse import Rays, are_coherent
 
 SEEDS = st.integers(0, 2**20)
 

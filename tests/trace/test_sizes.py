@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from renderer import BruteForce, MeshError, Octree
+from renderer.mesh.shapes import icosphere
 from renderer.octree import _LEAST_SIDE
-from renderer.shapes import icosphere
-from validation import exact
+from validation.oracle import exact
 
 BALL = icosphere(2)
 UNIT = np.array([[3.0, 0.0, 0.0], [4.0, 0.0, 0.0], [3.0, 1.0, 0.0]])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere, torus
 from renderer.octree import BruteForce, Octree
-from renderer.shapes import box, icosphere, torus
 
 COUNT = 100_000
 

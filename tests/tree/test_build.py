@@ -10,16 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from meshes import KINDS, arrays, make_mesh
 
-from renderer.bounds import BOX, FACE, Faces, face_boxes
-from renderer.build import SPLITS, _build_parts, build_tree
-from renderer.collapse import BLOCK_COST, NODE_COST, collapse
-from renderer.hierarchy import Rule, add_part, first_parts, new_hierarchy
-from renderer.invariants import faults
-from renderer.layout import LANES
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
-from renderer.shapes import icosphere, torus
-from renderer.subtree import cut_once, new_room
+from renderer.trace.layout import LANES
+from renderer.tree.bounds import BOX, FACE, Faces, face_boxes
+from renderer.tree.build import SPLITS, _build_parts, build_tree
+from renderer.tree.collapse import BLOCK_COST, NODE_COST, collapse
+from renderer.tree.hierarchy import Rule, add_part, first_parts, new_hierarchy
+from renderer.tree.invariants import faults
+from renderer.tree.subtree import cut_once, new_room
 
 SPLIT = pytest.mark.parametrize("split", sorted(SPLITS))
 # Several subtrees and a top of several levels, which begin beyond 8192 faces.

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from meshes import KINDS, make_mesh, meshes, options
 
-from renderer.invariants import faults
-from renderer.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, NODE_WORDS, Tree
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
-from renderer.shapes import icosphere, torus
+from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, NODE_WORDS, Tree
+from renderer.tree.invariants import faults
 
 
 @settings(max_examples=200)

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, arrays, assert_same_hits, make_mesh, meshes, options, rays_at, separate
 
-import renderer.refit
+import renderer.tree.refit
 from renderer.errors import MeshError
-from renderer.invariants import faults
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
-from renderer.refit import refit_tree
-from renderer.shapes import icosphere
+from renderer.tree.invariants import faults
+from renderer.tree.refit import refit_tree
 
 SPLIT = pytest.mark.parametrize("split", ["midpoint", "sah"])
 ACCELERATORS = pytest.mark.parametrize("accelerator", [Octree, BruteForce])
@@ -213,7 +213,7 @@ def test_mesh_and_arrays_change_at_once():
 def test_boxes_that_were_forgotten_are_noticed(monkeypatch, forgotten):
     vertices, faces = make_mesh("soup", 1, 300)
     octree, moved = Octree(vertices, faces), vertices * 2.0 + 1.0
-    monkeypatch.setattr(renderer.refit, forgotten, lambda *arguments: None)
+    monkeypatch.setattr(renderer.tree.refit, forgotten, lambda *arguments: None)
     tree = refit_tree(octree.tree, moved, octree.mesh.faces, 1.0, 1)
     assert faults(tree, Mesh(moved, faces))
 

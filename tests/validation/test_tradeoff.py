@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from renderer import Mesh, load_scene
-from renderer.render import render
-from validation import mitsuba_path, tradeoff_hits, tradeoff_pictures
-from validation.cases import SCENES
-from validation.mitsuba_sampling import Film, can_judge
+from renderer.picture.render import render
+from validation.efficiency import hits as tradeoff_hits
+from validation.efficiency import pictures as tradeoff_pictures
+from validation.references.mitsuba import path as mitsuba_path
+from validation.references.mitsuba.sampling import Film, can_judge
+from validation.report.tradeoff_figures import figures
+from validation.scenes import SCENES
 from validation.tradeoff import spending
-from validation.tradeoff_figures import figures
 
 HITS = tradeoff_hits.Effort(level=3, rays=2000, judged=400, leaks=5000, runs=1, few=20)
 PICTURES = tradeoff_pictures.Effort(size=32, theirs=(1, 16), truth=36, runs=1)

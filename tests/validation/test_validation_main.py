@@ -9,12 +9,16 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from validation import __main__ as command
-from validation import defects, numerical, report, schema, suite
-from validation.defects_list import DEFECTS
+from validation import suite
+from validation.defects import run as defects
+from validation.defects.list import DEFECTS
 from validation.gates import Gate
 from validation.job import Job
+from validation.report import page as report
+from validation.report import schema
+from validation.stability import section as numerical
 
-SCENE = Path(__file__).parent.parent / "scenes" / "stairs.toml"
+SCENE = Path(__file__).parents[2] / "scenes" / "stairs.toml"
 MESH = SCENE.parent / "models" / "stairs.ply"
 
 

@@ -14,12 +14,12 @@ from PIL import Image as Pillow
 from viewer_page import CHROMIUM, FLAGS, PATIENCE, SCENE, Viewer, served
 
 from renderer import load_scene, render
-from renderer.camera import PerspectiveCamera
-from renderer.face_phong import face_colors
-from renderer.image import Image, srgb
-from renderer.needs import needs_of
-from renderer.prepared_scene import PreparedScene, prepare_scene
-from renderer.scene_rows import MATERIAL_COLUMNS
+from renderer.inspect.face_phong import face_colors
+from renderer.picture.image import Image, srgb
+from renderer.picture.prepare import PreparedScene, prepare_scene
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.needs import needs_of
+from renderer.shade.records import MATERIAL_COLUMNS
 
 playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")

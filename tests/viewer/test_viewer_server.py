@@ -31,14 +31,14 @@ from websockets.sync.client import connect
 
 import renderer
 from renderer import load_scene, render
-from renderer.camera import PerspectiveCamera
 from renderer.cli import main
-from renderer.face_phong import face_colors
-from renderer.false_color import false_color, limits_of
-from renderer.image import srgb
-from renderer.scene import Scene
-from renderer.spawn import BOUNDED
-from renderer.tree_boxes import boxes_at, visited
+from renderer.inspect.face_phong import face_colors
+from renderer.inspect.false_color import false_color, limits_of
+from renderer.inspect.tree_boxes import boxes_at, visited
+from renderer.picture.image import srgb
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.scene import Scene
+from renderer.trace.spawn import BOUNDED
 from renderer.viewer import app, session
 from renderer.viewer.exhibit import Exhibit, open_file
 from renderer.viewer.passes import Answer
@@ -659,7 +659,7 @@ def test_the_mesh_and_the_boxes_are_fetched(url: str, folder: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 def test_the_command_prints_its_address_and_control_c_ends_it_in_the_middle_of_a_picture(folder: Path) -> None:
     command = [sys.executable, "-m", "renderer.cli", "view", str(folder / "heavy.toml"), "--no-browser"]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
     try:
         assert running.stdout is not None

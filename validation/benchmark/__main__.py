@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from renderer.errors import extra_hint
-from renderer.interrupt import interruptible
-from renderer.terminal import one_line
+from renderer.process.interrupt import interruptible
+from renderer.process.terminal import one_line
 from validation.output import add_output, check_output
 
 # Rays of a family, in full and in quick runs.
@@ -49,8 +49,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here so that --help answers at once.
-    from renderer.files import write_atomically
-    from validation.benchmark import page, record
+    from renderer.process.files import write_atomically
+    from validation.benchmark.page import page, record
     from validation.progress import steps
 
     options.output.mkdir(parents=True, exist_ok=True)
@@ -73,10 +73,12 @@ def _run(options: argparse.Namespace, command: str) -> int:
 def measure(
     quick: bool, huge: bool, paths: tuple[Path, ...], command: str, step: Callable[[str], None]
 ) -> dict[str, Any]:
-    """The whole record; see ``validation.benchmark.record``."""
-    from validation.benchmark import ablation, first_answers, frames, knobs, meshes, processes, record, targets
-    from validation.benchmark.queries import fits
-    from validation.benchmark.systems import available
+    """The whole record; see ``validation.benchmark.page.record``."""
+    from validation.benchmark.measures import ablation, first_answers, frames, meshes, processes
+    from validation.benchmark.measures.queries import fits
+    from validation.benchmark.page import record, targets
+    from validation.benchmark.parameters import study as knobs
+    from validation.benchmark.peers.systems import available
 
     began, date, load = time.perf_counter(), datetime.now(UTC), record.load()
     step("contenders")
@@ -105,7 +107,7 @@ def _measure_mesh(
     mesh: Any, systems: Sequence[Any], count: int, rows: dict[str, list[Any]], step: Callable[[str], None]
 ) -> None:
     """Add one mesh's rows. Memory first, while this process is small."""
-    from validation.benchmark import builds, memory, queries
+    from validation.benchmark.measures import builds, memory, queries
 
     grown = memory.measure(mesh, systems, step)
     rows["memory"] += [grown] if grown is not None else []
@@ -116,7 +118,7 @@ def _measure_mesh(
 def _libllvm(used: bool) -> str | None:
     if not used:
         return None
-    from validation.benchmark.mitsuba_variant import libllvm_path
+    from validation.benchmark.peers.mitsuba_variant import libllvm_path
 
     return libllvm_path()
 

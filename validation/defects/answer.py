@@ -4,7 +4,7 @@ import json
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from validation.defects_seam import Replacement, inject
+from validation.defects.inject import Replacement, inject
 
 if TYPE_CHECKING:
     from validation.gates import Gate

@@ -9,18 +9,21 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from renderer.mesh import Mesh
-from renderer.mesh_io import load_mesh
-from renderer.scene import load_scene
-from renderer.shapes import icosphere
-from validation import images, numerical, stability, watertight
-from validation.cases import SCENES
+from renderer.mesh.load import load_mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
+from renderer.scene.scene import load_scene
 from validation.gates import Gate
-from validation.hit_references import REFERENCES
-from validation.hit_refit import check_refit
-from validation.hits import Effort, check_leaks, check_mesh
+from validation.hits import watertight
+from validation.hits.rays import float32_exact
+from validation.hits.refit import check_refit
+from validation.hits.section import Effort, check_leaks, check_mesh
 from validation.job import Job
-from validation.rays import float32_exact
+from validation.pictures import section as images
+from validation.references.table import REFERENCES
+from validation.scenes import SCENES
+from validation.stability import section as numerical
+from validation.stability import sweeps as stability
 from validation.thresholds import Thresholds
 
 SEED = 2029

@@ -15,11 +15,11 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
 
-from validation.defects_syntax import Place, find_place, replaced
+from validation.defects.syntax import Place, find_place, replaced
 
-_PACKAGE = Path(__file__).resolve().parent.parent / "renderer"
-_DIGEST = "renderer.source_digest"
-_LOADED = "renderer.loaded"
+_PACKAGE = Path(__file__).resolve().parents[2] / "renderer"
+_DIGEST = "renderer.kernels.digest"
+_LOADED = "renderer.kernels.loaded"
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from validation.defects_seam import Replacement
+from validation.defects.inject import Replacement
 
 Group = Literal["hits", "pictures"]
 
@@ -107,7 +107,7 @@ PICTURES = (
     _python("pictures", "ior 1.501 for 1.5", "_materials",
             *_before("if needs.shadows and (not own.shadows):\n"
                      "    kinds[kinds == UNLIT] = LAMBERT",
-                     "from renderer.scene_rows import IOR\n"
+                     "from renderer.shade.records import IOR\n"
                      "rows[:, IOR] *= 1.501 / 1.5")),
     _python("pictures", "film shifted by half a pixel", "PreparedScene.picture",
             *_before("settings, film = (kernel_settings_of(self.needs, chosen, offset), _film(width, height, "
@@ -172,7 +172,7 @@ PICTURES = (
     _python("pictures", "a fixed offset 100 times too long", "_offset",
             "return float(offset)", "return 100.0 * float(offset)"),
     _python("pictures", "depth along the view axis", "PreparedScene.picture",
-            *_before(_IMAGE, "from renderer.camera import primary_rays\n"
+            *_before(_IMAGE, "from renderer.scene.camera import primary_rays\n"
                              "cosines = primary_rays(camera, width, height)[1] @ camera.frame()[2]\n"
                              "film.depth[...] *= cosines.reshape(height, width)")),
     _python("pictures", "faces numbered from 1", "PreparedScene.picture",

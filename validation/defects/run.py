@@ -16,17 +16,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from renderer import child
-from validation.defects_answer import MARK
-from validation.defects_list import DEFECTS, Defect
-from validation.defects_seam import Replacement
+from renderer.process import child
+from validation.defects.answer import MARK
+from validation.defects.inject import Replacement
+from validation.defects.list import DEFECTS, Defect
 from validation.gates import Gate
 
 # Ten times what the slowest defect takes on two busy cores: beyond it a kernel does not end.
 _PATIENCE = 600.0
 # Each compiles on one core.
 _AT_ONCE = 2
-_CHECKS = "validation.defects_checks"
+_CHECKS = "validation.defects.checks"
 
 _PATHS = "checks the other reference, whose recursion is like ours: a rule that both have wrong shows on paths alone"
 # Quantities that are another view of a measure: the same over other pixels, or the same verdict on other rays.
@@ -101,7 +101,7 @@ def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, c
     began = time.perf_counter()
     cache.mkdir(parents=True, exist_ok=True)
     asked = json.dumps([None if replacement is None else asdict(replacement), groups, checks])
-    command = child.command("validation.defects_answer:answer", asked)
+    command = child.command("validation.defects.answer:answer", asked)
     environment = child.environment(NUMBA_CACHE_DIR=str(cache))
     try:
         done = subprocess.run(

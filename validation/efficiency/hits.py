@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.parallel import available_threads
-from renderer.query import Hits
-from renderer.shapes import icosphere
-from validation import exact
-from validation.compare_hits import HitArrays
-from validation.hit_references import REFERENCES
-from validation.rays import RayBatch, camera_rays, float32_exact, leak_rays
+from renderer.process.parallel import available_threads
+from renderer.trace.query import Hits
+from validation.hits.compare import HitArrays
+from validation.hits.rays import RayBatch, camera_rays, float32_exact, leak_rays
+from validation.oracle import exact
+from validation.references.table import REFERENCES
 from validation.tradeoff import front, median_seconds, spending, timed
 
 SEED = 20

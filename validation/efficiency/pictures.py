@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.render import render
-from renderer.scene import UNLIMITED_RAYS, Scene
-from validation import mitsuba_path, mitsuba_scene
-from validation.compare_images import compare
-from validation.mitsuba_sampling import Film, Sampler
+from renderer.picture.render import render
+from renderer.scene.scene import UNLIMITED_RAYS, Scene
+from validation.pictures.compare import compare
+from validation.references.mitsuba import path as mitsuba_path
+from validation.references.mitsuba import scene as mitsuba_scene
+from validation.references.mitsuba.sampling import Film, Sampler
 from validation.tradeoff import RUNS, front, median_seconds, slope, spending
 
 Picture = NDArray[Any]

@@ -9,17 +9,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from renderer.mesh_io import load_mesh
+from renderer.mesh.load import load_mesh
 from renderer.octree import Octree
-from renderer.parallel import available_threads
-from renderer.render import render
-from renderer.scene import load_scene
-from validation import tradeoff_hits, tradeoff_pictures
-from validation.cases import SCENES
-from validation.embree import Embree
+from renderer.picture.render import render
+from renderer.process.parallel import available_threads
+from renderer.scene.scene import load_scene
+from validation.efficiency import hits as tradeoff_hits
+from validation.efficiency import pictures as tradeoff_pictures
 from validation.gates import Gate
+from validation.hits.rays import camera_rays, random_rays
 from validation.job import Job
-from validation.rays import camera_rays, random_rays
+from validation.references.embree import Embree
+from validation.scenes import SCENES
 from validation.tradeoff import RUNS, interleaved, ratio, spending, timed
 
 # The origin timed each of its configurations three times.

@@ -8,18 +8,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.prepared import WIDTH
-from validation import compare_hits, exact
-from validation.compare_hits import ExactErrors, HitArrays, HitComparison
+from renderer.trace.ray_lanes import WIDTH
 from validation.gates import Gate
-from validation.hit_errors import ErrorSizes, error_sizes, truth
-from validation.hit_references import REFERENCES, HitReference
-from validation.hit_verdicts import NEAR_EDGE
+from validation.hits import compare as compare_hits
+from validation.hits.compare import ExactErrors, HitArrays, HitComparison
+from validation.hits.errors import ErrorSizes, error_sizes, truth
+from validation.hits.rays import RayBatch, face_rays, families, float32_exact
+from validation.hits.verdicts import NEAR_EDGE
 from validation.job import Job
-from validation.rays import RayBatch, face_rays, families, float32_exact
-from validation.rounding import FLOAT32_ROUNDOFF, FLOAT64_ROUNDOFF
+from validation.oracle import exact
+from validation.oracle.rounding import FLOAT32_ROUNDOFF, FLOAT64_ROUNDOFF
+from validation.references.table import REFERENCES, HitReference
 from validation.thresholds import HitLimits
 from validation.tradeoff import spending
 

@@ -10,10 +10,9 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from validation import exact
-from validation.exact import ExactHit
-from validation.hit_errors import ErrorSizes, error_sizes, percentiles, truth
-from validation.hit_verdicts import (
+from validation.hits.errors import ErrorSizes, error_sizes, percentiles, truth
+from validation.hits.rays import RayBatch
+from validation.hits.verdicts import (
     NEAR_EDGE,
     OURS_WRONG,
     THEIRS_RIGHT,
@@ -26,8 +25,9 @@ from validation.hit_verdicts import (
     views,
     with_truth,
 )
-from validation.rays import RayBatch
-from validation.rounding import FLOAT32_ROUNDOFF
+from validation.oracle import exact
+from validation.oracle.exact import ExactHit
+from validation.oracle.rounding import FLOAT32_ROUNDOFF
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

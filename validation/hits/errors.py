@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.exact import ExactHit
+from validation.oracle.exact import ExactHit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
-from renderer.shapes import icosphere, torus
-from validation import watertight
-from validation.check_hits import SEED, Asked, Effort, ask
 from validation.gates import Gate
+from validation.hits import watertight
+from validation.hits.check import SEED, Asked, Effort, ask
+from validation.hits.rays import RayBatch, leak_rays
 from validation.job import Job
-from validation.rays import RayBatch, leak_rays
 
 
 def closed_meshes() -> dict[str, Mesh]:

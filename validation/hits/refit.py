@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.shapes import icosphere
 from validation.gates import Gate
+from validation.hits.rays import families
 from validation.job import Job
-from validation.rays import families
 
 _SEED = 2030
 _RAYS = 3_000

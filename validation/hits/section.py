@@ -5,18 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from renderer.mesh import Mesh
-from renderer.mesh_io import load_mesh
-from renderer.shapes import icosphere
-from validation.cases import SCENES
-from validation.check_hits import SEED, Effort, check_mesh
+from renderer.mesh.load import load_mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
 from validation.gates import Gate
-from validation.hit_errors import EXPONENTS
-from validation.hit_leaks import check_leaks, closed_meshes
-from validation.hit_refit import check_refit
-from validation.hit_verdicts import LISTED
+from validation.hits.check import SEED, Effort, check_mesh
+from validation.hits.errors import EXPONENTS
+from validation.hits.leaks import check_leaks, closed_meshes
+from validation.hits.rays import families, float32_exact
+from validation.hits.refit import check_refit
+from validation.hits.verdicts import LISTED
 from validation.job import Job
-from validation.rays import families, float32_exact
+from validation.scenes import SCENES
 
 __all__ = ["FULL", "QUICK", "Effort", "check_leaks", "check_mesh", "meshes", "run", "steps"]
 

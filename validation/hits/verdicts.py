@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from validation import exact
-from validation.exact import ExactHit
-from validation.rays import RayBatch
-from validation.rounding import FLOAT64_ROUNDOFF, RayView, t_bounds
+from validation.hits.rays import RayBatch
+from validation.oracle import exact
+from validation.oracle.exact import ExactHit
+from validation.oracle.rounding import FLOAT64_ROUNDOFF, RayView, t_bounds
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from renderer.mesh import Mesh
-from renderer.mesh_io import load_mesh
+from renderer.mesh.load import load_mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere, lattice_faces, torus
 from renderer.octree import Octree
-from renderer.shapes import icosphere, lattice_faces, torus
-from validation.cases import SCENES
-from validation.embree import Embree
 from validation.gates import Gate
-from validation.rays import RayBatch, float32_exact
+from validation.hits.rays import RayBatch, float32_exact
+from validation.references.embree import Embree
+from validation.scenes import SCENES
 
 Floats = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """What floating-point arithmetic may answer for a ray, seen from exact arithmetic.
 
-A face is judged by the exact determinants of ``validation.exact`` and by derived bounds on what rounding
+A face is judged by the exact determinants of ``validation.oracle.exact`` and by derived bounds on what rounding
 makes of them. ``RayView`` tells whether an answer is the exact one, and if not, whether rounding permits it.
 """
 
@@ -12,7 +12,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from validation import exact
+from validation.oracle import exact
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.camera import primary_rays
-from renderer.image import Image
-from renderer.scene import Scene
+from renderer.picture.image import Image
+from renderer.scene.camera import primary_rays
+from renderer.scene.scene import Scene
 from validation.gates import Gate
-from validation.mitsuba_whitted import Aovs
+from validation.references.mitsuba.whitted import Aovs
 from validation.thresholds import Aovs as Limits
 
 # What stands in for the largest error where no ray was hit by both.

@@ -11,12 +11,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.image import Image
-from validation import compare_images
-from validation.compare_images import ImageComparison, Picture
+from renderer.picture.image import Image
 from validation.gates import Gate
 from validation.job import Job
-from validation.picture_files import write_failed, write_shown
+from validation.pictures import compare as compare_images
+from validation.pictures.compare import ImageComparison, Picture
+from validation.pictures.files import write_failed, write_shown
 from validation.thresholds import REASONS, Pictures
 
 # Half a step of an 8-bit picture is what rounding to whole numbers leaves; beside it float64's rounding of that half.

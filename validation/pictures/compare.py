@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
-from validation.flip import flip_map
+from validation.references.flip import flip_map
 
 Picture = NDArray[np.floating[Any]]
 

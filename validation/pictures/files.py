@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.files import write_atomically
-from renderer.image import srgb, write_exr
-from validation.compare_images import ImageComparison, Picture
+from renderer.picture.image import srgb, write_exr
+from renderer.process.files import write_atomically
+from validation.pictures.compare import ImageComparison, Picture
 
 # One step of an 8-bit picture becomes a grey that is seen.
 _ENLARGED = 16.0

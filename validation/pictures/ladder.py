@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from renderer.camera import OrthographicCamera
-from renderer.light import DirectionalLight, Light, PointLight
-from renderer.material import Dielectric, Material, Mirror, Phong
-from renderer.scene import Scene
+from renderer.scene.camera import OrthographicCamera
+from renderer.scene.light import DirectionalLight, Light, PointLight
+from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.scene.scene import Scene
 
 _ADDS = {
     "diffuse": "direct diffuse light, of a lamp at the eye",
@@ -53,7 +53,7 @@ class Rung:
 def rungs(scene: Scene) -> tuple[list[Rung], dict[str, str]]:
     """The rungs of ``scene`` from the lowest on, the last of them ``scene`` itself; and why others are left out.
 
-    >>> from renderer.camera import PerspectiveCamera
+    >>> from renderer.scene.camera import PerspectiveCamera
     >>> empty = Scene(camera=PerspectiveCamera(eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0)), materials={})
     >>> [rung.name for rung in rungs(empty)[0]]
     ['everything']

@@ -14,14 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.camera import primary_rays
-from renderer.material import Dielectric, Phong
-from renderer.render import render
-from renderer.scene import UNLIMITED_RAYS, Scene
-from validation import mitsuba_path, mitsuba_whitted
-from validation.compare_images import fragile_pixels
+from renderer.picture.render import render
+from renderer.scene.camera import primary_rays
+from renderer.scene.material import Dielectric, Phong
+from renderer.scene.scene import UNLIMITED_RAYS, Scene
 from validation.gates import Gate
-from validation.shifted_film import shifted
+from validation.pictures.compare import fragile_pixels
+from validation.pictures.shifted_film import shifted
+from validation.references.mitsuba import path as mitsuba_path
+from validation.references.mitsuba import whitted as mitsuba_whitted
 from validation.tradeoff import slope
 
 PATHS = "random paths of Mitsuba's native path integrator (scalar_rgb)"

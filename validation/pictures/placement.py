@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from trimesh import transformations
 
-from renderer.mesh import Mesh
-from renderer.scene import Instance, Scene, SceneObject
+from renderer.mesh.mesh import Mesh
+from renderer.scene.scene import Instance, Scene, SceneObject
 from validation.gates import Gate
 
 NAME = "trimesh, files and their places"

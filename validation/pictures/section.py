@@ -11,27 +11,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from renderer.image import Image, srgb
-from renderer.render import render
-from renderer.scene import UNLIMITED_RAYS, Scene, load_scene
-from validation import (
-    check_picture,
-    compare_aovs,
-    ladder,
-    mitsuba_camera,
-    mitsuba_path,
-    mitsuba_whitted,
-    monte_carlo,
-    placement,
-)
-from validation.cases import CASES
-from validation.check_picture import Pair, Rule
-from validation.compare_images import Picture, fragile_pixels
+from renderer.picture.image import Image, srgb
+from renderer.picture.render import render
+from renderer.scene.scene import UNLIMITED_RAYS, Scene, load_scene
 from validation.gates import Gate
 from validation.job import Job
-from validation.ladder import Rung
-from validation.picture_files import write_png
-from validation.shifted_film import shifted
+from validation.pictures import aovs as compare_aovs
+from validation.pictures import check as check_picture
+from validation.pictures import ladder, monte_carlo, placement
+from validation.pictures.check import Pair, Rule
+from validation.pictures.compare import Picture, fragile_pixels
+from validation.pictures.files import write_png
+from validation.pictures.ladder import Rung
+from validation.pictures.shifted_film import shifted
+from validation.references.mitsuba import camera as mitsuba_camera
+from validation.references.mitsuba import path as mitsuba_path
+from validation.references.mitsuba import whitted as mitsuba_whitted
+from validation.scenes import CASES
 
 WHITTED = "Whitted recursion over Mitsuba's scene, BSDFs and rays (scalar_rgb)"
 AOVS = "Mitsuba's primary hits (scalar_rgb)"

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.camera import OrthographicCamera, PerspectiveCamera
-from renderer.scene import Scene
+from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
+from renderer.scene.scene import Scene
 
 Shift = tuple[float, float]
 

@@ -8,12 +8,13 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from validation import embree, igl, mitsuba_hits, trimesh_rays
-from validation.brute import Brute
-from validation.embree import Embree
-from validation.igl import Igl
-from validation.mitsuba_hits import MitsubaHits
-from validation.trimesh_rays import TrimeshRays
+from validation.references import embree, igl, trimesh_rays
+from validation.references.brute import Brute
+from validation.references.embree import Embree
+from validation.references.igl import Igl
+from validation.references.mitsuba import hits as mitsuba_hits
+from validation.references.mitsuba.hits import MitsubaHits
+from validation.references.trimesh_rays import TrimeshRays
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

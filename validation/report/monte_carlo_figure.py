@@ -1,9 +1,9 @@
-"""The error of random paths against their number as a plot, drawn from the record of ``validation.monte_carlo.run``."""
+"""The error of random paths against their number as a plot, from the record of ``pictures.monte_carlo.run``."""
 
 from collections.abc import Mapping
 from typing import Any
 
-from validation.plots import Series, loglog
+from validation.report.plots import Series, loglog
 
 # The grey, dotted row of the looks: a law is no measurement.
 _LAW = 8

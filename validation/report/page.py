@@ -8,8 +8,8 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation import monte_carlo_figure, tradeoff_figures
-from validation.plots import stability_figures
+from validation.report import monte_carlo_figure, tradeoff_figures
+from validation.report.plots import stability_figures
 
 _TEMPLATES = Path(__file__).parent / "templates"
 

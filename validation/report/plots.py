@@ -100,7 +100,7 @@ def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
 
 
 def stability_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The figures of the record of ``validation.stability.run``: for each a title (its caption too) and an SVG."""
+    """The figures of the record of ``stability.sweeps.run``: for each a title (its caption too) and an SVG."""
     sweeps = {name: part for name, part in record.items() if isinstance(part, dict) and "points" in part}
     return [_error_figure(name, part) for name, part in sweeps.items()] + [_leak_figure(record["leaks"])]
 

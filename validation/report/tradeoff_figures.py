@@ -1,9 +1,9 @@
-"""Figures of error against run time, drawn from the record of ``validation.efficiency.run`` alone."""
+"""Figures of error against run time, drawn from the record of ``validation.efficiency.section.run`` alone."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from validation.plots import Panel, Series, draw
+from validation.report.plots import Panel, Series, draw
 
 # The grey, dotted row of the looks: a front is no contender.
 _FRONT = 8

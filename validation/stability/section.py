@@ -1,9 +1,12 @@
 """The section on numerical stability: the table of extreme cases, the watertight sweep, the error curves."""
 
-from validation import extreme_hits, extreme_shading, stability, watertight
-from validation.extreme import ExtremeCase
 from validation.gates import Gate
+from validation.hits import watertight
 from validation.job import Job
+from validation.stability import sweeps as stability
+from validation.stability.cases import hits as extreme_hits
+from validation.stability.cases import shading as extreme_shading
+from validation.stability.cases.case import ExtremeCase
 
 CASES = (*extreme_hits.CASES, *extreme_shading.CASES)
 

@@ -12,16 +12,17 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.shapes import icosphere
-from validation import exact, watertight
-from validation.compare_hits import HitArrays
-from validation.embree import Embree
-from validation.exact import ExactHit
 from validation.gates import Gate
-from validation.rays import RayBatch
-from validation.rounding import t_bounds
+from validation.hits import watertight
+from validation.hits.compare import HitArrays
+from validation.hits.rays import RayBatch
+from validation.oracle import exact
+from validation.oracle.exact import ExactHit
+from validation.oracle.rounding import t_bounds
+from validation.references.embree import Embree
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from renderer import Image, Needs, Scene, needs_of, render
-from validation.benchmark import ablation
+from validation.benchmark.measures import ablation
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from validation import tradeoff
-from validation.benchmark import frames, libllvm, processes
-from validation.benchmark.fit import log_fit
-from validation.benchmark.targets import Target, judged
+from validation.benchmark.measures import frames, processes
+from validation.benchmark.measures.fit import log_fit
+from validation.benchmark.page.targets import Target, judged
+from validation.benchmark.peers import libllvm
 from validation.tradeoff import interleaved, ratio
 
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from renderer import Scene, load_scene, render
-from renderer.light import DirectionalLight
-from validation import mitsuba_scene
-from validation.benchmark import libllvm
-from validation.benchmark.mitsuba_variant import libllvm_path
-from validation.cases import SCENES
-from validation.compare_images import compare
+from renderer.scene.light import DirectionalLight
+from validation.benchmark.peers import libllvm
+from validation.benchmark.peers.mitsuba_variant import libllvm_path
+from validation.pictures.compare import compare
+from validation.references.mitsuba import scene as mitsuba_scene
+from validation.scenes import SCENES
 
 SIZE, DEPTH = 64, 6
 
@@ -22,7 +22,7 @@ def scene() -> Scene:
 
 
 def test_the_ray_lists_draw_our_picture_with_our_rays(scene: Scene) -> None:
-    from validation.benchmark.mitsuba_lists import RayLists
+    from validation.benchmark.peers.mitsuba_lists import RayLists
 
     lists = RayLists(scene, mitsuba_scene.camera_rays(scene, SIZE, SIZE, 1)[0], DEPTH)
     counts: dict[str, int] = {}
@@ -38,7 +38,7 @@ def test_the_ray_lists_draw_our_picture_with_our_rays(scene: Scene) -> None:
 
 
 def test_what_the_ray_lists_cannot_draw_is_refused(scene: Scene) -> None:
-    from validation.benchmark.mitsuba_lists import RayLists
+    from validation.benchmark.peers.mitsuba_lists import RayLists
 
     rays = mitsuba_scene.camera_rays(scene, 4, 4, 1)[0]
     sun = scene.model_copy(update={"lights": (DirectionalLight(type="directional", direction=(0, -1, 0)),)})

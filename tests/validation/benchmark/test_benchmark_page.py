@@ -6,21 +6,13 @@ from typing import Any
 
 import pytest
 
-from renderer.mesh_io import save_ply
+from renderer.mesh.load import save_ply
 from validation.benchmark import __main__ as command
-from validation.benchmark import (
-    ablation,
-    first_answers,
-    frames,
-    knobs,
-    memory,
-    meshes,
-    page,
-    processes,
-    record,
-    systems,
-)
-from validation.benchmark.ours import OURS, OURS_ONE
+from validation.benchmark.measures import ablation, first_answers, frames, memory, meshes, processes
+from validation.benchmark.page import page, record
+from validation.benchmark.parameters import study as knobs
+from validation.benchmark.peers import systems
+from validation.benchmark.peers.ours import OURS, OURS_ONE
 
 
 def _frames(*_: Any) -> dict[str, Any]:

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation.benchmark import queries, systems
-from validation.benchmark.contender import Family, System
-from validation.benchmark.families import cosine_distributed, families
-from validation.benchmark.meshes import displaced_spheres
-from validation.benchmark.ours import OURS, OURS_ONE
+from validation.benchmark.measures import queries
+from validation.benchmark.measures.families import cosine_distributed, families
+from validation.benchmark.measures.meshes import displaced_spheres
+from validation.benchmark.peers import systems
+from validation.benchmark.peers.contender import Family, System
+from validation.benchmark.peers.ours import OURS, OURS_ONE
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer import Mesh, Octree, load_scene
-from validation import exact, tradeoff_hits
-from validation.benchmark import knobs_hits, knobs_pictures, pareto
-from validation.cases import CASES
-from validation.compare_hits import HitArrays
-from validation.rays import random_rays
+from validation.benchmark.page import pareto
+from validation.benchmark.parameters import hits as knobs_hits
+from validation.benchmark.parameters import pictures as knobs_pictures
+from validation.efficiency import hits as tradeoff_hits
+from validation.hits.compare import HitArrays
+from validation.hits.rays import random_rays
+from validation.oracle import exact
+from validation.scenes import CASES
 from validation.tradeoff import front, median_seconds, slope, timed
 
 # Few values, so that equal costs and equal errors are common.

@@ -10,16 +10,18 @@ from typing import Any
 import pytest
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation import defects, defects_list, report
-from validation.defects import Answer
-from validation.defects_list import DEFECTS, Defect
-from validation.defects_seam import Replacement, inject
+from validation.defects import list as defects_list
+from validation.defects import run as defects
+from validation.defects.inject import Replacement, inject
+from validation.defects.list import DEFECTS, Defect
+from validation.defects.run import Answer
+from validation.report import page as report
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[3]
 HARMLESS = Replacement("image._encoded", "encoded * 255.0 + 0.5", "0.5 + encoded * 255.0")
 # Black, a middle grey and white, by hand: 255 (1.055 x .5^(1 / 2.4) - .055) = 187.5160.
 TINY_CHECKS = """
-from renderer.image import srgb
+from renderer.picture.image import srgb
 from validation.gates import Gate
 
 def run(groups):
@@ -60,7 +62,7 @@ class TestSeam:
             replacement.text()
 
     def test_a_process_that_has_the_renderer_is_refused(self) -> None:
-        import renderer.image  # noqa: F401
+        import renderer.picture.image  # noqa: F401
 
         with pytest.raises(RuntimeError, match="expected a process without modules of renderer"):
             inject(HARMLESS)
@@ -68,13 +70,13 @@ class TestSeam:
     def test_kernels_follow_though_the_cache_holds_sound_ones(self, tmp_path: Path) -> None:
         """The digest of ``shading`` and of what imports it changes; that of ``simd`` does not."""
         call = (
-            "from renderer.shading import fresnel; from renderer.source_digest import source_digest\n"
+            "from renderer.shade.shading import fresnel; from renderer.kernels.digest import source_digest\n"
             "from pathlib import Path; import json\n"
             "digests = [source_digest(Path('renderer').resolve() / f'{m}.py') for m in ('shading', 'direct', 'simd')]\n"
             "print(json.dumps([fresnel(1.0, 1.0, 1.0, 1.5), *digests]))"
         )
         alter = (
-            "from validation.defects_seam import Replacement, inject\n"
+            "from validation.defects.inject import Replacement, inject\n"
             "inject(Replacement('fresnel', 'return 0.5 * (s * s + p * p)', 'return 7.0'))\n"
         )
         sound, broken, again = (json.loads(python(p, tmp_path).stdout) for p in (call, alter + call, call))
@@ -106,9 +108,8 @@ def test_a_real_defect_is_caught_and_a_harmless_change_is_not(tiny_checks: str) 
 
 
 def page_of(record: dict[str, Any]) -> str:
-    page = Environment(
-        loader=FileSystemLoader(ROOT / "validation" / "templates"), autoescape=True, undefined=StrictUndefined
-    )
+    templates = FileSystemLoader(ROOT / "validation" / "report" / "templates")
+    page = Environment(loader=templates, autoescape=True, undefined=StrictUndefined)
     page.filters["number"] = report.number
     return page.get_template("defects.html").render(m={"defects": json.loads(json.dumps(record))})
 

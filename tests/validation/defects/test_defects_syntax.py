@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from validation.defects_syntax import find_place, replaced
+from validation.defects.syntax import find_place, replaced
 
 SOURCE = '''
 """A module."""

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from validation import exact, rays
-from validation.compare_hits import HitArrays, compare, exact_errors, judge, judge_all
-from validation.embree import Embree
-from validation.hit_errors import EXPONENTS, error_sizes, truth
-from validation.hit_verdicts import (
+from validation.hits import rays
+from validation.hits.compare import HitArrays, compare, exact_errors, judge, judge_all
+from validation.hits.errors import EXPONENTS, error_sizes, truth
+from validation.hits.verdicts import (
     BOTH_RIGHT,
     BOTH_WRONG,
     LISTED,
@@ -21,7 +20,9 @@ from validation.hit_verdicts import (
     THEIRS_RIGHT,
     VERDICTS,
 )
-from validation.rounding import FLOAT64_ROUNDOFF
+from validation.oracle import exact
+from validation.oracle.rounding import FLOAT64_ROUNDOFF
+from validation.references.embree import Embree
 
 BALL = trimesh.creation.icosphere(2)
 VERTICES = rays.float32_exact(BALL.vertices)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from validation import exact, rays
+from validation.hits import rays
+from validation.oracle import exact
 
 BALL = trimesh.creation.icosphere(2)
 VERTICES = rays.float32_exact(BALL.vertices * [1.0, 2.0, 3.0] + [5.0, -1.0, 0.5])

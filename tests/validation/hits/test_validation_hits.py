@@ -11,16 +11,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from renderer.layout import LANES
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.query import Hits
-from renderer.shapes import icosphere
-from validation import check_hits, hit_leaks, hits, report
+from renderer.trace.layout import LANES
+from renderer.trace.query import Hits
 from validation.gates import Gate
-from validation.hit_references import REFERENCES, HitReference
+from validation.hits import check as check_hits
+from validation.hits import leaks as hit_leaks
+from validation.hits import section as hits
+from validation.hits.rays import families, float32_exact
 from validation.job import Job
-from validation.rays import families, float32_exact
+from validation.references.table import REFERENCES, HitReference
+from validation.report import page as report
 from validation.thresholds import HitLimits, Thresholds
 
 QUICK = tuple(one for one in REFERENCES if one.key in ("embree_robust", "embree_default", "igl"))

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation import watertight
-from validation.watertight import BUILDS, Closed, Effort, Placement
+from validation.hits import watertight
+from validation.hits.watertight import BUILDS, Closed, Effort, Placement
 
 SHAPES = {closed.name: closed for closed in watertight.closed_meshes()}
 BALL = SHAPES["icosphere 3"]

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from validation import exact, rays
-from validation.rounding import FLOAT32_ROUNDOFF, FLOAT64_ROUNDOFF, RayView, t_bounds
+from validation.hits import rays
+from validation.oracle import exact
+from validation.oracle.rounding import FLOAT32_ROUNDOFF, FLOAT64_ROUNDOFF, RayView, t_bounds
 
 BALL = trimesh.creation.icosphere(2)
 VERTICES = rays.float32_exact(BALL.vertices)

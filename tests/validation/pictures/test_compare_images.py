@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
-from validation.compare_images import ImageComparison, compare, fragile_pixels, srgb
+from validation.pictures.compare import ImageComparison, compare, fragile_pixels, srgb
 
 SIZE = 128
 

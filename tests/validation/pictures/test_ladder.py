@@ -5,12 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from renderer.light import DirectionalLight
-from renderer.material import Phong
-from renderer.render import render
-from renderer.scene import load_scene
-from validation import ladder
-from validation.cases import SCENES
+from renderer.picture.render import render
+from renderer.scene.light import DirectionalLight
+from renderer.scene.material import Phong
+from renderer.scene.scene import load_scene
+from validation.pictures import ladder
+from validation.scenes import SCENES
 
 GLASS = load_scene(SCENES / "glass.toml")
 

@@ -9,15 +9,17 @@ import pytest
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from scipy.stats import norm
 
-from renderer.scene import Scene, load_scene
-from validation import mitsuba_path, monte_carlo
-from validation.cases import SCENES
+from renderer.scene.scene import Scene, load_scene
 from validation.gates import Gate
-from validation.monte_carlo import scatter_of
-from validation.monte_carlo_figure import figure
-from validation.report import number
+from validation.pictures import monte_carlo
+from validation.pictures.monte_carlo import scatter_of
+from validation.references.mitsuba import path as mitsuba_path
+from validation.report import page
+from validation.report.monte_carlo_figure import figure
+from validation.report.page import number
+from validation.scenes import SCENES
 
-TEMPLATES = Path(monte_carlo.__file__).parent / "templates"
+TEMPLATES = Path(page.__file__).parent / "templates"
 SLOPE, CHANCE = 0, 1
 PIXELS = 256
 

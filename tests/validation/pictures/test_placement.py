@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.mesh import Mesh
-from renderer.mesh_io import save_ply
-from renderer.scene import Scene, load_scene
-from renderer.shapes import icosphere
-from validation import placement
+from renderer.mesh.load import save_ply
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
+from renderer.scene.scene import Scene, load_scene
+from validation.pictures import placement
 
 SCENE = """
 [camera]

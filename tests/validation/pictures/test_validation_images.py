@@ -10,20 +10,22 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
-from renderer.camera import PerspectiveCamera
-from renderer.image import Image
-from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Mirror, Phong
-from renderer.render import render
-from renderer.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
-from renderer.shapes import icosphere
-from validation import images, ladder, mitsuba_path, monte_carlo
-from validation.cases import SCENES
+from renderer.mesh.shapes import icosphere
+from renderer.picture.image import Image
+from renderer.picture.render import render
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Dielectric, Mirror, Phong
+from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 from validation.gates import Gate
-from validation.images import Effort, Reference
 from validation.job import Job
-from validation.mitsuba_whitted import whitted
-from validation.shifted_film import shifted
+from validation.pictures import ladder, monte_carlo
+from validation.pictures import section as images
+from validation.pictures.section import Effort, Reference
+from validation.pictures.shifted_film import shifted
+from validation.references.mitsuba import path as mitsuba_path
+from validation.references.mitsuba.whitted import whitted
+from validation.scenes import SCENES
 from validation.thresholds import Thresholds
 
 SMALL = Effort(64, paths=False)
@@ -179,7 +181,7 @@ def test_every_defect_turns_a_gate_red(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_srgb_applied_twice_is_seen_in_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from renderer import image as module
+    from renderer.picture import image as module
 
     right = module.srgb
     monkeypatch.setattr(module, "srgb", lambda linear: right(right(linear) / 255.0))

@@ -3,7 +3,9 @@
 import numpy as np
 import trimesh
 
-from validation import embree, exact, rays
+from validation.hits import rays
+from validation.oracle import exact
+from validation.references import embree
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]])
 FACES = np.array([[0, 1, 2], [0, 2, 3]])

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from validation.compare_images import compare, srgb
-from validation.flip import flip_map
+from validation.pictures.compare import compare, srgb
+from validation.references.flip import flip_map
 from validation.thresholds import Pictures
 
 RNG = np.random.default_rng(5)

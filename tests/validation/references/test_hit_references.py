@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from renderer.shapes import icosphere
-from validation import exact
-from validation.hit_references import REFERENCES, HitReference
-from validation.rays import float32_exact, random_rays
+from renderer.mesh.shapes import icosphere
+from validation.hits.rays import float32_exact, random_rays
+from validation.oracle import exact
+from validation.references.table import REFERENCES, HitReference
 
 TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 FACE = np.array([[0, 1, 2]])

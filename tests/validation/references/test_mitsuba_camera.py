@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from renderer.camera import OrthographicCamera, PerspectiveCamera
-from validation.mitsuba_camera import largest_distance
+from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
+from validation.references.mitsuba.camera import largest_distance
 from validation.thresholds import Pictures
 
 CAMERA_PIXELS = Pictures().camera_pixels

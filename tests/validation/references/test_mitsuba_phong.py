@@ -7,14 +7,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from renderer.light import DirectionalLight
-from renderer.material import Dielectric, Phong
-from renderer.mesh import Mesh
-from renderer.scene import Scene
-from renderer.shapes import box, icosphere, torus
-from validation.mitsuba_path import can_judge, path, random_paths
-from validation.mitsuba_phong import Glass, PhongMirror
-from validation.mitsuba_whitted import whitted
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.scene.light import DirectionalLight
+from renderer.scene.material import Dielectric, Phong
+from renderer.scene.scene import Scene
+from validation.references.mitsuba.path import can_judge, path, random_paths
+from validation.references.mitsuba.phong import Glass, PhongMirror
+from validation.references.mitsuba.whitted import whitted
 
 # Mitsuba computes in float32 (rounding 6e-8); a radiance is some tens of operations on numbers near 1.
 FLOAT32 = 1e-5

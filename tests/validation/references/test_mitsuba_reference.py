@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from renderer.camera import primary_rays
-from renderer.mesh import Mesh
-from renderer.scene import Scene
-from renderer.shapes import box, icosphere, torus
-from validation.mitsuba_path import can_judge, path
-from validation.mitsuba_scene import Rays
-from validation.mitsuba_whitted import aovs, whitted
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.scene.camera import primary_rays
+from renderer.scene.scene import Scene
+from validation.references.mitsuba.path import can_judge, path
+from validation.references.mitsuba.scene import Rays
+from validation.references.mitsuba.whitted import aovs, whitted
 
 # Mitsuba computes in float32 (rounding 6e-8); a radiance is some tens of operations on numbers near 1.
 FLOAT32 = 1e-5

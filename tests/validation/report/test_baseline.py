@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from validation import baseline
 from validation.gates import Gate
+from validation.report import baseline
 
 
 def gate(value: float, threshold: float = 1.0, section: str = "hits", bound: Any = "at most") -> dict[str, Any]:

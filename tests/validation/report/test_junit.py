@@ -3,8 +3,8 @@
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from validation import junit
 from validation.gates import Gate
+from validation.report import junit
 
 
 def document(*gates: Gate, left_out: dict[str, str] | None = None) -> ET.Element:
@@ -27,7 +27,8 @@ def test_suites_cases_and_failures() -> None:
     counts = {name: (s.get("tests"), s.get("failures"), s.get("skipped")) for name, s in suites.items()}
     assert counts == {"hits": ("1", "0", "0"), "images": ("2", "2", "0"), "efficiency": ("1", "0", "1")}
     case = suites["images"].find("testcase")
-    assert case is not None and case.get("name") == "glass <b>: ssim" and case.get("classname") == "validation.images"
+    assert case is not None and case.get("name") == "glass <b>: ssim"
+    assert case.get("classname") == "validation.pictures.section"
     failures = [failure for failure in root.iter("failure")]
     assert failures[0].get("message") == "ssim is 0.5, expected at least 0.998"
     assert "structure & edges" in (failures[0].text or "")

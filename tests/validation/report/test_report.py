@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from jinja2 import UndefinedError
 
-from validation import report, schema, summary
 from validation.gates import Gate
+from validation.report import page as report
+from validation.report import schema, summary
 
 
 def png(path: Path, grey: int, width: int = 2, height: int = 1) -> None:

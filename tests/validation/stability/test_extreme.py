@@ -2,7 +2,7 @@
 
 import pytest
 
-from validation.extreme import ExtremeCase, Outcome
+from validation.stability.cases.case import ExtremeCase, Outcome
 
 
 def case(error: Exception | None) -> ExtremeCase:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from renderer import Hits, Mesh, Octree
-from validation import extreme_builds
-from validation.extreme import ExtremeCase
-from validation.extreme_hits import CASES
+from validation.stability.cases import builds as extreme_builds
+from validation.stability.cases.case import ExtremeCase
+from validation.stability.cases.hits import CASES
 
 ROWS = {case.number: case for case in CASES}
 Break = Callable[[Hits], Hits]

@@ -17,19 +17,20 @@ from hypothesis import strategies as st
 
 import renderer
 from renderer import Image, Mesh, Scene, render
-from renderer.camera import PerspectiveCamera
-from renderer.light import DirectionalLight, PointLight
-from renderer.material import Dielectric, Mirror, Phong
-from renderer.scene import SceneObject
-from renderer.shading import reflect, refract
-from renderer.shapes import box, icosphere, torus
-from validation.extreme import ExtremeCase
-from validation.extreme_refraction import critical_angle, nested_radiance, snell_residual, steep_indices
-from validation.extreme_scenes import Vector, ball, eye_at, quad, scene_of
-from validation.extreme_shading import CASES
-from validation.extreme_spawned import missed_planes, self_hits, wrong_pixels
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Dielectric, Mirror, Phong
+from renderer.scene.scene import SceneObject
+from renderer.shade.shading import reflect, refract
+from validation.defects.syntax import find_place, replaced
+from validation.stability.cases.case import ExtremeCase
+from validation.stability.cases.refraction import critical_angle, nested_radiance, snell_residual, steep_indices
+from validation.stability.cases.scenes import Vector, ball, eye_at, quad, scene_of
+from validation.stability.cases.shading import CASES
+from validation.stability.cases.spawned import missed_planes, self_hits, wrong_pixels
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: str(case.number))
@@ -100,14 +101,14 @@ class TestJudgesFindABrokenRefraction:
         assert snell_residual(d, n, t, 1.0, 1.0) == pytest.approx(0.2 * 2.0**53, rel=1e-12)
 
 
-# File, rule, and what it is replaced by; then the rows whose cases must notice.
+# Place, rule, and what it is replaced by; then the rows whose cases must notice.
 FAULTS = [
-    ("whitted.py", "return get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "return 1.0"),
-    ("whitted.py", "return largest > 0.0 and largest >= min_weight", "return largest > 0.02"),
-    ("direct.py", "if dot(n, to_light) <= error:", "if dot(n, to_light) < -1e-3:"),
-    ("sight.py", "m + DIFFUSE), dot(n, towards))", "m + DIFFUSE), abs(dot(n, towards)))"),
-    ("direct.py", "else SHORT_OF_LIGHT", "else 2.0"),
-    ("shading.py", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
+    ("whitted._innermost_ior", "get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
+    ("whitted._goes_on", "largest > 0.0 and largest >= min_weight", "largest > 0.02"),
+    ("direct._aim", "dot(n, to_light) <= error", "dot(n, to_light) < -1e-3"),
+    ("phong", "dot(n, towards)", "abs(dot(n, towards))"),
+    ("direct._aim", "SHORT_OF_LIGHT", "2.0"),
+    ("shading.specular", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
 ]
 NOTICED = [40, 41, 42, 43, 44, 45]
 
@@ -123,12 +124,11 @@ def test_cases_find_faults_in_the_kernels(tmp_path: Path) -> None:
     sound = Path(renderer.__file__).parent
     shutil.copytree(sound, copy, ignore=shutil.ignore_patterns("*.pyc"), copy_function=copy_file)
     for name, rule, broken in FAULTS:
-        text = (copy / name).read_text(encoding="utf-8")
-        assert text.count(rule) == 1, f"{name} does not say {rule!r} once"
-        (copy / name).write_text(text.replace(rule, broken), encoding="utf-8")
+        place = find_place(copy, name)
+        place.path.write_text(replaced(place, rule, broken), encoding="utf-8")
     program = (
         "import json, sys; sys.path[:0] = sys.argv[1:]; import renderer;"
-        "from validation.extreme_shading import CASES;"
+        "from validation.stability.cases.shading import CASES;"
         f"print(json.dumps([renderer.__file__, [c.number for c in CASES if c.number in {NOTICED}"
         " and not c.run(True).holds]]))"
     )

@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from validation import exact, stability
-from validation.compare_hits import HitArrays
+from validation.hits.compare import HitArrays
+from validation.oracle import exact
+from validation.stability import sweeps as stability
 
 EFFORT = stability.Effort(rays=20, leaks=300)
 

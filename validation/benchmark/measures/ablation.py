@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from renderer import Image, Needs, Scene, load_scene, needs_of, render
-from renderer.camera import PerspectiveCamera
-from renderer.light import DirectionalLight
-from renderer.material import Mirror, Phong
-from renderer.parallel import available_threads
-from renderer.prepared_scene import build_octree, kernel_settings_of, tree_for
-from renderer.scene import Floor, SceneObject
-from renderer.shapes import box, icosphere
-from renderer.spawn import BOUNDED
-from renderer.tile import tile_memory
-from renderer.world import pack
+from renderer.mesh.shapes import box, icosphere
+from renderer.picture.pack import pack
+from renderer.picture.prepare import build_octree, kernel_settings_of, tree_for
+from renderer.process.parallel import available_threads
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight
+from renderer.scene.material import Mirror, Phong
+from renderer.scene.scene import Floor, SceneObject
+from renderer.shade.tile import tile_memory
+from renderer.trace.spawn import BOUNDED
 
-SCENES = Path(__file__).parents[2] / "scenes"
+SCENES = Path(__file__).parents[3] / "scenes"
 RUNS = 5
 
 

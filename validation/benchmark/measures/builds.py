@@ -5,10 +5,10 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation.benchmark import ours
-from validation.benchmark.contender import System
+from validation.benchmark.peers import ours
+from validation.benchmark.peers.contender import System
 from validation.tradeoff import RUNS, interleaved, ratio, timed
 
 REFIT = "ours_refit"

@@ -1,4 +1,4 @@
-"""``python -m validation.benchmark.compiling``: where the time of compiling goes, by stage and by kernel.
+"""``python -m validation.benchmark.measures.compiling``: where the time of compiling goes, by stage and by kernel.
 
 Compiles what ``octree-render compile --queries`` or ``--pictures`` does, into an empty folder, with clocks around
 Numba's passes and LLVM. Times are wall seconds of one thread, those of callees not included.
@@ -42,7 +42,7 @@ def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
     """Seconds by stage and by kernel, and in all, of compiling ``what``; for a process that has compiled nothing."""
     from numba.core import compiler_machinery, lowering
 
-    from renderer import compiler
+    from renderer.kernels import compiler
     from renderer.precompile import compile_ahead, compile_into
 
     stages, kernels = _Clocks(), _Clocks()
@@ -81,7 +81,7 @@ def _dearest(seconds: dict[str, float]) -> list[tuple[str, float]]:
 
 def main() -> int:
     """Print the tables."""
-    parser = argparse.ArgumentParser(prog="python -m validation.benchmark.compiling", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m validation.benchmark.measures.compiling", description=__doc__)
     parser.add_argument("what", nargs="?", choices=("queries", "pictures"), default="queries")
     parser.add_argument("--kernels", type=int, default=15, metavar="N", help="how many of the dearest kernels")
     options = parser.parse_args()

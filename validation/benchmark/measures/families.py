@@ -3,8 +3,8 @@
 import numpy as np
 
 from renderer.octree import Octree
-from validation.benchmark.contender import Family, Floats
-from validation.rays import camera_rays, float32_exact, random_rays
+from validation.benchmark.peers.contender import Family, Floats
+from validation.hits.rays import camera_rays, float32_exact, random_rays
 
 _SEED = 11
 # Spawned rays start off their surface by this share of the mesh's size: a thousand times float32's rounding, so that

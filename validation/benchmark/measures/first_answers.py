@@ -15,12 +15,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from renderer import child
-from renderer.levels import AHEAD_VARIABLE
-from validation.cases import SCENES
+from renderer.kernels.levels import AHEAD_VARIABLE
+from renderer.process import child
+from validation.scenes import SCENES
 
 _RUNS = 3
-_HERE = "validation.benchmark.first_answers"
+_HERE = "validation.benchmark.measures.first_answers"
 # float32 does not hold thirds, and does hold these vertices as they are.
 _FLOAT64, _FLOAT32 = "0.3333333333333333", "1.0"
 # Calls of one ray or few whose time is taken together: some milliseconds.
@@ -95,7 +95,7 @@ def _spend(command: list[str], **more: str) -> Spent:
 
 def _kernels_ahead(folder: Path) -> tuple[str, Path]:
     """The best level that this machine runs but the last, and a folder of all kernels compiled for it."""
-    from renderer.kernel_store import runnable_levels
+    from renderer.kernels.store import runnable_levels
 
     levels = runnable_levels()
     # x86-64-v3 is what most machines of today have; where there is only one, that.
@@ -111,7 +111,7 @@ def first_hit(size: str) -> None:
     import numpy as np
 
     from renderer import Octree
-    from renderer.shapes import icosphere
+    from renderer.mesh.shapes import icosphere
 
     ball = icosphere(3)
     octree = Octree(ball.vertices.astype(np.float32).astype(np.float64) * float(size), ball.faces)
@@ -146,8 +146,8 @@ def trace() -> None:
     import numpy as np
 
     from renderer import Octree
-    from validation.benchmark.families import families
-    from validation.benchmark.meshes import displaced_spheres
+    from validation.benchmark.measures.families import families
+    from validation.benchmark.measures.meshes import displaced_spheres
 
     octree, digest, found = Octree.from_mesh(displaced_spheres(100_000)), hashlib.sha256(), {}
     for family in families(octree, 200_000):
@@ -166,10 +166,10 @@ def _calls(installed: set[str]) -> dict[str, list[float]]:
     """Microseconds of a call with few rays, in our arrays and in the peers' own; all take turns."""
     import numpy as np
 
-    from renderer.shapes import icosphere
-    from validation.benchmark import ours
-    from validation.benchmark.contender import Family
-    from validation.benchmark.systems import available
+    from renderer.mesh.shapes import icosphere
+    from validation.benchmark.peers import ours
+    from validation.benchmark.peers.contender import Family
+    from validation.benchmark.peers.systems import available
 
     mesh = icosphere(5)
     found: dict[str, list[float]] = {}

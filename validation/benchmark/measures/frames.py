@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.render import render
-from renderer.scene import Scene, load_scene
-from validation.cases import SCENES
+from renderer.picture.render import render
+from renderer.scene.scene import Scene, load_scene
+from validation.scenes import SCENES
 from validation.tradeoff import RUNS, interleaved, ratio, timed
 
 OURS, OURS_BUILT, LISTS = "ours", "ours_with_build", "mitsuba_llvm_lists"
@@ -59,9 +59,9 @@ def _render(scene: Scene, size: int) -> Any:
 def _add_mitsuba(
     scene: Scene, size: int, llvm: bool, calls: dict[str, Any], counts: dict[str, Any], pictures: dict[str, Any]
 ) -> None:
-    from validation import mitsuba_scene as source
-    from validation import mitsuba_whitted
-    from validation.benchmark.mitsuba_native import drawing
+    from validation.benchmark.peers.mitsuba_native import drawing
+    from validation.references.mitsuba import scene as source
+    from validation.references.mitsuba import whitted as mitsuba_whitted
 
     rays = source.camera_rays(scene, size, size, 1)[0]
 
@@ -74,7 +74,7 @@ def _add_mitsuba(
         return marks[-1] - marks[0]
 
     if llvm:
-        from validation.benchmark.mitsuba_lists import RayLists
+        from validation.benchmark.peers.mitsuba_lists import RayLists
 
         lists = RayLists(scene, rays, _DEPTH)
         counts[LISTS] = {}
@@ -87,7 +87,7 @@ def _add_mitsuba(
 
 
 def _difference(ours: NDArray[Any], theirs: NDArray[Any]) -> dict[str, float]:
-    from validation.compare_images import compare
+    from validation.pictures.compare import compare
 
     compared = compare(ours, np.asarray(theirs, np.float64))
     return {"ssim": compared.ssim, "mean_error": compared.mean_error, "pixel_share": compared.pixel_share}

@@ -1,4 +1,6 @@
-"""Memory of a built system, measured in a process of its own: ``python -m validation.benchmark.memory NAME FOLDER``.
+"""Memory of a built system, measured in a process of its own.
+
+Its command is ``python -m validation.benchmark.measures.memory NAME FOLDER``.
 
 The process reads the mesh (``vertices.npy``, ``faces.npy``), imports the system, builds a small mesh once so that
 libraries and compiled kernels are there, and brings the mesh into the system's own arrays. From then on everything by
@@ -18,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from renderer import child
-from renderer.mesh import Mesh
-from validation.benchmark import ours
-from validation.benchmark.contender import System
-from validation.benchmark.meshes import displaced_spheres
-from validation.benchmark.systems import available
+from renderer.mesh.mesh import Mesh
+from renderer.process import child
+from validation.benchmark.measures.meshes import displaced_spheres
+from validation.benchmark.peers import ours
+from validation.benchmark.peers.contender import System
+from validation.benchmark.peers.systems import available
 
 _STATUS = Path("/proc/self/status")
 
@@ -39,7 +41,7 @@ def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) 
         for system in systems:
             if system.times_build and system.takes(len(mesh.faces)):
                 step(f"{mesh.name}: memory of {system.label}")
-                command = child.command("validation.benchmark.memory:answer", system.name, folder)
+                command = child.command("validation.benchmark.measures.memory:answer", system.name, folder)
                 answer = subprocess.run(command, env=child.environment(), capture_output=True, text=True, check=True)
                 found[system.name] = json.loads(answer.stdout.splitlines()[-1])
     return {"mesh": mesh.name, "faces": len(mesh.faces), "systems": found}

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from renderer.mesh import Mesh
-from renderer.mesh_io import load_mesh
-from renderer.shapes import lattice_faces
-from validation.benchmark.contender import Floats
-from validation.rays import float32_exact
+from renderer.mesh.load import load_mesh
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import lattice_faces
+from validation.benchmark.peers.contender import Floats
+from validation.hits.rays import float32_exact
 
 QUICK = (1_000, 10_000, 100_000)
 FULL = (*QUICK, 1_000_000, 5_000_000)

@@ -7,8 +7,8 @@ import tempfile
 from collections.abc import Callable
 from typing import Any
 
-from renderer import child
-from validation.cases import SCENES
+from renderer.process import child
+from validation.scenes import SCENES
 from validation.tradeoff import interleaved, timed
 
 _RUNS = 3

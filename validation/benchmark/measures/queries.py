@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from renderer.mesh import Mesh
-from validation.benchmark.contender import Family, Peer, Query, System
-from validation.benchmark.families import families
-from validation.benchmark.fit import log_fit
-from validation.benchmark.ours import OURS, OURS_ONE, Ours
+from renderer.mesh.mesh import Mesh
+from validation.benchmark.measures.families import families
+from validation.benchmark.measures.fit import log_fit
+from validation.benchmark.peers.contender import Family, Peer, Query, System
+from validation.benchmark.peers.ours import OURS, OURS_ONE, Ours
 from validation.tradeoff import RUNS, interleaved, ratio, timed
 
 KINDS = ("closest", "any")

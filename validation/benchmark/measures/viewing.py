@@ -1,6 +1,6 @@
 """Milliseconds from a view to its pictures in the viewer, over a real socket.
 
-    python -m validation.benchmark.viewing [SCENE] [--views N]
+    python -m validation.benchmark.measures.viewing [SCENE] [--views N]
 
 Medians over views along a turn, each acknowledged as the page does. What a browser needs to draw is not in them.
 """
@@ -19,9 +19,9 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 import renderer
-from renderer.camera import PerspectiveCamera
+from renderer.scene.camera import PerspectiveCamera
 from renderer.viewer.protocol import HEADER
-from validation.cases import SCENES
+from validation.scenes import SCENES
 
 _SIZE = 512
 # A turn in so many steps; each shows other parts of the scene.

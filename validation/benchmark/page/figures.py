@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from validation.benchmark.fit import Fit
-from validation.benchmark.ours import OURS
-from validation.plots import Panel, Series, draw
+from validation.benchmark.measures.fit import Fit
+from validation.benchmark.peers.ours import OURS
+from validation.report.plots import Panel, Series, draw
 
 Record = Mapping[str, Any]
-# The look of ``validation.plots`` without markers; there are seven contenders before it.
+# The look of ``validation.report.plots`` without markers; there are seven contenders before it.
 _FIT_LOOK = 7
 # The memory of smaller meshes is a few pages of 4 kB, or none where the allocator had some left.
 _FEWEST_FACES = 5_000

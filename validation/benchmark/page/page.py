@@ -6,13 +6,13 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation.benchmark import figures, pareto
-from validation.benchmark.ours import OURS
-from validation.report import number
+from validation.benchmark.page import figures, pareto
+from validation.benchmark.peers.ours import OURS
+from validation.report.page import number
 
 # Half a processor taken by others moves a two-thread contender by a quarter, more than most ratios here differ from 1.
 BUSY = 0.5
-_TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
+_TEMPLATES = Path(__file__).resolve().parents[2] / "report" / "templates"
 
 
 def html(record: Mapping[str, Any]) -> str:

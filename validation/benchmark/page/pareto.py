@@ -1,9 +1,9 @@
-"""Figures of error against run time, drawn from the record of ``validation.benchmark.knobs.run`` alone."""
+"""Figures of error against run time, drawn from the record of ``validation.benchmark.parameters.study.run`` alone."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from validation.plots import Panel, Series, draw
+from validation.report.plots import Panel, Series, draw
 
 _NAMES = {
     "float64": "ours, float64",

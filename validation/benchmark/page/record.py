@@ -31,9 +31,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from renderer.files import write_atomically
+from renderer.process.files import write_atomically
 from validation import environment
-from validation.benchmark.contender import System
+from validation.benchmark.peers.contender import System
 
 SCHEMA = 2
 KEYS = (

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from validation.benchmark import frames, processes
-from validation.benchmark.ours import OURS
+from validation.benchmark.measures import frames, processes
+from validation.benchmark.peers.ours import OURS
 
 # The meshes on which rays and builds are judged: smaller ones fit into the caches and time the loop around them.
 FEWEST_FACES, MOST_FACES = 70_000, 5_000_000

@@ -14,14 +14,14 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.query import Hits
-from validation import exact
-from validation.embree import Embree
-from validation.rays import RayBatch, camera_rays, float32_exact, random_rays
+from renderer.trace.query import Hits
+from validation.efficiency.hits import answer, errors, turned_mesh
+from validation.hits.rays import RayBatch, camera_rays, float32_exact, random_rays
+from validation.oracle import exact
+from validation.references.embree import Embree
 from validation.tradeoff import front, median_seconds, timed
-from validation.tradeoff_hits import answer, errors, turned_mesh
 
 SEED = 20
 SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
@@ -61,7 +61,7 @@ class Contender(NamedTuple):
 
 
 def run(effort: Effort, step: Callable[[str], None]) -> dict[str, object]:
-    """Measure; see ``validation.benchmark.knobs`` for the record."""
+    """Measure; see ``validation.benchmark.parameters.study`` for the record."""
     mesh = turned_mesh(effort.level)
     batches = (
         camera_rays(mesh.vertices, effort.rays),

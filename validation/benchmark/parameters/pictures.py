@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from renderer.image import Image
-from renderer.render import render
-from renderer.scene import Scene, load_scene
-from validation.cases import Case
+from renderer.picture.image import Image
+from renderer.picture.render import render
+from renderer.scene.scene import Scene, load_scene
+from validation.scenes import Case
 from validation.tradeoff import front, median_seconds, slope
 
 Settings = dict[str, Any]
@@ -44,7 +44,7 @@ class Effort:
 
 
 def run(effort: Effort, step: Callable[[str], None]) -> dict[str, object]:
-    """Measure; see ``validation.benchmark.knobs`` for the record."""
+    """Measure; see ``validation.benchmark.parameters.study`` for the record."""
     scenes = []
     for case in effort.cases:
         step(f"knobs: pictures of {case.name}")

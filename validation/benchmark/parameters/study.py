@@ -30,8 +30,9 @@ The record, ready for JSON; ``front`` always lists the names of points that no o
 
 from collections.abc import Callable
 
-from validation.benchmark import knobs_hits, knobs_pictures
-from validation.cases import CASES
+from validation.benchmark.parameters import hits as knobs_hits
+from validation.benchmark.parameters import pictures as knobs_pictures
+from validation.scenes import CASES
 
 
 def run(quick: bool, step: Callable[[str], None]) -> dict[str, object]:

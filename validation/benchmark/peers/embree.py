@@ -1,6 +1,7 @@
 """Embree through ``embreex``, as a contender. It traces on one thread: the wrapper's loop allows no more.
 
-``validation.embree`` judges hits and converts on every call; here rays and answers stay in embreex's float32 arrays.
+``validation.references.embree`` judges hits and converts on every call; here rays and answers stay in embreex's
+float32 arrays.
 """
 
 from typing import Any
@@ -10,7 +11,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from validation.benchmark.contender import Faces, Family, Floats, Query, System
+from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
 
 # Embree's answer in t where nothing is hit is what went in; the face tells hits from misses.
 _NO_FACE = -1

@@ -11,9 +11,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from renderer.parallel import available_threads
-from validation.benchmark.contender import Faces, Family, Floats, Query, System
-from validation.benchmark.mitsuba_variant import LLVM, SCALAR, libllvm_path, using
+from renderer.process.parallel import available_threads
+from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
+from validation.benchmark.peers.mitsuba_variant import LLVM, SCALAR, libllvm_path, using
 
 
 class ScalarPeer:

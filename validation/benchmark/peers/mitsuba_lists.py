@@ -14,11 +14,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.light import PointLight
-from renderer.material import Dielectric, Mirror
-from renderer.scene import Scene
-from validation import mitsuba_scene as source
-from validation.benchmark.mitsuba_variant import LLVM, using
+from renderer.scene.light import PointLight
+from renderer.scene.material import Dielectric, Mirror
+from renderer.scene.scene import Scene
+from validation.benchmark.peers.mitsuba_variant import LLVM, using
+from validation.references.mitsuba import scene as source
 
 _DIFFUSE, _MIRROR, _GLASS = 0, 1, 2
 # Kept from the variant, so that none need be chosen while a clock runs.

@@ -11,11 +11,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from renderer.camera import PerspectiveCamera
-from renderer.material import Dielectric, Material, Mirror
-from renderer.scene import Scene
-from validation import mitsuba_scene as source
-from validation.benchmark.mitsuba_variant import using
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.material import Dielectric, Material, Mirror
+from renderer.scene.scene import Scene
+from validation.benchmark.peers.mitsuba_variant import using
+from validation.references.mitsuba import scene as source
 
 
 def drawing(scene: Scene, variant: str, integrator: str, size: int, max_depth: int) -> Callable[[], None]:

@@ -7,8 +7,8 @@ from functools import cache
 
 import mitsuba as mi
 
-import validation.mitsuba_scene  # noqa: F401  # selects scalar_rgb, which the rest of the suite expects
-from validation.benchmark import libllvm
+import validation.references.mitsuba.scene  # noqa: F401  # selects scalar_rgb, which the rest of the suite expects
+from validation.benchmark.peers import libllvm
 
 SCALAR, LLVM = "scalar_rgb", "llvm_ad_rgb"
 

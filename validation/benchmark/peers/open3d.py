@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import open3d as o3d
 
-from renderer.parallel import available_threads
-from validation.benchmark.contender import Faces, Family, Floats, Query, System
+from renderer.process.parallel import available_threads
+from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
 
 
 class Open3DPeer:

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from renderer.build import SPLITS
-from renderer.mesh import Mesh
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.parallel import available_threads
-from validation.benchmark.contender import Faces, Family, Floats, Query, System
+from renderer.process.parallel import available_threads
+from renderer.tree.build import SPLITS
+from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
 
 OURS, OURS_ONE = "ours", "ours_one_thread"
 

@@ -2,13 +2,13 @@
 
 from importlib import import_module
 
-from validation.benchmark import libllvm, ours
-from validation.benchmark.contender import System
+from validation.benchmark.peers import libllvm, ours
+from validation.benchmark.peers.contender import System
 
 _PEERS = {
     "embree": "pip install embreex",
     "open3d": "pip install open3d",
-    "trimesh": "pip install trimesh rtree",
+    "trimesh_rays": "pip install trimesh rtree",
     "mitsuba": "pip install mitsuba",
 }
 
@@ -18,7 +18,7 @@ def available() -> tuple[list[System], dict[str, str]]:
     found, missing = ours.systems(), {}
     for name, how in _PEERS.items():
         try:
-            found += import_module(f"validation.benchmark.peer_{name}").systems()
+            found += import_module(f"validation.benchmark.peers.{name}").systems()
         except ImportError:
             missing[name] = how
     if not any(system.name == "mitsuba_llvm" for system in found):

@@ -7,7 +7,7 @@ import rtree  # noqa: F401  # trimesh imports it late; its absence must show her
 import trimesh
 from trimesh.ray import ray_triangle
 
-from validation.benchmark.contender import Faces, Family, Floats, Query, System
+from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
 
 
 class TrimeshPeer:

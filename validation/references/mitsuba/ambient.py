@@ -8,9 +8,9 @@ of its normal and our ambient light has two, so a second pass turns the meshes o
 import mitsuba as mi
 import numpy as np
 
-from renderer.material import Phong
-from renderer.scene import Scene
-from validation import mitsuba_scene as source
+from renderer.scene.material import Phong
+from renderer.scene.scene import Scene
+from validation.references.mitsuba import scene as source
 
 
 def has_glow(scene: Scene) -> bool:

@@ -8,8 +8,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-import validation.mitsuba_scene  # noqa: F401  # selects the variant
-from renderer.camera import OrthographicCamera, PerspectiveCamera, primary_rays
+import validation.references.mitsuba.scene  # noqa: F401  # selects the variant
+from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, primary_rays
 
 Camera = PerspectiveCamera | OrthographicCamera
 Vector = NDArray[np.float64]

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import validation.mitsuba_scene as source  # selects the variant
+import validation.references.mitsuba.scene as source  # selects the variant
 
 
 def version() -> str:

@@ -10,7 +10,7 @@ the global illumination of the path integrator into Whitted's:
 4. Russian roulette is off, and the paths are as long as our rays: D bounces, and one more edge to the light.
 
 Without glass nothing is random. With it each path takes one branch, drawn by Fresnel's share, and the mean over many
-paths tends to the Whitted picture: ``random_paths``, which ``validation.monte_carlo`` judges.
+paths tends to the Whitted picture: ``random_paths``, which ``validation.pictures.monte_carlo`` judges.
 """
 
 from itertools import chain
@@ -20,10 +20,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.material import Dielectric
-from renderer.scene import Scene
-from validation import mitsuba_ambient, mitsuba_phong
-from validation import mitsuba_scene as source
+from renderer.scene.material import Dielectric
+from renderer.scene.scene import Scene
+from validation.references.mitsuba import ambient as mitsuba_ambient
+from validation.references.mitsuba import phong as mitsuba_phong
+from validation.references.mitsuba import scene as source
 
 # As reports show it.
 NAME = "Mitsuba's native path integrator (scalar_rgb)"

@@ -10,8 +10,8 @@ from math import pi
 
 import mitsuba as mi
 
-import validation.mitsuba_scene as source  # selects the variant before a class below derives from it
-from renderer.material import Dielectric, Material, Mirror, Phong
+import validation.references.mitsuba.scene as source  # selects the variant before a class below derives from it
+from renderer.scene.material import Dielectric, Material, Mirror, Phong
 
 _BOTH_SIDES = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
 _LIT = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.GlossyReflection | _BOTH_SIDES

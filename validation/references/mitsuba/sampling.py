@@ -12,11 +12,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.camera import PerspectiveCamera
-from renderer.material import Mirror, Phong
-from renderer.scene import Scene
-from validation import mitsuba_scene as source
-from validation.mitsuba_path import SHADOWLESS
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.material import Mirror, Phong
+from renderer.scene.scene import Scene
+from validation.references.mitsuba import scene as source
+from validation.references.mitsuba.path import SHADOWLESS
 
 # Interreflection is then this share of direct light: below float32's resolution of a picture, 6e-8 of each radiance
 # times some ten; and 1e-6 times a radiance is far from float32's smallest number.

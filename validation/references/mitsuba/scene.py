@@ -15,9 +15,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.camera import primary_rays, sample_offsets
-from renderer.light import DirectionalLight, Light
-from renderer.scene import Instance, Scene
+from renderer.scene.camera import primary_rays, sample_offsets
+from renderer.scene.light import DirectionalLight, Light
+from renderer.scene.scene import Instance, Scene
 
 mi.set_variant("scalar_rgb")
 

@@ -14,9 +14,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.material import Dielectric, Material, Mirror, Phong
-from renderer.scene import Scene
-from validation import mitsuba_scene as source
+from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.scene.scene import Scene
+from validation.references.mitsuba import scene as source
 
 # Delta lobes and delta emitters do not depend on the random numbers that they are sampled with.
 _ANY_NUMBER, _ANY_POINT = 0.5, mi.Point2f(0.5, 0.5)

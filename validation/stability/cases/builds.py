@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer import BruteForce, Hits, Mesh, Octree, load_mesh
-from renderer.shapes import grid, icosphere, torus
-from validation.cases import SCENES
-from validation.compare_hits import RTOL, RTOL_GRAZING, HitArrays
-from validation.embree import Embree
-from validation.extreme import ExtremeCase, Outcome
-from validation.extreme_judgement import (
+from renderer.mesh.shapes import grid, icosphere, torus
+from validation.hits.compare import RTOL, RTOL_GRAZING, HitArrays
+from validation.hits.rays import RayBatch, float32_exact
+from validation.references.embree import Embree
+from validation.scenes import SCENES
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.judgement import (
     SEED,
     Accelerator,
     against_brute_force,
@@ -31,7 +32,6 @@ from validation.extreme_judgement import (
     same_bits,
     unit_rows,
 )
-from validation.rays import RayBatch, float32_exact
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -1,7 +1,10 @@
 """Rows 1 to 32 and 46 of the extreme cases: everything about hits."""
 
-from validation import extreme_builds, extreme_order, extreme_precision, extreme_rays
-from validation.extreme import ExtremeCase
+from validation.stability.cases import builds as extreme_builds
+from validation.stability.cases import order as extreme_order
+from validation.stability.cases import precision as extreme_precision
+from validation.stability.cases import rays as extreme_rays
+from validation.stability.cases.case import ExtremeCase
 
 CASES: tuple[ExtremeCase, ...] = (
     *extreme_rays.CASES,

@@ -8,10 +8,11 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
 from renderer import BruteForce, Hits, Mesh, Octree
-from validation import compare_hits, exact
-from validation.compare_hits import ExactErrors, HitArrays
-from validation.embree import Embree
-from validation.rays import RayBatch, float32_exact
+from validation.hits import compare as compare_hits
+from validation.hits.compare import ExactErrors, HitArrays
+from validation.hits.rays import RayBatch, float32_exact
+from validation.oracle import exact
+from validation.references.embree import Embree
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

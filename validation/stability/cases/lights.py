@@ -5,11 +5,12 @@ import math
 import numpy as np
 
 from renderer import Mesh, Octree, Scene
-from renderer.light import DirectionalLight, Light, PointLight
-from renderer.material import Phong
-from renderer.shading import specular
-from validation.extreme import ExtremeCase, Outcome
-from validation.extreme_scenes import (
+from renderer.scene.light import DirectionalLight, Light, PointLight
+from renderer.scene.material import Phong
+from renderer.shade.shading import specular
+from validation.references.mitsuba.whitted import whitted
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.scenes import (
     REL,
     STORED,
     WHITE,
@@ -24,7 +25,6 @@ from validation.extreme_scenes import (
     unit,
     vector,
 )
-from validation.mitsuba_whitted import whitted
 
 
 def _facing_mirrors(k_r: float) -> Scene:

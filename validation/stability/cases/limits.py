@@ -6,9 +6,9 @@ import numpy as np
 
 from renderer import CutWarning, Mesh, OrthographicCamera, PerspectiveCamera, Phong, SceneError, render
 from renderer.limits import FARTHEST
-from renderer.shapes import icosphere
-from validation.extreme import ExtremeCase, Outcome
-from validation.extreme_scenes import close, eye_at, quad, scene_of
+from renderer.mesh.shapes import icosphere
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.scenes import close, eye_at, quad, scene_of
 
 _DEPTH, _BUDGET = 16, 5000
 

@@ -5,9 +5,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from renderer import BruteForce, Hits, Mesh, Octree
-from validation.compare_hits import HitArrays
-from validation.extreme import ExtremeCase, Outcome
-from validation.extreme_judgement import (
+from validation.hits.compare import HitArrays
+from validation.hits.rays import RayBatch, float32_exact
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.judgement import (
     SEED,
     against_exact,
     as_exact,
@@ -17,7 +18,6 @@ from validation.extreme_judgement import (
     ray_batch,
     same_bits,
 )
-from validation.rays import RayBatch, float32_exact
 
 # Exact arithmetic takes 20 ms a ray with 2,000 faces that all overlap.
 JUDGED = 64

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import BruteForce, Hits, Mesh, Octree
-from renderer.shapes import icosphere
-from validation import exact
-from validation.exact import FLOAT64_ROUNDOFF
-from validation.extreme import ExtremeCase, Outcome
-from validation.extreme_judgement import (
+from renderer.mesh.shapes import icosphere
+from validation.hits.rays import float32_exact
+from validation.oracle import exact
+from validation.oracle.exact import FLOAT64_ROUNDOFF
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.judgement import (
     FIRST_FACE,
     SEED,
     against_exact,
@@ -27,7 +28,6 @@ from validation.extreme_judgement import (
     ulp_errors,
     unit_rows,
 )
-from validation.rays import float32_exact
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

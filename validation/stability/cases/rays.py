@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Mesh, Octree
-from renderer.shapes import box, grid, icosphere, lattice_faces
-from validation.exact import FLOAT64_ROUNDOFF
-from validation.extreme import ExtremeCase, Outcome
-from validation.extreme_judgement import (
+from renderer.mesh.shapes import box, grid, icosphere, lattice_faces
+from validation.hits.rays import RayBatch, float32_exact, leak_rays
+from validation.oracle.exact import FLOAT64_ROUNDOFF
+from validation.oracle.rounding import RayView
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.judgement import (
     FIRST_FACE,
     SEED,
     against_exact,
@@ -26,8 +28,6 @@ from validation.extreme_judgement import (
     ray_batch,
     same_bits,
 )
-from validation.rays import RayBatch, float32_exact, leak_rays
-from validation.rounding import RayView
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Mesh, Scene, render
-from renderer.material import Dielectric, Material, Phong
-from renderer.scene import Floor
-from renderer.shading import refract
-from renderer.shapes import box, icosphere, torus
-from validation.extreme import ExtremeCase, Outcome
-from validation.extreme_scenes import (
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.scene.material import Dielectric, Material, Phong
+from renderer.scene.scene import Floor
+from renderer.shade.shading import refract
+from validation.references.mitsuba.whitted import whitted
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.scenes import (
     GLOWS,
     REL,
     STORED,
@@ -33,7 +34,6 @@ from validation.extreme_scenes import (
     unit,
     vector,
 )
-from validation.mitsuba_whitted import whitted
 
 # Cosine of the refracted angle (negative: total internal reflection) and its direction, as ``shading.refract``.
 Refract = Callable[[Vector, Vector, float, float], tuple[float, Vector]]

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Image, Mesh, Scene, render
-from renderer.camera import Camera, PerspectiveCamera
-from renderer.material import Material, Mirror, Phong
-from renderer.scene import UNLIMITED_RAYS, SceneObject
-from renderer.shapes import icosphere
+from renderer.mesh.shapes import icosphere
+from renderer.scene.camera import Camera, PerspectiveCamera
+from renderer.scene.material import Material, Mirror, Phong
+from renderer.scene.scene import UNLIMITED_RAYS, SceneObject
 
 Vector = tuple[float, float, float]
 

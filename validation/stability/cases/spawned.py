@@ -8,14 +8,26 @@ from typing import Literal
 import numpy as np
 
 from renderer import Mesh, Octree, Scene, render
-from renderer.light import DirectionalLight
-from renderer.material import Phong
-from renderer.shading import reflect, refract
-from renderer.shapes import icosphere
-from renderer.spawn import BOUNDED, offset_distance, spawn_origin
-from validation.extreme import ExtremeCase, Outcome
-from validation.extreme_scenes import GLOWS, MIRROR, WHITE, Vector, ball, eye_at, level, pixel, scene_of, unit, vector
-from validation.mitsuba_whitted import whitted
+from renderer.mesh.shapes import icosphere
+from renderer.scene.light import DirectionalLight
+from renderer.scene.material import Phong
+from renderer.shade.shading import reflect, refract
+from renderer.trace.spawn import BOUNDED, offset_distance, spawn_origin
+from validation.references.mitsuba.whitted import whitted
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.scenes import (
+    GLOWS,
+    MIRROR,
+    WHITE,
+    Vector,
+    ball,
+    eye_at,
+    level,
+    pixel,
+    scene_of,
+    unit,
+    vector,
+)
 
 # The offset rule as ``render`` takes it.
 Rule = Literal["bounded", "mitsuba"] | float

@@ -1,0 +1,1 @@
+"""Triangle meshes, the shapes that come with the package, and the files that meshes are read from."""

@@ -1,0 +1,1 @@
+"""Pictures: a scene packed for the kernels, its tiles rendered, the image and its files."""

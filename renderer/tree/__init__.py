@@ -1,0 +1,1 @@
+"""Trees: how they are built, checked and refitted."""

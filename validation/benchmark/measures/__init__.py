@@ -1,0 +1,1 @@
+"""What is measured: builds, queries, frames, memory, whole processes."""

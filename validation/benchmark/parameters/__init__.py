@@ -1,0 +1,1 @@
+"""How speed and error depend on the parameters."""

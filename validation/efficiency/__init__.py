@@ -1,0 +1,1 @@
+"""The section that measures error against run time."""

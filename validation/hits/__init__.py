@@ -1,0 +1,1 @@
+"""The section that checks hits: rays, comparison, verdicts, leaks."""

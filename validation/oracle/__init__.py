@@ -1,0 +1,1 @@
+"""Exact arithmetic, which shares no code with what it judges."""

@@ -1,0 +1,1 @@
+"""Adapters of the references: each answers our questions by another system."""

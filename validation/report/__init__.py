@@ -1,0 +1,1 @@
+"""The report: its page, plots, schema, summary and baseline."""

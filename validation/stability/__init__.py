@@ -1,0 +1,1 @@
+"""The section that checks numerical stability: sweeps and extreme cases."""

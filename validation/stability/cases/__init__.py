@@ -1,0 +1,1 @@
+"""Extreme cases: one file a group of them, with their judges and scenes."""
