@@ -149,9 +149,9 @@ def _goes_on(weight: Vector, min_weight: float) -> bool:
 
 
 @kernel
-def surface_of(world: World, face: int, u: float, v: float) -> Surface:
+def surface_of(world: World, face: int, u: float, v: float, d: Vector) -> Surface:
     """``surface_at``, for Python."""
-    return surface_at(look_at(world), face, u, v)
+    return surface_at(look_at(world), face, u, v, d)
 
 
 def _meet(stage: PreparedScene, ray: _Ray) -> _Met | None:
@@ -160,7 +160,7 @@ def _meet(stage: PreparedScene, ray: _Ray) -> _Met | None:
     if not hits.hit[0]:
         return None
     face = int(hits.face[0])
-    surface = surface_of(stage.world, face, float(hits.u[0]), float(hits.v[0]))
+    surface = surface_of(stage.world, face, float(hits.u[0]), float(hits.v[0]), ray.direction)
     inside = dot(ray.direction, surface.n_s) > 0.0
     n, row = scale(surface.n_s, -1.0) if inside else surface.n_s, int(surface.material)
     return _Met(face, surface, n, inside, row, stage.world.materials[row // MATERIAL_COLUMNS])

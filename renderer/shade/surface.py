@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined
 from renderer.kernels.simd import get, pointer
-from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_component, normalized, row3, scale, sub, three
+from renderer.kernels.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
 from renderer.shade.shading import specular
-from renderer.trace.spawn import offset_distance
+from renderer.trace.spawn import normal_of, offset_distance
 
 # Media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8
@@ -85,11 +85,11 @@ class Surface(NamedTuple):
 
 
 @inlined
-def surface_at(world, face, u, v):
-    """The ``Surface`` at barycentrics u, v of a face."""
+def surface_at(world, face, u, v, d):
+    """The ``Surface`` at barycentrics u, v of a face that a ray of direction d met."""
     a, b, c = row3(world.faces, face)
     p0, p1, p2 = row3(world.vertices, a), row3(world.vertices, b), row3(world.vertices, c)
-    n_g = normalized(cross(sub(p1, p0), sub(p2, p0)))
+    n_g = normal_of(p0, p1, p2, d)
     p = barycentric(p0, p1, p2, u, v)
     n_s = n_g
     if world.has_smooth and get(world.smooth, face):

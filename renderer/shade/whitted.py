@@ -165,9 +165,10 @@ def _innermost_ior(world, media, count):
 def _meet_surface(world, bundle, work, i):
     """Note the surface that ray ``i`` met, and its ambient light."""
     found, surface = work.found, at(work.surfaces, i * SURFACE_DOUBLES)
-    met = surface_at(world, get(found.face, i), get(found.u, i), get(found.v, i))
+    d = row3(bundle.directions, i)
+    met = surface_at(world, get(found.face, i), get(found.u, i), get(found.v, i), d)
     # The shading normal faces the eye; a surface without light from behind has two sides.
-    inside = dot(row3(bundle.directions, i), met.n_s) > 0.0
+    inside = dot(d, met.n_s) > 0.0
     put3(surface, POINT, met.p)
     put3(surface, NORMAL, scale(met.n_s, -1.0) if inside else met.n_s)
     put3(surface, GEOMETRIC, met.n_g)

@@ -9,6 +9,7 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import get, larger, load4, load8, magnitude, movemask, select, smaller, splat4, splat8
+from renderer.kernels.vec3 import cross, dot, largest_component, scale, sub
 from renderer.trace.layout import NODE_WORDS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
@@ -25,6 +26,9 @@ _TINY = np.float32(2.0**-149)
 # of every box around its face, and a hit in doubt is moved there by ``settled``: the answer is the least t over all
 # faces, whatever the tree, the packet or the order.
 _DOUBT = 2.0**-27
+# Of a face thinner than this share of its longest side every determinant is in doubt: A is at least the side as the ray
+# sees it, and D at least half the side.
+_THIN = 2.0**-30
 ROOM = 2.0**-21
 
 
@@ -181,27 +185,30 @@ class Shear(NamedTuple):
 @inlined
 def make_shear(ray):
     """Turn the axes so that z is the largest component of the direction, then shear the direction onto it."""
-    ax, ay, az = abs(ray.dx), abs(ray.dy), abs(ray.dz)
-    on_z = az >= ax and az >= ay
-    on_y = not on_z and ay >= ax
-    dx = _turned(on_z, on_y, ray.dy, ray.dz, ray.dx)
-    dy = _turned(on_z, on_y, ray.dz, ray.dx, ray.dy)
-    dz = _turned(on_z, on_y, ray.dx, ray.dy, ray.dz)
-    return Shear(
-        _turned(on_z, on_y, 4, 8, 0),
-        _turned(on_z, on_y, 8, 0, 4),
-        _turned(on_z, on_y, 0, 4, 8),
-        _turned(on_z, on_y, ray.oy, ray.oz, ray.ox),
-        _turned(on_z, on_y, ray.oz, ray.ox, ray.oy),
-        _turned(on_z, on_y, ray.ox, ray.oy, ray.oz),
-        dx / dz,
-        dy / dz,
-        dz,
-    )
+    axis = _longest_axis(ray)
+    row_x, row_y, row_z = _turned(axis, 0, 4, 8)
+    ox, oy, oz = _turned(axis, ray.ox, ray.oy, ray.oz)
+    dx, dy, dz = _turned(axis, ray.dx, ray.dy, ray.dz)
+    return Shear(row_x, row_y, row_z, ox, oy, oz, dx / dz, dy / dz, dz)
 
 
 @inlined
-def _turned(on_z, on_y, if_x, if_y, if_z):
+def _longest_axis(ray):
+    """Whether the largest component of the direction is z, and else whether it is y."""
+    ax, ay, az = abs(ray.dx), abs(ray.dy), abs(ray.dz)
+    on_z = az >= ax and az >= ay
+    return on_z, not on_z and ay >= ax
+
+
+@inlined
+def _turned(axis, x, y, z):
+    """Three values in the order of the ray's axes, the one of ``_longest_axis`` last."""
+    on_z, on_y = axis
+    return _chosen(on_z, on_y, y, z, x), _chosen(on_z, on_y, z, x, y), _chosen(on_z, on_y, x, y, z)
+
+
+@inlined
+def _chosen(on_z, on_y, if_x, if_y, if_z):
     return if_z if on_z else (if_y if on_y else if_x)
 
 
@@ -240,7 +247,8 @@ def see_triangles(tree, base, ray):
 
     Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
     ab - cd or is 0, and is antisymmetric, so two triangles never both miss on their shared edge; 0 counts as inside.
-    When all three edge functions are 0 (the ray lies in the plane, or the triangle has no area) it is a miss.
+    When all three edge functions are 0 (the ray lies in the plane, or two corners are one) it is a miss. A triangle
+    whose corners lie on a line may be hit: where its neighbours' rounded edges leave a slit, it fills it.
     """
     if tree.wide != 0:
         x0, x1, x2, y0, y1, y2, z0, z1, z2 = _load_rows(tree.wide_blocks, base, ray)
@@ -263,44 +271,98 @@ def see_triangles(tree, base, ray):
 
 @inlined
 def meet_planes(edges, ray):
-    """t of four triangles, and the mask of those in doubt: where rounding may have made t, or the determinant."""
+    """t of four triangles, and the masks of those in doubt, where rounding may have made t, and of those whose
+    determinant it may have made.
+    """
     x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant = edges
     across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
     numerator = e0 * z0 + e1 * z1 + e2 * z2
-    doubt = magnitude(numerator) <= across * (across + along) * along * splat4(_DOUBT)
-    return numerator / (determinant * splat4(ray.direction_z)), doubt
+    limit = across * (across + along) * splat4(_DOUBT)
+    doubt, blurred = magnitude(numerator) <= limit * along, magnitude(determinant) <= limit
+    return numerator / (determinant * splat4(ray.direction_z)), doubt, blurred
 
 
 @inlined
 def hit_triangles(tree, base, ray):
-    """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt, t, and the
-    numerators of u and v with their denominator. Of a hit in doubt ``settled`` decides.
+    """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt and of those
+    whose determinant is, t, the numerators of u and v, and their denominator. Of a hit in doubt ``settled`` decides.
     """
     edges, seen = see_triangles(tree, base, ray)
     bits, zero = movemask(seen), splat4(0.0)
     if bits == 0:
-        return bits, bits, zero, zero, zero, zero
-    t, doubt = meet_planes(edges, ray)
-    return bits, bits & movemask(doubt), t, edges.e1, edges.e2, edges.determinant
+        return bits, bits, bits, zero, zero, zero, zero
+    t, doubt, blurred = meet_planes(edges, ray)
+    return bits, bits & movemask(doubt), bits & movemask(blurred), t, edges.e1, edges.e2, edges.determinant
 
 
 @kernel
-def settled(tree, at, ray, t):
-    """The t that counts of a hit in doubt of the face at ``at``: no less than where the ray enters the face's own box.
+def settled(tree, at, ray, hit):
+    """What counts of a hit in doubt, (t, u, v, w), of the face at ``at``: t no less than where the ray enters its box.
 
-    NaN, which is no hit, where the ray misses that box or the face has no area: of a face seen edge-on the edge
-    functions are noise. The arithmetic is that of ``enter_boxes``, and monotone: boxes around this one are entered no
-    later. It starts from the ray, because keeping ``Slabs`` for it costs every ray.
+    NaN for t, which is no hit, where the ray misses that box or t lies before ``t_min``. The arithmetic is that of
+    ``enter_boxes``, and monotone: boxes around this one are entered no later. It starts from the ray, because keeping
+    ``Slabs`` for it costs every ray. It depends on the ray and the face alone, so whoever asks gets the same answer.
     """
     largest = largest_of(ray)
     t0, t1 = round_down(ray.t_min * largest), np.float32(np.inf)
     t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
     t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
     t0, t1 = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
-    if not (t0 <= np.float32(t1 * FAR_PADDING) and t0 <= _LARGEST and _has_area(tree, at)):
-        return np.nan
-    return t if t0 <= box_limit(t, largest) else np.float64(t0) / largest
+    t, u, v, w = _passed(tree, at, ray, largest, hit)
+    if not (t0 <= np.float32(t1 * FAR_PADDING) and t0 <= _LARGEST and t >= ray.t_min):
+        return np.nan, u, v, w
+    return (t if t0 <= box_limit(t, largest) else np.float64(t0) / largest), u, v, w
+
+
+@kernel
+def _passed(tree, at, ray, largest, hit):
+    """The hit (t, u, v, w) of a face that is a line but for a 2^30th of it: where the ray passes its longest side.
+
+    t and barycentrics from the edge functions would be noise there. Other faces keep their hit.
+    """
+    # In the order of the ray's axes, so that the bits do not depend on the names of the axes.
+    axis = _longest_axis(ray)
+    p0, p1, p2 = _corner(tree, at, axis), _corner(tree, at + 12, axis), _corner(tree, at + 24, axis)
+    o, d = _turned(axis, ray.ox, ray.oy, ray.oz), scale(_turned(axis, ray.dx, ray.dy, ray.dz), 1.0 / largest)
+    side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
+    l0, l1, l2 = largest_component(side0), largest_component(side1), largest_component(side2)
+    longest = larger(l0, larger(l1, l2))
+    # In units of the longest side, so that no product vanishes.
+    unit = 1.0 / longest
+    if largest_component(cross(scale(side1, unit), scale(side2, unit))) > _THIN:
+        return hit
+    if longest == l2:
+        s, t = _approach(scale(sub(p0, o), unit), d, scale(side2, unit))
+        u, v = s, 0.0
+    elif longest == l1:
+        s, t = _approach(scale(sub(p2, o), unit), d, scale(side1, unit))
+        u, v = 0.0, 1.0 - s
+    else:
+        s, t = _approach(scale(sub(p1, o), unit), d, scale(side0, unit))
+        u, v = 1.0 - s, s
+    return t * longest / largest, u, v, 1.0
+
+
+@kernel
+def _approach(start, d, side):
+    """Where a ray from the origin in direction d is nearest to a side: the share of the side before it, and t.
+
+    NaN for a ray that passes the line beyond the side by more than a face of no area is wide. A ray along the side is
+    nowhere nearer than elsewhere, and meets its start.
+    """
+    dd, ss, ds, dp, sp = dot(d, d), dot(side, side), dot(d, side), dot(d, start), dot(side, start)
+    apart = dd * ss - ds * ds
+    share, room = ds * dp - dd * sp, dd * ss * _THIN
+    if share < -room or share > apart + room:
+        return np.nan, np.nan
+    s = smaller(larger(share / apart, 0.0), 1.0) if apart > 0.0 else 0.0
+    return s, (dp + s * ds) / dd
+
+
+@inlined
+def _corner(tree, at, axis):
+    return _turned(axis, _coordinate(tree, at), _coordinate(tree, at + 4), _coordinate(tree, at + 8))
 
 
 @inlined
@@ -320,11 +382,3 @@ def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
     n = np.float32(np.float32(near - near_origin) * near_inverse)
     f = np.float32(np.float32(far - far_origin) * far_inverse)
     return (n if n > t0 else t0), (f if f < t1 else t1)
-
-
-@kernel
-def _has_area(tree, at):
-    ax, ay, az = _coordinate(tree, at), _coordinate(tree, at + 4), _coordinate(tree, at + 8)
-    bx, by, bz = _coordinate(tree, at + 12) - ax, _coordinate(tree, at + 16) - ay, _coordinate(tree, at + 20) - az
-    cx, cy, cz = _coordinate(tree, at + 24) - ax, _coordinate(tree, at + 28) - ay, _coordinate(tree, at + 32) - az
-    return by * cz - bz * cy != 0.0 or bz * cx - bx * cz != 0.0 or bx * cy - by * cx != 0.0

@@ -73,10 +73,10 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
     t, face, u, v, w = best
     doubtful = np.int64(0)
     for block in range(first, first + count):
-        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree, block * BLOCK_WORDS, shear)
+        bits, doubts, blurred, t4, u4, v4, w4 = hit_triangles(tree, block * BLOCK_WORDS, shear)
         if doubts != 0:
-            # What lies beyond the best hit matters no more, in doubt or not.
-            doubtful |= doubts & movemask((t4 >= splat4(t_min)) & (t4 <= splat4(t)))
+            # What surely lies beyond the best hit matters no more.
+            doubtful |= blurred | (doubts & movemask((t4 >= splat4(t_min)) & (t4 <= splat4(t))))
             bits &= ~doubts
         while bits != 0:
             i = lowest_bit(bits)
@@ -94,16 +94,17 @@ def nearest_carefully(tree, first, count, ray, shear, best):
     t, face, u, v, w = best
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
-        bits, doubts, t4, u4, v4, w4 = hit_triangles(tree, base, shear)
+        bits, doubts, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            ti = lane(t4, i)
             fi = get(tree.faces, block * LANES + i)
-            if (doubts >> i) & 1 != 0 and ray.t_min <= ti <= t:
-                ti = settled(tree, base + i, ray, ti)
-            if ti >= ray.t_min and (ti < t or (ti == t and fi < face)):
-                t, face, u, v, w = ti, fi, lane(u4, i), lane(v4, i), lane(w4, i)
+            hit = lane(t4, i), lane(u4, i), lane(v4, i), lane(w4, i)
+            if (doubts >> i) & 1 != 0:
+                hit = settled(tree, base + i, ray, hit)
+            if hit[0] >= ray.t_min and (hit[0] < t or (hit[0] == t and fi < face)):
+                t, u, v, w = hit
+                face = fi
     return t, face, u, v, w
 
 

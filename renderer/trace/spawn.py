@@ -29,6 +29,22 @@ MITSUBA_EPSILON = 1500.0 * 2.0**-24
 BOUNDED = -1.0
 
 
+@kernel
+def normal_of(p0, p1, p2, d):
+    """The unit normal of a face by its winding.
+
+    A face whose corners lie on a line has none. It fills a slit between its neighbours, so it is taken for one that
+    looks back along d as far as its longest side allows.
+    """
+    side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
+    n = cross(side2, sub(p2, p0))
+    if largest_component(n) > 0.0:
+        return normalized(n)
+    l0, l1, l2 = largest_component(side0), largest_component(side1), largest_component(side2)
+    longest = normalized(side2 if l2 >= l0 and l2 >= l1 else (side1 if l1 >= l0 else side0))
+    return normalized(sub(scale(longest, dot(d, longest)), d))
+
+
 @inlined
 def offset_distance(p, p0, p1, p2, u, v, n_g):
     """How far p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
@@ -42,6 +58,9 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
         reach = larger(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
     # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
     double_area = length(cross(sub(p1, p0), sub(p2, p0)))
+    if double_area == 0.0:
+        # Off its line a ray does not meet it again.
+        return _GAMMA7 * distance + _GAMMA264 * reach
     return _GAMMA7 * distance + _GAMMA264 * reach * (reach / double_area * reach)
 
 
@@ -76,16 +95,15 @@ def spawn_origin(p, error, n_g, w, offset):
 @inlined
 def _leave(p0, p1, p2, o, w):
     """The point o near the plane of a face, moved along the normal to the side of w until it is off for certain."""
-    normal = cross(sub(p1, p0), sub(p2, p0))
-    double_area = length(normal)
-    if double_area == 0.0:
-        return o  # no ray hits such a face
-    n_g, reach = normalized(normal), 0.0
+    double_area = length(cross(sub(p1, p0), sub(p2, p0)))
+    n_g, reach = normal_of(p0, p1, p2, scale(w, -1.0)), 0.0
     for p in (p0, p1, p2):
         reach = larger(reach, largest_component(sub(p, o)))
     side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
-    # A 1024th more, because the next test measures from where the point is moved to.
-    needed = (_GAMMA264 + _GAMMA336) * (1.0 + 2.0**-10) * reach * (reach / double_area * reach)
+    # A 1024th more, because the next test measures from where the point is moved to. Off its line a ray does not meet a
+    # face of no area again.
+    blown = reach / double_area * reach if double_area > 0.0 else 1.0
+    needed = (_GAMMA264 + _GAMMA336) * (1.0 + 2.0**-10) * reach * blown
     missing = needed - side * dot(n_g, sub(o, p0))
     if missing <= 0.0:
         return o

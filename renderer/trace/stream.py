@@ -184,11 +184,11 @@ def meet_leaves(tree, rays, lanes, count):
         block = (~child >> LEAF_BITS) if child != END else 0
         shear = shear_of(rays, r)
         edges, seen = see_triangles(tree, block * BLOCK_WORDS, shear)
-        t, doubt = meet_planes(edges, shear)
-        # What lies beyond the best hit matters no more, in doubt or not.
-        seen = seen & (t >= splat4(get(rays.doubles, T_MIN + r))) & (t <= splat4(get(rays.doubles, T + r)))
-        put(lanes.bits, r, movemask(seen))
-        put(lanes.doubts, r, movemask(doubt))
+        t, doubt, blurred = meet_planes(edges, shear)
+        within = (t >= splat4(get(rays.doubles, T_MIN + r))) & (t <= splat4(get(rays.doubles, T + r)))
+        # What surely lies beyond the best hit matters no more.
+        put(lanes.bits, r, movemask(seen & within) & ~movemask(doubt))
+        put(lanes.doubts, r, movemask(seen & (blurred | (doubt & within))))
         hits = 4 * LANES * r
         store(lanes.hits, hits, t)
         store(lanes.hits, hits + LANES, edges.e1)
@@ -200,8 +200,7 @@ def meet_leaves(tree, rays, lanes, count):
 def take_hits(tree, rays, lanes, r):
     """Keep the best hit of a leaf's first block. Returns whether it has one, and whether there was a doubt."""
     block, bits, hits = ~get(lanes.child, r) >> LEAF_BITS, get(lanes.bits, r), at(lanes.hits, 4 * LANES * r)
-    doubtful = bits & get(lanes.doubts, r)
-    bits &= ~doubtful
+    doubtful = get(lanes.doubts, r)
     if bits != 0:
         t, face, u, v, w = best_of(rays, r)
         while bits != 0:

@@ -118,7 +118,8 @@ def test_an_origin_in_the_plane_of_a_slab(accelerator, zero):
 
 @BOTH
 @pytest.mark.parametrize("kind", ["repeated index", "repeated point", "point", "collinear", "collinear tilted"])
-def test_a_triangle_without_area_is_never_hit(accelerator, kind):
+def test_a_triangle_without_area_is_met_within_rounding_of_its_line_or_never(accelerator, kind):
+    """Between two neighbours it fills the slit that rounding may leave; with two corners in one there is no slit."""
     vertices = np.array([[0, 0, 0], [1, 2, 3], [0, 0, 0], [2, 4, 6], [1.0, 1.0, 0.0], [3.0, 3.0, 0.0]])
     face = {
         "repeated index": [0, 1, 1],
@@ -132,7 +133,15 @@ def test_a_triangle_without_area_is_never_hit(accelerator, kind):
     share = rng.uniform(-1, 2, (4000, 1))
     targets = np.concatenate([corners[rng.integers(0, 3, 4000)], corners[0] + share * (corners[2] - corners[0])])
     origins = rng.normal(size=(8000, 3)) * 3
-    assert not accelerator(vertices, [face]).any_hit(origins, targets - origins).any()
+    lone = accelerator(vertices, [face])
+    hits = lone.closest_hit(origins, targets - origins)
+    if not kind.startswith("collinear"):
+        assert not hits.hit.any()
+        return
+    assert hits.hit.any()
+    on_ray = origins + hits.t[:, None] * (targets - origins)
+    np.testing.assert_allclose(hits.points[hits.hit], on_ray[hits.hit], rtol=0, atol=1e-9)
+    assert not lone.any_hit(origins, targets + 1e-9 * rng.normal(size=(8000, 3)) - origins).any()
 
 
 @BOTH

@@ -177,11 +177,11 @@ def judged(words, origins, directions, out):
         o, d = origins[i], directions[i]
         ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
         base, place = (i // LANES) * BLOCK_WORDS, i % LANES
-        bits, doubts, t4 = hit_triangles(tree, base, make_shear(ray))[:3]
+        bits, doubts, _, t4 = hit_triangles(tree, base, make_shear(ray))[:4]
         t = lane(t4, place)
         if (bits >> place) & 1 == 1 and t >= 0.0:
             out[i, 0], out[i, 1] = 1 + ((doubts >> place) & 1), t
-            out[i, 2] = settled(tree, base + place, ray, t)
+            out[i, 2] = settled(tree, base + place, ray, (t, 0.0, 0.0, 1.0))[0]
 
 
 def rays_close_to_planes(rng, count):

@@ -72,7 +72,8 @@ class TestSeam:
         call = (
             "from renderer.shade.shading import fresnel; from renderer.kernels.digest import source_digest\n"
             "from pathlib import Path; import json\n"
-            "digests = [source_digest(Path('renderer').resolve() / f'{m}.py') for m in ('shading', 'direct', 'simd')]\n"
+            "digests = [source_digest(Path('renderer').resolve() / f'{m}.py')"
+            " for m in ('shade/shading', 'shade/direct', 'kernels/simd')]\n"
             "print(json.dumps([fresnel(1.0, 1.0, 1.0, 1.5), *digests]))"
         )
         alter = (

@@ -106,7 +106,7 @@ FAULTS = [
     ("whitted._innermost_ior", "get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
     ("whitted._goes_on", "largest > 0.0 and largest >= min_weight", "largest > 0.02"),
     ("direct._aim", "dot(n, to_light) <= error", "dot(n, to_light) < -1e-3"),
-    ("phong", "dot(n, towards)", "abs(dot(n, towards))"),
+    ("surface.phong", "dot(n, towards)", "abs(dot(n, towards))"),
     ("direct._aim", "SHORT_OF_LIGHT", "2.0"),
     ("shading.specular", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
 ]

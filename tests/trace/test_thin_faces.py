@@ -1,0 +1,96 @@
+"""Faces of no area, or hardly any: a closed mesh that has them does not leak, and what is hit there is finite."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from renderer import (
+    BruteForce,
+    Dielectric,
+    Mesh,
+    Mirror,
+    Octree,
+    PerspectiveCamera,
+    Phong,
+    PointLight,
+    Scene,
+    SceneObject,
+    render,
+)
+from renderer.mesh.shapes import icosphere
+from validation.stability.cases.thin import BESIDE, at_the_side, split_side
+
+
+@pytest.mark.parametrize("beside", BESIDE)
+@pytest.mark.parametrize("turned", [False, True])
+def test_no_ray_from_within_is_lost_at_a_split_side(beside, turned):
+    mesh, rays = split_side(beside), at_the_side(20_000)
+    origins, directions = rays.origins, rays.directions
+    if turned:  # no coordinate is 0, and the corner lies beside its side by rounding alone
+        turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+        mesh = Mesh(mesh.vertices @ turn.T + 10.0, mesh.faces)
+        origins, directions = origins @ turn.T + 10.0, directions @ turn.T
+    assert mesh.is_closed()
+    for accelerator in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh), Octree.from_mesh(mesh, split="sah")):
+        hits = accelerator.closest_hit(origins, directions)
+        assert hits.hit.all() and accelerator.any_hit(origins, directions).all()
+        np.testing.assert_allclose(hits.t, 1.0, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(hits.points, origins + hits.t[:, None] * directions, rtol=0, atol=1e-8)
+        few = [accelerator.closest_hit(origins[i : i + 5], directions[i : i + 5]).t for i in range(0, 500, 5)]
+        np.testing.assert_array_equal(np.concatenate(few), hits.t[:500])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_spheres_rounded_until_faces_collapse_do_not_leak(seed):
+    rng = np.random.default_rng(seed)
+    centre = rng.normal(size=3) * 2.0**17
+    ball = icosphere(3)
+    vertices = (ball.vertices * rng.uniform(0.5, 2.0, 3) + centre).astype(np.float32).astype(np.float64)
+    mesh = Mesh(vertices, ball.faces)
+    corners = mesh.triangles
+    # At edges and corners, where rounding may open a slit; the origin is within by far.
+    share = rng.random((len(mesh.faces), 3, 1))
+    targets = np.concatenate([(corners * share + np.roll(corners, 1, 1) * (1 - share)).reshape(-1, 3), mesh.vertices])
+    origins = np.broadcast_to(mesh.vertices.mean(axis=0), targets.shape)
+    octree = Octree.from_mesh(mesh)
+    hits = octree.closest_hit(origins, targets - origins)
+    assert hits.hit.all()
+    brute = BruteForce.from_mesh(mesh).closest_hit(origins, targets - origins)
+    np.testing.assert_array_equal(hits.t, brute.t)
+    np.testing.assert_array_equal(hits.face, brute.face)
+
+
+def test_a_ray_leaves_a_face_of_no_area():
+    mesh, rays = split_side(0.0), at_the_side(20_000)
+    octree = Octree.from_mesh(mesh)
+    hits = octree.closest_hit(rays.origins, rays.directions)
+    thin = hits.face == 5
+    assert thin.sum() > 100
+    # Outwards, away from all faces.
+    outwards = np.random.default_rng(1).normal(size=(len(rays), 3)) * 0.1 + [1.0, -1.0, 1.0]
+    assert not octree.any_hit(hits.points[thin], outwards[thin], leaving=hits.face[thin]).any()
+
+
+@pytest.mark.parametrize("material", [Phong(diffuse=0.5, specular=0.3), Mirror(), Dielectric(ior=1.5)])
+def test_a_picture_of_a_face_of_no_area_is_finite_and_has_no_hole(material):
+    """Tiny fields of view, because wider ones would need luck to meet it."""
+    scene = Scene(
+        camera=PerspectiveCamera(eye=(4.0, -2.0, 4.0), target=(2.5, 0.0, 1.5)),
+        materials={"its": material},
+        lights=[PointLight(position=(5.0, -5.0, 5.0), intensity=100.0)],
+        objects=[SceneObject(mesh=split_side(0.0), material="its")],
+        background=(0.25, 0.5, 1.0),
+    )
+    met, rng = 0, np.random.default_rng(5)
+    for share in rng.random(60):
+        target = (4.0 * share, 0.0, 4.0 * (1.0 - share))
+        camera = PerspectiveCamera(eye=tuple(rng.uniform((4, -3, 4), (6, -2, 6))), target=target, fov=1e-13)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            image = render(scene, camera=camera, resolution=(16, 16), max_depth=4)
+        met += int((image.face == 5).sum())
+        assert (image.face >= 0).all()
+        assert np.isfinite(image.radiance).all() and np.isfinite(image.normal).all()
+        np.testing.assert_allclose(np.linalg.norm(image.normal, axis=-1), 1.0, atol=1e-6)
+    assert met > 0
