@@ -16,6 +16,7 @@ from validation.gates import Gate
 from validation.job import Job
 from validation.report import page as report
 from validation.report import schema
+from validation.sections import SECTIONS
 from validation.stability import section as numerical
 
 SCENE = Path(__file__).parents[2] / "scenes" / "stairs.toml"
@@ -51,8 +52,8 @@ def sections(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathF
     plain = {name: (title, "plain.html") for name, (title, _) in report.PARTIALS.items()}
     monkeypatch.setattr(report, "PARTIALS", plain)
     fakes = {name: Fake(name) for name in report.PARTIALS}
-    modules = {"numerical": "stability"}
-    monkeypatch.setattr(suite, "import_module", lambda name: fakes[modules.get(name.split(".")[1], name.split(".")[1])])
+    modules = {section.module: section.name for section in SECTIONS}
+    monkeypatch.setattr(suite, "import_module", lambda name: fakes[modules[name]])
     return fakes
 
 

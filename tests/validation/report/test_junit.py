@@ -28,7 +28,7 @@ def test_suites_cases_and_failures() -> None:
     assert counts == {"hits": ("1", "0", "0"), "images": ("2", "2", "0"), "efficiency": ("1", "0", "1")}
     case = suites["images"].find("testcase")
     assert case is not None and case.get("name") == "glass <b>: ssim"
-    assert case.get("classname") == "validation.pictures.section"
+    assert case.get("classname") == "validation.images"
     failures = [failure for failure in root.iter("failure")]
     assert failures[0].get("message") == "ssim is 0.5, expected at least 0.998"
     assert "structure & edges" in (failures[0].text or "")

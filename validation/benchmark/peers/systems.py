@@ -5,20 +5,21 @@ from importlib import import_module
 from validation.benchmark.peers import libllvm, ours
 from validation.benchmark.peers.contender import System
 
+# By name the module of each, and how to get it.
 _PEERS = {
-    "embree": "pip install embreex",
-    "open3d": "pip install open3d",
-    "trimesh_rays": "pip install trimesh rtree",
-    "mitsuba": "pip install mitsuba",
+    "embree": ("embree", "pip install embreex"),
+    "open3d": ("open3d", "pip install open3d"),
+    "trimesh": ("trimesh_rays", "pip install trimesh rtree"),
+    "mitsuba": ("mitsuba", "pip install mitsuba"),
 }
 
 
 def available() -> tuple[list[System], dict[str, str]]:
     """Ours and every peer that can be imported; and by name how to get the others."""
     found, missing = ours.systems(), {}
-    for name, how in _PEERS.items():
+    for name, (module, how) in _PEERS.items():
         try:
-            found += import_module(f"validation.benchmark.peers.{name}").systems()
+            found += import_module(f"validation.benchmark.peers.{module}").systems()
         except ImportError:
             missing[name] = how
     if not any(system.name == "mitsuba_llvm" for system in found):
