@@ -34,6 +34,7 @@ bench: $(STAMP)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	@foreign=$$(find . \( -path ./.venv -o -path ./.git \) -prune -o -type f \( -false $(FOREIGN:%=-o -name '*.%') \) -print); \

@@ -38,6 +38,7 @@ _HEADER = b"octree-renderer kernel 1\n"
 _FORM = "private pieces"
 _LOG = getLogger("renderer.jit")
 
+
 @dataclass(frozen=True)
 class Folders:
     """Where kernels of one source folder are kept: ``written`` (None where nothing can be) and all that are read."""
@@ -89,9 +90,7 @@ class KernelStore:
         if folders.written is None or self._digest is None:
             return True
         begin = f"{self._prefix()}{_short(self._digest)}-"
-        return any(
-            name.startswith(begin) for folder in (*folders.read, *ahead_folders()) for name in _names(folder)
-        )
+        return any(name.startswith(begin) for folder in (*folders.read, *ahead_folders()) for name in _names(folder))
 
     def load_overload(self, signature: Any, context: Any) -> CompileResult | None:
         """The kernel compiled for the types in ``signature``, or None where it must be compiled."""

@@ -307,9 +307,7 @@ class Mesh:
             lost = ~np.isfinite(given).all(axis=1)
             if lost.any():
                 given[lost] = cls(positions, indices[kept], name=name).vertex_normals()[lost]
-        repairs = Repairs(
-            *(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept, lost))
-        )
+        repairs = Repairs(*(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept, lost)))
         return cls(positions, indices[kept], name=name, **attributes), repairs
 
 

@@ -49,7 +49,6 @@ class Fields(BaseModel):
     # Without it pydantic would call __init__ for each record within another, and lose where that stands.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
-
     @staticmethod
     def _union_member(keys: Keys) -> int | None:
         """Where ``keys`` hold the name of a union's member; see ``first_fault``."""

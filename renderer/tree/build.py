@@ -55,9 +55,7 @@ def build_tree(
     return Tree(nodes, fill_blocks(vertices, faces, block_faces, threads), block_faces, depth, scale)
 
 
-def build_blocks(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], scale: float = 1.0, threads: int = 1
-) -> Tree:
+def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], scale: float = 1.0, threads: int = 1) -> Tree:
     """The blocks alone, in the order of the faces, for a search without a tree."""
     block_faces = np.full(-(-len(faces) // LANES) * LANES, -1, np.int32)
     block_faces[: len(faces)] = np.arange(len(faces))

@@ -58,9 +58,7 @@ def _fit_nodes(nodes, links):
                     nodes[at], nodes[at + 8] = low, high
 
 
-def refit_tree(
-    tree: Tree, vertices: NDArray[np.float64], faces: NDArray[np.int32], scale: float, threads: int
-) -> Tree:
+def refit_tree(tree: Tree, vertices: NDArray[np.float64], faces: NDArray[np.int32], scale: float, threads: int) -> Tree:
     """``tree`` over moved vertices, in new arrays; the faces of its blocks, which do not change, are shared."""
     nodes = cache_aligned(len(tree.nodes), np.float32)
     links = nodes.view(np.int32)

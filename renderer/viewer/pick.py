@@ -59,7 +59,4 @@ def _met(shown: Exhibit, stage: PreparedScene, hits: Hits) -> dict[str, Any]:
 
 
 def _told(path: Sequence[Segment]) -> list[dict[str, Any]]:
-    return [
-        {"kind": s.kind, "depth": s.depth, "start": s.start, "end": s.end, "hit": s.hit}
-        for s in path
-    ]
+    return [{"kind": s.kind, "depth": s.depth, "start": s.start, "end": s.end, "hit": s.hit} for s in path]

@@ -75,8 +75,7 @@ import scipy.linalg
 
 def test_the_public_names_are_there_whatever_was_imported_first():
     script = (
-        "import renderer, renderer.scene.scene\n"
-        "from renderer.picture.render import prepare\nfrom renderer import *"
+        "import renderer, renderer.scene.scene\nfrom renderer.picture.render import prepare\nfrom renderer import *"
     )
     tell = "print(callable(render), *[f'{n}:{getattr(renderer, n).__module__}' for n in renderer._HOMES])"
     is_callable, *names = output(f"{script}\n{tell}").split()

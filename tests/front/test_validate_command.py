@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-TRAP = "raise SystemExit('the user\'s own package ran')"
+TRAP = "raise SystemExit('the user's own package ran')"
 
 
 def run(folder, *arguments, before="", package=ROOT):

@@ -84,9 +84,7 @@ def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
     assert "a closed mesh has no holes" in (tmp_path / "junit.xml").read_text()
 
 
-def test_no_gate_is_no_success(
-    tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_gate_is_no_success(tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]) -> None:
     sections["hits"].gates.clear()
     assert command.main(["--only", "hits", "--output", str(tmp_path)]) == 1
     assert "FAIL, nothing judged" in capsys.readouterr().out

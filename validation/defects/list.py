@@ -32,9 +32,7 @@ def _before(rule: str, statements: str) -> tuple[str, str]:
 
 
 _LIGHT_ROWS = "return rows[~dark | (dark & extra)]"
-_IMAGE = (
-    "return Image(*film, build_seconds=self.build_seconds, render_seconds=clock.seconds(), cut=int(cut.sum()))"
-)
+_IMAGE = "return Image(*film, build_seconds=self.build_seconds, render_seconds=clock.seconds(), cut=int(cut.sum()))"
 
 HITS = (
     _kernel("hits", "a triangle missing from the tree", "_fill",

@@ -104,9 +104,7 @@ def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, c
     command = child.command("validation.defects.answer:answer", asked)
     environment = child.environment(NUMBA_CACHE_DIR=str(cache))
     try:
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False
-        )
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False)
     except subprocess.TimeoutExpired:
         return Answer((), (), f"did not end within {_PATIENCE:.0f} s", time.perf_counter() - began)
     seconds = time.perf_counter() - began

@@ -90,8 +90,7 @@ def _origin(step: Callable[[str], None]) -> dict[str, object]:
     for accelerator, size, depth in _ORIGIN_ROWS:
         step(f"efficiency: origin, {accelerator} {size} x {size}")
         images = [
-            render(scene, resolution=(size, size), max_depth=depth, accelerator=accelerator)
-            for _ in range(ORIGIN_RUNS)
+            render(scene, resolution=(size, size), max_depth=depth, accelerator=accelerator) for _ in range(ORIGIN_RUNS)
         ]
         seconds = [i.build_seconds + i.render_seconds for i in images]
         rows.append(

@@ -166,8 +166,6 @@ def _check(ours: Picture, reference: Picture, *masks: NDArray[np.bool_] | None) 
             )
     for name, mask in zip(("fragile", "foreground"), masks, strict=True):
         if mask is not None and (mask.shape != shape[:2] or mask.dtype != np.bool_):
-            raise ValueError(
-                f"{name}: expected a bool mask of shape {shape[:2]}, got {mask.dtype} {mask.shape}"
-            )
+            raise ValueError(f"{name}: expected a bool mask of shape {shape[:2]}, got {mask.dtype} {mask.shape}")
     if masks[1] is not None and not masks[1].any():
         raise ValueError("foreground: expected at least one pixel, got none")

@@ -159,9 +159,7 @@ def test_errors_count_every_kind_of_wrong_answer():
     origins = np.array([[0.2, 0.2, 1.0]] * 4 + [[2.0, 2.0, 1.0]] * 2)
     directions = np.array([[0.0, 0.0, -1.0]] * 6)
     truth = exact.closest_hits(triangle + below, [[0, 1, 2], [3, 4, 5]], origins, directions)
-    answer = HitArrays(
-        np.array([1.0, 1.25, 2.0, np.inf, np.inf, 3.0]), np.array([0, 0, 1, -1, -1, 1], dtype=np.int64)
-    )
+    answer = HitArrays(np.array([1.0, 1.25, 2.0, np.inf, np.inf, 3.0]), np.array([0, 0, 1, -1, -1, 1], dtype=np.int64))
     found = tradeoff_hits.errors(answer, truth)
     assert (found["missed"], found["false_hits"], found["wrong_face"], found["both_hit"]) == (1, 1, 1, 3)
     assert found["p50"] == 0.25 and found["max"] == 1.0

@@ -104,9 +104,7 @@ def test_values_by_hand() -> None:
     result = compare(ours, reference, fragile)
     assert result.mean_error == pytest.approx((0.1 + 0.01 + 3 * 0.001) / (3 * 256), rel=1e-12)
     assert result.pixel_share == 2 / 256
-    assert result.max_error == pytest.approx(
-        float(srgb(0.51 * np.ones(1))[0] - srgb(0.5 * np.ones(1))[0]), rel=1e-12
-    )
+    assert result.max_error == pytest.approx(float(srgb(0.51 * np.ones(1))[0] - srgb(0.5 * np.ones(1))[0]), rel=1e-12)
     assert result.fragile_share == 1 / 256
     assert result.difference[3, 4] == result.difference.max() > result.max_error
     assert compare(ours, reference).max_error == result.difference.max()

@@ -45,4 +45,3 @@ class MitsubaHits:
             if found.is_valid():
                 t[row], face[row] = found.t, found.prim_index
         return t, face
-

@@ -49,9 +49,7 @@ def diffuse(albedo: Rgb) -> mi.BSDF:
 
 def mirror(reflectance: Rgb) -> mi.BSDF:
     """A perfect mirror on both sides of the surface."""
-    return _two_sided(
-        {"type": "conductor", "material": "none", "specular_reflectance": _reflectance(reflectance)}
-    )
+    return _two_sided({"type": "conductor", "material": "none", "specular_reflectance": _reflectance(reflectance)})
 
 
 def dielectric(ior: float, reflectance: Rgb, transmittance: Rgb) -> mi.BSDF:
@@ -94,9 +92,7 @@ def meshes(scene: Scene, bsdfs: Sequence[mi.BSDF]) -> dict[mi.Mesh, int]:
     Raises ``ValueError`` for a mesh whose shape does not survive float32, see ``VERTEX_ROUNDING``.
     """
     placed = zip(scene.instances, bsdfs, strict=True)
-    return {
-        _mesh(i, instance, bsdf): i for i, (instance, bsdf) in enumerate(placed) if len(instance.mesh.faces)
-    }
+    return {_mesh(i, instance, bsdf): i for i, (instance, bsdf) in enumerate(placed) if len(instance.mesh.faces)}
 
 
 def assemble(shapes: dict[mi.Mesh, int], emitters: Sequence[mi.Emitter]) -> mi.Scene:
@@ -112,9 +108,7 @@ def assemble(shapes: dict[mi.Mesh, int], emitters: Sequence[mi.Emitter]) -> mi.S
     scene = mi.load_dict(content, optimize=False)
     loaded = scene.shapes()
     if len(loaded) != len(shapes) or any(shape not in shapes for shape in loaded):
-        raise RuntimeError(
-            f"mitsuba: expected the {len(shapes)} shapes handed in, got {len(loaded)}, merged or copied"
-        )
+        raise RuntimeError(f"mitsuba: expected the {len(shapes)} shapes handed in, got {len(loaded)}, merged or copied")
     return scene
 
 
@@ -147,9 +141,7 @@ def _mesh(index: int, instance: Instance, bsdf: mi.BSDF) -> mi.Mesh:
     return fill(result, vertices, mesh.faces, instance.normals if instance.smooth else None)
 
 
-def fill(
-    mesh: mi.Mesh, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None = None
-) -> mi.Mesh:
+def fill(mesh: mi.Mesh, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None = None) -> mi.Mesh:
     """``mesh`` with these arrays, float32 and uint32 there: vertices and their normals (V, 3), faces (F, 3)."""
     arrays = mi.traverse(mesh)
     arrays["vertex_positions"] = np.asarray(vertices, np.float32).ravel()
