@@ -1,10 +1,11 @@
 """The server's routes: the page, what it fetches, and the WebSocket."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -67,7 +68,7 @@ class Viewer:
         """The WebSocket: one session, until the page leaves."""
         with suppress(WebSocketDisconnect):  # a page may leave before its answer
             await socket.accept()
-            session = Session(self, Wire(socket.send_text, socket.send_bytes), self._threads)
+            session = Session(self, Wire(_telling(socket.send_text), _telling(socket.send_bytes)), self._threads)
             if len(self.sessions) < MAX_CONNECTIONS:
                 return await self._attend(socket, session)
             await session.complain(ValueError(f"connections: expected at most {MAX_CONNECTIONS}, got another"))
@@ -86,6 +87,18 @@ class Viewer:
     async def stop(self) -> None:
         """Begin nothing more."""
         self._threads.shutdown(wait=False, cancel_futures=True)
+
+
+def _telling(send: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:
+    """``send`` that says of a page that has gone meanwhile that it has gone, and not that we were wrong to send."""
+
+    async def tell(message: Any) -> None:
+        try:
+            await send(message)
+        except RuntimeError as error:
+            raise WebSocketDisconnect from error
+
+    return tell
 
 
 async def _receive_all(socket: WebSocket, session: Session) -> None:

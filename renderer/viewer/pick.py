@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from renderer.inspect.ray_path import Segment, ray_path, surface_of
+from renderer.inspect.ray_path import Segment, Vector, ray_path, surface_of
 from renderer.inspect.tree_boxes import visited
 from renderer.picture.prepare import PreparedScene
 from renderer.shade.records import MATERIAL_COLUMNS
@@ -24,6 +24,7 @@ def picked(shown: Exhibit, pick: Pick) -> dict[str, Any]:
     rows = camera_of(pick.m, pick.fovy).rows(pick.w, pick.h)
     origin, direction = rows[0], rows[3] + (pick.x + 0.5) * rows[4] + (pick.y + 0.5) * rows[5]
     direction = direction / np.linalg.norm(direction)
+    x, y, z = direction.tolist()
     hits = stage.octree.closest_hit(origin[None], direction[None])
     path = ray_path(
         stage,
@@ -38,16 +39,16 @@ def picked(shown: Exhibit, pick: Pick) -> dict[str, Any]:
         {"level": level, "lower": lower.tolist(), "upper": upper.tolist(), "leaf": leaf}
         for level, lower, upper, leaf in nodes[:_MAX_BOXES]
     ]
-    met = _met(shown, stage, hits)
+    met = _met(shown, stage, (x, y, z), hits)
     return {"type": "pick", "seq": pick.seq, **met, "path": _told(path), "nodes": boxes, "visited": len(nodes)}
 
 
-def _met(shown: Exhibit, stage: PreparedScene, hits: Hits) -> dict[str, Any]:
+def _met(shown: Exhibit, stage: PreparedScene, direction: Vector, hits: Hits) -> dict[str, Any]:
     if not hits.hit[0]:
         return {"hit": False, "t": None, "face": None, "material": None, "point": None, "normal": None}
     face = int(hits.face[0])
     material = list(shown.scene.materials)[int(stage.world.material[face]) // MATERIAL_COLUMNS]
-    surface = surface_of(stage.world, face, float(hits.u[0]), float(hits.v[0]))
+    surface = surface_of(stage.world, face, float(hits.u[0]), float(hits.v[0]), direction)
     return {
         "hit": True,
         "t": float(hits.t[0]),

@@ -50,6 +50,7 @@ class Viewing:
             timeout_graceful_shutdown=_LAST_WORDS,
         )
         logging.getLogger("uvicorn.error").addFilter(_no_mere_refusal)
+        logging.getLogger("asyncio").addFilter(_no_lost_client)
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, args=([listening],), name="viewer", daemon=True)
         self._thread.start()
@@ -88,6 +89,11 @@ class Viewing:
 def _no_mere_refusal(record: logging.LogRecord) -> bool:
     """Leaves out what uvicorn says of each WebSocket that is refused by an HTTP answer: 0.54 takes it for our fault."""
     return record.getMessage() != "ASGI callable returned without completing handshake."
+
+
+def _no_lost_client(record: logging.LogRecord) -> bool:
+    """Leaves out what asyncio says of words that our server sends to a page that has gone."""
+    return not (record.threadName == "viewer" and record.getMessage() == "socket.send() raised exception.")
 
 
 def _listen(host: str, port: int) -> socket.socket:
