@@ -11,9 +11,9 @@ import uvicorn
 
 from renderer.errors import expect
 from renderer.viewer.app import make_app
-from renderer.viewer.exhibit import Exhibit
 from renderer.viewer.protocol import MAX_MESSAGE_BYTES
 from renderer.viewer.security import is_loopback, new_token
+from renderer.viewer.shown import ShownScene
 
 # Seconds for connections to end; what they compute stops between tiles.
 _LAST_WORDS = 1
@@ -21,13 +21,13 @@ _LAST_WORDS = 1
 _PATIENCE = 0.5
 
 
-class Viewing:
+class ViewerServer:
     """A scene on show at ``url`` until ``close``. Notebooks show the page itself, by way of a frame.
 
     Use as a context manager, or call ``wait`` to stay until Ctrl-C.
     """
 
-    def __init__(self, shown: Exhibit, host: str, port: int, framed: bool) -> None:
+    def __init__(self, shown: ShownScene, host: str, port: int, framed: bool) -> None:
         """Listen on ``host`` and ``port``, 0 for a free one; ``framed`` lets pages of this machine frame this one.
 
         On a ``host`` that other machines reach, only who knows the address as printed, with its token, is served.
@@ -69,7 +69,7 @@ class Viewing:
         """Show the page in the usual browser; False where there is none."""
         return webbrowser.open(self.url)
 
-    def __enter__(self) -> "Viewing":
+    def __enter__(self) -> "ViewerServer":
         return self
 
     def __exit__(
