@@ -4,6 +4,7 @@ import argparse
 import ast
 import re
 import shlex
+import tomllib
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -231,3 +232,26 @@ def test_extreme_cases_and_gates_that_a_page_names_are_there(page):
     assert {int(number) for number in re.findall(r"\b[Cc]ase (\d+)\b", page.read_text())} <= numbers
     gates = set(re.findall(r"`hits\.(\w+)`", page.read_text())) - {"t", "face", "u", "v", "points", "normals", "hit"}
     assert gates <= set(HitLimits.model_fields)
+
+
+@pytest.mark.parametrize("package", ["renderer", "validation"])
+def test_the_diagram_of_the_rooms_has_the_order_of_the_contracts(package):
+    """Folder by folder from above, as import-linter checks them; names that may be absent need not be drawn."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    (layers,) = (contract["layers"] for contract in contracts if contract["id"] == package)
+    levels = {
+        name: level for level, line in enumerate(layers) for name in line.strip("()").replace(")", "").split(" | ")
+    }
+    there = {name for name in levels if (ROOT / package / name).is_dir() or (ROOT / package / f"{name}.py").is_file()}
+    lines = (ROOT / "docs" / "architecture.md").read_text().splitlines()
+    (top,) = (k for k, line in enumerate(lines) if re.fullmatch(r"    renderer/ +validation/", line))
+    column = (
+        slice(4, lines[top].index("validation/"))
+        if package == "renderer"
+        else slice(lines[top].index("validation/"), 999)
+    )
+    block = lines[top + 1 : lines.index("", top)]
+    # The names, less what is said of them three spaces further on.
+    drawn = [name.strip("/") for line in block for name in re.split(r" {3,}", line[column].strip())[0].split()]
+    assert set(drawn) == there
+    assert [levels[name] for name in drawn] == sorted(levels[name] for name in drawn)
