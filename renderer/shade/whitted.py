@@ -47,7 +47,7 @@ from renderer.trace.traverse import HitPointers, RayPointers, Scratch
 
 class Settings(NamedTuple):
     """Bounces, the weight below which a ray ends, the offset rule of ``spawn.spawn_origin``, how many media a ray
-    remembers (``sight.MAX_MEDIA``, or 0 where nothing refracts), whether surfaces hide lights, and after how many rays
+    remembers (``surface.MAX_MEDIA``, or 0 where nothing refracts), whether surfaces hide lights, and after how many rays
     of a sample of a pixel no more are left.
     """
 
