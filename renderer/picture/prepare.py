@@ -22,6 +22,7 @@ from renderer.shade.tile import CUT, Film, render_tile, tile_memory
 from renderer.shade.whitted import Settings
 from renderer.trace.layout import Tree, cache_aligned
 from renderer.trace.query import rays_against_blocks
+from renderer.trace.spawn import OffsetRule
 
 # Pixels a side: 256 tiles share a 512 x 512 picture evenly, and neighbouring rays find their nodes in the cache.
 TILE = 32
@@ -54,7 +55,7 @@ class PreparedScene:
         self,
         camera: Camera,
         chosen: RenderSettings,
-        offset: float,
+        offset: OffsetRule,
         threads: int,
         finished: Callable[[int], object] | None = None,
         planes: Collection[str] = PLANES,
@@ -102,7 +103,7 @@ def prepare_scene(
 
 def _bundles_in_a_row(tree: Tree) -> int:
     """After how many bundles a kernel returns, so that Ctrl-C and others are heard: some 10 ms of tracing."""
-    return 256 if tree.depth > 0 else max(1, rays_against_blocks(tree) // SIZE)
+    return 256 if tree.has_nodes else max(1, rays_against_blocks(tree) // SIZE)
 
 
 def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_seconds: float) -> PreparedScene:
@@ -141,7 +142,7 @@ def _widened(tree: Tree) -> Tree:
     return replace(tree, blocks=blocks)
 
 
-def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: float) -> Settings:
+def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: OffsetRule) -> Settings:
     """The kernel's settings: no bounces where nothing bounces, and no media where nothing refracts."""
     bounces = chosen.max_depth if needs.reflection or needs.refraction else 0
     media = MAX_MEDIA if needs.refraction else 0

@@ -14,7 +14,7 @@ from renderer.process.terminal import on_terminal
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.scene.needs import Needs, checked_needs
 from renderer.scene.scene import Scene, checked_settings
-from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON
+from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule
 from renderer.tree.build import SPLITS
 
 
@@ -128,12 +128,12 @@ def _expect_usual(accelerator: object, split: object, needs: object) -> None:
     expect(needs is None, "needs", "None, as the scene is prepared", repr(needs))
 
 
-def _offset(offset: str | float) -> float:
+def _offset(offset: str | float) -> OffsetRule:
     if isinstance(offset, str):
         expect(offset in ("bounded", "mitsuba"), "offset", "'bounded', 'mitsuba' or a number", repr(offset))
-        return BOUNDED if offset == "bounded" else MITSUBA_EPSILON
+        return BOUNDED if offset == "bounded" else OffsetRule(False, MITSUBA_EPSILON)
     expect(isinstance(offset, Real) and 0.0 <= offset < 0.1, "offset", "a number from 0 to below 0.1", offset)
-    return float(offset)
+    return OffsetRule(False, float(offset))
 
 
 @contextmanager

@@ -11,8 +11,9 @@ from renderer.kernels.vec3 import add, dot, normalized, row3, scale, sub, three,
 from renderer.shade.bundle import SIZE
 from renderer.shade.records import DIELECTRIC, DIRECTIONAL, KIND, LIGHT_COLUMNS, MIRROR, UNLIT
 from renderer.shade.surface import phong
+from renderer.trace.rays import RayPointers
 from renderer.trace.spawn import spawn_origin
-from renderer.trace.traverse import RayPointers, search_blocks, trace
+from renderer.trace.traverse import search_blocks, trace
 
 # What a lit ray of a bundle leaves for its light and its children, one column of SURFACE_DOUBLES float64 a ray.
 POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT = 0, 3, 6, 9, 10, 11, 12
@@ -29,10 +30,10 @@ SHORT_OF_LIGHT = 1.0 - 2.0**-36
 @kernel
 def trace_any(tree, rays, found, count, scratch, any_hit):
     """``trace`` of the first ``count`` rays, or every block where the tree has no nodes."""
-    if tree.depth == 0:
-        search_blocks(tree, rays, found, 0, count, any_hit)
-    else:
+    if tree.has_nodes:
         trace(tree, rays, found, 0, count, scratch, any_hit)
+    else:
+        search_blocks(tree, rays, found, 0, count, any_hit)
 
 
 @inlined
@@ -72,7 +73,7 @@ def _aim(scene, surface, light, offset):
         return False, p, to_light, 0.0, to_light, arriving
     o = spawn_origin(p, error, n_g, to_light, offset)
     # Mitsuba stops ten of its epsilons short.
-    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else SHORT_OF_LIGHT
+    t_max = SHORT_OF_LIGHT if offset.bounded else 1.0 - 10.0 * offset.epsilon
     return True, o, sub(towards, o), t_max, normalized(to_light), scale(arriving, 1.0 / squared)
 
 

@@ -41,19 +41,22 @@ from renderer.shade.direct import (
 from renderer.shade.records import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
 from renderer.shade.surface import surface_at
-from renderer.trace.spawn import spawn_origin
-from renderer.trace.traverse import HitPointers, RayPointers, Scratch
+from renderer.trace.rays import HitPointers, RayPointers
+from renderer.trace.spawn import OffsetRule, spawn_origin
+from renderer.trace.traverse import Scratch
 
 
 class Settings(NamedTuple):
-    """Bounces, the weight below which a ray ends, the offset rule of ``spawn.spawn_origin``, how many media a ray
-    remembers (``surface.MAX_MEDIA``, or 0 where nothing refracts), whether surfaces hide lights, and after how many rays
-    of a sample of a pixel no more are left.
+    """What holds for a whole picture.
+
+    Bounces, the weight below which a ray ends, the offset rule of spawned rays, how many media a ray remembers
+    (``surface.MAX_MEDIA``, or 0 where nothing refracts), whether surfaces hide lights, and after how many rays of a
+    sample of a pixel no more are spawned.
     """
 
     max_depth: int
     min_weight: float
-    offset: float
+    offset: OffsetRule
     media: int
     shadows: bool
     max_rays: int

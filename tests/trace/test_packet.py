@@ -14,7 +14,8 @@ from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, ro
 from renderer.trace.layout import NODE_WORDS
 from renderer.trace.packet import enter_beam, make_beam
 from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare
-from renderer.trace.traverse import RayPointers, are_coherent
+from renderer.trace.rays import RayPointers
+from renderer.trace.traverse import are_coherent
 
 SEEDS = st.integers(0, 2**20)
 
