@@ -1,4 +1,4 @@
-"""One run of the suite: its sections in turn, then everything that was found as metrics, page and JUnit file."""
+"""One run of the suite: it runs the sections in turn, then writes metrics, page and JUnit file."""
 
 import json
 import shutil
@@ -27,7 +27,7 @@ from validation.thresholds import Thresholds, load_thresholds
 
 @dataclass(frozen=True)
 class Request:
-    """What the command line asks for; ``gate`` is a file of thresholds or None for the suite's own."""
+    """The options of a run; ``gate`` is a file of thresholds, or None for the suite's own."""
 
     command: str
     quick: bool
@@ -41,8 +41,8 @@ class Request:
 def run(asked: Request) -> dict[str, Any]:
     """Run the sections, write the report into ``asked.output`` and return the metrics.
 
-    What stood in that folder stays as it is until everything new is complete. Raises ``ValueError`` and ``OSError`` for
-    files of the user's that are no good, before any section runs, and ``ImportError`` where a reference is missing.
+    Old files in that folder stay unchanged until all new ones are complete. Raises ``ValueError`` and ``OSError`` for
+    invalid user files, before any section runs, and ``ImportError`` where a reference is missing.
     """
     began, started = time.perf_counter(), datetime.now(UTC)
     thresholds = Thresholds() if asked.gate is None else load_thresholds(asked.gate)
@@ -75,7 +75,7 @@ def run(asked: Request) -> dict[str, Any]:
 
 
 def _open(asked: Request) -> None:
-    """Read every file that the user gave, so that a bad one is an error now and not minutes later."""
+    """Read every user file first, so that an invalid one is an error at once and not minutes later."""
     if not (asked.scenes or asked.meshes or SCENES.is_dir()):
         raise ValueError(
             f"expected --scene or --mesh, or the suite's own scenes in {SCENES}, which only a checkout has; got none"
@@ -87,7 +87,7 @@ def _open(asked: Request) -> None:
 
 
 def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, Any]], list[Gate]]:
-    """Run each section with one progress bar over all; the references that a section needs are imported with it."""
+    """Run the sections with one progress bar for all; each section's references are imported with its module."""
     modules: dict[str, Any] = {section.name: import_module(section.module) for section in chosen}
     records: dict[str, dict[str, Any]] = {}
     gates: list[Gate] = []
@@ -96,7 +96,7 @@ def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, 
             began = time.perf_counter()
             record, found = module.run(replace(job, step=step))
             record |= {"seconds": time.perf_counter() - began}
-            # Here, because at the end of the run nobody would know which section it was.
+            # Checked here, because the end of the run could not name the section at fault.
             try:
                 json.dumps(record, allow_nan=False)
             except (TypeError, ValueError) as error:
@@ -116,7 +116,7 @@ def _outcome(
 
 
 def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
-    """Write metrics, page and JUnit file into ``output``, and move the folder ``pictures`` there instead of the old."""
+    """Write metrics, page and JUnit file into ``output``; the folder ``pictures`` replaces the old one there."""
     texts = {
         "metrics.json": schema.text(metrics),
         "index.html": report.page(metrics, pictures).encode(),
@@ -131,9 +131,9 @@ def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
 
 
 def run_defects(asked: Request) -> list[Gate]:
-    """Inject the seeded defects, store what was found as ``defects.json`` and return the gates.
+    """Inject the seeded defects, store the results as ``defects.json`` and return the gates.
 
-    A report that lies in the same folder is drawn again with it.
+    A report in the same folder is drawn again with these results.
     """
     from validation.defects import run as defects
     from validation.defects.list import DEFECTS
@@ -158,7 +158,7 @@ def run_defects(asked: Request) -> list[Gate]:
 
 
 def _draw_again(output: Path) -> None:
-    """Put the stored defects into the report that lies in ``output``, if one of this schema does."""
+    """Draw the report in ``output`` again with the stored defects, if there is one of this schema."""
     try:
         metrics = schema.read(output / "metrics.json")
     except (ValueError, OSError):
@@ -168,7 +168,7 @@ def _draw_again(output: Path) -> None:
 
 
 def stored_defects(output: Path) -> dict[str, Any] | None:
-    """The last ``defects.json`` with ``changed``, whether the sources are others since; None where there is none."""
+    """The last ``defects.json``, None without one; its ``changed`` says whether the sources have changed since."""
     try:
         record = json.loads((output / "defects.json").read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -181,7 +181,7 @@ def stored_defects(output: Path) -> dict[str, Any] | None:
 
 
 def write_baseline(output: Path) -> Path:
-    """Make ``baseline.json`` from the ``metrics.json`` beside it; see ``baseline.summary`` for what is refused."""
+    """Make ``baseline.json`` from the ``metrics.json`` beside it; ``baseline.summary`` says what is refused."""
     text = baseline.text(schema.read(output / "metrics.json"))
     path = output / "baseline.json"
     _write(path, text)
@@ -189,5 +189,5 @@ def write_baseline(output: Path) -> Path:
 
 
 def _write(path: Path, text: bytes) -> None:
-    """The whole file or, where that fails, what was there before."""
+    """Write the whole file; on failure the old one stays."""
     write_atomically(path, lambda file: file.write(text))

@@ -1,7 +1,7 @@
 """Mitsuba's intersections as a reference for hits, ray by ray from Python.
 
-The variant ``scalar_rgb`` works in float32 and asks an Embree of its own, in robust mode: it judges how the answers
-come through Mitsuba, and is no independent judge of distances.
+The variant ``scalar_rgb`` works in float32 and finds hits with its own Embree in robust mode: it judges the answers
+that come through Mitsuba, and is no independent judge of distances.
 """
 
 from typing import Any
@@ -35,7 +35,7 @@ class MitsubaHits:
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest hits of ``origins``, ``directions`` (n, 3): (t, face), t in units of |direction|.
 
-        ``t`` is float64 that holds Mitsuba's float32, inf on a miss; ``face`` is int64, -1 on a miss.
+        ``t`` is Mitsuba's float32 stored as float64, inf on a miss; ``face`` is int64, -1 on a miss.
         """
         o = np.asarray(origins, dtype=np.float64).reshape(-1, 3)
         d = np.asarray(directions, dtype=np.float64).reshape(-1, 3)

@@ -1,9 +1,9 @@
 """Reference B: the Whitted recursion over Mitsuba's scene, BSDFs and emitters.
 
-Only the recursion is written here. Hits, shading frames, spawned rays, mirror and refraction directions,
-Fresnel's shares, light falloff and shadows are Mitsuba's; the Phong highlight, for which Mitsuba has no
-plugin, is computed from Mitsuba's frame and its ``reflect``. Each lobe of a BSDF is sampled on its own, so
-nothing is random and a second run gives the same bits.
+Only the recursion is written here. Hits, shading frames, spawned rays, mirror and refraction directions, Fresnel's
+shares, light falloff and shadows are Mitsuba's. Mitsuba has no plugin for the Phong highlight, which is computed from
+Mitsuba's frame and its ``reflect``. Each lobe of a BSDF is sampled on its own, so nothing is random and a second run
+gives the same bits.
 """
 
 from collections.abc import Callable
@@ -18,15 +18,15 @@ from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import Scene
 from validation.references.mitsuba import scene as source
 
-# Delta lobes and delta emitters do not depend on the random numbers that they are sampled with.
+# Delta lobes and delta emitters do not depend on the random numbers.
 _ANY_NUMBER, _ANY_POINT = 0.5, mi.Point2f(0.5, 0.5)
 
 
 def _context(component: int | None = None) -> mi.BSDFContext:
     """A context that samples one component of a BSDF, or all of them.
 
-    Importance transport leaves out the factor 1 / eta^2 by which radiance is compressed in glass: Whitted's
-    model, and ours, has none.
+    Importance transport omits the factor 1 / eta^2 by which radiance is compressed in glass: Whitted's model, and ours,
+    has none.
     """
     context = mi.BSDFContext(mi.TransportMode.Importance)
     if component is not None:
@@ -39,7 +39,7 @@ _ALL, _REFLECTION, _REFRACTION = _context(), _context(0), _context(1)
 
 @dataclass(frozen=True)
 class _Lobe:
-    """A direction in which light is followed; ``weight`` replaces the BSDF's own where it is given."""
+    """A direction in which a ray is followed; a ``weight`` that is given replaces the BSDF's own."""
 
     bsdf: mi.BSDF
     context: mi.BSDFContext
@@ -48,7 +48,7 @@ class _Lobe:
 
 @dataclass(frozen=True)
 class _Surface:
-    """What one material does: its ambient light k_a I_a, what it scatters of the lights, its lobes."""
+    """One material's surface: ambient light k_a I_a, the BSDF and highlight that scatter the lights, and the lobes."""
 
     ambient: mi.Color3f
     diffuse: mi.BSDF | None
@@ -130,9 +130,7 @@ def _surface(material: Material, ambient_light: source.Rgb) -> _Surface:
 
 
 def _phong_lobes(material: Phong) -> tuple[_Lobe, ...]:
-    """The constant shares; clear glass gives the refracted direction, and weight 0 under total internal
-    reflection.
-    """
+    """The constant shares; clear glass gives the refracted direction, and weight 0 under total internal reflection."""
     lobes = []
     if any(material.reflectance):
         lobes.append(_Lobe(source.mirror(material.reflectance), _ALL))
@@ -144,7 +142,7 @@ def _phong_lobes(material: Phong) -> tuple[_Lobe, ...]:
 
 def _whitted(scene: Scene, max_depth: int) -> _Whitted:
     surfaces = [_surface(scene.materials[i.material], scene.ambient) for i in scene.instances]
-    # A shape must carry some BSDF; each surface's own are asked instead, so what it is does not matter.
+    # Mitsuba requires a BSDF for each shape, but only the surfaces' own lobes are sampled, so any will do.
     shapes = source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
     lights = tuple(source.emitter(light) for light in scene.lights)
     return _Whitted(
@@ -180,9 +178,8 @@ def whitted(
 
     max_depth : bounces followed, as in ``RenderSettings``; there is no ``min_weight``.
     samples : a square number of rays a pixel, on our regular grid.
-    rays : origins and unit directions, (height * width, 3) each, instead of the camera's; ``samples`` is then
-        not used.
-    progress : called with the rows done and the rows in all.
+    rays : origins and unit directions, (height * width, 3) each, instead of the camera's; ``samples`` is then unused.
+    progress : called with the number of finished rows and of all rows.
     """
     tracer = _whitted(scene, max_depth)
     bundles = source.camera_rays(scene, width, height, samples) if rays is None else [rays]
@@ -199,7 +196,7 @@ def whitted(
 
 @dataclass(frozen=True)
 class Aovs:
-    """What the primary rays meet; every array begins with (height, width).
+    """The primary hits; every array begins with (height, width).
 
     depth : float64, distance along the unit ray, inf on a miss.
     position, geometric_normal, shading_normal : (..., 3) float64, NaN on a miss. Normals point to the side
@@ -215,7 +212,7 @@ class Aovs:
 
 
 def aovs(scene: Scene, width: int, height: int, *, rays: source.Rays | None = None) -> Aovs:
-    """Mitsuba's hits, in float32, of our primary rays through the pixels' centres, or of ``rays``."""
+    """Mitsuba's float32 hits of our primary rays through the pixels' centres, or of ``rays``."""
     shapes = source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
     unlit = source.assemble(shapes, [])
     table = np.full((height * width, 10), np.nan)
