@@ -1,4 +1,4 @@
-"""One mesh, every family of rays: our closest hits against exact arithmetic and against each reference."""
+"""One mesh and every family of rays: our closest hits against exact arithmetic and against each reference."""
 
 import hashlib
 import time
@@ -29,19 +29,18 @@ Ints = NDArray[np.int64]
 SEED = 2026
 EXACT = "exact arithmetic"
 
-# Families whose rays are aimed at nothing in particular: there, a hit that float64 cannot decide (the ray passes an
-# edge closer than the rounding of the edge function) has a chance of 1e-9 a ray, so one would be suspicious. Rays
-# aimed at edges and vertices, that begin on a face or come from far away are undecidable by design; they are counted
-# and shown.
+# Families whose rays have no particular target. There a hit that float64 cannot decide (the ray passes an edge closer
+# than the rounding of the edge function) has a chance of 1e-9 a ray, so one would be suspicious. Rays that are aimed at
+# edges and vertices, begin on a face or come from far away are undecidable by design; they are counted and shown.
 UNAIMED = ("camera", "camera_squares", "random", "grazing", "from_inside", "face")
-# These begin in the box of the mesh. Where that has no thickness they begin on faces, which is undecidable as well.
+# These begin in the box of the mesh. In a box without thickness they begin on faces, which is undecidable as well.
 _IN_THE_BOX = ("random", "from_inside")
-# Rays begin up to 1e5 radii away, and their numbers and those of hits must be float32's, which end at 3e38 and lose
+# Rays begin up to 1e5 radii away. Their numbers and those of hits must be float32 numbers, which end at 3e38 and lose
 # digits below 1e-38.
 _SMALLEST, _LARGEST = 1e-30, 1e30
 
 # Rays of a family that are not plainly right get a slow judgement, 5 ms each. The sound renderer needs it for a few
-# hundred; beyond these all count as wrong.
+# hundred; all rays beyond this number count as wrong.
 _JUDGED = 1_500
 
 _ROUNDOFF = {"float32": FLOAT32_ROUNDOFF, "float64": FLOAT64_ROUNDOFF}
@@ -49,12 +48,12 @@ _ROUNDOFF = {"float32": FLOAT32_ROUNDOFF, "float64": FLOAT64_ROUNDOFF}
 
 @dataclass(frozen=True)
 class Effort:
-    """How much to check.
+    """How many rays to check, and against which references.
 
-    rays        a family and mesh
+    rays        of each family on each mesh
     exact       of these, judged by exact arithmetic whether or not a reference disagrees
     leaks       rays of each kind from inside each closed mesh
-    references  who is asked
+    references  that are compared
     """
 
     rays: int
@@ -64,20 +63,20 @@ class Effort:
 
 
 class Asked(NamedTuple):
-    """A reference and what it made of the mesh; ``seconds`` holds its build and its queries."""
+    """A reference with the mesh loaded; ``seconds`` sums its build and its queries."""
 
     reference: HitReference
     tree: Any
     seconds: dict[str, float]
 
     def closest_hit(self, rays: RayBatch) -> HitArrays:
-        """Its closest hits, timed."""
+        """Closest hits of the reference, timed."""
         answer = spending(self.seconds, "query", self.tree.closest_hit)
         return HitArrays(*answer(rays.origins, rays.directions))
 
 
 def ask(reference: HitReference, mesh: Mesh) -> Asked:
-    """Give the mesh to the reference, timed."""
+    """Build the reference's structure over the mesh, timed."""
     began = time.perf_counter()
     tree = reference.make(mesh.vertices, mesh.faces)
     return Asked(reference, tree, {"build": time.perf_counter() - began, "query": 0.0})
@@ -101,8 +100,10 @@ class _Target(NamedTuple):
 
 
 class _Findings(NamedTuple):
-    """Of one family: our errors on the exact sample, comparisons and error sizes by reference, any-hit differences, and
-    rays of the sample whose hit is another one when they are asked a few at a time.
+    """Results of one family: errors on the exact sample, comparisons and error sizes by reference, and counts.
+
+    ``any_hit_differs`` counts rays whose any hit differs from the closest hit, ``few_differ`` rays of the sample that
+    have another hit when traced a few at a time.
     """
 
     errors: ExactErrors
@@ -115,7 +116,7 @@ class _Findings(NamedTuple):
 def check_mesh(name: str, mesh: Mesh, effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Check all families of rays on ``mesh``; returns a record for JSON and the gates.
 
-    A reference that cannot judge the mesh stands with its reason under ``left_out``; exact arithmetic always judges.
+    A reference that cannot judge the mesh is listed with its reason under ``left_out``; exact arithmetic always judges.
     Raises ``ValueError`` for a mesh without faces, or of a size for which rays cannot be float32 numbers.
     """
     size = float(np.abs(mesh.vertices[mesh.faces]).max(initial=0.0))
@@ -142,7 +143,7 @@ def check_mesh(name: str, mesh: Mesh, effort: Effort, job: Job) -> tuple[dict[st
 
 
 def describe(asked: Asked) -> dict[str, Any]:
-    """Who was asked, for JSON."""
+    """The reference and its seconds, for JSON."""
     reference = asked.reference
     named = {"key": reference.key, "name": reference.name, "version": reference.version}
     return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in asked.seconds.items()}}
@@ -186,7 +187,10 @@ def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -
 
 
 def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: Effort) -> _Findings:
-    """Ask everybody. Who takes few rays gets the first of one seeded order, so that all samples lie in each other."""
+    """Compare with exact arithmetic and every reference.
+
+    A slow reference gets the first rays of one seeded order, so that every smaller sample is part of every larger one.
+    """
     vertices, faces = target.mesh.vertices, target.mesh.faces
     order = np.random.default_rng(SEED).permutation(len(rays))
     sample = np.sort(order[: effort.exact])
@@ -211,7 +215,7 @@ def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: Effort) -> _
 
 
 def _few_differ(octree: Octree, rays: RayBatch, ours: HitArrays) -> int:
-    """How many rays have another hit in calls of one ray, two, and so on up to a packet less one, and then again."""
+    """Number of rays with another hit in calls of one ray, two, and so on up to a packet less one, and then again."""
     differ, begin, count = 0, 0, 1
     while begin < len(rays):
         rows = np.arange(begin, min(begin + count, len(rays)))

@@ -40,8 +40,8 @@ class SeenFace:
 
 
 class RayView:
-    """Exact and rounding-tolerant verdicts on one ray and a mesh ``vertices`` (V, 3), ``faces`` (F, 3), for hits at t
-    >= 0.
+    """Exact and rounding-tolerant verdicts on one ray, hits at t >= 0, and a mesh ``vertices`` (V, 3), ``faces`` (F,
+    3).
 
     ``seen`` holds all faces that are hit or that rounding might call hit; ``closest`` is the exact closest t, None on a
     miss, and ``closest_faces`` holds all faces that attain it.
@@ -110,8 +110,7 @@ class RayView:
         return seen
 
     def _sheets(self) -> list[tuple[Fraction, float]]:
-        """(t, bound) of each set of joined faces that a watertight kernel must hit, though it surely hits no single
-        one.
+        """(t, bound) of each set of joined faces that a watertight kernel must hit, though no single one is sure.
 
         Such a kernel shears each vertex once and takes the signs of the edges between the sheared points without error,
         so it sees a slightly moved mesh without gaps. Take the faces joined by common edges, and the edges that an odd

@@ -97,8 +97,7 @@ def can_judge(scene: Scene) -> str | None:
 
 
 def _bsdf(scene: Scene, name: str, lit: bool) -> mi.BSDF:
-    """A material's BSDF: diffuse surfaces are black in the background's pass, and a millionth as bright in a light's.
-    """
+    """A material's BSDF: diffuse surfaces are black in the background's pass, a millionth as bright in a light's."""
     material = scene.materials[name]
     if isinstance(material, Mirror):
         return source.mirror(material.reflectance)
