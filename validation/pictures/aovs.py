@@ -1,4 +1,4 @@
-"""What the primary rays meet, ours against Mitsuba's: the lowest rung, geometry and camera apart from shading."""
+"""Primary hits, ours against Mitsuba's: the lowest rung, which tests geometry and camera apart from shading."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from validation.gates import Gate
 from validation.references.mitsuba.whitted import Aovs
 from validation.thresholds import Aovs as Limits
 
-# What stands in for the largest error where no ray was hit by both.
+# The largest error where no ray was hit by both.
 _NONE = 0.0
 
 
@@ -43,7 +43,7 @@ def _limited(errors: dict[str, NDArray[np.float64]], limits: Limits) -> dict[str
 
 
 def _errors(scene: Scene, ours: Image, theirs: Aovs, both: NDArray[np.bool_]) -> dict[str, NDArray[np.float64]]:
-    """Of each pixel that both hit, in the order of the picture."""
+    """Errors of each pixel that both hit, in the picture's order."""
     height, width = ours.depth.shape
     origins, directions = (rays[both.ravel()] for rays in primary_rays(scene.camera, width, height))
     depth, met = ours.depth[both], theirs.depth[both]

@@ -1,8 +1,8 @@
-"""One picture of ours against a reference: the numbers that it is gated on, and which pixels may not count.
+"""Comparison of one picture of ours with a reference: the numbers of its gates, and the fragile pixels.
 
-SSIM sees structure: an edge out of place, a wrong normal, a missing bounce. It is nearly blind to brightness
-(a gain of 1.10 leaves .998), so it never stands alone: the share of pixels that differ visibly, the mean
-error, the largest error and FLIP go with it. sRGB is what people see; linear radiance is what a renderer computes.
+SSIM measures structure: an edge out of place, a wrong normal, a missing bounce. It is nearly blind to brightness (a
+gain of 1.10 leaves .998), so it is never used alone: the share of pixels that differ visibly, the mean error, the
+largest error and FLIP complement it. sRGB is what people see; linear radiance is what a renderer computes.
 """
 
 from collections.abc import Callable
@@ -17,14 +17,14 @@ from validation.references.flip import flip_map
 
 Picture = NDArray[np.floating[Any]]
 
-# The smallest difference that an 8-bit picture shows.
+# The smallest visible difference of 8-bit pictures.
 VISIBLE = 1.0 / 255.0
 
-# A pixel is fragile when one of these small changes moves it by half of what is visible. The offsets are
-# those by which renderers lift spawned rays off a surface: 1e-7 of the scene is as small as double precision
-# cares for, 3e-4 is more than Mitsuba's. The steps around Mitsuba's 8.94e-5 are small, because a ray that starts
-# just inside a facet's reach is caught by it at some offsets and not at others. 0.002 pixel is how far a
-# silhouette moves when float32 rounds rays and vertices.
+# A pixel is fragile when one of these small changes moves it by half of what is visible. The offsets are those by which
+# renderers lift spawned rays off a surface: 1e-7 of the scene is the smallest sensible offset in double precision, 3e-4
+# is more than Mitsuba's. The steps around Mitsuba's 8.94e-5 are small, because a ray that starts just within reach of a
+# facet hits it at some offsets and not at others. Rounding rays and vertices to float32 moves a silhouette by 0.002
+# pixel.
 BASE_OFFSET = 1e-7
 OFFSETS = (1e-5, 3e-5, 6e-5, 9e-5, 1e-4, 3e-4)
 SHIFT = 0.002
@@ -38,7 +38,7 @@ _WINDOW = 11
 
 @dataclass(frozen=True)
 class ImageComparison:
-    """How far ``ours`` is from the reference.
+    """The differences between our picture and the reference.
 
     ssim : mean structural similarity of the sRGB pictures, 1 when they are the same.
     ssim_foreground : its mean over the foreground's pixels, which a wide background cannot raise; None
