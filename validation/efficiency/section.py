@@ -1,6 +1,6 @@
-"""The section on run time: rays a second beside Embree's, the origin's table, and error against seconds.
+"""The section on efficiency: rays a second beside Embree's, the student program's table, and error against seconds.
 
-Nothing here is gated, because speed on a shared machine proves nothing.
+Nothing here has a gate, because speed on a shared machine proves nothing.
 """
 
 import statistics
@@ -23,9 +23,10 @@ from validation.references.embree import Embree
 from validation.scenes import SCENES
 from validation.tradeoff import RUNS, interleaved, ratio, spending, timed
 
-# The origin timed each of its configurations three times.
+# The student's program timed each of its configurations three times.
 ORIGIN_RUNS = 3
-# What the C++ program that this grew out of printed, on another machine and other models: 100 x 100, depth 3.
+# Times printed by the student's C++ program from which this renderer grew, on another machine and other models: 100 x
+# 100, depth 3.
 _ORIGIN_ROWS: tuple[tuple[Literal["octree", "brute"], int, int], ...] = (
     ("brute", 100, 3),
     ("octree", 100, 3),
@@ -35,7 +36,7 @@ ORIGIN = {"brute_seconds": 205.4, "octree_seconds": 0.411}
 
 
 def steps(job: Job) -> int:
-    """How often ``run`` calls ``job.step``: for two families of rays, the origin's rows, and error against run time."""
+    """Number of calls of ``job.step``: two families of rays, the student program's rows, two of error against time."""
     return 2 + len(_ORIGIN_ROWS) + 2
 
 
@@ -54,7 +55,7 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
 
 
 def _hits(count: int, step: Callable[[str], None], costs: dict[str, float]) -> dict[str, object]:
-    """Rays a second of ours and Embree's on one mesh and the same rays, in turn, after a warm-up."""
+    """Rays a second of ours and Embree's on one mesh with the same rays, in turn, after a warm-up."""
     mesh = load_mesh(SCENES / "models" / "displaced_sphere.ply")
     octree, embree = Octree.from_mesh(mesh), Embree(mesh.vertices, mesh.faces)
     single = Octree.from_mesh(mesh, threads=1)
@@ -81,7 +82,7 @@ def _hits(count: int, step: Callable[[str], None], costs: dict[str, float]) -> d
 
 
 def _origin(step: Callable[[str], None]) -> dict[str, object]:
-    """The origin's table on our main scene: build and render, every run a new tree."""
+    """The student program's table on our main scene: build and render, with a new tree in every run."""
     scene = load_scene(SCENES / "three_models.toml")
     # Compile both kernels before any clock starts.
     for accelerator, _, _ in _ORIGIN_ROWS:

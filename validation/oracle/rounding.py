@@ -40,8 +40,7 @@ class SeenFace:
 
 
 class RayView:
-    """Exact and rounding-tolerant verdicts on the hits at t >= 0 of one ray on a mesh: ``vertices`` (V, 3), ``faces``
-    (F, 3).
+    """Exact and rounding-tolerant verdicts on one ray's hits at t >= 0 on a mesh ``vertices`` (V, 3), ``faces`` (F, 3).
 
     ``seen`` holds all faces that are hit or that rounding might call hit; ``closest`` is the exact closest t, None on a
     miss, and ``closest_faces`` holds all faces that attain it.

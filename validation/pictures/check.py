@@ -38,7 +38,7 @@ class Pair(NamedTuple):
 def check(subject: str, pair: Pair, job: Job, *, shown: bool) -> tuple[dict[str, Any], list[Gate]]:
     """Compare a pair; returns the record and the gates.
 
-    shown : whether the report shows the pair, so that its PNGs are written even if it passes. A pair that fails leaves its
+    shown : whether the report shows the pair, so that its PNGs are written even if it passes. A failing pair leaves its
         PNGs and EXRs in ``job.folder``/failed.
     """
     ours, hit = pair.ours.radiance, pair.ours.face >= 0

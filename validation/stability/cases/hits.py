@@ -1,4 +1,4 @@
-"""Rows 1 to 32, 46 and 49 of the extreme cases: everything about hits."""
+"""Extreme cases 1 to 32, 46 and 49: hits."""
 
 from validation.stability.cases import builds as extreme_builds
 from validation.stability.cases import order as extreme_order

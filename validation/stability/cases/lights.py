@@ -1,4 +1,4 @@
-"""Extreme cases 41 to 45: halls of mirrors, branching rays, highlights, lights on and under surfaces."""
+"""Extreme cases 41 to 45: facing mirrors, branching rays, highlights, lights on and under surfaces."""
 
 import math
 
@@ -64,7 +64,7 @@ def _highlights(quick: bool) -> Outcome:
         material = Phong(diffuse=0.0, ambient=0.0, specular=1.0, shininess=shininess)
         for off in (0.0, 1e-6, 1e-3, 2e-3, 0.1, half, math.pi / 2 - 1e-3):
             light = DirectionalLight(direction=(math.sin(half + off), -math.cos(half + off), 0.0))
-            if off > half - 1e-9:  # the light would be below; turned to the other side, R.V = cos(off) all the same
+            if off > half - 1e-9:  # the light would be below; on the other side R.V = cos(off) too
                 light = DirectionalLight(direction=(math.sin(half - off), -math.cos(half - off), 0.0))
             value = pixel(scene_of(eye_at((1, 1, 0), (0, 0, 0)), (level(3, 0, 1), material), lights=(light,)))
             # The angle errs by 2 u, cos^n relatively by n tan(off) times that, and the lobe by 16 u (n + 2).

@@ -1,4 +1,4 @@
-"""Row 46 of the extreme cases: rays whose hits err by more than the boxes are wide, asked in every order."""
+"""Extreme case 46: rays whose hits err by more than the boxes' width, in every order."""
 
 from collections.abc import Callable, Iterator
 
@@ -19,12 +19,12 @@ from validation.stability.cases.judgement import (
     same_bits,
 )
 
-# Exact arithmetic takes 20 ms a ray with 2,000 faces that all overlap.
+# Exact arithmetic takes 20 ms a ray, because all 2,000 faces overlap.
 JUDGED = 64
 
 
 def sheets(count: int) -> Mesh:
-    """Triangles in the plane x = 0 that overlap: every float32 box around them is flat."""
+    """Overlapping triangles in the plane x = 0: every float32 box around them is flat."""
     corners = float32_exact(np.random.default_rng(SEED).uniform(-0.5, 0.5, (count, 3, 3)))
     corners[..., 0] = 0.0
     return Mesh(corners.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3))
@@ -43,7 +43,7 @@ def _refitted(mesh: Mesh) -> Octree:
 
 
 def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tuple[str, Hits]]:
-    """The closest hits of the same rays by brute force, trees of all kinds, and batches cut and turned in many ways."""
+    """Closest hits of the same rays by brute force, all kinds of trees, and batches cut and reordered in many ways."""
 
     def ask(accelerator: Octree | BruteForce, *pieces: np.ndarray) -> Hits:
         far = np.broadcast_to(t_max, len(rays))
@@ -72,7 +72,7 @@ def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tu
 
 
 def differing(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray = np.inf) -> tuple[np.ndarray, Hits, list[str]]:
-    """The rays that some order answers otherwise than the first one, its hits, and which orders those are."""
+    """Rays that some order answers differently from the first, the first order's hits, and those orders' names."""
     asked = orders(mesh, rays, t_max)
     _, first = next(asked)
     differs, names = np.zeros(len(rays), dtype=np.bool_), []
@@ -86,7 +86,7 @@ def differing(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray = np.inf) ->
 def _order(quick: bool) -> Outcome:
     mesh, rays = sheets(2000), beside_sheets(80 if quick else 200)
     differs, hits, names = differing(mesh, rays)
-    # Half the limits cut the hit off by less than its error is large, half leave it.
+    # Half of the limits cut the hit off by less than its error, half keep it.
     close = np.where(hits.hit, hits.t, 1.0) * np.where(np.arange(len(rays)) % 2, 1 - 1e-9, 1 + 1e-9)
     differs_close, _, names_close = differing(mesh, rays, close)
     judged = np.linspace(0, len(rays) - 1, JUDGED).astype(int)
