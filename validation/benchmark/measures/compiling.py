@@ -15,14 +15,14 @@ from typing import Any
 
 
 class _Clocks:
-    """Seconds by name, those of calls within left out."""
+    """Seconds by name, without those of nested calls."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = defaultdict(float)
         self._within: list[float] = []
 
     def around(self, name: Callable[..., str], call: Callable[..., Any]) -> Callable[..., Any]:
-        """``call`` with a clock, whose name its arguments tell."""
+        """``call`` with a clock, whose name is a function of the arguments."""
 
         def timed(*arguments: Any, **keywords: Any) -> Any:
             self._within.append(0.0)
@@ -39,7 +39,7 @@ class _Clocks:
 
 
 def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
-    """Seconds by stage and by kernel, and in all, of compiling ``what``; for a process that has compiled nothing."""
+    """Seconds by stage, by kernel and in total of compiling ``what``; for a process that has compiled nothing."""
     from numba.core import compiler_machinery, lowering
 
     from renderer.kernels import compiler
@@ -65,7 +65,7 @@ def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
 
 
 def _stage(name: str) -> str:
-    """What a pass of Numba's is a part of."""
+    """The stage of a Numba pass."""
     known = {
         "translate_bytecode": "read bytecode",
         "nopython_type_inference": "infer types",

@@ -1,4 +1,4 @@
-"""Whole Whitted pictures: ours beside what Mitsuba needs for the same rays, and beside its own integrators."""
+"""Whole Whitted pictures: ours beside Mitsuba's with the same rays, and beside its own integrators."""
 
 import statistics
 import time
@@ -66,7 +66,7 @@ def _add_mitsuba(
     rays = source.camera_rays(scene, size, size, 1)[0]
 
     def recursion() -> float:
-        """From the end of the picture's first row, of background, to its end: scene and rays were made before."""
+        """Seconds from the end of the first row, which shows background, to the picture's end: setup is excluded."""
         marks: list[float] = []
         pictures[SCALAR] = mitsuba_whitted.whitted(
             scene, size, size, max_depth=_DEPTH, rays=rays, progress=lambda *_: marks.append(time.perf_counter())

@@ -14,7 +14,7 @@ _NAMES = {
 
 
 def figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
-    """For each figure a title (its caption too) and an ``<svg>`` element."""
+    """For each figure a title (also its caption) and an ``<svg>`` element."""
     hits, pictures = record["hits"], record["pictures"]
     drawn = [_storage_figure(hits, family) for family in hits["storage"]]
     drawn += [_tree_figure(hits, family["rays"]) for family in hits["storage"]]
@@ -79,7 +79,7 @@ def _curves(scene: Mapping[str, Any], error: str) -> list[Series]:
 
 
 def _curve(name: str, points: Sequence[Mapping[str, Any]], error: str) -> Series:
-    # An exact 0 has no place beside errors of a percent; the figure's floor would flatten the curves.
+    # An exact 0 is left out beside errors of a percent; drawn at the figure's floor, it would flatten the curves.
     return Series(name, [p["seconds"] for p in points], [p[error] or None for p in points])
 
 

@@ -1,4 +1,4 @@
-"""The record of a run, ``benchmark.json``: what is in it, how it is written and read. The page is drawn from it alone.
+"""The record of a run, ``benchmark.json``: its keys, reading and writing. The page is drawn from it alone.
 
 schema            SCHEMA; another number is refused
 command, date, commit, quick, seconds      how the record was made; commit is null outside a git checkout
@@ -44,7 +44,7 @@ _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 
 
 def describe(libllvm: str | None, load: float | None) -> dict[str, Any]:
-    """Where and with what: ``validation.environment`` and what only the benchmark uses."""
+    """The environment: ``validation.environment`` and what only the benchmark uses."""
     found: dict[str, Any] = environment.describe()
     packages = {name: _version(name) for name in _MORE_PACKAGES}
     return found | {"packages": found["packages"] | packages, "libllvm": libllvm, "load": load}
@@ -59,7 +59,7 @@ def described(systems: Sequence[System]) -> dict[str, Any]:
 
 
 def load() -> float | None:
-    """How many processes wanted a processor, on average over the last minute; None where the system does not tell."""
+    """Mean number of processes that wanted a processor in the last minute; None where the system does not report it."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
@@ -77,14 +77,14 @@ def commit() -> str | None:
 
 
 def write(record: Mapping[str, Any], path: Path) -> None:
-    """Whole or not at all; ``ValueError`` for NaN and infinities, which are no JSON."""
+    """Write the whole file or nothing; raises ``ValueError`` for NaN and infinities, which JSON lacks."""
     _expect_keys(record, "record")
     text = json.dumps(record, indent=1, allow_nan=False)
     write_atomically(path, lambda file: file.write(text.encode()))
 
 
 def read(path: Path) -> dict[str, Any]:
-    """What ``write`` wrote. Raises ``ValueError`` for another schema or missing parts."""
+    """A stored record. Raises ``ValueError`` for another schema or missing parts."""
     record = json.loads(path.read_text(encoding="utf-8"))
     got = record.get("schema") if isinstance(record, dict) else type(record).__name__
     if got != SCHEMA:

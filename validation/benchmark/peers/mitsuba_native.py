@@ -1,8 +1,8 @@
-"""Mitsuba's own integrators on a scene of ours, in either variant: what its users would call to draw it.
+"""Mitsuba's own integrators on a scene of ours, in either variant, as its users would call them.
 
 ``path`` follows one random branch at glass and adds light between diffuse surfaces, ``direct`` stops at the first
-surface, and the background shines on diffuse surfaces, so their pictures differ from Whitted's. They are here as a
-clock, not as a reference.
+surface, and the background shines on diffuse surfaces, so their pictures differ from Whitted's. Only their time is
+compared; they are no reference.
 """
 
 from collections.abc import Callable
