@@ -6,9 +6,11 @@ o, b = p1 - o, c = p2 - o:
 
     U = d . (b x c),  V = d . (c x a),  W = d . (a x b),  T = a . (b x c),  t = T / (U + V + W).
 
-A float64 filter runs before the rational test; it discards only faces that it proves to be missed.
+Semantics: a triangle is closed (its edges and vertices belong to it) and two-sided; a ray in the triangle's plane and a
+triangle of zero area are missed; t counts in units of |direction|; t_min <= t <= t_max is closed; the closest hit is
+the smallest exact t and, at equal t, the lowest face.
 
-In front of the rational test stands a float64 filter that only discards what it proves to be missed.
+A float64 filter runs before the rational test; it discards only faces that it proves to be missed.
 """
 
 import math

@@ -138,9 +138,9 @@ def fragile_pixels(render: Callable[[float, tuple[float, float]], Picture]) -> N
         ``offset`` and primary rays moved by ``shift`` pixels in x and y.
 
     Where a ray passes an edge by less than two renderers' roundings, or a spawned ray starts so near another
-    surface that the offset decides what it meets, both of their pictures are right. Only our own picture is
-    asked, so an error of ours cannot excuse itself by differing from the reference: a pixel that is wrong but
-    steady is not fragile.
+    surface that the offset decides its hit, both of their pictures are right. The mask depends on our own picture
+    alone, so a difference from the reference excuses no error of ours: a pixel that is wrong but steady is not
+    fragile.
     """
     base = srgb(render(BASE_OFFSET, (0.0, 0.0)))
     changes = [(offset, (0.0, 0.0)) for offset in OFFSETS]

@@ -7,7 +7,7 @@ their numbers differ. A run with ``--only`` compares the sections that ran. Rule
                     threshold allows: our side is deterministic, but another processor or version of a reference
                     moves last digits
   seconds, ratios   are listed beyond a factor of 1.5: load alone moves them by tens of percent on a shared machine
-  verdicts          always count, whatever the numbers
+  verdicts          always count, for any change of the numbers
 
 The comparison does not affect the exit code; only a failing gate does.
 """

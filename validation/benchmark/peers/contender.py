@@ -38,7 +38,7 @@ class Family:
 class Query(NamedTuple):
     """Rays already in the system's own arrays. Only ``trace`` is timed.
 
-    read : converts the result of ``trace`` to t of each ray, float64 (n,), inf on a miss; for any-hit queries bool (n,).
+    read : converts ``trace``'s result to t of each ray, float64 (n,), inf on a miss; for any-hit queries to bool (n,).
     """
 
     trace: Callable[[], Any]
