@@ -100,15 +100,15 @@ def _run(options: argparse.Namespace, command: str) -> int:
     if options.write_baseline:
         print(f"validation: wrote {suite.write_baseline(options.output)}")
         return 0
-    asked = suite.Request(
+    request = suite.Request(
         command, options.quick, options.only, options.output, options.gate, tuple(options.scene), tuple(options.mesh)
     )
     if options.defects:
-        return _defects_verdict(suite.run_defects(asked), asked)
-    return _verdict(suite.run(asked), asked)
+        return _defects_verdict(suite.run_defects(request), request)
+    return _verdict(suite.run(request), request)
 
 
-def _verdict(metrics: Mapping[str, Any], asked: "Request") -> int:
+def _verdict(metrics: Mapping[str, Any], request: "Request") -> int:
     """Print the failing gates and a one-line summary; returns the exit code."""
     _print_failures(metrics["gates"])
     passed, gates, failed = (metrics["verdict"][key] for key in ("passed", "gates", "failed"))
@@ -117,17 +117,17 @@ def _verdict(metrics: Mapping[str, Any], asked: "Request") -> int:
     if "absent" not in metrics["baseline"]:
         better, worse = (len(metrics["baseline"][key]) for key in ("better", "worse"))
         against = f"; better {better}, worse {worse} than baseline"
-    state, page = "PASS" if passed else "FAIL", asked.output / "index.html"
+    state, page = "PASS" if passed else "FAIL", request.output / "index.html"
     print(f"validation: {state}, {count} in {metrics['seconds']:.0f} s{against}; see {page}")
     return 0 if passed else 1
 
 
-def _defects_verdict(gates: Sequence["Gate"], asked: "Request") -> int:
+def _defects_verdict(gates: Sequence["Gate"], request: "Request") -> int:
     """As ``_verdict``, for the gates of a run of the seeded defects."""
     _print_failures([gate.record() for gate in gates])
     held = sum(gate.passed for gate in gates)
     state = "PASS" if gates and held == len(gates) else "FAIL"
-    stored = asked.output / "defects.json"
+    stored = request.output / "defects.json"
     print(f"validation: {state}, {held} of {len(gates)} gates on seeded defects; see {stored}")
     return int(state == "FAIL")
 

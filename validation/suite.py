@@ -18,8 +18,7 @@ from validation import environment
 from validation.gates import Gate
 from validation.job import Job
 from validation.progress import steps
-from validation.report import baseline, junit, schema, summary
-from validation.report import page as report
+from validation.report import baseline, junit, page, schema, summary
 from validation.scenes import SCENES
 from validation.sections import Section, choose
 from validation.thresholds import Thresholds, load_thresholds
@@ -38,51 +37,51 @@ class Request:
     meshes: tuple[Path, ...] = ()
 
 
-def run(asked: Request) -> dict[str, Any]:
-    """Run the sections, write the report into ``asked.output`` and return the metrics.
+def run(request: Request) -> dict[str, Any]:
+    """Run the sections, write the report into ``request.output`` and return the metrics.
 
     Old files in that folder stay unchanged until all new ones are complete. Raises ``ValueError`` and ``OSError`` for
     invalid user files, before any section runs, and ``ImportError`` where a reference is missing.
     """
     began, started = time.perf_counter(), datetime.now(UTC)
-    thresholds = Thresholds() if asked.gate is None else load_thresholds(asked.gate)
-    _open(asked)
-    given = {kind for kind, files in (("scene", asked.scenes), ("mesh", asked.meshes)) if files}
-    chosen, left_out = choose(asked.only, given)
-    stored_baseline = baseline.read(asked.output / "baseline.json")
-    asked.output.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=asked.output, prefix=".run-") as folder:
+    thresholds = Thresholds() if request.gate is None else load_thresholds(request.gate)
+    _open(request)
+    given = {kind for kind, files in (("scene", request.scenes), ("mesh", request.meshes)) if files}
+    chosen, left_out = choose(request.only, given)
+    stored_baseline = baseline.read(request.output / "baseline.json")
+    request.output.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=request.output, prefix=".run-") as folder:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()
-        job = Job(asked.quick, thresholds, pictures, lambda _: None, asked.scenes, asked.meshes)
+        job = Job(request.quick, thresholds, pictures, lambda _: None, request.scenes, request.meshes)
         records, gates = _sections(chosen, job)
         metrics = {
             "schema": schema.VERSION,
-            "command": asked.command,
-            "quick": asked.quick,
+            "command": request.command,
+            "quick": request.quick,
             "own": job.own,
             "started": started.isoformat(timespec="seconds"),
-            "thresholds": {"file": asked.gate and str(asked.gate), "moved": thresholds.moved()},
+            "thresholds": {"file": request.gate and str(request.gate), "moved": thresholds.moved()},
             "left_out": left_out,
             "environment": environment.describe(),
             **records,
         }
-        metrics |= _outcome(records, [gate.record() for gate in gates], stored_defects(asked.output))
+        metrics |= _outcome(records, [gate.record() for gate in gates], stored_defects(request.output))
         metrics["baseline"] = baseline.compare(metrics, stored_baseline)
         metrics["seconds"] = time.perf_counter() - began
-        write(metrics, asked.output, pictures)
+        write(metrics, request.output, pictures)
     return metrics
 
 
-def _open(asked: Request) -> None:
+def _open(request: Request) -> None:
     """Read every user file first, so that an invalid one is an error at once and not minutes later."""
-    if not (asked.scenes or asked.meshes or SCENES.is_dir()):
+    if not (request.scenes or request.meshes or SCENES.is_dir()):
         raise ValueError(
             f"expected --scene or --mesh, or the suite's own scenes in {SCENES}, which only a checkout has; got none"
         )
-    for scene in asked.scenes:
+    for scene in request.scenes:
         _ = load_scene(scene).instances
-    for mesh in asked.meshes:
+    for mesh in request.meshes:
         load_mesh(mesh)
 
 
@@ -119,7 +118,7 @@ def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
     """Write metrics, page and JUnit file into ``output``; the folder ``pictures`` replaces the old one there."""
     texts = {
         "metrics.json": schema.text(metrics),
-        "index.html": report.page(metrics, pictures).encode(),
+        "index.html": page.page(metrics, pictures).encode(),
         "junit.xml": junit.document(metrics),
     }
     kept = output / "pictures"
@@ -130,7 +129,7 @@ def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
         _write(output / name, text)
 
 
-def run_defects(asked: Request) -> list[Gate]:
+def run_defects(request: Request) -> list[Gate]:
     """Inject the seeded defects, store the results as ``defects.json`` and return the gates.
 
     A report in the same folder is drawn again with these results.
@@ -140,20 +139,20 @@ def run_defects(asked: Request) -> list[Gate]:
 
     began, started = time.perf_counter(), datetime.now(UTC)
     sources = environment.sources_sha256()
-    chosen = [d for d in DEFECTS if not (asked.quick and d.kernel)]
-    asked.output.mkdir(parents=True, exist_ok=True)
+    chosen = [d for d in DEFECTS if not (request.quick and d.kernel)]
+    request.output.mkdir(parents=True, exist_ok=True)
     with steps(len(chosen) + 1) as step:
-        record, gates = defects.run(asked.quick, step)
+        record, gates = defects.run(request.quick, step)
     record |= {
         "sources": sources,
-        "quick": asked.quick,
-        "command": asked.command,
+        "quick": request.quick,
+        "command": request.command,
         "started": started.isoformat(timespec="seconds"),
         "seconds": time.perf_counter() - began,
     }
     text = json.dumps(record, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-    _write(asked.output / "defects.json", text.encode())
-    _draw_again(asked.output)
+    _write(request.output / "defects.json", text.encode())
+    _draw_again(request.output)
     return gates
 
 

@@ -57,7 +57,7 @@ class Pictures(_Table):
     camera_pixels: _Error = 2e-3
 
 
-class Aovs(_Table):
+class AovLimits(_Table):
     """Limits for the primary hits."""
 
     # A float32 hit errs by 3e-7 + 2e-7 / |n.d| of its distance; below an angle of 0.02 rad that passes 1e-5.
@@ -89,7 +89,7 @@ class Thresholds(_Table):
     """All thresholds that can be changed; those of the stability section are derived from rounding and cannot."""
 
     pictures: Pictures = Pictures()
-    aovs: Aovs = Aovs()
+    aovs: AovLimits = AovLimits()
     hits: HitLimits = HitLimits()
 
     def moved(self) -> dict[str, tuple[float | None, float | None]]:

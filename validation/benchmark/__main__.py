@@ -77,7 +77,7 @@ def measure(
     from validation.benchmark.measures import ablation, first_answers, frames, meshes, processes
     from validation.benchmark.measures.queries import fits
     from validation.benchmark.page import record, targets
-    from validation.benchmark.parameters import study as knobs
+    from validation.benchmark.parameters import study
     from validation.benchmark.peers.systems import available
 
     began, date, load = time.perf_counter(), datetime.now(UTC), record.load()
@@ -98,7 +98,7 @@ def measure(
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
         "first_answers": first_answers.measure(names, step),
-        "ablation": ablation.run(quick, step), "knobs": knobs.run(quick, step),
+        "ablation": ablation.run(quick, step), "knobs": study.run(quick, step),
     }  # fmt: skip
     return found | {"targets": targets.judged(found), "seconds": time.perf_counter() - began}
 

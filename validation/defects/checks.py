@@ -17,23 +17,23 @@ from validation.gates import Gate
 from validation.hits import watertight
 from validation.hits.rays import float32_exact
 from validation.hits.refit import check_refit
-from validation.hits.section import Effort, check_leaks, check_mesh
+from validation.hits.section import HitEffort, check_leaks, check_mesh
 from validation.job import Job
-from validation.pictures import section as images
+from validation.pictures.section import PictureEffort, check_scene
 from validation.references.table import REFERENCES
 from validation.scenes import SCENES
-from validation.stability import section as numerical
-from validation.stability import sweeps as stability
+from validation.stability import sweeps
+from validation.stability.section import CASES, check_case
 from validation.thresholds import Thresholds
 
 SEED = 2029
 # The scene glass has what every rung of the ladder needs: mirrors, highlights, two lights, ambient light, smooth and
 # flat meshes. Random paths through it make a separate picture. The scene stairs has the other camera.
-_SCENES = {"glass": images.Effort(size=128, lower=64), "stairs": images.Effort(size=64)}
+_SCENES = {"glass": PictureEffort(size=128, lower=64), "stairs": PictureEffort(size=64)}
 # Enough for packets and streams in every family; a defect that shows on one ray in a thousand is still found. One
 # reference is enough to raise a disagreement; exact arithmetic decides which side is wrong.
 _EMBREE = tuple(reference for reference in REFERENCES if reference.key == "embree_robust")
-_HITS = Effort(rays=3_000, exact=40, leaks=20_000, references=_EMBREE)
+_HITS = HitEffort(rays=3_000, exact=40, leaks=20_000, references=_EMBREE)
 # Leak rays of each kind in each placement: the rarest of these defects leaks one in 20,000.
 _LEAKS = 200_000
 # The extreme case of a million triangles; no defect here affects what it tests about size.
@@ -50,7 +50,7 @@ def run(groups: tuple[str, ...]) -> list[Gate]:
 def pictures(job: Job) -> Iterator[Gate]:
     """Two scenes: AOVs, the ladder's rungs against their references, and random paths through glass."""
     for name, effort in _SCENES.items():
-        _, found = images.check_scene(name, "", load_scene(SCENES / f"{name}.toml"), effort, job)
+        _, found = check_scene(name, "", load_scene(SCENES / f"{name}.toml"), effort, job)
         yield from found
 
 
@@ -58,9 +58,9 @@ def extreme(first: int, last: int) -> Callable[[Job], Iterator[Gate]]:
     """A check of the extreme cases ``first`` to ``last``, without the one whose mesh is too large here."""
 
     def check(job: Job) -> Iterator[Gate]:
-        for case in numerical.CASES:
+        for case in CASES:
             if first <= case.number <= last and case.number != _LARGE:
-                yield numerical.check_case(case, job)[1]
+                yield check_case(case, job)[1]
 
     return check
 
@@ -79,7 +79,7 @@ def sweep(job: Job) -> list[Gate]:
 
 def curves(job: Job) -> list[Gate]:
     """Error of t against offset, scale, angle and sliver height."""
-    _, found = stability.run(job.quick, job.step)
+    _, found = sweeps.run(job.quick, job.step)
     return found
 
 

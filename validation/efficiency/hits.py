@@ -20,17 +20,18 @@ from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.process.parallel import available_threads
 from renderer.trace.query import Hits
+from validation.error_curves import front
 from validation.hits.compare import HitArrays
 from validation.hits.rays import RayBatch, camera_rays, float32_exact, leak_rays
 from validation.oracle import exact
 from validation.references.table import REFERENCES
-from validation.tradeoff import front, median_seconds, spending, timed
+from validation.timing import median_seconds, spending, timed
 
 SEED = 20
 
 
 @dataclass(frozen=True)
-class Effort:
+class HitTimingEffort:
     """Size of the measurement.
 
     level   of the icosphere
@@ -49,8 +50,8 @@ class Effort:
     few: int = 100
 
 
-QUICK = Effort(level=4, rays=50_000, judged=1000, leaks=20_000, runs=3)
-FULL = Effort(level=5, rays=200_000, judged=5000, leaks=100_000, runs=5)
+QUICK = HitTimingEffort(level=4, rays=50_000, judged=1000, leaks=20_000, runs=3)
+FULL = HitTimingEffort(level=5, rays=200_000, judged=5000, leaks=100_000, runs=5)
 
 _COMPARED = ("embree_default", "embree_robust", "igl", "mitsuba", "trimesh")
 
@@ -64,7 +65,7 @@ class Contender(NamedTuple):
     most: int
 
 
-def run(effort: Effort, costs: dict[str, float]) -> dict[str, object]:
+def run(effort: HitTimingEffort, costs: dict[str, float]) -> dict[str, object]:
     """Measure; adds the seconds spent in each reference to ``costs``."""
     mesh = turned_mesh(effort.level)
     contenders = _contenders(mesh, effort, costs)
@@ -143,7 +144,7 @@ def answer(found: Hits | tuple[NDArray[np.float64], NDArray[np.int64]]) -> HitAr
     return HitArrays(found.t, found.face) if isinstance(found, Hits) else HitArrays(*found)
 
 
-def _contenders(mesh: Mesh, effort: Effort, costs: dict[str, float]) -> Mapping[str, Contender]:
+def _contenders(mesh: Mesh, effort: HitTimingEffort, costs: dict[str, float]) -> Mapping[str, Contender]:
     """The contenders by name.
 
     Ours stores float64, or float32 where it gets rounded vertices. One thread and all threads are separate contenders,

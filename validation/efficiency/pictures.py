@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from renderer.picture.render import render
 from renderer.scene.scene import UNLIMITED_RAYS, Scene
+from validation.error_curves import front, slope
 from validation.pictures.compare import compare
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba import scene as mitsuba_scene
 from validation.references.mitsuba.sampling import Film, Sampler
-from validation.tradeoff import RUNS, front, median_seconds, slope, spending
+from validation.timing import RUNS, median_seconds, spending
 
 Picture = NDArray[Any]
 Point = dict[str, Any]
@@ -42,7 +43,7 @@ SHALLOW = 3
 
 
 @dataclass(frozen=True)
-class Effort:
+class PictureTimingEffort:
     """Pixels a side, Mitsuba's timed numbers of samples, samples of the converged pictures, and ``runs`` of the clock.
 
     The converged picture is the mean of two with ``truth`` stratified samples each, a square number.
@@ -54,8 +55,8 @@ class Effort:
     runs: int
 
 
-QUICK = Effort(size=48, theirs=(1, 4, 16, 64), truth=256, runs=1)
-FULL = Effort(size=64, theirs=(1, 4, 16, 64, 256), truth=576, runs=3)
+QUICK = PictureTimingEffort(size=48, theirs=(1, 4, 16, 64), truth=256, runs=1)
+FULL = PictureTimingEffort(size=64, theirs=(1, 4, 16, 64, 256), truth=576, runs=3)
 
 
 class Drawn(NamedTuple):
@@ -68,7 +69,7 @@ class Drawn(NamedTuple):
 class Bench:
     """One scene with its renderers; adds the seconds spent in Mitsuba's film to ``costs``."""
 
-    def __init__(self, scene: Scene, effort: Effort, costs: dict[str, float]) -> None:
+    def __init__(self, scene: Scene, effort: PictureTimingEffort, costs: dict[str, float]) -> None:
         self.scene, self.effort = scene, effort
         self._film, self._costs = Film(scene, effort.size), costs
 
@@ -87,7 +88,9 @@ class Bench:
         return Drawn(radiance, seconds)
 
 
-def run(scene: Scene, name: str, effort: Effort, costs: dict[str, float]) -> tuple[dict[str, Any], dict[str, Any]]:
+def run(
+    scene: Scene, name: str, effort: PictureTimingEffort, costs: dict[str, float]
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """The records of the curves and of the split; adds the seconds spent in each reference to ``costs``."""
     bench = Bench(scene, effort, costs)
     halves = [bench.theirs(effort.truth, sampler="stratified", seed=seed).radiance for seed in (1, 2)]
@@ -133,12 +136,14 @@ def _truncation(bench: Bench) -> list[dict[str, Any]]:
     ]
 
 
-def _curve(who: str, knob: str, draws: Mapping[Any, Callable[[], Drawn]], truth: Picture, runs: int) -> dict[str, Any]:
+def _curve(
+    who: str, parameter: str, draws: Mapping[Any, Callable[[], Drawn]], truth: Picture, runs: int
+) -> dict[str, Any]:
     """Seconds and errors of every setting."""
     pictures = {value: draw().radiance for value, draw in draws.items()}
     seconds = median_seconds({str(value): partial(_seconds, draw) for value, draw in draws.items()}, runs, unseen=0)
     points = [{"value": v, "seconds": seconds[str(v)]} | _errors(picture, truth) for v, picture in pictures.items()]
-    return {"who": who, "knob": knob, "points": points}
+    return {"who": who, "knob": parameter, "points": points}
 
 
 def _slopes(curve: dict[str, Any]) -> dict[str, Any]:

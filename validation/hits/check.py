@@ -12,7 +12,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.trace.ray_lanes import WIDTH
 from validation.gates import Gate
-from validation.hits import compare as compare_hits
+from validation.hits import compare
 from validation.hits.compare import ExactErrors, HitArrays, HitComparison
 from validation.hits.errors import ErrorSizes, error_sizes, truth
 from validation.hits.rays import RayBatch, face_rays, families, float32_exact
@@ -22,7 +22,7 @@ from validation.oracle import exact
 from validation.oracle.rounding import FLOAT32_ROUNDOFF, FLOAT64_ROUNDOFF
 from validation.references.table import REFERENCES, HitReference
 from validation.thresholds import HitLimits
-from validation.tradeoff import spending
+from validation.timing import spending
 
 Ints = NDArray[np.int64]
 
@@ -47,7 +47,7 @@ _ROUNDOFF = {"float32": FLOAT32_ROUNDOFF, "float64": FLOAT64_ROUNDOFF}
 
 
 @dataclass(frozen=True)
-class Effort:
+class HitEffort:
     """How many rays to check, and against which references.
 
     rays        of each family on each mesh
@@ -113,7 +113,7 @@ class _Findings(NamedTuple):
     few_differ: int
 
 
-def check_mesh(name: str, mesh: Mesh, effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+def check_mesh(name: str, mesh: Mesh, effort: HitEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Check all families of rays on ``mesh``; returns a record for JSON and the gates.
 
     A reference that cannot judge the mesh is listed with its reason under ``left_out``; exact arithmetic always judges.
@@ -149,7 +149,7 @@ def describe(asked: Asked) -> dict[str, Any]:
     return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in asked.seconds.items()}}
 
 
-def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
+def _check(target: _Target, rays: RayBatch, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
     hits = target.octree.closest_hit(rays.origins, rays.directions)
     ours = HitArrays(hits.t, hits.face)
     found = _find(target, rays, ours, effort)
@@ -186,7 +186,7 @@ def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -
     return record, [Gate("hits", subject, q, float(v), "at most", most, why) for q, v, most, why in quantities]
 
 
-def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: Effort) -> _Findings:
+def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: HitEffort) -> _Findings:
     """Compare with exact arithmetic and every reference.
 
     A slow reference gets the first rays of one seeded order, so that every smaller sample is part of every larger one.
@@ -196,7 +196,7 @@ def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: Effort) -> _
     sample = np.sort(order[: effort.exact])
     picked = rays.select(sample)
     exactly = spending(target.costs, EXACT, exact.closest_hits)(vertices, faces, picked.origins, picked.directions)
-    judged = spending(target.costs, EXACT, compare_hits.exact_errors)
+    judged = spending(target.costs, EXACT, compare.exact_errors)
     errors = judged(ours.select(sample), exactly, vertices, faces, picked, _JUDGED, sample)
     known = truth(exactly)
 
@@ -205,10 +205,10 @@ def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: Effort) -> _
         rows = np.sort(order[: one.reference.most_rays])
         asked, roundoff = rays.select(rows), _ROUNDOFF[one.reference.stored or one.reference.precision]
         theirs = one.closest_hit(asked)
-        comparisons.append(compare_hits.compare(ours.select(rows), theirs, vertices, faces, asked, roundoff, rows))
+        comparisons.append(compare.compare(ours.select(rows), theirs, vertices, faces, asked, roundoff, rows))
         _, here, there = np.intersect1d(rows, sample, assume_unique=True, return_indices=True)
         sizes.append(error_sizes(theirs.t[here], theirs.face[here], known.select(there)))
-    comparisons = spending(target.costs, EXACT, compare_hits.judge_all)(comparisons, vertices, faces, _JUDGED)
+    comparisons = spending(target.costs, EXACT, compare.judge_all)(comparisons, vertices, faces, _JUDGED)
     occluded = target.octree.any_hit(rays.origins, rays.directions)
     any_differs = int(np.count_nonzero(occluded != ours.hit))
     return _Findings(errors, comparisons, sizes, any_differs, _few_differ(target.octree, picked, ours.select(sample)))

@@ -9,7 +9,7 @@ from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits import watertight
-from validation.hits.check import SEED, Asked, Effort, ask
+from validation.hits.check import SEED, Asked, HitEffort, ask
 from validation.hits.rays import RayBatch, leak_rays
 from validation.job import Job
 
@@ -19,7 +19,7 @@ def closed_meshes() -> dict[str, Mesh]:
     return {"icosphere 6": icosphere(6), "torus": torus(1.0, 0.4, 400, 125)}
 
 
-def check_leaks(effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+def check_leaks(effort: HitEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Count leaks of ours and of the references; returns a record for JSON and the gates.
 
     Our rays are aimed in float64, or no float64 kernel could leak; a float32 reference rounds the mesh and the rays.

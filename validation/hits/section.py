@@ -9,7 +9,7 @@ from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from validation.gates import Gate
-from validation.hits.check import SEED, Effort, check_mesh
+from validation.hits.check import SEED, HitEffort, check_mesh
 from validation.hits.errors import EXPONENTS
 from validation.hits.leaks import check_leaks, closed_meshes
 from validation.hits.rays import families, float32_exact
@@ -18,10 +18,10 @@ from validation.hits.verdicts import LISTED
 from validation.job import Job
 from validation.scenes import SCENES
 
-__all__ = ["FULL", "QUICK", "Effort", "check_leaks", "check_mesh", "meshes", "run", "steps"]
+__all__ = ["FULL", "QUICK", "HitEffort", "check_leaks", "check_mesh", "meshes", "run", "steps"]
 
-QUICK = Effort(rays=4_000, exact=200, leaks=100_000)
-FULL = Effort(rays=20_000, exact=2_000, leaks=1_000_000)
+QUICK = HitEffort(rays=4_000, exact=200, leaks=100_000)
+FULL = HitEffort(rays=20_000, exact=2_000, leaks=1_000_000)
 
 
 def meshes() -> dict[str, Mesh]:

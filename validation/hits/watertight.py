@@ -60,7 +60,7 @@ BUILDS = tuple(Build(*options) for options in product(SPLITS, (1, 4, 32), (1, 8,
 
 
 @dataclass(frozen=True)
-class Effort:
+class LeakEffort:
     """Total rays of each kind, number of ``BUILDS`` for each placement, and rays of each kind for Embree."""
 
     rays: int
@@ -83,8 +83,8 @@ class Shot(NamedTuple):
     leaks: int
 
 
-QUICK = Effort(rays=100_000, builds=1, embree=500)
-FULL = Effort(rays=1_000_000, builds=9, embree=5_000)
+QUICK = LeakEffort(rays=100_000, builds=1, embree=500)
+FULL = LeakEffort(rays=1_000_000, builds=9, embree=5_000)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from renderer.picture.image import Image
 from validation.gates import Gate
 from validation.job import Job
-from validation.pictures import compare as compare_images
+from validation.pictures import compare
 from validation.pictures.compare import ImageComparison, Picture
 from validation.pictures.files import write_failed, write_shown
 from validation.thresholds import REASONS, Pictures
@@ -42,7 +42,7 @@ def check(subject: str, pair: Pair, job: Job, *, shown: bool) -> tuple[dict[str,
         PNGs and EXRs in ``job.folder``/failed.
     """
     ours, hit = pair.ours.radiance, pair.ours.face >= 0
-    result = compare_images.compare(ours, pair.reference, pair.fragile, hit if hit.any() else None)
+    result = compare.compare(ours, pair.reference, pair.fragile, hit if hit.any() else None)
     found = [*_gates(subject, pair.rule, result, job.thresholds.pictures), _encoding(subject, pair)]
     stem = re.sub(r"\W+", "-", subject)
     record: dict[str, Any] = {
@@ -79,7 +79,7 @@ def _gates(subject: str, rule: Rule, result: ImageComparison, pictures: Pictures
 def _encoding(subject: str, pair: Pair) -> Gate:
     """Gate on ``Image.save``: the reference's radiance, saved and read back, against the formula of sRGB."""
     radiance = pair.reference.astype(np.float32)
-    off = np.abs(_saved(replace(pair.ours, radiance=radiance)) - 255.0 * compare_images.srgb(radiance)).max()
+    off = np.abs(_saved(replace(pair.ours, radiance=radiance)) - 255.0 * compare.srgb(radiance)).max()
     reason = "a saved picture is the formula's sRGB, rounded"
     return Gate("images", subject, "8-bit steps from the formula", float(off), "at most", _STEPS, reason)
 

@@ -18,12 +18,12 @@ from renderer.picture.render import render
 from renderer.scene.camera import primary_rays
 from renderer.scene.material import Dielectric, Phong
 from renderer.scene.scene import UNLIMITED_RAYS, Scene
+from validation.error_curves import slope
 from validation.gates import Gate
 from validation.pictures.compare import fragile_pixels
 from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba import whitted as mitsuba_whitted
-from validation.tradeoff import slope
 
 PATHS = "random paths of Mitsuba's native path integrator (scalar_rgb)"
 STEPS = 2

@@ -16,9 +16,7 @@ from renderer.picture.render import render
 from renderer.scene.scene import UNLIMITED_RAYS, Scene, load_scene
 from validation.gates import Gate
 from validation.job import Job
-from validation.pictures import aovs as compare_aovs
-from validation.pictures import check as check_picture
-from validation.pictures import ladder, monte_carlo, placement
+from validation.pictures import aovs, check, ladder, monte_carlo, placement
 from validation.pictures.check import Pair, Rule
 from validation.pictures.compare import Picture, fragile_pixels
 from validation.pictures.files import write_png
@@ -54,7 +52,7 @@ REFERENCES = (
 
 
 @dataclass(frozen=True)
-class Effort:
+class PictureEffort:
     """Picture sizes of one scene: the longer side, in pixels.
 
     size    of the scene as it is
@@ -110,7 +108,9 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     return result, found
 
 
-def check_scene(name: str, shows: str, scene: Scene, effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+def check_scene(
+    name: str, shows: str, scene: Scene, effort: PictureEffort, job: Job
+) -> tuple[dict[str, Any], list[Gate]]:
     """Check one scene; returns its record for JSON and the gates.
 
     A rung that no reference can judge fails a gate; the record lists each rung or reference that is left out with its
@@ -141,17 +141,21 @@ def check_scene(name: str, shows: str, scene: Scene, effort: Effort, job: Job) -
     return record, found
 
 
-def _scenes(job: Job) -> list[tuple[str, str, Path, Effort]]:
+def _scenes(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
     """Names, descriptions, files and efforts of a user's scenes, or else of the suite's own."""
     size, lower = (256, 128) if job.quick else (512, 256)
     if not job.own:
         stems = Counter(path.stem for path in job.scenes)
         names = [path.stem if stems[path.stem] == 1 else str(path) for path in job.scenes]
-        return [(name, str(path), path, Effort(size, lower)) for name, path in zip(names, job.scenes, strict=True)]
-    return [(case.name, case.shows, case.path, Effort(size, lower if case.every_rung else None)) for case in CASES]
+        return [
+            (name, str(path), path, PictureEffort(size, lower)) for name, path in zip(names, job.scenes, strict=True)
+        ]
+    return [
+        (case.name, case.shows, case.path, PictureEffort(size, lower if case.every_rung else None)) for case in CASES
+    ]
 
 
-def _plan(scene: Scene, effort: Effort) -> _Plan:
+def _plan(scene: Scene, effort: PictureEffort) -> _Plan:
     rungs, left_out = ladder.rungs(scene)
     if effort.lower is None:
         left_out = {rung.name: "climbed on another scene" for rung in rungs[:-1]} | left_out
@@ -187,7 +191,7 @@ def _check_aovs(name: str, scene: Scene, resolution: tuple[int, int], job: Job) 
     theirs = mitsuba_whitted.aovs(scene, *resolution)
     seconds = time.perf_counter() - began
     ours = render(scene, resolution=resolution, samples=1, max_depth=0)
-    record, found = compare_aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
+    record, found = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
     made = {"reference_name": AOVS, "reference_seconds": seconds, "size": list(resolution), "camera_pixels": shift}
     return made | record, [camera, *found]
 
@@ -211,7 +215,7 @@ def _check_rung(name: str, task: _Task, job: Job) -> tuple[dict[str, Any], list[
             # The report shows our own rule, which users get, beside the first reference.
             shown = rule == "own" and reference is task.references[0]
             against = f"{subject} against {reference.key}, {rule} offset"
-            record, passed = check_picture.check(against, Pair(image, rule, radiance, fragile), job, shown=shown)
+            record, passed = check.check(against, Pair(image, rule, radiance, fragile), job, shown=shown)
             comparisons.append(made | {"offset": rule} | record)
             found += passed
     return _rung_record(task, images["own"], comparisons), found

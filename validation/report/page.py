@@ -8,7 +8,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation.report import monte_carlo_figure, tradeoff_figures
+from validation.report import efficiency_figures, monte_carlo_figure
 from validation.report.plots import stability_figures
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -16,7 +16,7 @@ _TEMPLATES = Path(__file__).parent / "templates"
 # Functions for templates that draw curves from a record: figures with a title and an SVG, or the SVG alone.
 FIGURES: dict[str, Callable[..., Any]] = {
     "figures": stability_figures,
-    "tradeoff_figures": tradeoff_figures.figures,
+    "efficiency_figures": efficiency_figures.figures,
     "monte_carlo_figure": monte_carlo_figure.figure,
 }
 

@@ -3,12 +3,11 @@
 from validation.gates import Gate
 from validation.hits import watertight
 from validation.job import Job
-from validation.stability import sweeps as stability
-from validation.stability.cases import hits as extreme_hits
-from validation.stability.cases import shading as extreme_shading
+from validation.stability import sweeps
+from validation.stability.cases import hits, shading
 from validation.stability.cases.case import ExtremeCase
 
-CASES = (*extreme_hits.CASES, *extreme_shading.CASES)
+CASES = (*hits.CASES, *shading.CASES)
 
 # The judges of this section. Each works within a case or sweep, so its seconds are not measured apart.
 JUDGES = ("exact arithmetic", "analytic", "Embree robust", "Embree default", "brute force")
@@ -16,7 +15,7 @@ JUDGES = ("exact arithmetic", "analytic", "Embree robust", "Embree default", "br
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step`` in ``run``: one for each case, closed mesh and sweep, and one for the leaks."""
-    return len(CASES) + len(watertight.closed_meshes()) + len(stability.SWEEPS) + 1
+    return len(CASES) + len(watertight.closed_meshes()) + len(sweeps.SWEEPS) + 1
 
 
 def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
@@ -28,7 +27,7 @@ def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
         cases.append(record)
         gates.append(gate)
     sweep, sweep_gates = watertight.run(job.quick, job.step)
-    curves, curve_gates = stability.run(job.quick, job.step)
+    curves, curve_gates = sweeps.run(job.quick, job.step)
     record = {"cases": cases, "watertight": sweep, "curves": curves, "costs": dict.fromkeys(JUDGES)}
     return record, [*gates, *sweep_gates, *curve_gates]
 

@@ -52,15 +52,15 @@ class Sweep:
 
 
 @dataclass(frozen=True)
-class Effort:
+class SweepEffort:
     """Rays at each x, and leak rays of each kind and mesh."""
 
     rays: int
     leaks: int
 
 
-QUICK = Effort(rays=60, leaks=20_000)
-FULL = Effort(rays=200, leaks=200_000)
+QUICK = SweepEffort(rays=60, leaks=20_000)
+FULL = SweepEffort(rays=200, leaks=200_000)
 
 
 def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:

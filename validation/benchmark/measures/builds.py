@@ -9,7 +9,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.benchmark.peers import ours
 from validation.benchmark.peers.contender import System
-from validation.tradeoff import RUNS, interleaved, ratio, timed
+from validation.timing import RUNS, interleaved, ratio, timed
 
 REFIT = "ours_refit"
 # Above this size a round of all builds takes half a minute, so there are three rounds instead of five.

@@ -9,7 +9,7 @@ from typing import Any
 
 from renderer.process import child
 from validation.scenes import SCENES
-from validation.tradeoff import interleaved, timed
+from validation.timing import interleaved, timed
 
 _RUNS = 3
 WARM, IMPORT = "render_warm", "import_renderer"

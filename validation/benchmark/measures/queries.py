@@ -11,7 +11,7 @@ from validation.benchmark.measures.families import families
 from validation.benchmark.measures.fit import log_fit
 from validation.benchmark.peers.contender import Family, Peer, Query, System
 from validation.benchmark.peers.ours import OURS, OURS_ONE, Ours
-from validation.tradeoff import RUNS, interleaved, ratio, timed
+from validation.timing import RUNS, interleaved, ratio, timed
 
 KINDS = ("closest", "any")
 # Between float32 and float64 only rays within about 1e-6 of a silhouette may differ; a picture of 1e6 rays has some

@@ -25,7 +25,7 @@ def html(record: Mapping[str, Any]) -> str:
     plots = {
         "query_figures": figures.query_figures(record),
         "build_figures": figures.build_figures(record),
-        "knob_figures": pareto.figures(record["knobs"]) if record["knobs"] else [],
+        "parameter_figures": pareto.figures(record["knobs"]) if record["knobs"] else [],
     }
     return environment.get_template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **plots)
 

@@ -19,7 +19,7 @@ frames            scene, size, max_depth, faces, labels, contenders, ratios, ray
                   mean_error, pixel_share against ours
 processes         by name: command, seconds, median
 first_answers     level, for which kernels were compiled ahead; rows by name: unit, values, median; null where not run
-ablation, knobs   see ``ablation.run`` and ``knobs.run``; null where not run
+ablation, knobs   see ``ablation.run`` and ``study.run``; null where not run
 targets[]         see ``targets.Target``; met and aimed are null where nothing was measured
 """
 

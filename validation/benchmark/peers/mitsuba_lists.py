@@ -18,7 +18,7 @@ from renderer.scene.light import PointLight
 from renderer.scene.material import Dielectric, Mirror
 from renderer.scene.scene import Scene
 from validation.benchmark.peers.mitsuba_variant import LLVM, using
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import scene as mitsuba_scene
 
 _DIFFUSE, _MIRROR, _GLASS = 0, 1, 2
 # Taken from the variant once, so that none must be selected while a clock runs.
@@ -31,13 +31,13 @@ class RayLists:
     Raises ``ValueError`` for a scene that has more than diffuse, mirror and glass surfaces under one point light.
     """
 
-    def __init__(self, scene: Scene, rays: source.Rays, max_depth: int) -> None:
+    def __init__(self, scene: Scene, rays: mitsuba_scene.Rays, max_depth: int) -> None:
         _check(scene)
         self._depth, self._count = max_depth, len(rays[0])
         with using(LLVM):
             self._mi = SimpleNamespace(**{name: getattr(mi, name) for name in _NAMES})
-            shapes = source.meshes(scene, [source.diffuse((0.5, 0.5, 0.5))] * len(scene.instances))
-            self._scene = source.assemble(shapes, [source.emitter(light) for light in scene.lights])
+            shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.5, 0.5, 0.5))] * len(scene.instances))
+            self._scene = mitsuba_scene.assemble(shapes, [mitsuba_scene.emitter(light) for light in scene.lights])
             self._tables(scene, shapes)
             o, d = (np.ascontiguousarray(a.T, np.float32) for a in rays)
             self._o, self._d = mi.Point3f(o), mi.Vector3f(d)

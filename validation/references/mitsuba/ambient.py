@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.scene.material import Phong
 from renderer.scene.scene import Scene
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import scene as mitsuba_scene
 
 
 def has_glow(scene: Scene) -> bool:
@@ -30,7 +30,7 @@ def glowing(scene: Scene, shapes: dict[mi.Mesh, int], *, turned: bool) -> dict[m
     return result
 
 
-def _glow(scene: Scene, name: str) -> source.Rgb:
+def _glow(scene: Scene, name: str) -> mitsuba_scene.Rgb:
     """k_a I_a of the material ``name``."""
     material = scene.materials[name]
     if not isinstance(material, Phong):
@@ -39,7 +39,7 @@ def _glow(scene: Scene, name: str) -> source.Rgb:
     return [k * i for k, i in zip(ambient, scene.ambient, strict=True)]
 
 
-def _emitting(shape: mi.Mesh, radiance: source.Rgb, turned: bool) -> mi.Mesh:
+def _emitting(shape: mi.Mesh, radiance: mitsuba_scene.Rgb, turned: bool) -> mi.Mesh:
     """A copy of a mesh with an emitter; ``turned`` reverses its faces' orientation and its normals."""
     properties = mi.Properties()
     properties["bsdf"] = shape.bsdf()
@@ -49,4 +49,4 @@ def _emitting(shape: mi.Mesh, radiance: source.Rgb, turned: bool) -> mi.Mesh:
     given = mi.traverse(shape)
     faces = np.array(given["faces"]).reshape(-1, 3)
     normals = np.array(given["vertex_normals"]) * (-1.0 if turned else 1.0) if smooth else None
-    return source.fill(result, np.array(given["vertex_positions"]), faces[:, ::-1] if turned else faces, normals)
+    return mitsuba_scene.fill(result, np.array(given["vertex_positions"]), faces[:, ::-1] if turned else faces, normals)

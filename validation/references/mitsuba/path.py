@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 
 from renderer.scene.material import Dielectric
 from renderer.scene.scene import Scene
-from validation.references.mitsuba import ambient as mitsuba_ambient
-from validation.references.mitsuba import phong as mitsuba_phong
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import ambient, phong
+from validation.references.mitsuba import scene as mitsuba_scene
 
 # The name in reports.
 NAME = "Mitsuba's native path integrator (scalar_rgb)"
@@ -69,7 +68,7 @@ def path(
     *,
     max_depth: int,
     samples: int = 1,
-    rays: source.Rays | None = None,
+    rays: mitsuba_scene.Rays | None = None,
 ) -> NDArray[np.float64]:
     """The picture of ``scene`` by reference A, linear radiance (height, width, 3) float64.
 
@@ -80,13 +79,13 @@ def path(
     fault = can_judge(scene)
     if fault is not None:
         raise ValueError(f"scene: expected only Phong surfaces and mirrors, got {fault}")
-    bundles = source.camera_rays(scene, width, height, samples) if rays is None else [rays]
+    bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
     passes = _passes(scene, max_depth)
     result = sum(_paths(passes, bundle, 1)[0] for bundle in bundles)
     return (result / len(bundles)).reshape(height, width, 3)
 
 
-def random_paths(scene: Scene, rays: source.Rays, count: int, *, max_depth: int) -> NDArray[np.float64]:
+def random_paths(scene: Scene, rays: mitsuba_scene.Rays, count: int, *, max_depth: int) -> NDArray[np.float64]:
     """Radiance along ``count`` random paths of each of the n rays, (count, n, 3) float64.
 
     Their mean tends to the Whitted picture. Rows are independent of each other and the same in every run, and a smaller
@@ -105,23 +104,25 @@ def _passes(scene: Scene, max_depth: int) -> list[_Pass]:
     materials = [scene.materials[instance.material] for instance in scene.instances]
     passes = []
     if scene.lights:
-        lit = source.meshes(scene, [mitsuba_phong.bsdf(material) for material in materials])
-        passes = [_Pass(source.assemble(lit, [source.emitter(light)]), max_depth + 2) for light in scene.lights]
-    sky = [source.background(scene.background)] if any(scene.background) else []
-    glows = mitsuba_ambient.has_glow(scene)
+        lit = mitsuba_scene.meshes(scene, [phong.bsdf(material) for material in materials])
+        passes = [
+            _Pass(mitsuba_scene.assemble(lit, [mitsuba_scene.emitter(light)]), max_depth + 2) for light in scene.lights
+        ]
+    sky = [mitsuba_scene.background(scene.background)] if any(scene.background) else []
+    glows = ambient.has_glow(scene)
     if sky or glows:
-        unlit = source.meshes(scene, [mitsuba_phong.unlit(material) for material in materials])
-        front = mitsuba_ambient.glowing(scene, unlit, turned=False)
-        passes.append(_Pass(source.assemble(front, sky), max_depth + 1))
+        unlit = mitsuba_scene.meshes(scene, [phong.unlit(material) for material in materials])
+        front = ambient.glowing(scene, unlit, turned=False)
+        passes.append(_Pass(mitsuba_scene.assemble(front, sky), max_depth + 1))
     if glows:
-        back = mitsuba_ambient.glowing(scene, unlit, turned=True)
-        passes.append(_Pass(source.assemble(back, []), max_depth + 1))
+        back = ambient.glowing(scene, unlit, turned=True)
+        passes.append(_Pass(mitsuba_scene.assemble(back, []), max_depth + 1))
     return passes
 
 
-def _paths(passes: list[_Pass], rays: source.Rays, count: int) -> NDArray[np.float64]:
+def _paths(passes: list[_Pass], rays: mitsuba_scene.Rays, count: int) -> NDArray[np.float64]:
     """The sum of the passes along ``count`` paths of each ray, (count, n, 3) float64."""
-    traced = [mi.RayDifferential3f(ray) for ray in source.mitsuba_rays(rays)]
+    traced = [mi.RayDifferential3f(ray) for ray in mitsuba_scene.mitsuba_rays(rays)]
     result = np.zeros((count, len(traced), 3))
     for number, (scene, edges) in enumerate(passes):
         integrator = mi.load_dict({"type": "path", "max_depth": edges, "rr_depth": _NO_ROULETTE})

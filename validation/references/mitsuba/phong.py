@@ -10,7 +10,7 @@ from math import pi
 
 import mitsuba as mi
 
-import validation.references.mitsuba.scene as source  # selects the variant before a class below derives from it
+import validation.references.mitsuba.scene as mitsuba_scene  # selects the variant before a class below derives from it
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
 
 _BOTH_SIDES = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
@@ -84,7 +84,7 @@ class Glass(mi.BSDF):  # type: ignore[misc]  # as above
 
     def __init__(self, material: Dielectric) -> None:
         super().__init__(mi.Properties())
-        self._inner = source.dielectric(material.ior, material.reflectance, material.transmittance)
+        self._inner = mitsuba_scene.dielectric(material.ior, material.reflectance, material.transmittance)
         self.m_components = [self._inner.flags(i) for i in range(self._inner.component_count())]
         self.m_flags = self._inner.flags()
 
@@ -116,7 +116,7 @@ class Glass(mi.BSDF):  # type: ignore[misc]  # as above
 def bsdf(material: Material) -> mi.BSDF:
     """The BSDF of a material; it omits constant transmission and ambient light."""
     if isinstance(material, Mirror):
-        return source.mirror(material.reflectance)
+        return mitsuba_scene.mirror(material.reflectance)
     return Glass(material) if isinstance(material, Dielectric) else PhongMirror(material)
 
 
@@ -124,4 +124,4 @@ def unlit(material: Material) -> mi.BSDF:
     """The material's mirror or glass alone, without the component that scatters the lights."""
     if isinstance(material, Dielectric):
         return Glass(material)
-    return source.mirror(material.reflectance)
+    return mitsuba_scene.mirror(material.reflectance)

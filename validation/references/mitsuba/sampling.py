@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.material import Mirror, Phong
 from renderer.scene.scene import Scene
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import scene as mitsuba_scene
 from validation.references.mitsuba.path import SHADOWLESS
 
 # Interreflection is then this share of direct light. That is below float32's resolution of a picture, 6e-8 of each
@@ -43,8 +43,8 @@ class Film:
         # last to the light.
         self._passes = [(self._lit(index), 2) for index in range(len(scene.lights))]
         if any(scene.background):
-            dark = source.meshes(scene, [_bsdf(scene, i.material, lit=False) for i in scene.instances])
-            self._passes.append((source.assemble(dark, [source.background(scene.background)]), 1))
+            dark = mitsuba_scene.meshes(scene, [_bsdf(scene, i.material, lit=False) for i in scene.instances])
+            self._passes.append((mitsuba_scene.assemble(dark, [mitsuba_scene.background(scene.background)]), 1))
 
     def render(self, samples: int, *, max_depth: int, sampler: Sampler, seed: int = 0) -> NDArray[np.float64]:
         """Linear radiance (size, size, 3) float64 by ``samples`` paths a pixel in each pass, ``max_depth`` bounces.
@@ -62,8 +62,10 @@ class Film:
         return picture
 
     def _lit(self, index: int) -> mi.Scene:
-        shapes = source.meshes(self._scene, [_bsdf(self._scene, i.material, lit=True) for i in self._scene.instances])
-        return source.assemble(shapes, [source.emitter(self._scene.lights[index], 1.0 / _FADED)])
+        shapes = mitsuba_scene.meshes(
+            self._scene, [_bsdf(self._scene, i.material, lit=True) for i in self._scene.instances]
+        )
+        return mitsuba_scene.assemble(shapes, [mitsuba_scene.emitter(self._scene.lights[index], 1.0 / _FADED)])
 
     def _sensor(self, samples: int, sampler: Sampler) -> dict[str, object]:
         camera = self._scene.camera
@@ -100,6 +102,6 @@ def _bsdf(scene: Scene, name: str, lit: bool) -> mi.BSDF:
     """A material's BSDF: diffuse surfaces are black in the background's pass, a millionth as bright in a light's."""
     material = scene.materials[name]
     if isinstance(material, Mirror):
-        return source.mirror(material.reflectance)
+        return mitsuba_scene.mirror(material.reflectance)
     assert isinstance(material, Phong)
-    return source.diffuse([_FADED * channel if lit else 0.0 for channel in material.diffuse])
+    return mitsuba_scene.diffuse([_FADED * channel if lit else 0.0 for channel in material.diffuse])

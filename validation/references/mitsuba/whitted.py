@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import Scene
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import scene as mitsuba_scene
 
 # Delta lobes and delta emitters do not depend on the random numbers.
 _ANY_NUMBER, _ANY_POINT = 0.5, mi.Point2f(0.5, 0.5)
@@ -112,17 +112,17 @@ def _scattered(si: mi.SurfaceInteraction3f, surface: _Surface, wo: mi.Vector3f) 
     return result
 
 
-def _surface(material: Material, ambient_light: source.Rgb) -> _Surface:
+def _surface(material: Material, ambient_light: mitsuba_scene.Rgb) -> _Surface:
     black = mi.Color3f(0.0)
     if isinstance(material, Mirror):
-        return _Surface(black, None, None, 0.0, (_Lobe(source.mirror(material.reflectance), _ALL),))
+        return _Surface(black, None, None, 0.0, (_Lobe(mitsuba_scene.mirror(material.reflectance), _ALL),))
     if isinstance(material, Dielectric):
-        glass = source.dielectric(material.ior, material.reflectance, material.transmittance)
+        glass = mitsuba_scene.dielectric(material.ior, material.reflectance, material.transmittance)
         return _Surface(black, None, None, 0.0, (_Lobe(glass, _REFLECTION), _Lobe(glass, _REFRACTION)))
     ambient = material.diffuse if material.ambient is None else material.ambient
     return _Surface(
         mi.Color3f(*ambient) * mi.Color3f(*ambient_light),
-        source.diffuse(material.diffuse) if any(material.diffuse) else None,
+        mitsuba_scene.diffuse(material.diffuse) if any(material.diffuse) else None,
         mi.Color3f(*material.specular) if any(material.specular) else None,
         material.shininess,
         _phong_lobes(material),
@@ -133,9 +133,9 @@ def _phong_lobes(material: Phong) -> tuple[_Lobe, ...]:
     """The constant shares; clear glass gives the refracted direction, and weight 0 under total internal reflection."""
     lobes = []
     if any(material.reflectance):
-        lobes.append(_Lobe(source.mirror(material.reflectance), _ALL))
+        lobes.append(_Lobe(mitsuba_scene.mirror(material.reflectance), _ALL))
     if any(material.transmittance):
-        glass = source.dielectric(material.ior, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+        glass = mitsuba_scene.dielectric(material.ior, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
         lobes.append(_Lobe(glass, _REFRACTION, mi.Color3f(*material.transmittance)))
     return tuple(lobes)
 
@@ -143,10 +143,10 @@ def _phong_lobes(material: Phong) -> tuple[_Lobe, ...]:
 def _whitted(scene: Scene, max_depth: int) -> _Whitted:
     surfaces = [_surface(scene.materials[i.material], scene.ambient) for i in scene.instances]
     # Mitsuba requires a BSDF for each shape, but only the surfaces' own lobes are sampled, so any will do.
-    shapes = source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
-    lights = tuple(source.emitter(light) for light in scene.lights)
+    shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
+    lights = tuple(mitsuba_scene.emitter(light) for light in scene.lights)
     return _Whitted(
-        source.assemble(shapes, lights),
+        mitsuba_scene.assemble(shapes, lights),
         {shape: surfaces[index] for shape, index in shapes.items()},
         lights,
         mi.Color3f(*scene.background),
@@ -158,7 +158,7 @@ def _whitted(scene: Scene, max_depth: int) -> _Whitted:
 def can_judge(scene: Scene) -> str | None:
     """Why Mitsuba cannot hold ``scene``, so that neither reference can judge it; None if it can."""
     try:
-        source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
+        mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
     except ValueError as error:
         return str(error)
     return None
@@ -171,7 +171,7 @@ def whitted(
     *,
     max_depth: int,
     samples: int = 1,
-    rays: source.Rays | None = None,
+    rays: mitsuba_scene.Rays | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> NDArray[np.float64]:
     """The picture of ``scene`` by reference B, linear radiance (height, width, 3) float64.
@@ -182,10 +182,10 @@ def whitted(
     progress : called with the number of finished rows and of all rows.
     """
     tracer = _whitted(scene, max_depth)
-    bundles = source.camera_rays(scene, width, height, samples) if rays is None else [rays]
+    bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
     result = np.zeros((height, width, 3))
     for number, bundle in enumerate(bundles):
-        traced = source.mitsuba_rays(bundle)
+        traced = mitsuba_scene.mitsuba_rays(bundle)
         for row in range(height):
             line = [tracer.radiance(ray, 0) for ray in traced[row * width : (row + 1) * width]]
             result[row] += np.array(line, dtype=np.float64).reshape(width, 3)
@@ -211,15 +211,15 @@ class Aovs:
     instance: NDArray[np.int64]
 
 
-def aovs(scene: Scene, width: int, height: int, *, rays: source.Rays | None = None) -> Aovs:
+def aovs(scene: Scene, width: int, height: int, *, rays: mitsuba_scene.Rays | None = None) -> Aovs:
     """Mitsuba's float32 hits of our primary rays through the pixels' centres, or of ``rays``."""
-    shapes = source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
-    unlit = source.assemble(shapes, [])
+    shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
+    unlit = mitsuba_scene.assemble(shapes, [])
     table = np.full((height * width, 10), np.nan)
     table[:, 0] = np.inf
     instance = np.full(height * width, -1, dtype=np.int64)
-    bundle = source.camera_rays(scene, width, height, 1)[0] if rays is None else rays
-    for row, ray in enumerate(source.mitsuba_rays(bundle)):
+    bundle = mitsuba_scene.camera_rays(scene, width, height, 1)[0] if rays is None else rays
+    for row, ray in enumerate(mitsuba_scene.mitsuba_rays(bundle)):
         si = unlit.ray_intersect(ray)
         if si.is_valid():
             table[row] = si.t, *si.p, *si.n, *si.sh_frame.n

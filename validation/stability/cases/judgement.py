@@ -8,8 +8,7 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
 from renderer import BruteForce, Hits, Mesh, Octree
-from validation.hits import compare as compare_hits
-from validation.hits.compare import ExactErrors, HitArrays
+from validation.hits.compare import ExactErrors, HitArrays, exact_errors
 from validation.hits.rays import RayBatch, float32_exact
 from validation.oracle import exact
 from validation.references.embree import Embree
@@ -48,7 +47,7 @@ def embree_says(mesh: Mesh, rays: RayBatch, say: Callable[[Floats, Ints], str]) 
 def against_exact(mesh: Mesh, rays: RayBatch, hits: Hits | HitArrays) -> ExactErrors:
     """Compare every ray with exact arithmetic, t within the bound that rounding explains."""
     truth = exact.closest_hits(mesh.vertices, mesh.faces, rays.origins, rays.directions)
-    return compare_hits.exact_errors(HitArrays(hits.t, hits.face), truth, mesh.vertices, mesh.faces, rays)
+    return exact_errors(HitArrays(hits.t, hits.face), truth, mesh.vertices, mesh.faces, rays)
 
 
 def as_exact(errors: ExactErrors) -> bool:

@@ -10,7 +10,7 @@ _FRONT = 8
 # Roundoff of float32, in which pictures are stored: a smaller error is meaningless beside errors of a percent.
 _ROUNDOFF = 2.0**-24
 _QUANTITIES = {"rmse": "RMSE, linear", "flip": "FLIP", "dissimilarity": "1 - SSIM"}
-_KNOBS = {"samples": "samples", "max_depth": "depth", "min_weight": "least weight"}
+_PARAMETERS = {"samples": "samples", "max_depth": "depth", "min_weight": "least weight"}
 
 
 def figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -80,11 +80,14 @@ def _samples_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
 def _truncation_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
     curves = [c for c in pictures["curves"] if c["knob"] != "samples"]
     panels = [
-        Panel([_curve(f"{c['who']}, {_KNOBS[c['knob']]}", c, quantity, look) for look, c in enumerate(curves)], label)
+        Panel(
+            [_curve(f"{c['who']}, {_PARAMETERS[c['knob']]}", c, quantity, look) for look, c in enumerate(curves)], label
+        )
         for quantity, label in _QUANTITIES.items()
     ]
     values = "; ".join(
-        f"{c['who']}, {_KNOBS[c['knob']]} {c['points'][0]['value']:g} to {c['points'][-1]['value']:g}" for c in curves
+        f"{c['who']}, {_PARAMETERS[c['knob']]} {c['points'][0]['value']:g} to {c['points'][-1]['value']:g}"
+        for c in curves
     )
     title = (
         f"{pictures['scene']}: error against seconds over depth and least weight, 1 sample a pixel ({values}). Each is "
