@@ -43,18 +43,23 @@ def run(request: Request) -> dict[str, Any]:
     Old files in that folder stay unchanged until all new ones are complete. Raises ``ValueError`` and ``OSError`` for
     invalid user files, before any section runs, and ``ImportError`` where a reference is missing.
     """
+    # Read all input before any section runs.
     began, started = time.perf_counter(), datetime.now(UTC)
     thresholds = Thresholds() if request.gate is None else load_thresholds(request.gate)
     _open(request)
     given = {kind for kind, files in (("scene", request.scenes), ("mesh", request.meshes)) if files}
     chosen, left_out = choose(request.only, given)
     stored_baseline = baseline.read(request.output / "baseline.json")
+
+    # Run the sections, with pictures in a temporary folder.
     request.output.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=request.output, prefix=".run-") as folder:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()
         job = Job(request.quick, thresholds, pictures, lambda _: None, request.scenes, request.meshes)
         records, gates = _sections(chosen, job)
+
+        # Collect the metrics and write the report.
         metrics = {
             "schema": schema.VERSION,
             "command": request.command,

@@ -86,6 +86,7 @@ def _student_program(step: Callable[[str], None]) -> dict[str, object]:
     # Compile both kernels before any clock starts.
     for accelerator, _, _ in _STUDENT_ROWS:
         render(scene, resolution=(4, 4), max_depth=1, accelerator=accelerator)
+    # Time each row of the table, with a new tree in every run.
     rows: list[dict[str, Any]] = []
     for accelerator, size, depth in _STUDENT_ROWS:
         step(f"efficiency: student program, {accelerator} {size} x {size}")
@@ -105,6 +106,7 @@ def _student_program(step: Callable[[str], None]) -> dict[str, object]:
                 "rays": int(images[0].rays.sum()),
             }
         )
+    # Compare with brute force, and with the times that the student's program printed.
     brute, octree = rows[0], rows[1]
     return {
         "faces": sum(len(i.mesh.faces) for i in scene.instances),

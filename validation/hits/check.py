@@ -150,12 +150,17 @@ def describe(asked: Asked) -> dict[str, Any]:
 
 
 def _check(target: _Target, rays: RayBatch, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
+    # Trace the rays and compare with every reference.
     hits = target.octree.closest_hit(rays.origins, rays.directions)
     ours = HitArrays(hits.t, hits.face)
     found = _find(target, rays, ours, effort)
+
+    # Count the rays on which we are wrong, or which rounding decides.
     wrong = frozenset[int]().union(*(comparison.wrong_rays for comparison in found.comparisons))
     disagreements = [*found.errors.disagreements, *(d for one in found.comparisons for d in one.disagreements)]
     near_edge = len({d.ray for d in disagreements if d.verdict == NEAR_EDGE})
+
+    # Write the record.
     record = {
         "family": rays.name,
         "rays": len(rays),
@@ -171,6 +176,8 @@ def _check(target: _Target, rays: RayBatch, effort: HitEffort, limits: HitLimits
             for one, comparison, sizes in zip(target.asked, found.comparisons, found.sizes, strict=True)
         ],
     }
+
+    # Make the gates; a family that is not aimed at edges must not come within rounding of one.
     judge = "exact arithmetic says so"
     quantities = [
         ("rays on which we are wrong", len(wrong), limits.wrong, judge),

@@ -152,18 +152,22 @@ def compare(
     if not len(ours.t) == len(theirs.t) == len(rays):
         got = f"{len(ours.t)}, {len(theirs.t)} and {len(rays)}"
         raise ValueError(f"ours, theirs, rays: expected equal numbers of rays, got {got}")
+
+    # Compute the relative difference of t where both hit.
     corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
     both = np.flatnonzero(ours.hit & theirs.hit)
     t, other = ours.t[both], theirs.t[both]
     larger = np.maximum(np.abs(t), np.abs(other))
     error = np.divide(np.abs(t - other), larger, out=np.zeros(len(both)), where=larger > 0)
 
-    # "Not within" rather than "beyond", so that a NaN is a disagreement.
+    # Collect the disagreements: "not within" rather than "beyond", so that a NaN is one.
     rtol = _relative_tolerance(corners[ours.face[both]], rays.directions[both])
     beyond = both[~(error <= rtol)]
     flipped = np.flatnonzero(ours.hit != theirs.hit)
     found = [_disagreement(ray, "hit or miss", ours, theirs, rays, numbers) for ray in flipped.tolist()]
     found += [_disagreement(ray, "t", ours, theirs, rays, numbers) for ray in beyond.tolist()]
+
+    # Count.
     p50, p99, largest = percentiles(error)
     return HitComparison(
         family=rays.name,
@@ -230,6 +234,8 @@ def exact_errors(
     if not len(ours.t) == len(exact_hits) == len(rays):
         got = f"{len(ours.t)}, {len(exact_hits)} and {len(rays)}"
         raise ValueError(f"ours, exact_hits, rays: expected equal numbers of rays, got {got}")
+
+    # List the rays whose answer is not right, with the exact hit and a verdict.
     points, triangles = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     found = []
     for row, view in views(ours.t, ours.face, exact_hits, points, triangles, rays, most).items():
@@ -237,6 +243,8 @@ def exact_errors(
             d = with_truth(_disagreement(row, "exact", ours, None, rays, numbers), exact_hits[row])
             verdict = {"near edge": NEAR_EDGE, "wrong": THEIRS_RIGHT, None: None}[view]
             found.append(replace(d, ours_right=None if view is None else False, verdict=verdict))
+
+    # Count them, those within rounding of an edge apart.
     near_edge = [d for d in found if d.verdict == NEAR_EDGE]
     return ExactErrors(
         family=rays.name,

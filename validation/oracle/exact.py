@@ -115,11 +115,13 @@ def closest_hits(
     finite. ``filtered=False`` judges every face for every ray rationally; the answer is the same. Raises
     ``ValueError`` for wrong shapes, numbers that are not finite and face indices out of range.
     """
+    # Check the input.
     points, triangles = _mesh(vertices, faces)
     o, d = _rows(origins, "origins"), _rows(directions, "directions")
     if o.shape != d.shape:
         raise ValueError(f"directions: expected the shape of origins {o.shape}, got {d.shape}")
 
+    # Scale to integers; without the filter test every face.
     query = _Scaled(points, o, d)
     named = [(face, i, j, k) for face, (i, j, k) in enumerate(triangles.tolist())]
     if not filtered:
@@ -127,6 +129,7 @@ def closest_hits(
     if not len(triangles):
         return [None] * len(o)
 
+    # Filter the faces for many rays at once, then test each ray's candidates exactly.
     hits: list[ExactHit | None] = []
     boxes = _BoxTree(points[triangles])
     for start in range(0, len(o), _RAYS_AT_ONCE):

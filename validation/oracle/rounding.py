@@ -182,6 +182,7 @@ def t_bounds(
     and by at most 8 u sum |n_j a_j| / |det|. The sum of all covers both. ``determinants`` are U, V, W (n, 3),
     well known.
     """
+    # Express the corners relative to the origin, and bound the determinants.
     u = unit_roundoff
     relative = corners - origins[:, None, :]
     bounds = exact.determinant_bounds(relative, directions, u)
@@ -191,6 +192,7 @@ def t_bounds(
     rows = np.arange(len(directions))
     normal = np.cross(relative[:, 1] - relative[:, 0], relative[:, 2] - relative[:, 0])
 
+    # Sum the terms of the bound.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         depth = relative[rows, :, axis] / directions[rows, axis][:, None]
         t = (determinants * depth).sum(axis=1) / det

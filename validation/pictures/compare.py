@@ -88,12 +88,16 @@ def compare(
     that is not finite.
     """
     _check(ours, reference, fragile, foreground)
+
+    # Compute the differences of each pixel.
     encoded, expected = srgb(ours), srgb(reference)
     similarity = _similarity(encoded, expected)
     difference = np.abs(encoded - expected).max(axis=2)
     error = np.abs(np.subtract(ours, reference, dtype=np.float64))
     judged = np.ones(difference.shape, dtype=bool) if fragile is None else ~fragile
     visible = flip_map(encoded, expected)
+
+    # Reduce them to numbers.
     return ImageComparison(
         ssim=_inner_mean(similarity),
         ssim_foreground=None if foreground is None else float(similarity[foreground].mean()),

@@ -34,6 +34,8 @@ def check(name: str, scene: Scene) -> tuple[dict[str, Any], list[Gate]]:
     began = time.perf_counter()
     corners = [instance.mesh.vertices for instance in scene.instances]
     radius = float(np.linalg.norm(np.concatenate(corners), axis=1).max()) if corners else 0.0
+
+    # Compare each object with trimesh's, or note why it cannot be compared.
     vertices: list[float] = []
     normals: list[float] = []
     left_out: dict[str, str] = {}
@@ -55,6 +57,8 @@ def check(name: str, scene: Scene) -> tuple[dict[str, Any], list[Gate]]:
                 left_out[f"{where}, normals"] = open_to_choice
             elif instance.smooth:
                 normals.append(_between(placed, instance))
+
+    # Make the record and the gates.
     record = {"reference": NAME, "objects": len(vertices), "smooth": len(normals), "left_out": left_out}
     record["seconds"] = time.perf_counter() - began
     gates = []

@@ -55,6 +55,7 @@ def self_hits(mesh: Mesh, count: int, offset: float = BOUNDED) -> tuple[int, int
     A ray spawned outwards must hit nothing; one spawned inwards must leave through a face that points its way. Each is
     traced twice: from the offset start of pictures, and as ``leaving`` its face from the hit point.
     """
+    # Trace rays inwards from outside, and outwards from inside.
     rng = np.random.default_rng(33)
     octree = Octree.from_mesh(mesh, threads=1)
     middle, size = (mesh.bounds[0] + mesh.bounds[1]) / 2, mesh.extent
@@ -65,6 +66,8 @@ def self_hits(mesh: Mesh, count: int, offset: float = BOUNDED) -> tuple[int, int
     hits = octree.closest_hit(origins, directions)
     corners = mesh.triangles[hits.face]
     normals, points, lost = hits.normals, hits.points, int((~hits.hit).sum())
+
+    # Spawn a reflected, a shadow and, without total reflection, a refracted ray at each hit.
     starts: list[Vector] = []
     ways: list[Vector] = []
     outwards: list[bool] = []
@@ -83,6 +86,8 @@ def self_hits(mesh: Mesh, count: int, offset: float = BOUNDED) -> tuple[int, int
             ways.append(w)
             rows.append(int(i))
             outwards.append(float(np.dot(n_g, w)) > 0.0)
+
+    # Trace the spawned rays from both starts and count the wrong ones.
     wrong = 0
     for spawned in (octree.closest_hit(starts, ways), octree.closest_hit(points[rows], ways, leaving=hits.face[rows])):
         facing = np.einsum("nk,nk->n", np.nan_to_num(spawned.normals, nan=-1.0), np.array(ways)) > 0.0
