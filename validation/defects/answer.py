@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 MARK = "gates: "
 
 
-def answer(asked: str) -> None:
-    """Counterpart of ``defects.run.ask`` in the child process: inject, check, print the gates as one line of JSON."""
-    replacement, groups, checks = json.loads(asked)
+def answer(task: str) -> None:
+    """Counterpart of ``run.run_checks`` in the child process: inject, check, print the gates as a line of JSON."""
+    replacement, groups, checks = json.loads(task)
     if replacement is not None:
         inject(Replacement(**replacement))
     # Imported only now, because it loads the renderer.

@@ -78,7 +78,7 @@ def run(
         sound_cache = Path(folder) / "sound"
         step("defects: none, as the control")
         groups = tuple(dict.fromkeys(d.group for d in chosen))
-        control = ask(None, groups, sound_cache, checks)
+        control = run_checks(None, groups, sound_cache, checks)
 
         def answer(numbered: tuple[int, Defect]) -> Answer:
             number, defect = numbered
@@ -86,7 +86,7 @@ def run(
             cache = Path(folder) / str(number)
             shutil.copytree(sound_cache, cache)
             try:
-                return ask(defect.replacement, (defect.group,), cache, checks)
+                return run_checks(defect.replacement, (defect.group,), cache, checks)
             finally:
                 shutil.rmtree(cache, ignore_errors=True)
 
@@ -96,12 +96,12 @@ def run(
     return found, [*judged, idle(found)] if set(chosen) >= set(DEFECTS) else judged
 
 
-def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, checks: str = _CHECKS) -> Answer:
+def run_checks(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, checks: str = _CHECKS) -> Answer:
     """Run the checks of ``groups`` in a new process with one replacement, or none; its kernels go to ``cache``."""
     began = time.perf_counter()
     cache.mkdir(parents=True, exist_ok=True)
-    asked = json.dumps([None if replacement is None else asdict(replacement), groups, checks])
-    command = child.command("validation.defects.answer:answer", asked)
+    task = json.dumps([None if replacement is None else asdict(replacement), groups, checks])
+    command = child.command("validation.defects.answer:answer", task)
     environment = child.environment(NUMBA_CACHE_DIR=str(cache))
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False)

@@ -163,8 +163,8 @@ def _contenders(mesh: Mesh, effort: HitTimingEffort, costs: dict[str, float]) ->
     references = {reference.key: reference for reference in REFERENCES}
     for key in _COMPARED:
         name = references[key].name
-        asked = spending(costs, name, references[key].make(mesh.vertices, mesh.faces).closest_hit)
-        found[key] = Contender(name, 1, asked, every)
+        query = spending(costs, name, references[key].make(mesh.vertices, mesh.faces).closest_hit)
+        found[key] = Contender(name, 1, query, every)
     slowest = found["trimesh"]
     label = f"{slowest.label}, {effort.few:,} rays of each set"
     found["trimesh"] = slowest._replace(label=label, most=effort.few)

@@ -62,7 +62,7 @@ class HitEffort:
     references: tuple[HitReference, ...] = REFERENCES
 
 
-class Asked(NamedTuple):
+class LoadedReference(NamedTuple):
     """A reference with the mesh loaded; ``seconds`` sums its build and its queries."""
 
     reference: HitReference
@@ -75,11 +75,11 @@ class Asked(NamedTuple):
         return HitArrays(*answer(rays.origins, rays.directions))
 
 
-def ask(reference: HitReference, mesh: Mesh) -> Asked:
+def load_reference(reference: HitReference, mesh: Mesh) -> LoadedReference:
     """Build the reference's structure over the mesh, timed."""
     began = time.perf_counter()
     tree = reference.make(mesh.vertices, mesh.faces)
-    return Asked(reference, tree, {"build": time.perf_counter() - began, "query": 0.0})
+    return LoadedReference(reference, tree, {"build": time.perf_counter() - began, "query": 0.0})
 
 
 def can_judge(reference: HitReference, mesh: Mesh) -> str | None:
@@ -95,7 +95,7 @@ class _Target(NamedTuple):
     name: str
     mesh: Mesh
     octree: Octree
-    asked: tuple[Asked, ...]
+    references: tuple[LoadedReference, ...]
     costs: dict[str, float]
 
 
@@ -123,8 +123,8 @@ def check_mesh(name: str, mesh: Mesh, effort: HitEffort, job: Job) -> tuple[dict
     if not _SMALLEST <= size <= _LARGEST:
         raise ValueError(f"{name}: expected faces whose largest coordinate is 1e-30 to 1e30, got {size:g}")
     reasons = {reference: can_judge(reference, mesh) for reference in effort.references}
-    asked = tuple(ask(reference, mesh) for reference, reason in reasons.items() if reason is None)
-    target = _Target(name, mesh, Octree.from_mesh(mesh), asked, {EXACT: 0.0})
+    loaded = tuple(load_reference(reference, mesh) for reference, reason in reasons.items() if reason is None)
+    target = _Target(name, mesh, Octree.from_mesh(mesh), loaded, {EXACT: 0.0})
     records: list[dict[str, Any]] = []
     gates: list[Gate] = []
     for rays in (*families(mesh.vertices, mesh.faces, effort.rays, SEED), face_rays(mesh.vertices, mesh.faces)):
@@ -135,18 +135,18 @@ def check_mesh(name: str, mesh: Mesh, effort: HitEffort, job: Job) -> tuple[dict
     return {
         "name": name,
         "faces": len(mesh.faces),
-        "references": [describe(one) for one in asked],
+        "references": [describe(one) for one in loaded],
         "left_out": {reference.name: reason for reference, reason in reasons.items() if reason is not None},
         "families": records,
-        "costs": target.costs | {one.reference.name: sum(one.seconds.values()) for one in asked},
+        "costs": target.costs | {one.reference.name: sum(one.seconds.values()) for one in loaded},
     }, gates
 
 
-def describe(asked: Asked) -> dict[str, Any]:
+def describe(loaded: LoadedReference) -> dict[str, Any]:
     """The reference and its seconds, for JSON."""
-    reference = asked.reference
+    reference = loaded.reference
     named = {"key": reference.key, "name": reference.name, "version": reference.version}
-    return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in asked.seconds.items()}}
+    return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in loaded.seconds.items()}}
 
 
 def _check(target: _Target, rays: RayBatch, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
@@ -173,7 +173,7 @@ def _check(target: _Target, rays: RayBatch, effort: HitEffort, limits: HitLimits
         "exact": found.errors.record(),
         "references": [
             {"key": one.reference.key} | comparison.record() | {"sizes": asdict(sizes)}
-            for one, comparison, sizes in zip(target.asked, found.comparisons, found.sizes, strict=True)
+            for one, comparison, sizes in zip(target.references, found.comparisons, found.sizes, strict=True)
         ],
     }
 
@@ -208,11 +208,11 @@ def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: HitEffort) -
     known = truth(exactly)
 
     comparisons, sizes = [], []
-    for one in target.asked:
+    for one in target.references:
         rows = np.sort(order[: one.reference.most_rays])
-        asked, roundoff = rays.select(rows), _ROUNDOFF[one.reference.stored or one.reference.precision]
-        theirs = one.closest_hit(asked)
-        comparisons.append(compare.compare(ours.select(rows), theirs, vertices, faces, asked, roundoff, rows))
+        given, roundoff = rays.select(rows), _ROUNDOFF[one.reference.stored or one.reference.precision]
+        theirs = one.closest_hit(given)
+        comparisons.append(compare.compare(ours.select(rows), theirs, vertices, faces, given, roundoff, rows))
         _, here, there = np.intersect1d(rows, sample, assume_unique=True, return_indices=True)
         sizes.append(error_sizes(theirs.t[here], theirs.face[here], known.select(there)))
     comparisons = spending(target.costs, EXACT, compare.judge_all)(comparisons, vertices, faces, _JUDGED)

@@ -9,7 +9,7 @@ from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits import watertight
-from validation.hits.check import SEED, Asked, HitEffort, ask
+from validation.hits.check import SEED, HitEffort, LoadedReference, load_reference
 from validation.hits.rays import RayBatch, leak_rays
 from validation.job import Job
 
@@ -29,25 +29,25 @@ def check_leaks(effort: HitEffort, job: Job) -> tuple[dict[str, Any], list[Gate]
     costs: dict[str, float] = {}
     for name, mesh in closed_meshes().items():
         subject, octree = f"{name} ({len(mesh.faces):,} faces)", Octree.from_mesh(mesh)
-        asked = [ask(one, mesh) for one in effort.references if len(mesh.faces) <= one.most_faces]
+        loaded = [load_reference(one, mesh) for one in effort.references if len(mesh.faces) <= one.most_faces]
         for rays in leak_rays(mesh.vertices, mesh.faces, effort.leaks, SEED):
             job.step(f"leaks: {name}, {rays.name}")
             inside = _from_ring_core(rays) if name == "torus" else rays
             leaks, limit = watertight.leaks(octree, inside), job.thresholds.hits.leaks
-            theirs = [_leaks(one, inside) for one in asked]
+            theirs = [_leaks(one, inside) for one in loaded]
             sets.append({"mesh": subject, "kind": rays.name, "rays": len(rays), "ours": leaks, "references": theirs})
             where, reason = f"{subject}, {rays.name} rays from inside", "a closed mesh has no holes"
             gates.append(Gate("hits", where, "leaks", float(leaks), "at most", limit, reason))
-        for one in asked:
+        for one in loaded:
             costs[one.reference.name] = costs.get(one.reference.name, 0.0) + sum(one.seconds.values())
     return {"sets": sets, "costs": costs}, gates
 
 
-def _leaks(asked: Asked, inside: RayBatch) -> dict[str, Any]:
+def _leaks(loaded: LoadedReference, inside: RayBatch) -> dict[str, Any]:
     """Leaks of a reference among as many of the rays as it takes."""
-    some = inside.select(np.arange(min(len(inside), asked.reference.most_rays)))
-    leaks = int(np.count_nonzero(~asked.closest_hit(some).hit))
-    return {"key": asked.reference.key, "name": asked.reference.name, "rays": len(some), "leaks": leaks}
+    some = inside.select(np.arange(min(len(inside), loaded.reference.most_rays)))
+    leaks = int(np.count_nonzero(~loaded.closest_hit(some).hit))
+    return {"key": loaded.reference.key, "name": loaded.reference.name, "rays": len(some), "leaks": leaks}
 
 
 def _from_ring_core(rays: RayBatch) -> RayBatch:

@@ -31,9 +31,9 @@ def measure(mesh: Mesh, systems: Sequence[System], count: int, step: Callable[[s
             step(f"{mesh.name}: {family.name} rays, {kind} hit")
             rays = {name: family.at_most(labels[name].most_rays or count) for name in peers}
             queries = {name: _query(peer, kind, rays[name]) for name, peer in peers.items()}
-            asked = {name: query for name, query in queries.items() if query is not None}
+            offered = {name: query for name, query in queries.items() if query is not None}
             rows.append({"mesh": mesh.name, "faces": len(mesh.faces), "family": family.name, "query": kind}
-                        | _row(family, asked, rays))  # fmt: skip
+                        | _row(family, offered, rays))  # fmt: skip
     return rows
 
 

@@ -173,9 +173,9 @@ def _without_area(quick: bool) -> Outcome:
     wrong = np.zeros(count, dtype=np.bool_)
     trees: list[Accelerator] = [*octrees(mesh), BruteForce.from_mesh(mesh)]
     for tree in trees:
-        for asked in (rays, exact_aim):
-            hits = closest(tree, asked)
-            on_ray = asked.origins + np.where(hits.hit, hits.t, 0.0)[:, None] * asked.directions
+        for batch in (rays, exact_aim):
+            hits = closest(tree, batch)
+            on_ray = batch.origins + np.where(hits.hit, hits.t, 0.0)[:, None] * batch.directions
             # Faces 0 to 2 have two equal corners.
             near = np.abs(hits.points - on_ray).max(axis=1) <= 1e-9
             wrong |= hits.hit & ~(near & (hits.face >= 3))

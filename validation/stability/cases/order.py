@@ -45,7 +45,7 @@ def _refitted(mesh: Mesh) -> Octree:
 def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tuple[str, Hits]]:
     """Closest hits of the same rays by brute force, all kinds of trees, and batches cut and reordered in many ways."""
 
-    def ask(accelerator: Octree | BruteForce, *pieces: np.ndarray) -> Hits:
+    def trace(accelerator: Octree | BruteForce, *pieces: np.ndarray) -> Hits:
         far = np.broadcast_to(t_max, len(rays))
         parts = [accelerator.closest_hit(rays.origins[p], rays.directions[p], t_max=far[p]) for p in pieces]
         back = np.argsort(np.concatenate(pieces), kind="stable")
@@ -63,20 +63,20 @@ def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tu
         "a refit": lambda: _refitted(mesh),
         "one thread": lambda: octree,
     }
-    yield "brute force", ask(BruteForce.from_mesh(mesh), rows)
+    yield "brute force", trace(BruteForce.from_mesh(mesh), rows)
     for name, build in builds.items():
-        yield name, ask(build(), rows)
-    yield "without the first eight", ask(octree, rows[8:], rows[:8])
-    yield "turned", ask(octree, rows[::-1])
-    yield "few at a time", ask(octree, *np.array_split(rows, len(rows) // 7))
+        yield name, trace(build(), rows)
+    yield "without the first eight", trace(octree, rows[8:], rows[:8])
+    yield "turned", trace(octree, rows[::-1])
+    yield "few at a time", trace(octree, *np.array_split(rows, len(rows) // 7))
 
 
 def differing(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray = np.inf) -> tuple[np.ndarray, Hits, list[str]]:
     """Rays that some order answers differently from the first, the first order's hits, and those orders' names."""
-    asked = orders(mesh, rays, t_max)
-    _, first = next(asked)
+    traced = orders(mesh, rays, t_max)
+    _, first = next(traced)
     differs, names = np.zeros(len(rays), dtype=np.bool_), []
-    for name, hits in asked:
+    for name, hits in traced:
         other = ~same_bits(hits, first)
         differs |= other
         names += [name] * bool(other.any())
