@@ -68,13 +68,13 @@ def extreme(first: int, last: int) -> Callable[[Job], Iterator[Gate]]:
 def sweep(job: Job) -> list[Gate]:
     """Rays from inside a closed mesh at its edges and vertices: near zero, and far away in a crowded tree."""
     spheres = {f"icosphere {level}": icosphere(level) for level in (5, 3)}
-    shot: list[watertight.Shot] = []
+    counts: list[watertight.LeakCount] = []
     for (name, mesh), offset in zip(spheres.items(), (0.0, 1e4), strict=True):
         closed = watertight.Closed(name, mesh, lambda rng, n: rng.uniform(-0.4, 0.4, (n, 3)))
         placement = watertight.Placement(closed, turned=True, offset=offset, scale=1.0)
         build = watertight.Build("midpoint", 4, 32)
-        shot += watertight.shoot(placement, [build], _LEAKS / placement.weight, np.random.default_rng(SEED))
-    return watertight.gates(shot)
+        counts += watertight.shoot(placement, [build], _LEAKS / placement.weight, np.random.default_rng(SEED))
+    return watertight.gates(counts)
 
 
 def curves(job: Job) -> list[Gate]:

@@ -20,9 +20,9 @@ from validation.hits.verdicts import (
     Disagreement,
     Point,
     judged,
+    judgements,
     listed,
     theirs_right,
-    views,
     with_truth,
 )
 from validation.oracle import exact
@@ -207,14 +207,16 @@ def judge_all(
     misses = [one is None for one in face]
     ours = HitArrays(np.where(misses, np.inf, t).astype(np.float64), np.where(misses, -1, face).astype(np.int64))
     exactly = exact.closest_hits(points, triangles, rays.origins, rays.directions)
-    seen = views(ours.t, ours.face, exactly, points, triangles, rays, most)
+    seen = judgements(ours.t, ours.face, exactly, points, triangles, rays, most)
     known = {ray: (hit, seen.get(row, "right")) for row, (ray, hit) in enumerate(zip(unique, exactly, strict=True))}
     judged_all = []
     for c in comparisons:
         found = [known[d.answered] for d in c.disagreements]
         right = theirs_right(c.disagreements, [hit for hit, _ in found], points[triangles], c.roundoff)
         rows = zip(c.disagreements, found, right, strict=True)
-        judged_all.append(replace(c, disagreements=tuple(judged(d, hit, view, one) for d, (hit, view), one in rows)))
+        judged_all.append(
+            replace(c, disagreements=tuple(judged(d, hit, ours_is, one) for d, (hit, ours_is), one in rows))
+        )
     return judged_all
 
 
@@ -238,11 +240,11 @@ def exact_errors(
     # List the rays whose answer is not right, with the exact hit and a verdict.
     points, triangles = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     found = []
-    for row, view in views(ours.t, ours.face, exact_hits, points, triangles, rays, most).items():
-        if view != "right":
+    for row, judgement in judgements(ours.t, ours.face, exact_hits, points, triangles, rays, most).items():
+        if judgement != "right":
             d = with_truth(_disagreement(row, "exact", ours, None, rays, numbers), exact_hits[row])
-            verdict = {"near edge": NEAR_EDGE, "wrong": THEIRS_RIGHT, None: None}[view]
-            found.append(replace(d, ours_right=None if view is None else False, verdict=verdict))
+            verdict = {"near edge": NEAR_EDGE, "wrong": THEIRS_RIGHT, None: None}[judgement]
+            found.append(replace(d, ours_right=None if judgement is None else False, verdict=verdict))
 
     # Count them, those within rounding of an edge apart.
     near_edge = [d for d in found if d.verdict == NEAR_EDGE]

@@ -22,8 +22,8 @@ from validation.oracle.rounding import FLOAT64_ROUNDOFF, RayView, t_bounds
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Point = tuple[float, float, float]
-# The class of an answer of ours: "near edge" where rounding permits it, None where it was not judged.
-View = Literal["right", "near edge", "wrong"] | None
+# The judgement of an answer of ours: "near edge" where rounding permits it, None where it was not judged.
+Judgement = Literal["right", "near edge", "wrong"] | None
 
 OURS_RIGHT = "ours right"
 THEIRS_RIGHT = "theirs right"
@@ -46,7 +46,7 @@ LISTED = 3
 class Disagreement:
     """One ray with different answers; t and face are None on a miss. The other fields are None until judged.
 
-    ``verdict`` stays None where ours is not plainly right and the ray was not judged, see ``views``.
+    ``verdict`` stays None where ours is not plainly right and the ray was not judged, see ``judgements``.
     """
 
     ray: int
@@ -78,7 +78,7 @@ def listed(disagreements: Sequence[Disagreement]) -> list[dict[str, object]]:
     return [asdict(d) for d in sorted(disagreements, key=lambda d: order.index(d.verdict))[:LISTED]]
 
 
-def views(
+def judgements(
     t: Floats,
     face: Ints,
     exact_hits: Sequence[ExactHit | None],
@@ -86,32 +86,32 @@ def views(
     faces: Ints,
     rays: RayBatch,
     most: int,
-) -> dict[int, View]:
-    """Classes of our answers ``t``, ``face`` (n,), by row, where they are not plainly right.
+) -> dict[int, Judgement]:
+    """Judgements of our answers ``t``, ``face`` (n,), by row, where they are not plainly right.
 
     None where the ray was not judged: beyond the first ``most`` rows, and after ``SETTLED`` wrong ones.
     """
-    seen: dict[int, View] = {}
+    seen: dict[int, Judgement] = {}
     wrong = 0
     for row in _rows_to_judge(t, face, exact_hits, vertices[faces], rays):
         seen[row] = None
         if len(seen) <= most and wrong < SETTLED:
             answer = (float(t[row]), int(face[row])) if face[row] >= 0 else (None, None)
-            view = RayView(vertices, faces, tuple(rays.origins[row]), tuple(rays.directions[row]), FLOAT64_ROUNDOFF)
-            seen[row] = "right" if view.is_right(*answer) else "near edge" if view.is_permitted(*answer) else "wrong"
+            ray = RayView(vertices, faces, tuple(rays.origins[row]), tuple(rays.directions[row]), FLOAT64_ROUNDOFF)
+            seen[row] = "right" if ray.is_right(*answer) else "near edge" if ray.is_permitted(*answer) else "wrong"
             wrong += seen[row] == "wrong"
     return seen
 
 
-def judged(d: Disagreement, hit: ExactHit | None, view: View, theirs_right: bool) -> Disagreement:
-    """The disagreement with its verdict, from the exact hit, the class of our answer and whether theirs is right."""
+def judged(d: Disagreement, hit: ExactHit | None, ours: Judgement, theirs_right: bool) -> Disagreement:
+    """The disagreement with its verdict, from the exact hit, our answer's judgement and whether theirs is right."""
     verdict = {
         "right": BOTH_RIGHT if theirs_right else OURS_RIGHT,
         "near edge": NEAR_EDGE,
         "wrong": THEIRS_RIGHT if theirs_right else BOTH_WRONG,
         None: None,
-    }[view]
-    ours_right = None if view is None else view == "right"
+    }[ours]
+    ours_right = None if ours is None else ours == "right"
     return replace(with_truth(d, hit), ours_right=ours_right, theirs_right=theirs_right, verdict=verdict)
 
 

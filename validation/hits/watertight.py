@@ -68,7 +68,7 @@ class LeakEffort:
     embree: int
 
 
-class Shot(NamedTuple):
+class LeakCount(NamedTuple):
     """Leak count for one (kernel, mesh, ray kind, placement, build); the build's options are of our kernel alone."""
 
     kernel: str
@@ -199,7 +199,7 @@ def placements(closed: Closed) -> Iterator[Placement]:
 def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:
     """Run the sweep; returns a record for JSON and a gate for each mesh and kind of ray."""
     effort = QUICK if quick else FULL
-    shot: list[Shot] = []
+    counts: list[LeakCount] = []
     left_out = []
     meshes = closed_meshes()
     share = effort.rays / effort.builds / sum(p.weight for closed in meshes for p in placements(closed))
@@ -211,44 +211,44 @@ def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], li
                 continue
             # Seeded by placement, so that leaving one out changes no other.
             rng = np.random.default_rng([SEED, index, place])
-            shot += shoot(placement, builds(place, effort.builds), share, rng)
-            shot += shoot_embree(placement, effort.embree, rng)
+            counts += shoot(placement, builds(place, effort.builds), share, rng)
+            counts += shoot_embree(placement, effort.embree, rng)
     record = {
-        "meshes": sums(shot, "mesh", "kind"),
-        "places": sums(shot, "offset", "scale"),
-        "builds": sums([s for s in shot if s.kernel == "ours"], "split", "leaf_size", "max_depth"),
+        "meshes": sums(counts, "mesh", "kind"),
+        "places": sums(counts, "offset", "scale"),
+        "builds": sums([c for c in counts if c.kernel == "ours"], "split", "leaf_size", "max_depth"),
         "left_out": left_out,
         "seed": SEED,
     }
-    return record, gates(shot)
+    return record, gates(counts)
 
 
-def gates(shot: Sequence[Shot]) -> list[Gate]:
+def gates(counts: Sequence[LeakCount]) -> list[Gate]:
     """Gates on our leaks, one for each mesh and kind of ray; none is allowed."""
     reason = "a closed mesh has no holes, wherever it lies and however its tree is built"
     found = []
-    for row in sums([s for s in shot if s.kernel == "ours"], "mesh", "kind"):
+    for row in sums([c for c in counts if c.kernel == "ours"], "mesh", "kind"):
         subject = f"{row['mesh']}, {row['ours_rays']:,} {row['kind']} rays from inside, all places and builds"
         found.append(Gate("stability", subject, "leaks", row["ours"], "at most", 0.0, reason))
     return found
 
 
-def sums(shot: Sequence[Shot], *keys: str) -> list[dict[str, Any]]:
-    """Rays and leaks of each kernel in ``shot``, one row for each combination of ``keys`` that occurs.
+def sums(counts: Sequence[LeakCount], *keys: str) -> list[dict[str, Any]]:
+    """Rays and leaks of each kernel in ``counts``, one row for each combination of ``keys`` that occurs.
 
     Leaks are None where a kernel got no rays.
     """
-    kernels = sorted({s.kernel for s in shot}, reverse=True)
+    kernels = sorted({c.kernel for c in counts}, reverse=True)
     rows: dict[tuple[object, ...], Counter[str]] = {}
     leaked: dict[tuple[object, ...], Counter[str]] = {}
-    for s in shot:
-        row = tuple(getattr(s, key) for key in keys)
-        rows.setdefault(row, Counter())[s.kernel] += s.rays
-        leaked.setdefault(row, Counter())[s.kernel] += s.leaks
+    for c in counts:
+        row = tuple(getattr(c, key) for key in keys)
+        rows.setdefault(row, Counter())[c.kernel] += c.rays
+        leaked.setdefault(row, Counter())[c.kernel] += c.leaks
     found = []
     for row, rays in rows.items():
-        counts = {f"{k}_rays": rays[k] for k in kernels} | {k: leaked[row][k] if rays[k] else None for k in kernels}
-        found.append(dict(zip(keys, row, strict=True)) | counts)
+        columns = {f"{k}_rays": rays[k] for k in kernels} | {k: leaked[row][k] if rays[k] else None for k in kernels}
+        found.append(dict(zip(keys, row, strict=True)) | columns)
     return found
 
 
@@ -259,7 +259,7 @@ def builds(place: int, count: int) -> list[Build]:
     return [BUILDS[(first + 2 * i) % len(BUILDS)] for i in range(count)]
 
 
-def shoot(placement: Placement, built: Sequence[Build], share: float, rng: Generator) -> Iterator[Shot]:
+def shoot(placement: Placement, built: Sequence[Build], share: float, rng: Generator) -> Iterator[LeakCount]:
     """Trace our rays in one placement: ``share`` times its weight of each kind through each of the trees ``built``."""
     vertices = placement.vertices()
     count = math.ceil(share * placement.weight)
@@ -267,10 +267,10 @@ def shoot(placement: Placement, built: Sequence[Build], share: float, rng: Gener
         octree = Octree(vertices, placement.closed.mesh.faces, **build._asdict())
         for kind in KINDS:
             lost = leaks(octree, placement.rays(kind, count, rng))
-            yield Shot("ours", placement.closed.name, kind, placement.offset, placement.scale, *build, count, lost)
+            yield LeakCount("ours", placement.closed.name, kind, placement.offset, placement.scale, *build, count, lost)
 
 
-def shoot_embree(placement: Placement, count: int, rng: Generator) -> Iterator[Shot]:
+def shoot_embree(placement: Placement, count: int, rng: Generator) -> Iterator[LeakCount]:
     """The same by Embree, for information, on float32 vertices and origins, if no face flips in float32."""
     vertices, faces = float32_exact(placement.vertices()), placement.closed.mesh.faces
     if not placement.keeps_sides(vertices):
@@ -282,7 +282,7 @@ def shoot_embree(placement: Placement, count: int, rng: Generator) -> Iterator[S
             embree = Embree(vertices, faces, robust=mode == "robust")
             lost = embree_leaks(embree, rays)
             where = placement.closed.name, kind, placement.offset, placement.scale
-            yield Shot(f"embree_{mode}", *where, "", 0, 0, count, lost)
+            yield LeakCount(f"embree_{mode}", *where, "", 0, 0, count, lost)
 
 
 def _area_vectors(vertices: Floats, faces: NDArray[np.int32]) -> Floats:

@@ -34,7 +34,7 @@ def page(metrics: dict[str, Any], pictures: Path) -> str:
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    shown = Pictures(pictures)
+    shown = PictureClasses(pictures)
     environment.filters["number"] = number
     environment.globals |= FIGURES
     environment.globals["picture"] = lambda name: _data_uri(pictures / name)
@@ -45,7 +45,7 @@ def page(metrics: dict[str, Any], pictures: Path) -> str:
     return environment.get_template("report.html").render(m=metrics)
 
 
-class Pictures:
+class PictureClasses:
     """The PNGs of a folder as CSS classes, so that the page contains equal ones only once."""
 
     def __init__(self, folder: Path) -> None:

@@ -72,7 +72,7 @@ class MatrixRow(_Strict):
     references: dict[str, _Seconds | None]
 
 
-class Thresholds(_Strict):
+class ThresholdChanges(_Strict):
     """The file that changed thresholds, and each change by the key's path: from and to."""
 
     file: str | None
@@ -91,7 +91,7 @@ class Metrics(_Strict):
     verdict: Verdict
     facts: list[Fact]
     matrix: list[MatrixRow]
-    thresholds: Thresholds
+    thresholds: ThresholdChanges
     gates: list[GateRecord]
     left_out: dict[str, str]
     baseline: dict[str, Any]

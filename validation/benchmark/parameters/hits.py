@@ -53,7 +53,7 @@ class Tree(NamedTuple):
         return f"{self.split}, leaf {self.leaf_size}, depth {self.max_depth}"
 
 
-class Contender(NamedTuple):
+class StorageContender(NamedTuple):
     """One implementation of closest hits, with the cost of its build; bytes are None where they are unknown."""
 
     query: Callable[[NDArray[np.float64], NDArray[np.float64]], Any]
@@ -157,7 +157,7 @@ def _storage(mesh: Mesh, batches: tuple[RayBatch, ...], effort: HitStudyEffort) 
     return records
 
 
-def _contenders(mesh: Mesh, runs: int) -> dict[str, Contender]:
+def _contenders(mesh: Mesh, runs: int) -> dict[str, StorageContender]:
     rounded = Mesh(float32_exact(mesh.vertices), mesh.faces)
     builders: dict[str, Callable[[], Any]] = {
         "float64": partial(_built, mesh, Tree()),
@@ -168,7 +168,7 @@ def _contenders(mesh: Mesh, runs: int) -> dict[str, Contender]:
     seconds = median_seconds({name: timed(_ready, build) for name, build in builders.items()}, runs)
     built = {name: build() for name, build in builders.items()}
     return {
-        name: Contender(b.closest_hit, seconds[name], b.stats.bytes if isinstance(b, Octree) else None)
+        name: StorageContender(b.closest_hit, seconds[name], b.stats.bytes if isinstance(b, Octree) else None)
         for name, b in built.items()
     }
 
