@@ -70,9 +70,9 @@ def sweep(job: Job) -> list[Gate]:
     spheres = {f"icosphere {level}": icosphere(level) for level in (5, 3)}
     counts: list[watertight.LeakCount] = []
     for (name, mesh), offset in zip(spheres.items(), (0.0, 1e4), strict=True):
-        closed = watertight.Closed(name, mesh, lambda rng, n: rng.uniform(-0.4, 0.4, (n, 3)))
+        closed = watertight.ClosedMesh(name, mesh, lambda rng, n: rng.uniform(-0.4, 0.4, (n, 3)))
         placement = watertight.Placement(closed, turned=True, offset=offset, scale=1.0)
-        build = watertight.Build("midpoint", 4, 32)
+        build = watertight.BuildOptions("midpoint", 4, 32)
         counts += watertight.shoot(placement, [build], _LEAKS / placement.weight, np.random.default_rng(SEED))
     return watertight.gates(counts)
 

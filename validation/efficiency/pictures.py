@@ -1,8 +1,8 @@
 """Pictures: error against seconds, ours and Mitsuba's, over samples, depth and the least weight; the error's causes.
 
-The truth for samples is a picture without any code of ours: Mitsuba's film, converged, see ``references.mitsuba``'s
-``sampling``. The truth for depth and least weight is the same renderer's own picture at a deeper setting, which
-measures truncation and not correctness: the picture gates judge that.
+Mitsuba's converged film, in which no code of ours takes part, is the truth for samples; see
+``validation.references.mitsuba.sampling``. The truth for depth and least weight is the same renderer's own picture at a
+deeper setting, which measures truncation and not correctness: the picture gates judge that.
 """
 
 import time

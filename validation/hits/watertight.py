@@ -39,7 +39,7 @@ _AWAY = np.array([1.0, -0.75, 0.375])
 _TURN = np.linalg.qr(np.array([[2.0, 3.0, 1.0], [-1.0, 2.0, 5.0], [4.0, -1.0, 1.0]]))[0]
 
 
-class Closed(NamedTuple):
+class ClosedMesh(NamedTuple):
     """A closed mesh, and a function of a generator and n that gives points (n, 3) inside it."""
 
     name: str
@@ -47,7 +47,7 @@ class Closed(NamedTuple):
     inside: Callable[[Generator, int], Floats]
 
 
-class Build(NamedTuple):
+class BuildOptions(NamedTuple):
     """Options of ``Octree``."""
 
     split: Literal["midpoint", "sah"]
@@ -56,7 +56,7 @@ class Build(NamedTuple):
 
 
 SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
-BUILDS = tuple(Build(*options) for options in product(SPLITS, (1, 4, 32), (1, 8, 32)))
+BUILDS = tuple(BuildOptions(*options) for options in product(SPLITS, (1, 4, 32), (1, 8, 32)))
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ FULL = LeakEffort(rays=1_000_000, builds=9, embree=5_000)
 class Placement:
     """A closed mesh, possibly rotated, then scaled, then moved; ``place`` transforms any point alike."""
 
-    closed: Closed
+    closed: ClosedMesh
     turned: bool
     offset: float
     scale: float
@@ -155,9 +155,9 @@ def embree_leaks(embree: Embree, rays: RayBatch) -> int:
     return int(np.count_nonzero(embree.closest_hit(rays.origins, rays.directions)[1] < 0))
 
 
-def closed_meshes() -> tuple[Closed, ...]:
+def closed_meshes() -> tuple[ClosedMesh, ...]:
     """The closed meshes: convex and not, a knot, and a box of which every number is an integer."""
-    balls = (Closed(f"icosphere {level}", icosphere(level), _cube(0.0, 0.4)) for level in (3, 4, 5, 6))
+    balls = (ClosedMesh(f"icosphere {level}", icosphere(level), _cube(0.0, 0.4)) for level in (3, 4, 5, 6))
     ring = torus(1.0, 0.4, 100, 40)
     knot = load_mesh(SCENES / "models" / "torus_knot.ply")
     # Its vertices are ordered by cross-section, 50 each: the mean of a section is in the middle of the tube.
@@ -165,10 +165,10 @@ def closed_meshes() -> tuple[Closed, ...]:
     hills = icosphere(4)
     return (
         *balls,
-        Closed("integer box", integer_box(), _cube(4.0, 3.0)),
-        Closed("torus", ring, _in_ring),
-        Closed("hilly sphere", Mesh(hilly(hills.vertices), hills.faces), _cube(0.0, 0.2)),
-        Closed("torus knot", knot, lambda rng, count: core[rng.integers(0, len(core), count)]),
+        ClosedMesh("integer box", integer_box(), _cube(4.0, 3.0)),
+        ClosedMesh("torus", ring, _in_ring),
+        ClosedMesh("hilly sphere", Mesh(hilly(hills.vertices), hills.faces), _cube(0.0, 0.2)),
+        ClosedMesh("torus knot", knot, lambda rng, count: core[rng.integers(0, len(core), count)]),
     )
 
 
@@ -190,7 +190,7 @@ def hilly(points: Floats) -> Floats:
     return points * (1.0 + 0.3 * np.sin(x) * np.sin(y + 1.0) * np.sin(z + 2.0))[:, None]
 
 
-def placements(closed: Closed) -> Iterator[Placement]:
+def placements(closed: ClosedMesh) -> Iterator[Placement]:
     """All placements of one closed mesh."""
     for turned, offset, scale in product((False, True), OFFSETS, SCALES):
         yield Placement(closed, turned, offset, scale)
@@ -252,14 +252,14 @@ def sums(counts: Sequence[LeakCount], *keys: str) -> list[dict[str, Any]]:
     return found
 
 
-def builds(place: int, count: int) -> list[Build]:
+def builds(place: int, count: int) -> list[BuildOptions]:
     """``count`` builds for a mesh's placement: with 1 each mesh gets all of them, with 9 at each offset and scale."""
     # The two orientations are half the placements apart, and must take builds of different parity.
     first = place - place // (len(OFFSETS) * len(SCALES))
     return [BUILDS[(first + 2 * i) % len(BUILDS)] for i in range(count)]
 
 
-def shoot(placement: Placement, built: Sequence[Build], share: float, rng: Generator) -> Iterator[LeakCount]:
+def shoot(placement: Placement, built: Sequence[BuildOptions], share: float, rng: Generator) -> Iterator[LeakCount]:
     """Trace our rays in one placement: ``share`` times its weight of each kind through each of the trees ``built``."""
     vertices = placement.vertices()
     count = math.ceil(share * placement.weight)

@@ -3,13 +3,13 @@
 schema            SCHEMA; another number is refused
 command, date, commit, quick, seconds      how the record was made; commit is null outside a git checkout
 environment       processor, processors, threads, python, platform, packages (version or null), libllvm (or null),
-                  load: processes that wanted to run in the minute before, or null; above 0 the others' share counts
+                  load: mean number of processes that wanted to run in the minute before the run, or null
 systems           by name: label, threads, precision, most_rays (null: no limit)
-missing           by name: how to get a peer that is not here
-series            names of the generated meshes, which differ in nothing but size
+missing           by name: how to install a peer that is absent
+series            names of the generated meshes, which differ in size only
 queries[]         one a mesh, family and kind of query
   mesh, faces, family, query     family: camera, shadow, random, bounce; query: closest, any
-  rays, hit_share, agree         agree: all contenders hit the same rays, but for float32's silhouettes, and some
+  rays, hit_share, agree         agree: some rays hit, and all contenders hit the same ones except at silhouettes
   contenders        by name: rays, hits, differing (hit flags unlike ours), seconds (all runs), median, mrays, ns
   ratios            by peer: the median over the rounds of its time a ray over ours
 fits[]            family, query, contender, and a, b, residual of ns = a log2 N + b

@@ -40,7 +40,7 @@ class HitStudyEffort:
     runs: int
 
 
-class Tree(NamedTuple):
+class TreeOptions(NamedTuple):
     """Options of an octree."""
 
     split: Literal["midpoint", "sah"] = "midpoint"
@@ -96,9 +96,9 @@ def tree_parameters(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dic
 
     That number must be 0, else the option trades more than time.
     """
-    sweeps = {f"leaf_size, {split}": [Tree(split, size) for size in LEAF_SIZES] for split in SPLITS}
-    sweeps["max_depth"] = [Tree(max_depth=depth) for depth in DEPTHS]
-    trees = dict.fromkeys([Tree()] + [tree for row in sweeps.values() for tree in row])
+    sweeps = {f"leaf_size, {split}": [TreeOptions(split, size) for size in LEAF_SIZES] for split in SPLITS}
+    sweeps["max_depth"] = [TreeOptions(max_depth=depth) for depth in DEPTHS]
+    trees = dict.fromkeys([TreeOptions()] + [tree for row in sweeps.values() for tree in row])
     builders = {tree.name: partial(_built, mesh, tree) for tree in trees}
     build_seconds = median_seconds({name: timed(build) for name, build in builders.items()}, runs)
     octrees = {name: build() for name, build in builders.items()}
@@ -113,7 +113,7 @@ def tree_parameters(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dic
     ]
     names = list(octrees)
     return {
-        "default": Tree().name,
+        "default": TreeOptions().name,
         "points": points,
         "sweeps": {name: [tree.name for tree in row] for name, row in sweeps.items()},
         "differing_rays": sum(differing.values()),
@@ -128,7 +128,7 @@ def _differing(octrees: dict[str, Octree], batches: tuple[RayBatch, ...]) -> dic
     """Number of rays of all families for which each tree gives other bits than the default tree."""
     counts = dict.fromkeys(octrees, 0)
     for batch in batches:
-        expected = octrees[Tree().name].closest_hit(batch.origins, batch.directions)
+        expected = octrees[TreeOptions().name].closest_hit(batch.origins, batch.directions)
         for name, octree in octrees.items():
             counts[name] += differing_rays(octree.closest_hit(batch.origins, batch.directions), expected)
     return counts
@@ -160,8 +160,8 @@ def _storage(mesh: Mesh, batches: tuple[RayBatch, ...], effort: HitStudyEffort) 
 def _contenders(mesh: Mesh, runs: int) -> dict[str, StorageContender]:
     rounded = Mesh(float32_exact(mesh.vertices), mesh.faces)
     builders: dict[str, Callable[[], Any]] = {
-        "float64": partial(_built, mesh, Tree()),
-        "float32": partial(_built, rounded, Tree()),
+        "float64": partial(_built, mesh, TreeOptions()),
+        "float32": partial(_built, rounded, TreeOptions()),
         "embree_default": partial(Embree, mesh.vertices, mesh.faces, robust=False),
         "embree_robust": partial(Embree, mesh.vertices, mesh.faces, robust=True),
     }
@@ -173,7 +173,7 @@ def _contenders(mesh: Mesh, runs: int) -> dict[str, StorageContender]:
     }
 
 
-def _built(mesh: Mesh, tree: Tree) -> Octree:
+def _built(mesh: Mesh, tree: TreeOptions) -> Octree:
     return Octree.from_mesh(mesh, **tree._asdict(), threads=1)
 
 

@@ -321,7 +321,7 @@ def _terrain(side: int) -> Mesh:
 
 
 def _differing(rays: RayBatch, hits: Hits, t: Floats) -> Ints:
-    """Rays that only one of both hits, or whose t differs by more than Embree's float32 explains."""
+    """Rays that only one of the two hits, or whose t differs by more than Embree's float32 explains."""
     differs = hits.hit != np.isfinite(t)
     both = np.flatnonzero(hits.hit & np.isfinite(t))
     directions = rays.directions[both]
