@@ -130,7 +130,7 @@ def _similarity(ours: Picture, reference: Picture) -> NDArray[np.float64]:
 
 
 def _inner_mean(similarity: NDArray[np.float64]) -> float:
-    """The published mean leaves out the rim, where the window reaches beyond the picture."""
+    """Mean SSIM as published: without the rim, where the window reaches beyond the picture."""
     rim = _WINDOW // 2
     return float(similarity[rim:-rim, rim:-rim].mean())
 

@@ -32,7 +32,7 @@ DEPTHS = (1, 2, 4, 8, 16, 32)
 
 @dataclass(frozen=True)
 class HitStudyEffort:
-    """``level`` of the icosphere, ``rays`` timed and ``judged`` in each family, timed ``runs``."""
+    """The icosphere's ``level``, the numbers of rays timed and judged in each family, and ``runs`` of the clock."""
 
     level: int
     rays: int
