@@ -17,7 +17,7 @@ from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.needs import Needs
 from renderer.scene.scene import RenderSettings, Scene
 from renderer.shade.bundle import SIZE
-from renderer.shade.surface import MAX_MEDIA, World
+from renderer.shade.surface import MAX_MEDIA, SceneArrays
 from renderer.shade.tile import CUT, Film, render_tile, tile_memory
 from renderer.shade.whitted import Settings
 from renderer.trace.layout import Tree, cache_aligned
@@ -42,7 +42,7 @@ class PreparedScene:
     mesh: Mesh
     octree: Octree | BruteForce
     needs: Needs
-    world: World
+    arrays: SceneArrays
     tree: Tree
     build_seconds: float
 
@@ -68,16 +68,16 @@ class PreparedScene:
         width, height = chosen.resolution
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
         settings, film = kernel_settings_of(self.needs, chosen, offset), _film(width, height, planes)
-        world = self.world
+        arrays = self.arrays
         if self.needs.refraction and camera is not self.scene.camera:
-            world = world._replace(media=media_around(self.scene, camera))
+            arrays = arrays._replace(media=media_around(self.scene, camera))
         across, cut = -(-width // TILE), np.zeros(tiles(chosen.resolution), np.int64)
 
         def render_one(first: int, _end: int) -> Iterator[None]:
             x, y = first % across * TILE, first // across * TILE
             tile = (x, y, min(x + TILE, width), min(y + TILE, height))
             memory = tile_memory(self.tree.depth, settings, _bundles_in_a_row(self.tree))
-            while not render_tile(self.tree.words, world, settings, rows, samples, film, tile, memory):
+            while not render_tile(self.tree.words, arrays, settings, rows, samples, film, tile, memory):
                 yield
             cut[first] = memory.state[CUT]
 
@@ -94,10 +94,10 @@ def prepare_scene(
 ) -> PreparedScene:
     """Make ``scene`` ready, by checked arguments; see ``render``."""
     clock = Stopwatch()
-    mesh, world = pack(scene, needs)
+    mesh, arrays = pack(scene, needs)
     octree = build_octree(mesh, accelerator, split, needs, threads)
     tree = tree_for(octree, needs)
-    return PreparedScene(scene, mesh, octree, needs, world, tree, clock.seconds())
+    return PreparedScene(scene, mesh, octree, needs, arrays, tree, clock.seconds())
 
 
 def _bundles_in_a_row(tree: Tree) -> int:
@@ -106,8 +106,8 @@ def _bundles_in_a_row(tree: Tree) -> int:
 
 
 def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_seconds: float) -> PreparedScene:
-    _, world = pack(scene, needs)
-    return PreparedScene(scene, octree.mesh, octree, needs, world, tree_for(octree, needs), build_seconds)
+    _, arrays = pack(scene, needs)
+    return PreparedScene(scene, octree.mesh, octree, needs, arrays, tree_for(octree, needs), build_seconds)
 
 
 def tiles(resolution: tuple[int, int]) -> int:

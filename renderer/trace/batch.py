@@ -7,8 +7,8 @@ from renderer.kernels.simd import LOCAL_WORDS, get, larger, local_words, pointer
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.trace.leaf import NO_FACE, tree_pointers
 from renderer.trace.traverse import (
-    Found,
-    Rays,
+    HitPointers,
+    RayPointers,
     depth_of_stack,
     make_scratch,
     ray_at,
@@ -42,9 +42,9 @@ def _first_bad_ray(rays, begin, end):
 
 @inlined
 def _ray_pointers(rays, scale):
-    """``Rays`` of the arrays (origins, directions, t_min, t_max); all but the directions may have one row for all."""
+    """``RayPointers`` of a batch (origins, directions, t_min, t_max); all but directions may have one row for all."""
     origins, directions, t_min, t_max = rays
-    return Rays(
+    return RayPointers(
         pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
         3 * np.int64(len(origins) > 1), np.int64(len(t_min) > 1), np.int64(len(t_max) > 1), scale,
     )  # fmt: skip
@@ -52,9 +52,9 @@ def _ray_pointers(rays, scale):
 
 @inlined
 def _found_pointers(out):
-    """``Found`` of the arrays (t, face, u, v, hit)."""
+    """``HitPointers`` of the arrays (t, face, u, v, hit)."""
     t, face, u, v, hit = out
-    return Found(pointer(t), pointer(face), pointer(u), pointer(v), pointer(hit))
+    return HitPointers(pointer(t), pointer(face), pointer(u), pointer(v), pointer(hit))
 
 
 @kernel

@@ -167,16 +167,16 @@ def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: 
     array = _array("leaving", leaving)
     whole = array.dtype.kind in "iu" and (array.ndim == 0 or array.shape == (count,))
     expect(whole, "leaving", f"an integer or integers of shape ({count},)", f"{array.dtype} of shape {array.shape}")
-    good = (array >= -1) & (array < len(mesh.faces))
+    # A copy, which no other thread can change once it is checked.
+    faces = np.array(np.broadcast_to(array, (count,)), np.int64)
+    good = (faces >= -1) & (faces < len(mesh.faces))
     if not good.all():
-        row = int((~np.atleast_1d(good)).argmax())
-        expected = f"faces from 0 to {len(mesh.faces) - 1}, or -1"
-        expect(False, "leaving", expected, f"{np.atleast_1d(array)[row]} in row {row}")
+        row = int((~good).argmax())
+        expect(False, "leaving", f"faces from 0 to {len(mesh.faces) - 1}, or -1", f"{faces[row]} in row {row}")
     near = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1)
     if not near.all():
         # As it was given: moved, it would be told by numbers that nobody knows.
         _reject(rays, int((~near).argmax()), scale)
-    faces = np.array(np.broadcast_to(array, (count,)), np.int64)
     starts = np.empty((count, 3))
 
     def leave(begin: int, end: int) -> None:

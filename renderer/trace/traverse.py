@@ -35,7 +35,7 @@ _SPREAD = 0.125
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
 
 
-class Rays(NamedTuple):
+class RayPointers(NamedTuple):
     """Pointers to rows of origins and directions, and to t_min and t_max. All but the directions have a step from one
     ray to the next, 0 where all share one. ``scale`` is the tree's, a power of two, so t goes in and out of its units
     exactly.
@@ -51,7 +51,7 @@ class Rays(NamedTuple):
     scale: float
 
 
-class Found(NamedTuple):
+class HitPointers(NamedTuple):
     """Pointers to what is written: t, face, u, v as ``Hits`` has them, and for any hits only ``hit``, a bool."""
 
     t: Any

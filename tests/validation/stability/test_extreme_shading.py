@@ -284,7 +284,7 @@ def test_light_that_overflows_makes_no_nan(diffuse: Any, intensity: float) -> No
 
 
 def test_reflection_keeps_its_length_at_any_angle() -> None:
-    """A hall of mirrors at 64 bounces multiplies any drift of the direction's length."""
+    """A host of mirrors at 64 bounces multiplies any drift of the direction's length."""
     d: Vector = (0.6, -0.8, 0.0)
     for i in range(1000):
         angle = 0.1 * i
