@@ -23,6 +23,9 @@ from validation.scenes import SCENES
 from validation.sections import Section, choose
 from validation.thresholds import Thresholds, load_thresholds
 
+# In the folder of the pictures: the names of those that a run wrote, which the next run may remove.
+_MANIFEST = ".written"
+
 
 @dataclass(frozen=True)
 class Request:
@@ -43,7 +46,8 @@ def run(request: Request) -> dict[str, Any]:
     Old files in that folder stay unchanged until all new ones are complete. Raises ``ValueError`` and ``OSError`` for
     invalid user files, before any section runs, and ``ImportError`` where a reference is missing.
     """
-    # Read all input before any section runs.
+    # Look at the folder and read all input before any section runs.
+    _check_folder(request.output)
     began, started = time.perf_counter(), datetime.now(UTC)
     thresholds = Thresholds() if request.gate is None else load_thresholds(request.gate)
     _open(request)
@@ -120,7 +124,7 @@ def _outcome(
 
 
 def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
-    """Write metrics, page and JUnit file into ``output``; the folder ``pictures`` replaces the old one there."""
+    """Write metrics, page and JUnit file into ``output``; ``pictures`` replace those of an earlier run there."""
     texts = {
         "metrics.json": schema.text(metrics),
         "index.html": page.page(metrics, pictures).encode(),
@@ -128,10 +132,35 @@ def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
     }
     kept = output / "pictures"
     if pictures != kept:
-        shutil.rmtree(kept, ignore_errors=True)
-        pictures.replace(kept)
+        _replace_pictures(pictures, kept)
     for name, text in texts.items():
         _write(output / name, text)
+
+
+def _replace_pictures(new: Path, kept: Path) -> None:
+    """Move the files of ``new`` to ``kept`` and remove what an earlier run wrote there; files of others stay."""
+    kept.mkdir(exist_ok=True)
+    manifest = kept / _MANIFEST
+    names = {path.relative_to(new).as_posix() for path in new.rglob("*") if path.is_file()}
+    before = set(manifest.read_text(encoding="utf-8").splitlines()) if manifest.is_file() else set()
+    for name in before - names:
+        if ".." not in Path(name).parts and not Path(name).is_absolute():
+            (kept / name).unlink(missing_ok=True)
+    for name in sorted(names):
+        (kept / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(new / name, kept / name)
+    _write(manifest, "".join(f"{name}\n" for name in sorted(names)).encode())
+
+
+def _check_folder(output: Path) -> None:
+    """Raise ``ValueError`` for a folder whose files a report would replace though no report wrote them."""
+    expected = f"--output: expected a new folder or one with a report, got {output} with"
+    if output.exists() and not output.is_dir():
+        raise ValueError(f"--output: expected a folder, got the file {output}")
+    if (output / "index.html").exists() and not (output / "metrics.json").exists():
+        raise ValueError(f"{expected} another index.html")
+    if (output / "pictures").exists() and not (output / "pictures").is_dir():
+        raise ValueError(f"{expected} a file called pictures")
 
 
 def run_defects(request: Request) -> list[Gate]:
@@ -145,6 +174,7 @@ def run_defects(request: Request) -> list[Gate]:
     began, started = time.perf_counter(), datetime.now(UTC)
     sources = environment.sources_sha256()
     chosen = [d for d in DEFECTS if not (request.quick and d.kernel)]
+    _check_folder(request.output)
     request.output.mkdir(parents=True, exist_ok=True)
     with steps(len(chosen) + 1) as step:
         record, gates = defects.run(request.quick, step)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from logging import getLogger
 from pathlib import Path
+from stat import S_ISREG
 from types import CodeType, ModuleType
 from typing import Any
 
@@ -284,6 +285,8 @@ def _names(folder: Path) -> list[str]:
 def _read(path: Path, key: tuple[str, ...]) -> Any:
     """What a file holds, or None where it is absent, damaged or of another key."""
     try:
+        if not S_ISREG(path.stat().st_mode):  # a pipe would be waited for
+            return None
         content = path.read_bytes()
     except FileNotFoundError:
         return None
@@ -311,6 +314,9 @@ def _tolerant(path: Path) -> Iterator[None]:
 
 def _write(path: Path, key: tuple[str, ...], payload: bytes) -> None:
     body = pickle.dumps((key, payload))
+    if path.exists() and not path.is_file():  # a pipe, say, which would be written to
+        with suppress(OSError):
+            path.unlink()
     write_atomically(path, lambda file: file.write(_HEADER + hashlib.sha256(body).digest() + body))
 
 

@@ -281,3 +281,12 @@ class TestAhead:
         bottom_of(package).write_text("STEP = 20\n")
         assert run(package, OCTREE_RENDERER_KERNELS=str(folder)) == ["27", "0", "1"]
         assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+def test_a_pipe_in_the_place_of_a_kernel_is_not_waited_for(package):
+    assert run(package) == COMPILED
+    (path,) = (package / "__pycache__").glob("*.kernel")
+    path.unlink()
+    os.mkfifo(path)
+    assert run(package) == COMPILED
