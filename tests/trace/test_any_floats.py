@@ -89,7 +89,7 @@ def test_no_ray_leaves_its_stack_or_spoils_another(kind, alike, any_hit):
     rng = np.random.default_rng([1, len(kind), alike])
     mesh = icosphere(3) if kind == "sphere" else Mesh(*make_mesh(kind, 5, 500))
     octree = Octree.from_mesh(mesh, leaf_size=4)
-    assert octree.tree.depth > 1
+    assert octree.tree.depth >= 3
     with np.errstate(all="ignore"):
         rays = any_rays(rng, 6000, alike)
         found, right = answers(octree, rays, any_hit), answers(octree, rays, any_hit, by_blocks=True)
@@ -98,7 +98,7 @@ def test_no_ray_leaves_its_stack_or_spoils_another(kind, alike, any_hit):
     if any_hit:
         np.testing.assert_array_equal(found[4][good], right[4][good])
         return
-    assert (right[1][good] >= 0).sum() > 20
+    assert (right[1][good] >= 0).sum() > 450
     for ours, brute in zip(found[:4], right[:4], strict=True):
         np.testing.assert_array_equal(ours[good], brute[good])
     assert (found[1] >= -1).all()
