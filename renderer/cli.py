@@ -88,6 +88,9 @@ def _scene_to_write(options: argparse.Namespace) -> None:
     if options.write_scene is not None:
         is_mesh = options.scene.suffix.lower() in MESH_SUFFIXES
         expect(is_mesh, "--write-scene", f"a mesh file ({', '.join(MESH_SUFFIXES)})", str(options.scene))
+        # It may have been changed since it was written.
+        new = not os.path.lexists(options.write_scene)
+        expect(new, "--write-scene", "a new file", f"{options.write_scene}, which is there already")
         write_scene(options.scene, options.write_scene)
 
 
@@ -161,6 +164,7 @@ def _render(options: argparse.Namespace) -> None:
 
     check_picture_path(options.output)
     scene = load_scene(options.scene)
+    _check_output_is_no_input(options, scene)
     _scene_to_write(options)
     compile_in_two()
     warnings.simplefilter("ignore", CutWarning)  # said below, in a line of ours
@@ -188,6 +192,15 @@ def _render(options: argparse.Namespace) -> None:
             f"({rays / image.render_seconds / 1e6:.1f} million a second), scene ready in "
             f"{image.build_seconds:.2f} s"
         )
+
+
+def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
+    """Refuse a picture in the place of what it is made of, whatever links lead there."""
+    read = [options.scene, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
+    written = [options.write_scene] if options.write_scene else []
+    output = os.path.realpath(options.output)
+    for path in [*read, *written]:
+        expect(os.path.realpath(path) != output, "--output", "another file than the scene's own", f"{output} by a link")
 
 
 def _save(image: Any, path: Path) -> None:

@@ -329,6 +329,8 @@ def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
         row = int((~exact).argmax())
         got = mesh.vertices[row].tolist()
         raise MeshError(f"vertices: expected coordinates within 2^900 of each other, got {got} in row {row}")
+    # As the mesh's own, or kernels would be compiled again for arrays that may be written.
+    scaled.setflags(write=False)
     return scaled, 2.0**exponent
 
 

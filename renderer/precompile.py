@@ -110,12 +110,12 @@ def compile_into(folder: Path) -> None:
     kernel_store.keep_in(folder)
 
 
-def touch_viewing(stage: PreparedScene) -> None:
+def touch_viewing(prepared: PreparedScene) -> None:
     """Compile or load what the viewer calls beside pictures; takes milliseconds where that was done before."""
-    eye, forward = stage.scene.camera.eye, stage.scene.camera.frame()[2]
-    face_colors(stage.world, eye)
-    ray_path(stage, eye, forward, 1)
-    visited(stage.octree, eye, forward)
+    eye, forward = prepared.scene.camera.eye, prepared.scene.camera.frame()[2]
+    face_colors(prepared.arrays, eye)
+    ray_path(prepared, eye, forward, 1)
+    visited(prepared.octree, eye, forward)
 
 
 def compile_in_two() -> None:

@@ -182,12 +182,12 @@ class Viewer:
 
     def pinch(self) -> None:
         """Two fingers that part."""
-        wire = self.context.new_cdp_session(self.page)
+        connection = self.context.new_cdp_session(self.page)
         x, y = self.centre()
 
         def touch(kind: str, *apart: float) -> None:
             points = [{"x": x + side * d, "y": y, "id": side} for d in apart for side in (0, 1)]
-            wire.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+            connection.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
         touch("touchStart", 40)
         for apart in (60, 80, 100):

@@ -24,7 +24,7 @@ from renderer.shade.records import (
     REFLECTANCE,
     TRANSMITTANCE,
 )
-from renderer.shade.surface import World, look_at, phong
+from renderer.shade.surface import SceneArrays, phong, scene_pointers
 
 # 1 to 2 ms of work: little beside a frame, much beside taking a chunk.
 _CHUNK = 8192
@@ -34,20 +34,20 @@ _PLACES = 4096
 _STAND_IN = 0.5
 
 
-def face_colors(world: World, eye: ArrayLike, threads: int | None = None) -> NDArray[np.uint8]:
-    """The colour of each face of ``world`` seen from ``eye`` (3,), as (F, 3) uint8 sRGB.
+def face_colors(arrays: SceneArrays, eye: ArrayLike, threads: int | None = None) -> NDArray[np.uint8]:
+    """The colour of each face of ``arrays`` seen from ``eye`` (3,), as (F, 3) uint8 sRGB.
 
     A material with no colour of its own, as mirrors and glass have none, would be black without bounces. It shows as a
     matte surface instead, whose colour is half of what it reflects or lets through, whichever is more: middle grey
     for clear glass, tinted where the glass is.
 
-    A face of no area has no normal and shows its ambient light alone. Only lights in ``world`` shine: a world packed
+    A face of no area has no normal and shows its ambient light alone. Only lights in ``arrays`` shine: a arrays packed
     for a scene on which no light falls (``needs.shadows`` False) has none. The same bits for any number of threads.
     Raises ``ValueError`` naming the argument.
     """
     at = checked_vector("eye", eye)
-    seen = world._replace(materials=_with_stand_ins(world.materials))
-    colors = np.empty((len(world.faces), 3), np.uint8)
+    seen = arrays._replace(materials=_with_stand_ins(arrays.materials))
+    colors = np.empty((len(arrays.faces), 3), np.uint8)
 
     def shade(begin: int, end: int) -> None:
         _shade(seen, at, colors, _table(), begin, end)
@@ -79,11 +79,11 @@ def _with_stand_ins(materials: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @inlined
-def _shine(world, light, p, n, d, m):
+def _add_light(arrays, light, p, n, d, m):
     """What the surface p of normal n and material row m sends against d of the light's."""
     row = light * LIGHT_COLUMNS
-    towards, arriving = three(world.lights, row + 1), three(world.lights, row + 4)
-    directional = get(world.lights, row) == DIRECTIONAL
+    towards, arriving = three(arrays.lights, row + 1), three(arrays.lights, row + 4)
+    directional = get(arrays.lights, row) == DIRECTIONAL
     if not directional:
         towards = sub(towards, p)
     if dot(n, towards) <= 0.0:
@@ -91,7 +91,7 @@ def _shine(world, light, p, n, d, m):
     if not directional:
         arriving = scale(arriving, 1.0 / dot(towards, towards))
         towards = normalized(towards)
-    return times(phong(world, m, n, d, towards), arriving)
+    return times(phong(arrays, m, n, d, towards), arriving)
 
 
 @inlined
@@ -106,9 +106,9 @@ def _encoded(x, table):
 
 
 @kernel
-def _shade(world, eye, colors, table, begin, end):
+def _shade(arrays, eye, colors, table, begin, end):
     """Colour the faces from ``begin`` to ``end``."""
-    seen, table = look_at(world), (pointer(table[0]), pointer(table[1]))
+    seen, table = scene_pointers(arrays), (pointer(table[0]), pointer(table[1]))
     for face in range(begin, end):
         a, b, c = row3(seen.faces, face)
         p0, p1, p2 = row3(seen.vertices, a), row3(seen.vertices, b), row3(seen.vertices, c)
@@ -117,6 +117,6 @@ def _shade(world, eye, colors, table, begin, end):
         n = scale(n, -1.0) if dot(d, n) > 0.0 else n
         color = times(three(seen.materials, m + AMBIENT), row3(seen.colors, 0))
         for light in range(seen.light_count):
-            color = add(color, _shine(seen, light, p, n, d, m))
+            color = add(color, _add_light(seen, light, p, n, d, m))
         for k in range(3):
             colors[face, k] = _encoded(color[k], table)

@@ -31,7 +31,7 @@ from renderer.shade.records import (
     TRANSMITTANCE,
 )
 from renderer.shade.shading import fresnel, reflect, refract
-from renderer.shade.surface import MAX_MEDIA, Surface, World, look_at, phong, surface_at
+from renderer.shade.surface import MAX_MEDIA, SceneArrays, Surface, phong, scene_pointers, surface_at
 from renderer.trace.spawn import BOUNDED, spawn_origin
 
 Vector = tuple[float, float, float]
@@ -103,7 +103,7 @@ class _Aim(NamedTuple):
 
 
 def ray_path(
-    stage: PreparedScene,
+    prepared: PreparedScene,
     origin: ArrayLike,
     direction: ArrayLike,
     max_depth: int,
@@ -115,7 +115,7 @@ def ray_path(
     rays that leave its end.
 
     ``max_depth``, ``min_weight`` and ``shadows`` as in ``RenderSettings``; spawned rays leave by the bounded offset. At
-    most MAX_RAYS rays, and for each as many shadow rays as ``stage.world`` has lights; of more the deepest are left
+    most MAX_RAYS rays, and for each as many shadow rays as ``prepared.arrays`` has lights; of more the deepest are left
     out. Otherwise the segments are as many as the pixel's ``Image.rays``, and their ``radiance`` sums to its colour.
     Without ``shadows`` the ray that met a surface brings home the light that falls there. Raises ``ValueError`` naming
     the argument.
@@ -123,25 +123,25 @@ def ray_path(
     expect(is_count(max_depth), "max_depth", "an integer >= 0", repr(max_depth))
     o, d = checked_vector("origin", origin), checked_vector("direction", direction)
     expect(any(d), "direction", "a vector of non-zero length", repr(direction))
-    bounces = max_depth if stage.needs.reflection or stage.needs.refraction else 0
-    waiting = deque([_Ray("camera", 0, -1, o, normalized(d), (1.0, 1.0, 1.0), _media_at(stage, o))])
+    bounces = max_depth if prepared.needs.reflection or prepared.needs.refraction else 0
+    waiting = deque([_Ray("camera", 0, -1, o, normalized(d), (1.0, 1.0, 1.0), _media_at(prepared, o))])
     path: list[Segment] = []
     for _ in range(MAX_RAYS):
         if not waiting:
             break
         ray, own = waiting.popleft(), len(path)
-        met = _meet(stage, ray)
-        path += _lit(stage, ray, met, own, shadows) if met else [_lost(stage, ray)]
+        met = _meet(prepared, ray)
+        path += _hit_segments(prepared, ray, met, own, shadows) if met else [_miss_segment(prepared, ray)]
         if met and ray.depth < bounces:
-            waiting += [r for r in _bounce(stage, ray, met, own) if _goes_on(r.weight, min_weight)]
+            waiting += [r for r in _bounce(prepared, ray, met, own) if _goes_on(r.weight, min_weight)]
     return tuple(path)
 
 
-def _media_at(stage: PreparedScene, eye: Vector) -> tuple[int, ...]:
+def _media_at(prepared: PreparedScene, eye: Vector) -> tuple[int, ...]:
     """The media around the eye, as ``PreparedScene.picture`` has them for a camera there."""
-    if not stage.needs.refraction:
+    if not prepared.needs.refraction:
         return ()
-    return tuple(media_around(stage.scene, stage.scene.camera.model_copy(update={"eye": eye})).tolist())
+    return tuple(media_around(prepared.scene, prepared.scene.camera.model_copy(update={"eye": eye})).tolist())
 
 
 def _goes_on(weight: Vector, min_weight: float) -> bool:
@@ -149,21 +149,21 @@ def _goes_on(weight: Vector, min_weight: float) -> bool:
 
 
 @kernel
-def surface_of(world: World, face: int, u: float, v: float, d: Vector) -> Surface:
+def surface_of(arrays: SceneArrays, face: int, u: float, v: float, d: Vector) -> Surface:
     """``surface_at``, for Python."""
-    return surface_at(look_at(world), face, u, v, d)
+    return surface_at(scene_pointers(arrays), face, u, v, d)
 
 
-def _meet(stage: PreparedScene, ray: _Ray) -> _Met | None:
+def _meet(prepared: PreparedScene, ray: _Ray) -> _Met | None:
     """The nearest surface on the ray's way."""
-    hits = stage.octree.closest_hit([ray.origin], [ray.direction])
+    hits = prepared.octree.closest_hit([ray.origin], [ray.direction])
     if not hits.hit[0]:
         return None
     face = int(hits.face[0])
-    surface = surface_of(stage.world, face, float(hits.u[0]), float(hits.v[0]), ray.direction)
+    surface = surface_of(prepared.arrays, face, float(hits.u[0]), float(hits.v[0]), ray.direction)
     inside = dot(ray.direction, surface.n_s) > 0.0
     n, row = scale(surface.n_s, -1.0) if inside else surface.n_s, int(surface.material)
-    return _Met(face, surface, n, inside, row, stage.world.materials[row // MATERIAL_COLUMNS])
+    return _Met(face, surface, n, inside, row, prepared.arrays.materials[row // MATERIAL_COLUMNS])
 
 
 def _color(columns: NDArray[np.float64], first: int) -> Vector:
@@ -171,39 +171,39 @@ def _color(columns: NDArray[np.float64], first: int) -> Vector:
     return x, y, z
 
 
-def _lost(stage: PreparedScene, ray: _Ray) -> Segment:
+def _miss_segment(prepared: PreparedScene, ray: _Ray) -> Segment:
     """The segment of a ray that met nothing."""
-    radiance = times(ray.weight, _color(stage.world.colors[1], 0))
-    end = _beyond(stage, ray.origin, ray.direction)
+    radiance = times(ray.weight, _color(prepared.arrays.colors[1], 0))
+    end = _beyond(prepared, ray.origin, ray.direction)
     return Segment(ray.kind, ray.depth, ray.parent, ray.origin, end, False, -1, ray.weight, radiance)
 
 
-def _beyond(stage: PreparedScene, origin: Vector, direction: Vector) -> Vector:
+def _beyond(prepared: PreparedScene, origin: Vector, direction: Vector) -> Vector:
     """The point in unit ``direction`` at which the sphere around all faces is left behind for certain."""
-    lower, upper = stage.mesh.bounds if len(stage.mesh.faces) else (np.zeros(3), np.ones(3))
+    lower, upper = prepared.mesh.bounds if len(prepared.mesh.faces) else (np.zeros(3), np.ones(3))
     reach = np.linalg.norm(origin - (lower + upper) / 2.0) + np.linalg.norm(upper - lower) / 2.0
     return add(origin, scale(direction, float(reach)))
 
 
-def _lit(stage: PreparedScene, ray: _Ray, met: _Met, own: int, shadows: bool) -> list[Segment]:
+def _hit_segments(prepared: PreparedScene, ray: _Ray, met: _Met, own: int, shadows: bool) -> list[Segment]:
     """The segment of a ray that met a surface, in place ``own`` of the path, and those of its shadow rays."""
-    radiance = times(ray.weight, times(_color(met.material, AMBIENT), _color(stage.world.colors[0], 0)))
-    aims, shadow_rays = _aim(stage, ray, met), []
+    radiance = times(ray.weight, times(_color(met.material, AMBIENT), _color(prepared.arrays.colors[0], 0)))
+    aims, shadow_rays = _aim(prepared, ray, met), []
     for aim in aims:
         if shadows:
-            shadow_rays.append(_shadow(stage, ray, own, aim))
+            shadow_rays.append(_shadow(prepared, ray, own, aim))
         else:
             radiance = add(radiance, aim.radiance)
     p = met.surface.p
     return [Segment(ray.kind, ray.depth, ray.parent, ray.origin, p, True, met.face, ray.weight, radiance), *shadow_rays]
 
 
-def _aim(stage: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
+def _aim(prepared: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
     """The ways to the lights that the surface faces, by the rules of ``direct``."""
     if met.material[KIND] not in (PHONG, LAMBERT):
         return []
     aims, (p, error, n_g, *_) = [], met.surface
-    for light in stage.world.lights:
+    for light in prepared.arrays.lights:
         place, arriving = _color(light, 1), _color(light, 4)
         directional = light[0] == DIRECTIONAL
         to_light = place if directional else sub(place, p)
@@ -211,42 +211,42 @@ def _aim(stage: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
             continue
         o = spawn_origin(p, error, n_g, to_light, BOUNDED)
         if directional:
-            way, t_max, end = place, np.inf, _beyond(stage, o, place)
+            way, t_max, end = place, np.inf, _beyond(prepared, o, place)
         else:
             way, t_max, end = sub(place, o), SHORT_OF_LIGHT, place
             arriving = scale(arriving, 1.0 / dot(to_light, to_light))
             to_light = normalized(to_light)
-        seen = times(ray.weight, times(_phong(stage.world, met.row, met.n, ray.direction, to_light), arriving))
+        seen = times(ray.weight, times(_phong(prepared.arrays, met.row, met.n, ray.direction, to_light), arriving))
         aims.append(_Aim(o, way, t_max, end, seen))
     return aims
 
 
 @kernel
-def _phong(world: World, m: int, n: Vector, d: Vector, towards: Vector) -> Vector:
+def _phong(arrays: SceneArrays, m: int, n: Vector, d: Vector, towards: Vector) -> Vector:
     """``phong``, for Python."""
-    return phong(look_at(world), m, n, d, towards)
+    return phong(scene_pointers(arrays), m, n, d, towards)
 
 
-def _shadow(stage: PreparedScene, ray: _Ray, own: int, aim: _Aim) -> Segment:
+def _shadow(prepared: PreparedScene, ray: _Ray, own: int, aim: _Aim) -> Segment:
     """The segment of a shadow ray; it ends at the nearest surface that hides the light."""
-    hits = stage.octree.closest_hit([aim.origin], [aim.direction], t_max=aim.t_max)
+    hits = prepared.octree.closest_hit([aim.origin], [aim.direction], t_max=aim.t_max)
     hidden = bool(hits.hit[0])
     end = _color(hits.points[0], 0) if hidden else aim.end
     radiance = (0.0, 0.0, 0.0) if hidden else aim.radiance
     return Segment("shadow", ray.depth, own, aim.origin, end, hidden, int(hits.face[0]), ray.weight, radiance)
 
 
-def _bounce(stage: PreparedScene, ray: _Ray, met: _Met, own: int) -> list[_Ray]:
+def _bounce(prepared: PreparedScene, ray: _Ray, met: _Met, own: int) -> list[_Ray]:
     """The rays that leave the surface: the reflected one, then the refracted one where light passes."""
     d, m = ray.direction, met.material
     k_r, k_t = _color(m, REFLECTANCE), _color(m, TRANSMITTANCE)
     children = []
     if any(k_t) or m[KIND] == DIELECTRIC:
-        limit = MAX_MEDIA if stage.needs.refraction else 0
+        limit = MAX_MEDIA if prepared.needs.refraction else 0
         beyond = _cross(ray.media, met, limit)
         # From inside, n1 is this material even where no entry was seen: an open mesh.
-        n1 = float(m[IOR]) if met.inside else _innermost_ior(stage, ray.media)
-        n2 = _innermost_ior(stage, beyond) if met.inside else float(m[IOR])
+        n1 = float(m[IOR]) if met.inside else _innermost_ior(prepared, ray.media)
+        n2 = _innermost_ior(prepared, beyond) if met.inside else float(m[IOR])
         cos_t, through = refract(d, met.n, n1, n2)
         if m[KIND] == DIELECTRIC:
             f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, met.n), cos_t, n1, n2)
@@ -274,5 +274,5 @@ def _cross(media: tuple[int, ...], met: _Met, limit: int) -> tuple[int, ...]:
     return media
 
 
-def _innermost_ior(stage: PreparedScene, media: tuple[int, ...]) -> float:
-    return float(stage.world.materials[media[-1] // MATERIAL_COLUMNS, IOR]) if media else 1.0
+def _innermost_ior(prepared: PreparedScene, media: tuple[int, ...]) -> float:
+    return float(prepared.arrays.materials[media[-1] // MATERIAL_COLUMNS, IOR]) if media else 1.0

@@ -115,6 +115,17 @@ def pointer(typingctx, array):
     return types.CPointer(array.dtype)(array), codegen
 
 
+@intrinsic
+def address(typingctx, array):
+    """The same as an int64, for memory whose values are of more than one type."""
+
+    def codegen(context, builder, sig, args):
+        data = cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0]).data
+        return builder.ptrtoint(data, context.get_value_type(sig.return_type))
+
+    return types.int64(array), codegen
+
+
 def _pointer_to(dtype: Any) -> Any:
     """The function that makes an address, an int64, a ``pointer`` to values of ``dtype``."""
 
@@ -131,6 +142,8 @@ def _pointer_to(dtype: Any) -> Any:
 float32_pointer = _pointer_to(types.float32)
 float64_pointer = _pointer_to(types.float64)
 int32_pointer = _pointer_to(types.int32)
+int64_pointer = _pointer_to(types.int64)
+bool_pointer = _pointer_to(types.boolean)
 
 
 def _extreme(predicate: str) -> Any:

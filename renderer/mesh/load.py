@@ -114,6 +114,8 @@ def _parse_glb(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
 
 # glTF 2.0, section 5.24.4, and the extensions that pack vertices.
 _TRIANGLES, _TRIANGLE_FAN = 4, 6
+# trimesh's time grows with the cube of the depth: a second at this one.
+_MAX_NODE_DEPTH = 256
 _UNREAD_EXTENSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 
 
@@ -149,6 +151,21 @@ def _refuse_unread(document: Any) -> None:
     for number, accessor in enumerate(dicts(document, "accessors")):
         if "sparse" in accessor:
             raise MeshError(f"GLB: expected plain accessors, got a sparse one, accessor {number}")
+        if "bufferView" not in accessor:  # all zeros, as many as it says
+            raise MeshError(f"GLB: expected accessors with data, got none in accessor {number}")
+    _refuse_deep(dicts(document, "nodes"))
+
+
+def _refuse_deep(nodes: list[dict[str, Any]]) -> None:
+    """Raise ``MeshError`` for nodes within each other to such a depth that trimesh takes minutes, or for ever."""
+    lists = [node.get("children") for node in nodes]
+    children = [[c for c in row if isinstance(c, int)] if isinstance(row, list) else [] for row in lists]
+    level, seen = set(range(len(nodes))) - {child for row in children for child in row}, 0
+    for _ in range(_MAX_NODE_DEPTH):
+        seen += len(level)
+        level = {child for number in level for child in children[number] if 0 <= child < len(nodes)}
+    if level or seen < len(nodes):
+        raise MeshError(f"GLB: expected nodes at most {_MAX_NODE_DEPTH} deep and without circles, got others")
 
 
 def _from_trimesh(geometry: Any, repairs: list[Repairs] | None) -> Mesh:

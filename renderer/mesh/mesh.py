@@ -137,14 +137,15 @@ class Mesh:
         return floats
 
     def _checked_faces(self, vertex_count: int) -> Int32Array:
-        faces = _index_rows(self.name, self.faces)
+        # A copy, which no other thread can change once it is checked.
+        faces = np.array(_index_rows(self.name, self.faces), order="C")
         if vertex_count > MAX_VERTICES:
             raise self._error(f"vertices: expected at most {MAX_VERTICES} rows, got {vertex_count}")
         if faces.size and (faces.min() < 0 or faces.max() >= vertex_count):
             row, corner = np.argwhere((faces < 0) | (faces >= vertex_count))[0]
             there = f"indices from 0 to {vertex_count - 1}" if vertex_count else "no faces, as there are no vertices"
             raise self._error(f"faces: expected {there}, got {faces[row, corner]} in row {row}")
-        return np.array(faces, dtype=np.int32, order="C")
+        return faces.astype(np.int32, copy=False)
 
     @cached_property
     def bounds(self) -> tuple[Float64Array, Float64Array]:

@@ -8,10 +8,10 @@ from renderer.scene.camera import Camera
 from renderer.scene.needs import Needs, needs_of
 from renderer.scene.scene import Scene
 from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
-from renderer.shade.surface import MAX_MEDIA, World
+from renderer.shade.surface import MAX_MEDIA, SceneArrays
 
 
-def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, World]:
+def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
     """The merged mesh of all instances in their order, and everything else that the kernel reads.
 
     Only what ``needs`` names is there, and for None only what the scene needs.
@@ -27,7 +27,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, World]:
         vertices, faces = np.zeros((0, 3)), np.zeros((0, 3), np.int32)
     counts = [len(i.mesh.faces) for i in instances]
     mesh = Mesh(vertices, faces)
-    world = World(
+    arrays = SceneArrays(
         vertices=mesh.vertices,
         normals=_normals(scene, len(vertices)) if needs.smooth_normals else np.zeros((0, 3)),
         faces=mesh.faces,
@@ -38,7 +38,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, World]:
         colors=np.array([scene.ambient, scene.background]),
         media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
     )
-    return mesh, world
+    return mesh, arrays
 
 
 def _materials(scene: Scene, needs: Needs) -> NDArray[np.float64]:

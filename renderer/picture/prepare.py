@@ -17,11 +17,12 @@ from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.needs import Needs
 from renderer.scene.scene import RenderSettings, Scene
 from renderer.shade.bundle import SIZE
-from renderer.shade.surface import MAX_MEDIA, World
+from renderer.shade.surface import MAX_MEDIA, SceneArrays
 from renderer.shade.tile import CUT, Film, render_tile, tile_memory
 from renderer.shade.whitted import Settings
 from renderer.trace.layout import Tree, cache_aligned
 from renderer.trace.query import rays_against_blocks
+from renderer.trace.spawn import OffsetRule
 
 # Pixels a side: 256 tiles share a 512 x 512 picture evenly, and neighbouring rays find their nodes in the cache.
 TILE = 32
@@ -42,7 +43,7 @@ class PreparedScene:
     mesh: Mesh
     octree: Octree | BruteForce
     needs: Needs
-    world: World
+    arrays: SceneArrays
     tree: Tree
     build_seconds: float
 
@@ -54,7 +55,7 @@ class PreparedScene:
         self,
         camera: Camera,
         chosen: RenderSettings,
-        offset: float,
+        offset: OffsetRule,
         threads: int,
         finished: Callable[[int], object] | None = None,
         planes: Collection[str] = PLANES,
@@ -68,16 +69,16 @@ class PreparedScene:
         width, height = chosen.resolution
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
         settings, film = kernel_settings_of(self.needs, chosen, offset), _film(width, height, planes)
-        world = self.world
+        arrays = self.arrays
         if self.needs.refraction and camera is not self.scene.camera:
-            world = world._replace(media=media_around(self.scene, camera))
+            arrays = arrays._replace(media=media_around(self.scene, camera))
         across, cut = -(-width // TILE), np.zeros(tiles(chosen.resolution), np.int64)
 
         def render_one(first: int, _end: int) -> Iterator[None]:
             x, y = first % across * TILE, first // across * TILE
             tile = (x, y, min(x + TILE, width), min(y + TILE, height))
             memory = tile_memory(self.tree.depth, settings, _bundles_in_a_row(self.tree))
-            while not render_tile(self.tree.words, world, settings, rows, samples, film, tile, memory):
+            while not render_tile(self.tree.words, arrays, settings, rows, samples, film, tile, memory):
                 yield
             cut[first] = memory.state[CUT]
 
@@ -94,20 +95,20 @@ def prepare_scene(
 ) -> PreparedScene:
     """Make ``scene`` ready, by checked arguments; see ``render``."""
     clock = Stopwatch()
-    mesh, world = pack(scene, needs)
+    mesh, arrays = pack(scene, needs)
     octree = build_octree(mesh, accelerator, split, needs, threads)
     tree = tree_for(octree, needs)
-    return PreparedScene(scene, mesh, octree, needs, world, tree, clock.seconds())
+    return PreparedScene(scene, mesh, octree, needs, arrays, tree, clock.seconds())
 
 
 def _bundles_in_a_row(tree: Tree) -> int:
     """After how many bundles a kernel returns, so that Ctrl-C and others are heard: some 10 ms of tracing."""
-    return 256 if tree.depth > 0 else max(1, rays_against_blocks(tree) // SIZE)
+    return 256 if tree.has_nodes else max(1, rays_against_blocks(tree) // SIZE)
 
 
 def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_seconds: float) -> PreparedScene:
-    _, world = pack(scene, needs)
-    return PreparedScene(scene, octree.mesh, octree, needs, world, tree_for(octree, needs), build_seconds)
+    _, arrays = pack(scene, needs)
+    return PreparedScene(scene, octree.mesh, octree, needs, arrays, tree_for(octree, needs), build_seconds)
 
 
 def tiles(resolution: tuple[int, int]) -> int:
@@ -141,7 +142,7 @@ def _widened(tree: Tree) -> Tree:
     return replace(tree, blocks=blocks)
 
 
-def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: float) -> Settings:
+def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: OffsetRule) -> Settings:
     """The kernel's settings: no bounces where nothing bounces, and no media where nothing refracts."""
     bounces = chosen.max_depth if needs.reflection or needs.refraction else 0
     media = MAX_MEDIA if needs.refraction else 0

@@ -1,8 +1,9 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
 import warnings
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from numbers import Real
 from typing import Any, Literal
 
 from renderer.errors import expect
@@ -13,7 +14,7 @@ from renderer.process.terminal import on_terminal
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.scene.needs import Needs, checked_needs
 from renderer.scene.scene import Scene, checked_settings
-from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON
+from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule
 from renderer.tree.build import SPLITS
 
 
@@ -64,7 +65,8 @@ def render(
     eye = source.camera if camera is None else camera
     expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
     chosen = checked_settings(source.render, settings)
-    known = not isinstance(planes, str) and set(planes) <= set(PLANES)
+    kept = tuple(planes) if isinstance(planes, Iterable) and not isinstance(planes, str) else (planes,)
+    known = not isinstance(planes, str) and all(isinstance(p, str) and p in PLANES for p in kept)
     expect(known, "planes", f"some of {', '.join(PLANES)}", repr(planes))
     if isinstance(scene, PreparedScene):
         _expect_usual(accelerator, split, needs)
@@ -72,7 +74,7 @@ def render(
     else:
         prepared = _prepared(scene, chosen.max_depth, accelerator, split, needs, threads)
     with _bar(tiles(chosen.resolution), progress) as update:
-        image = prepared.picture(eye, chosen, rule, threads, update, planes)
+        image = prepared.picture(eye, chosen, rule, threads, update, kept)
     if image.cut:
         warnings.warn(image.cut_message(chosen.max_rays), CutWarning, stacklevel=2)
     return image
@@ -126,12 +128,12 @@ def _expect_usual(accelerator: object, split: object, needs: object) -> None:
     expect(needs is None, "needs", "None, as the scene is prepared", repr(needs))
 
 
-def _offset(offset: str | float) -> float:
+def _offset(offset: str | float) -> OffsetRule:
     if isinstance(offset, str):
         expect(offset in ("bounded", "mitsuba"), "offset", "'bounded', 'mitsuba' or a number", repr(offset))
-        return BOUNDED if offset == "bounded" else MITSUBA_EPSILON
-    expect(isinstance(offset, int | float) and 0.0 <= offset < 0.1, "offset", "a number from 0 to below 0.1", offset)
-    return float(offset)
+        return BOUNDED if offset == "bounded" else OffsetRule(False, MITSUBA_EPSILON)
+    expect(isinstance(offset, Real) and 0.0 <= offset < 0.1, "offset", "a number from 0 to below 0.1", offset)
+    return OffsetRule(False, float(offset))
 
 
 @contextmanager

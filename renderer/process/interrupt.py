@@ -1,4 +1,4 @@
-"""How a command ends by Ctrl-C: with one line and an exit code, also in the midst of compiling."""
+"""How a command ends by Ctrl-C, with one line and an exit code, also in the compiler; and by other signals."""
 
 import os
 import signal
@@ -12,6 +12,8 @@ from typing import Protocol
 
 # The usual code of a shell for a process that SIGINT ended.
 INTERRUPTED = 130
+# What a job's time limit and a terminal that is closed send. Unheard they would leave temporary files.
+_ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class Command(Protocol):
@@ -26,16 +28,47 @@ def interruptible(message: str) -> Callable[[Command], Command]:
     def decorate(command: Command) -> Command:
         @wraps(command)
         def run(arguments: Sequence[str] | None = None) -> int:
+            own_process, ended_by = arguments is None, list[int]()
             try:
-                with ends_while_compiling(message, own_process=arguments is None):
+                with _ends_clean(ended_by, own_process), ends_while_compiling(message, own_process):
                     return command(arguments)
             except KeyboardInterrupt:
-                print(message, file=sys.stderr)
-                return INTERRUPTED
+                if not ended_by:
+                    print(message, file=sys.stderr)
+                    return INTERRUPTED
+            # As it would have ended at once, so that whoever sent the signal sees what became of it.
+            signal.raise_signal(ended_by[0])
+            return 128 + ended_by[0]
 
         return run
 
     return decorate
+
+
+@contextmanager
+def _ends_clean(ended_by: list[int], own_process: bool) -> Iterator[None]:
+    """Within, a signal that would end the process raises KeyboardInterrupt, so that temporary files are removed.
+
+    Its number goes to ``ended_by``. In the compiler it ends the process at once, see ``ends_while_compiling``. Does
+    nothing where the process is not the command's own, or something else handles or ignores the signal.
+    """
+    main = own_process and current_thread() is main_thread()
+    heard = [number for number in _ENDING if main and signal.getsignal(number) is signal.SIG_DFL]
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        ended_by.append(number)
+        signal.signal(number, signal.SIG_DFL)
+        if _in_compiler(frame):
+            signal.raise_signal(number)
+        raise KeyboardInterrupt
+
+    for number in heard:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number in heard:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @contextmanager

@@ -220,10 +220,14 @@ def write_scene(mesh_file: str | Path, path: str | Path) -> None:
 
     Raises ``ValueError`` unless ``path`` is that of a .toml file, and leads to no other kind.
     """
-    for name in (Path(path), Path(os.path.realpath(path))):
-        expect(name.suffix.lower() == ".toml", "path", "a .toml file", str(path))
+    target = Path(os.path.realpath(path))
+    for name in (Path(path), target):
+        leads = "" if name == Path(path) else f", a link to {target}"
+        expect(name.suffix.lower() == ".toml", "path", "a .toml file", f"{path}{leads}")
     # From beside the scene file as it is named, where ``load_scene`` looks, and not from where a link may lead.
     inside = os.path.relpath(Path(mesh_file).resolve(), Path(path).parent.resolve())
+    is_text = inside.encode(errors="replace").decode() == inside
+    expect(is_text, "mesh", "a name in UTF-8, as TOML has no other", ascii(inside))
     text = showcase_text(load_mesh(mesh_file), Path(inside).as_posix())
     write_atomically(path, lambda file: file.write(text.encode()))
 

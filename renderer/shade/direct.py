@@ -11,8 +11,9 @@ from renderer.kernels.vec3 import add, dot, normalized, row3, scale, sub, three,
 from renderer.shade.bundle import SIZE
 from renderer.shade.records import DIELECTRIC, DIRECTIONAL, KIND, LIGHT_COLUMNS, MIRROR, UNLIT
 from renderer.shade.surface import phong
+from renderer.trace.rays import RayPointers
 from renderer.trace.spawn import spawn_origin
-from renderer.trace.traverse import Rays, search_blocks, trace
+from renderer.trace.traverse import search_blocks, trace
 
 # What a lit ray of a bundle leaves for its light and its children, one column of SURFACE_DOUBLES float64 a ray.
 POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT = 0, 3, 6, 9, 10, 11, 12
@@ -29,10 +30,10 @@ SHORT_OF_LIGHT = 1.0 - 2.0**-36
 @kernel
 def trace_any(tree, rays, found, count, scratch, any_hit):
     """``trace`` of the first ``count`` rays, or every block where the tree has no nodes."""
-    if tree.depth == 0:
-        search_blocks(tree, rays, found, 0, count, any_hit)
-    else:
+    if tree.has_nodes:
         trace(tree, rays, found, 0, count, scratch, any_hit)
+    else:
+        search_blocks(tree, rays, found, 0, count, any_hit)
 
 
 @inlined
@@ -51,7 +52,7 @@ def is_lit(materials, m):
 
 
 @inlined
-def _aim(world, surface, light, offset):
+def _aim(scene, surface, light, offset):
     """The shadow ray from a surface to a light: (whether the light faces it, origin, direction, t_max, unit direction,
     the irradiance that arrives facing it).
 
@@ -59,9 +60,9 @@ def _aim(world, surface, light, offset):
     itself does not hide it.
     """
     row = light * LIGHT_COLUMNS
-    towards, arriving = three(world.lights, row + 1), three(world.lights, row + 4)
+    towards, arriving = three(scene.lights, row + 1), three(scene.lights, row + 4)
     p, n, n_g, error = three(surface, POINT), three(surface, NORMAL), three(surface, GEOMETRIC), get(surface, BOUND)
-    if get(world.lights, row) == DIRECTIONAL:
+    if get(scene.lights, row) == DIRECTIONAL:
         if dot(n, towards) <= 0.0:
             return False, p, towards, 0.0, towards, arriving
         return True, spawn_origin(p, error, n_g, towards, offset), towards, np.inf, towards, arriving
@@ -72,17 +73,17 @@ def _aim(world, surface, light, offset):
         return False, p, to_light, 0.0, to_light, arriving
     o = spawn_origin(p, error, n_g, to_light, offset)
     # Mitsuba stops ten of its epsilons short.
-    t_max = 1.0 - 10.0 * offset if offset >= 0.0 else SHORT_OF_LIGHT
+    t_max = SHORT_OF_LIGHT if offset.bounded else 1.0 - 10.0 * offset.epsilon
     return True, o, sub(towards, o), t_max, normalized(to_light), scale(arriving, 1.0 / squared)
 
 
 @kernel
-def _aim_all(world, surfaces, lit, count, light, offset, shadows):
+def _aim_all(scene, surfaces, lit, count, light, offset, shadows):
     """Aim the ``count`` rays in ``lit`` at a light. Returns how many face it; they go to ``lit`` from SIZE on."""
     aimed = 0
     for k in range(count):
         i = get(lit, k)
-        faces, o, d, t_max, towards, arriving = _aim(world, at(surfaces, i * SURFACE_DOUBLES), light, offset)
+        faces, o, d, t_max, towards, arriving = _aim(scene, at(surfaces, i * SURFACE_DOUBLES), light, offset)
         if faces:
             put3(shadows, _ORIGIN + 3 * aimed, o)
             put3(shadows, _DIRECTION + 3 * aimed, d)
@@ -95,10 +96,10 @@ def _aim_all(world, surfaces, lit, count, light, offset, shadows):
 
 
 @inlined
-def _shine(world, bundle, surface, i, towards, arriving):
+def _add_light(scene, bundle, surface, i, towards, arriving):
     """Add what ray ``i`` sees of a light that reaches its surface."""
     m, n, d = np.int64(get(surface, MATERIAL)), three(surface, NORMAL), row3(bundle.directions, i)
-    factor = phong(world, m, n, d, towards)
+    factor = phong(scene, m, n, d, towards)
     put3(surface, LIGHT, add(three(surface, LIGHT), times(factor, arriving)))
 
 
@@ -106,7 +107,7 @@ def _shine(world, bundle, surface, i, towards, arriving):
 def _trace_shadows(tree, bundle, lit, aimed, work):
     """Find which of the ``aimed`` shadow rays meet something, and count them in their pixels."""
     shadows = work.shadows
-    rays = Rays(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0)
+    rays = RayPointers(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0)
     trace_any(tree, rays, work.found, aimed, work.trace, np.bool_(True))
     for k in range(aimed):
         pixel = get(bundle.pixels, get(lit, SIZE + k))
@@ -114,7 +115,7 @@ def _trace_shadows(tree, bundle, lit, aimed, work):
 
 
 @kernel
-def light_surfaces(tree, world, bundle, surfaces, lit, settings, work):
+def light_surfaces(tree, scene, bundle, surfaces, lit, settings, work):
     """Direct light of the surfaces that a bundle met, into their LIGHT.
 
     ``lit`` lists, after their number, the rays whose material shows it, with room for as many again. Shadow rays are
@@ -122,12 +123,12 @@ def light_surfaces(tree, world, bundle, surfaces, lit, settings, work):
     """
     count, lit = get(lit, 0), at(lit, 1)
     shadows = work.shadows
-    for light in range(world.light_count):
-        aimed = _aim_all(world, surfaces, lit, count, light, settings.offset, shadows)
+    for light in range(scene.light_count):
+        aimed = _aim_all(scene, surfaces, lit, count, light, settings.offset, shadows)
         if settings.shadows:
             _trace_shadows(tree, bundle, lit, aimed, work)
         for k in range(aimed):
             i = get(lit, SIZE + k)
             if not (settings.shadows and get(work.found.hit, k)):
                 towards, arriving = three(shadows, _TOWARDS + 3 * k), three(shadows, _ARRIVING + 3 * k)
-                _shine(world, bundle, at(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)
+                _add_light(scene, bundle, at(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)

@@ -16,7 +16,7 @@ from renderer.trace.spawn import normal_of, offset_distance
 MAX_MEDIA = 8
 
 
-class World(NamedTuple):
+class SceneArrays(NamedTuple):
     """What the kernel reads of a scene; rows of materials and lights as in ``material`` and ``light``.
 
     vertices (V, 3), normals (V, 3), faces (F, 3) int32, material (F,) int32, smooth (F,) bool (normals and smooth
@@ -36,9 +36,9 @@ class World(NamedTuple):
     media: NDArray[np.int64]
 
 
-class Sight(NamedTuple):
-    """A ``World`` as the kernels read it: pointers, the numbers of lights and of media around the eye, and whether any
-    face is smooth.
+class ScenePointers(NamedTuple):
+    """A ``SceneArrays`` as the kernels read it: pointers, the numbers of lights and of media around the eye, and
+    whether any face is smooth.
     """
 
     vertices: Any
@@ -56,21 +56,21 @@ class Sight(NamedTuple):
 
 
 @inlined
-def look_at(world):
-    """Pointers into a world, which the caller must keep alive."""
-    return Sight(
-        pointer(world.vertices),
-        pointer(world.normals),
-        pointer(world.faces),
-        pointer(world.material),
-        pointer(world.smooth),
-        pointer(world.materials),
-        pointer(world.lights),
-        pointer(world.colors),
-        pointer(world.media),
-        len(world.lights),
-        len(world.media),
-        len(world.smooth) > 0,
+def scene_pointers(scene):
+    """Pointers into a scene, which the caller must keep alive."""
+    return ScenePointers(
+        pointer(scene.vertices),
+        pointer(scene.normals),
+        pointer(scene.faces),
+        pointer(scene.material),
+        pointer(scene.smooth),
+        pointer(scene.materials),
+        pointer(scene.lights),
+        pointer(scene.colors),
+        pointer(scene.media),
+        len(scene.lights),
+        len(scene.media),
+        len(scene.smooth) > 0,
     )
 
 
@@ -85,28 +85,28 @@ class Surface(NamedTuple):
 
 
 @inlined
-def surface_at(world, face, u, v, d):
+def surface_at(scene, face, u, v, d):
     """The ``Surface`` at barycentrics u, v of a face that a ray of direction d met."""
-    a, b, c = row3(world.faces, face)
-    p0, p1, p2 = row3(world.vertices, a), row3(world.vertices, b), row3(world.vertices, c)
+    a, b, c = row3(scene.faces, face)
+    p0, p1, p2 = row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c)
     n_g = normal_of(p0, p1, p2, d)
     p = barycentric(p0, p1, p2, u, v)
     n_s = n_g
-    if world.has_smooth and get(world.smooth, face):
-        n = barycentric(row3(world.normals, a), row3(world.normals, b), row3(world.normals, c), u, v)
+    if scene.has_smooth and get(scene.smooth, face):
+        n = barycentric(row3(scene.normals, a), row3(scene.normals, b), row3(scene.normals, c), u, v)
         # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
         n_s = normalized(n) if largest_component(n) > 0.0 else n_g
     error = offset_distance(p, p0, p1, p2, u, v, n_g)
-    return Surface(p, error, n_g, n_s, get(world.material, face))
+    return Surface(p, error, n_g, n_s, get(scene.material, face))
 
 
 @inlined
-def phong(world, m, n, d, towards):
+def phong(scene, m, n, d, towards):
     """The share of light from the unit direction ``towards`` that the material in row ``m`` sends against d:
     k_d N.L + k_s (R.V)^n, for N.L >= 0.
     """
-    factor = scale(three(world.materials, m + DIFFUSE), dot(n, towards))
-    if get(world.materials, m + KIND) == PHONG:
-        shininess = get(world.materials, m + SHININESS)
-        factor = add(factor, scale(three(world.materials, m + SPECULAR), specular(d, n, towards, shininess)))
+    factor = scale(three(scene.materials, m + DIFFUSE), dot(n, towards))
+    if get(scene.materials, m + KIND) == PHONG:
+        shininess = get(scene.materials, m + SHININESS)
+        factor = add(factor, scale(three(scene.materials, m + SPECULAR), specular(d, n, towards, shininess)))
     return factor

@@ -10,7 +10,7 @@ from renderer.kernels.simd import at, get, pointer, put, smaller
 from renderer.kernels.vec3 import add, normalized, row3, scale, three
 from renderer.shade.bundle import SIDE, SIZE, append, clear, count_of
 from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
-from renderer.shade.surface import look_at
+from renderer.shade.surface import scene_pointers
 from renderer.shade.whitted import Settings, begin_work, make_work, push_children, slot, trace_bundle, work_lengths
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
@@ -33,7 +33,7 @@ class Film(NamedTuple):
     rays: NDArray[np.int32]
 
 
-class Camera(NamedTuple):
+class CameraMap(NamedTuple):
     """Pointers to the rows of the camera's affine map and to the samples' places in a pixel, and their number."""
 
     rows: Any
@@ -50,7 +50,7 @@ def _place(k):
 
 
 @inlined
-def _shoot(camera, world, bundle, sample, block):
+def _shoot(camera, scene, bundle, sample, block):
     """Fill a bundle with the camera rays of a block = (x0, y0, x1, y1); pixels count row by row, SIDE a row."""
     x0, y0, x1, y1 = block
     clear(bundle, 0)
@@ -62,7 +62,7 @@ def _shoot(camera, world, bundle, sample, block):
             rows = camera.rows
             o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))
             d = add(row3(rows, 3), add(scale(row3(rows, 4), px), scale(row3(rows, 5), py)))
-            append(bundle, o, normalized(d), (1.0, 1.0, 1.0), j * SIDE + i, world.media, world.media_count)
+            append(bundle, o, normalized(d), (1.0, 1.0, 1.0), j * SIDE + i, scene.media, scene.media_count)
 
 
 @inlined
@@ -137,7 +137,7 @@ _BLOCK, _BEGUN, _WAITING, _FROM_CAMERA, CUT, _STATE = range(6)
 
 
 @kernel
-def _next_sample(world, settings, camera, film, tile, work, total, state):
+def _next_sample(scene, settings, camera, film, tile, work, total, state):
     """End the sample under way and begin the next one, of the next block where that was the last. Returns whether there
     is one.
     """
@@ -155,7 +155,7 @@ def _next_sample(world, settings, camera, film, tile, work, total, state):
     for k in range(SIZE):
         put(work.traced, k, 0)
         put3(work.color, 3 * k, (0.0, 0.0, 0.0))
-    _shoot(camera, world, slot(work, settings, 0), begun, block)
+    _shoot(camera, scene, slot(work, settings, 0), begun, block)
     put(state, _BEGUN, begun + 1)
     put(state, _WAITING, 1)
     put(state, _FROM_CAMERA, 1)
@@ -187,21 +187,21 @@ def tile_memory(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileM
 
 
 @inlined
-def _trace_next(tree, world, settings, camera, film, tile, work, state):
+def _trace_next(tree, scene, settings, camera, film, tile, work, state):
     """Trace the bundle that was left last, and let it leave its own."""
     top = get(state, _WAITING) - 1
     bundle = slot(work, settings, top)
-    trace_bundle(tree, world, settings, bundle, work)
+    trace_bundle(tree, scene, settings, bundle, work)
     if get(state, _FROM_CAMERA) != 0:
         put(state, _FROM_CAMERA, 0)
         if get(state, _BEGUN) == _middle(camera.count) + 1:
             block = _block_of(tile, get(state, _BLOCK))
             _write_first_hits(film, bundle, work, block[0], block[1])
-    put(state, _WAITING, push_children(world, settings, work, bundle, top))
+    put(state, _WAITING, push_children(scene, settings, work, bundle, top))
 
 
 @kernel
-def render_tile(words, world, settings, camera, samples, film, tile, memory):
+def render_tile(words, scene, settings, camera, samples, film, tile, memory):
     """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
 
     ``words`` are the tree's. Depth, face and normal come from the middle sample (the pixel's centre for one sample),
@@ -211,8 +211,8 @@ def render_tile(words, world, settings, camera, samples, film, tile, memory):
     doubles, integers, hits = pointer(memory.doubles), pointer(memory.integers), pointer(memory.hits)
     state, total = pointer(memory.state), pointer(memory.total)
     work = make_work(doubles, integers, hits, settings, make_scratch(memory.trace))
-    tree, seen = tree_pointers(words), look_at(world)
-    shooting = Camera(pointer(camera), pointer(samples), len(samples))
+    tree, seen = tree_pointers(words), scene_pointers(scene)
+    shooting = CameraMap(pointer(camera), pointer(samples), len(samples))
     if get(state, _BLOCK) == 0 and get(state, _BEGUN) == 0:
         begin_work(work, settings)
     for _ in range(memory.bundles):

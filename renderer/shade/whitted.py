@@ -41,19 +41,22 @@ from renderer.shade.direct import (
 from renderer.shade.records import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
 from renderer.shade.surface import surface_at
-from renderer.trace.spawn import spawn_origin
-from renderer.trace.traverse import Found, Rays, Scratch
+from renderer.trace.rays import HitPointers, RayPointers
+from renderer.trace.spawn import OffsetRule, spawn_origin
+from renderer.trace.traverse import Scratch
 
 
 class Settings(NamedTuple):
-    """Bounces, the weight below which a ray ends, the offset rule of ``spawn.spawn_origin``, how many media a ray
-    remembers (``sight.MAX_MEDIA``, or 0 where nothing refracts), whether surfaces hide lights, and after how many rays
-    of a sample of a pixel no more are left.
+    """What holds for a whole picture.
+
+    Bounces, the weight below which a ray ends, the offset rule of spawned rays, how many media a ray remembers
+    (``surface.MAX_MEDIA``, or 0 where nothing refracts), whether surfaces hide lights, and after how many rays of a
+    sample of a pixel no more are spawned.
     """
 
     max_depth: int
     min_weight: float
-    offset: float
+    offset: OffsetRule
     media: int
     shadows: bool
     max_rays: int
@@ -72,7 +75,7 @@ class Work(NamedTuple):
     bundle_words: Any
     order: Any
     trace: Scratch
-    found: Found
+    found: HitPointers
     zero: Any
     infinity: Any
     surfaces: Any
@@ -108,7 +111,7 @@ def make_work(doubles, integers, hits, settings, scratch):
     lit = at(face, SIZE)
     beyond = at(lit, 1 + 2 * SIZE)
     traced = at(beyond, settings.media)
-    found = Found(t, face, u, v, hits)
+    found = HitPointers(t, face, u, v, hits)
     return Work(
         doubles, integers, order, scratch, found, zero, infinity, surfaces, shadows, lit, beyond,
         at(shadows, SHADOW_DOUBLES), traced, at(traced, SIZE),
@@ -157,16 +160,16 @@ def _enter_or_leave(media, count, material, inside, limit):
 
 
 @inlined
-def _innermost_ior(world, media, count):
-    return get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0
+def _innermost_ior(scene, media, count):
+    return get(scene.materials, get(media, count - 1) + IOR) if count > 0 else 1.0
 
 
 @inlined
-def _meet_surface(world, bundle, work, i):
+def _meet_surface(scene, bundle, work, i):
     """Note the surface that ray ``i`` met, and its ambient light."""
     found, surface = work.found, at(work.surfaces, i * SURFACE_DOUBLES)
     d = row3(bundle.directions, i)
-    met = surface_at(world, get(found.face, i), get(found.u, i), get(found.v, i), d)
+    met = surface_at(scene, get(found.face, i), get(found.u, i), get(found.v, i), d)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, met.n_s) > 0.0
     put3(surface, POINT, met.p)
@@ -175,30 +178,30 @@ def _meet_surface(world, bundle, work, i):
     put(surface, BOUND, met.error)
     put(surface, MATERIAL, float(met.material))
     put(surface, INSIDE, 1.0 if inside else 0.0)
-    put3(surface, LIGHT, times(three(world.materials, met.material + AMBIENT), row3(world.colors, 0)))
+    put3(surface, LIGHT, times(three(scene.materials, met.material + AMBIENT), row3(scene.colors, 0)))
     return met.material
 
 
 @kernel
-def _meet_surfaces(world, bundle, work):
+def _meet_surfaces(scene, bundle, work):
     """Note what each ray met; rays that left the scene add the background. Lists the lit ones."""
     lit = 0
     for i in range(count_of(bundle)):
         pixel = get(bundle.pixels, i)
         put(work.traced, pixel, get(work.traced, pixel) + 1)
         if get(work.found.face, i) < 0:
-            seen = times(row3(bundle.weights, i), row3(world.colors, 1))
+            seen = times(row3(bundle.weights, i), row3(scene.colors, 1))
             put3(work.color, 3 * pixel, add(row3(work.color, pixel), seen))
-        elif is_lit(world.materials, _meet_surface(world, bundle, work, i)):
+        elif is_lit(scene.materials, _meet_surface(scene, bundle, work, i)):
             lit += 1
             put(work.lit, lit, i)
     put(work.lit, 0, lit)
 
 
 @inlined
-def _refract(world, bundle, surface, i, settings, beyond):
+def _refract(scene, bundle, surface, i, settings, beyond):
     """The refracted ray: (its direction, whether there is one, k_r, k_t, the media beyond, in ``beyond``)."""
-    m, materials, count = np.int64(get(surface, MATERIAL)), world.materials, get(bundle.media_counts, i)
+    m, materials, count = np.int64(get(surface, MATERIAL)), scene.materials, get(bundle.media_counts, i)
     d, n, inside = row3(bundle.directions, i), three(surface, NORMAL), get(surface, INSIDE) != 0.0
     k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
     media = at(bundle.media, i * bundle.limit)
@@ -206,8 +209,8 @@ def _refract(world, bundle, surface, i, settings, beyond):
         put(beyond, k, get(media, k))
     left = _enter_or_leave(beyond, count, m, inside, bundle.limit)
     # From inside, n1 is this material even where no entry was seen: an open mesh.
-    n1 = get(materials, m + IOR) if inside else _innermost_ior(world, media, count)
-    n2 = _innermost_ior(world, beyond, left) if inside else get(materials, m + IOR)
+    n1 = get(materials, m + IOR) if inside else _innermost_ior(scene, media, count)
+    n2 = _innermost_ior(scene, beyond, left) if inside else get(materials, m + IOR)
     cos_t, through = refract(d, n, n1, n2)
     if get(materials, m + KIND) == DIELECTRIC:
         f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
@@ -216,7 +219,7 @@ def _refract(world, bundle, surface, i, settings, beyond):
 
 
 @inlined
-def _leave(surface, pixel, w, weight, children, media, count, settings):
+def _spawn(surface, pixel, w, weight, children, media, count, settings):
     """Add the ray in direction ``w`` from the surface that a ray of ``pixel`` met to ``children``."""
     w = normalized(w)
     p, n_g = three(surface, POINT), three(surface, GEOMETRIC)
@@ -236,9 +239,9 @@ def _may_leave(work, pixel, weight, settings):
 
 
 @kernel
-def _bounce(world, bundle, settings, work, refracted, reflected):
+def _bounce(scene, bundle, settings, work, refracted, reflected):
     """Collect the rays that a bundle leaves."""
-    materials = world.materials
+    materials = scene.materials
     for i in range(count_of(bundle)):
         if get(work.found.face, i) < 0:
             continue
@@ -246,23 +249,23 @@ def _bounce(world, bundle, settings, work, refracted, reflected):
         m, weight, pixel = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i), get(bundle.pixels, i)
         k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
         if largest_component(k_t) > 0.0 or get(materials, m + KIND) == DIELECTRIC:
-            w, passes, k_r, k_t, left = _refract(world, bundle, surface, i, settings, work.beyond)
+            w, passes, k_r, k_t, left = _refract(scene, bundle, surface, i, settings, work.beyond)
             if passes and _may_leave(work, pixel, times(weight, k_t), settings):
-                _leave(surface, pixel, w, times(weight, k_t), refracted, work.beyond, left, settings)
+                _spawn(surface, pixel, w, times(weight, k_t), refracted, work.beyond, left, settings)
         if _may_leave(work, pixel, times(weight, k_r), settings):
             media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
             w = reflect(row3(bundle.directions, i), three(surface, NORMAL))
-            _leave(surface, pixel, w, times(weight, k_r), reflected, media, count, settings)
+            _spawn(surface, pixel, w, times(weight, k_r), reflected, media, count, settings)
 
 
 @inlined
-def _collect_light(world, bundle, work):
+def _collect_light(scene, bundle, work):
     """Add what the surfaces of a bundle show of their own to the pixels."""
     for i in range(count_of(bundle)):
         if get(work.found.face, i) < 0:
             continue
         surface = at(work.surfaces, i * SURFACE_DOUBLES)
-        kind = get(world.materials, np.int64(get(surface, MATERIAL)) + KIND)
+        kind = get(scene.materials, np.int64(get(surface, MATERIAL)) + KIND)
         if kind != MIRROR and kind != DIELECTRIC:
             pixel = get(bundle.pixels, i)
             own = times(row3(bundle.weights, i), three(surface, LIGHT))
@@ -270,17 +273,17 @@ def _collect_light(world, bundle, work):
 
 
 @kernel
-def trace_bundle(tree, world, settings, bundle, work):
+def trace_bundle(tree, scene, settings, bundle, work):
     """Trace the rays of a bundle and light what they meet; what they leave is up to ``_bounce``."""
-    rays = Rays(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 0, 0, 1.0)
+    rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 0, 0, 1.0)
     trace_any(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
-    _meet_surfaces(world, bundle, work)
-    light_surfaces(tree, world, bundle, work.surfaces, work.lit, settings, work)
-    _collect_light(world, bundle, work)
+    _meet_surfaces(scene, bundle, work)
+    light_surfaces(tree, scene, bundle, work.surfaces, work.lit, settings, work)
+    _collect_light(scene, bundle, work)
 
 
 @inlined
-def push_children(world, settings, work, bundle, top):
+def push_children(scene, settings, work, bundle, top):
     """Let the bundle in place ``top`` leave its rays in the two free places above it. Returns the new top.
 
     The bundle's own place is free then, and goes behind the others; an empty bundle does not wait.
@@ -290,7 +293,7 @@ def push_children(world, settings, work, bundle, top):
     refracted, reflected = slot(work, settings, top + 1), slot(work, settings, top + 2)
     clear(refracted, depth_of(bundle) + 1)
     clear(reflected, depth_of(bundle) + 1)
-    _bounce(world, bundle, settings, work, refracted, reflected)
+    _bounce(scene, bundle, settings, work, refracted, reflected)
     order, own = work.order, get(work.order, top)
     first, second = get(order, top + 1), get(order, top + 2)
     if count_of(refracted) == 0:

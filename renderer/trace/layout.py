@@ -53,6 +53,11 @@ class Tree:
     scale: float = 1.0
 
     @property
+    def has_nodes(self) -> bool:
+        """Whether rays go through nodes; else every ray meets every block."""
+        return self.depth > 0
+
+    @property
     def links(self) -> NDArray[np.int32]:
         """The memory of ``nodes`` as int32."""
         return self.nodes.view(np.int32)

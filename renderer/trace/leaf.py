@@ -35,7 +35,7 @@ class TreePointers(NamedTuple):
     wide: Any
     faces: Any
     count: int
-    depth: int
+    has_nodes: bool
     scale: float
 
 
@@ -52,7 +52,7 @@ def tree_pointers(words):
         get(at, WIDE),
         int32_pointer(get(at, FACES)),
         get(at, BLOCK_COUNT),
-        get(at, DEPTH),
+        get(at, DEPTH) > 0,
         double_of(get(at, SCALE)),
     )
 

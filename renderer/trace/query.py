@@ -12,11 +12,12 @@ from renderer.errors import expect
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh.mesh import Mesh, face_normals
 from renderer.process.parallel import for_chunks
-from renderer.trace.batch import FEW_DEPTH, search_chunk, trace_chunk, trace_few
 from renderer.trace.layout import LANES, Tree
 from renderer.trace.ray_lanes import WIDTH
+from renderer.trace.rays import HIT_ROWS
+from renderer.trace.singly import FEW_DEPTH, stack_size, trace_few
 from renderer.trace.spawn import leave_faces
-from renderer.trace.traverse import Memory, make_memory, stack_size
+from renderer.trace.traverse import Memory, make_memory, search_chunk, trace_chunk
 
 # Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
 # taking a chunk costs nothing beside its 1 to 10 ms of tracing.
@@ -167,16 +168,16 @@ def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: 
     array = _array("leaving", leaving)
     whole = array.dtype.kind in "iu" and (array.ndim == 0 or array.shape == (count,))
     expect(whole, "leaving", f"an integer or integers of shape ({count},)", f"{array.dtype} of shape {array.shape}")
-    good = (array >= -1) & (array < len(mesh.faces))
+    # A copy, which no other thread can change once it is checked.
+    faces = np.array(np.broadcast_to(array, (count,)), np.int64)
+    good = (faces >= -1) & (faces < len(mesh.faces))
     if not good.all():
-        row = int((~np.atleast_1d(good)).argmax())
-        expected = f"faces from 0 to {len(mesh.faces) - 1}, or -1"
-        expect(False, "leaving", expected, f"{np.atleast_1d(array)[row]} in row {row}")
+        row = int((~good).argmax())
+        expect(False, "leaving", f"faces from 0 to {len(mesh.faces) - 1}, or -1", f"{faces[row]} in row {row}")
     near = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1)
     if not near.all():
         # As it was given: moved, it would be told by numbers that nobody knows.
         _reject(rays, int((~near).argmax()), scale)
-    faces = np.array(np.broadcast_to(array, (count,)), np.int64)
     starts = np.empty((count, 3))
 
     def leave(begin: int, end: int) -> None:
@@ -200,32 +201,34 @@ def _reject(rays: RayBatch, row: int, scale: float) -> None:
 
 def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
-    count = len(rays.directions)
-    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
-        t, u, v, face = _trace_few(tree, rays)
-        return Hits(t, face.view(np.int64), u, v, mesh)
-    out = np.empty(count), np.empty(count, np.int64), np.empty(count), np.empty(count)
-    _run(tree, rays, (*out, _NO_BOOLS), threads, any_hit=False)
-    return Hits(*out, mesh)
+    if _are_few(tree, rays):
+        out = _trace_few(tree, rays)
+    else:
+        out = np.empty((HIT_ROWS, len(rays.directions)))
+        _run(tree, rays, out, threads, any_hit=False)
+    t, u, v, face = out
+    return Hits(t, face.view(np.int64), u, v, mesh)
 
 
 def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
-    count = len(rays.directions)
-    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
+    if _are_few(tree, rays):
         return _trace_few(tree, rays)[3].view(np.int64) >= 0
-    out = np.empty(count, np.bool_)
-    _run(tree, rays, (_NONE, _NO_INTEGERS, _NONE, _NONE, out), threads, any_hit=True)
-    return out
+    # In whole words, so that kernels are compiled for one kind of output.
+    out = np.empty((1, -(-len(rays.directions) // 8)))
+    _run(tree, rays, out, threads, any_hit=True)
+    return out.view(np.bool_)[0, : len(rays.directions)]
 
 
-_NONE, _NO_INTEGERS, _NO_BOOLS = np.empty(0), np.empty(0, np.int64), np.empty(0, np.bool_)
+def _are_few(tree: Tree, rays: RayBatch) -> bool:
+    """Whether each ray goes alone."""
+    return tree.has_nodes and len(rays.directions) <= FEW and tree.depth <= FEW_DEPTH
 
 
 def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
-    """Closest hits of a few rays on the caller's thread, as ``batch.trace_few`` writes them."""
-    out = np.empty((4, len(rays.directions)))
-    row = trace_few(tree.words, *rays, out)
+    """Closest hits of a few rays on the caller's thread, as ``singly.trace_few`` writes them."""
+    out = np.empty((HIT_ROWS, len(rays.directions)))
+    row = trace_few(tree.words, rays, out)
     if row >= 0:
         _reject(rays, row, tree.scale)
     return out
@@ -236,17 +239,17 @@ def rays_against_blocks(tree: Tree) -> int:
     return max(1, _BLOCK_TESTS * LANES // max(1, len(tree.faces)))
 
 
-def _run(tree: Tree, rays: RayBatch, out: Any, threads: int, any_hit: bool) -> None:
+def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any_hit: bool) -> None:
     count = len(rays.directions)
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
-    if tree.depth == 0:
+    if not tree.has_nodes:
         size = min(size, rays_against_blocks(tree))
     bad: list[int] = []
 
     def trace(begin: int, end: int) -> None:
         # Only chunks behind a bad ray are left out, so the first bad ray is always among the found.
         if not bad or begin < bad[0]:
-            if tree.depth > 0:
+            if tree.has_nodes:
                 row = trace_chunk(tree.words, rays, out, begin, end, any_hit, _thread_memory(tree.depth))
             else:
                 row = search_chunk(tree.words, rays, out, begin, end, any_hit)

@@ -4,6 +4,7 @@ Vectors are tuples of float64.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +26,16 @@ _GAMMA336 = 336.0 * _ROUNDOFF / (1.0 - 336.0 * _ROUNDOFF)
 _SMALLEST = 2.0**-1074
 # Mitsuba 3's RayEpsilon: 1500 times the unit roundoff of float32.
 MITSUBA_EPSILON = 1500.0 * 2.0**-24
-# ``offset`` below 0 asks for the error-bounded rule.
-BOUNDED = -1.0
+
+
+class OffsetRule(NamedTuple):
+    """How far from its surface a ray starts: by the bound of the rounding errors, or (1 + max|p|) ``epsilon``."""
+
+    bounded: bool
+    epsilon: float
+
+
+BOUNDED = OffsetRule(True, 0.0)
 
 
 @kernel
@@ -81,12 +90,12 @@ def _away(x, step):
 def spawn_origin(p, error, n_g, w, offset):
     """Where a ray from the surface point p in direction w starts, so that it does not meet that surface again.
 
-    ``offset`` < 0: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away.
-    Otherwise Mitsuba's rule, (1 + max|p|) ``offset`` along n_g.
+    By the rule ``offset``: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away; or as
+    Mitsuba does, by its epsilon.
     """
     side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
-    if offset >= 0.0:
-        distance = (1.0 + largest_component(p)) * offset
+    if not offset.bounded:
+        distance = (1.0 + largest_component(p)) * offset.epsilon
         return add(p, scale(n_g, side * distance))
     step = scale(n_g, side * error)
     return (_away(p[0], step[0]), _away(p[1], step[1]), _away(p[2], step[2]))

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, larger, lowest_bit, pointer, put, smaller, splat8
-from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, cache_aligned
-from renderer.trace.leaf import NO_FACE, nearest_carefully, search_all_blocks
+from renderer.kernels.simd import at, get, lowest_bit, pointer, put, smaller
+from renderer.trace.layout import cache_aligned
+from renderer.trace.leaf import NO_FACE, search_all_blocks, tree_pointers
 from renderer.trace.packet import child_of, meet_octant, trace_packet
 from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare
+from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
+from renderer.trace.singly import search_singly, stack_size
 from renderer.trace.stream import (
     END,
     LANE_DOUBLES,
@@ -32,33 +33,6 @@ from renderer.trace.stream import (
 # Rays whose slopes against their dominant axis differ by more than this from the first one's are no packet. It only
 # spares rays that point anywhere the attempt: how far a packet goes, its budget tells.
 _SPREAD = 0.125
-_MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
-
-
-class Rays(NamedTuple):
-    """Pointers to rows of origins and directions, and to t_min and t_max. All but the directions have a step from one
-    ray to the next, 0 where all share one. ``scale`` is the tree's, a power of two, so t goes in and out of its units
-    exactly.
-    """
-
-    origins: Any
-    directions: Any
-    t_min: Any
-    t_max: Any
-    origin_step: int
-    min_step: int
-    max_step: int
-    scale: float
-
-
-class Found(NamedTuple):
-    """Pointers to what is written: t, face, u, v as ``Hits`` has them, and for any hits only ``hit``, a bool."""
-
-    t: Any
-    face: Any
-    u: Any
-    v: Any
-    hit: Any
 
 
 class Scratch(NamedTuple):
@@ -81,16 +55,6 @@ class Memory(NamedTuple):
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     stack_size: int
-
-
-def stack_size(depth: int) -> int:
-    """Entries of one stack: each level leaves at most seven octants waiting, and some are written above the top."""
-    return 7 * depth + 24
-
-
-def depth_of_stack(size: int) -> int:
-    """The levels of a tree for which a stack of ``size`` entries is enough."""
-    return (size - 24) // 7
 
 
 def make_memory(depth: int, rays: int) -> Memory:
@@ -119,18 +83,6 @@ def make_scratch(memory):
     return Scratch(Prepared(floats, doubles, integers), lanes, packet_stack, doubtful, number, waiting)
 
 
-@inlined
-def ray_at(rays, i):
-    """Ray ``i`` in the tree's units, and its t_max."""
-    o, d, s = at(rays.origins, i * rays.origin_step), at(rays.directions, 3 * i), rays.scale
-    least = get(rays.t_min, i * rays.min_step)
-    # Above 0 it stays so, that a hit at the start is still too near.
-    t_min = larger(s * least, _TINIEST) if least > 0.0 else least
-    ray = Ray(s * get(o, 0), s * get(o, 1), s * get(o, 2), get(d, 0), get(d, 1), get(d, 2), t_min)
-    # A hit beyond the largest number, in either unit, is none.
-    return ray, smaller(s * smaller(get(rays.t_max, i * rays.max_step), _MOST), _MOST)
-
-
 @kernel
 def are_coherent(rays, begin):
     """Whether the sixteen rays from ``begin`` on share their dominant axis, its sign and nearly their slopes."""
@@ -151,48 +103,6 @@ def are_coherent(rays, begin):
     return size > abs(get(d, u)) and size > abs(get(d, v))
 
 
-@kernel
-def search_singly(tree, ray, t_max, stack):
-    """The closest hit (t, face, u, v, w) of one ray, with every doubt settled; face = NO_FACE for none.
-
-    Octants are opened in the order in which they stand in their node, the last of them first. That suits few rays and
-    compiles in a fraction of the time that packets and streams take.
-    """
-    largest = largest_of(ray)
-    slabs, shear = make_slabs(ray, largest), make_shear(ray)
-    lower = splat8(round_down(ray.t_min * largest))
-    best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
-    top = 1
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            code = ~child
-            best = nearest_carefully(tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray, shear, best)
-            continue
-        _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
-        while bits != 0:
-            put(stack, top, np.int64(get(tree.links, child * NODE_WORDS + CHILDREN + lowest_bit(bits))))
-            bits &= bits - 1
-            top += 1
-    return best
-
-
-@inlined
-def _write(found, i, scale, best, any_hit):
-    t, face, u, v, w = best
-    hit = face != NO_FACE
-    if any_hit:
-        put(found.hit, i, hit)
-        return
-    # No t, u or v is -0.0.
-    put(found.t, i, t / scale + 0.0 if hit else np.inf)
-    put(found.face, i, np.int64(face if hit else -1))
-    put(found.u, i, u / w + 0.0 if hit else np.nan)
-    put(found.v, i, v / w + 0.0 if hit else np.nan)
-
-
 @inlined
 def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
     """Write the hit of ray ``i``, in place ``r``, after a careful search on its stack if there was a doubt."""
@@ -200,7 +110,7 @@ def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
     if doubtful:
         ray, t_max = ray_at(rays, i)
         best = search_singly(tree, ray, t_max, at(scratch.lanes.stacks, r * scratch.lanes.stack_size))
-    _write(found, i, rays.scale, best, any_hit)
+    write_hit(found, i, rays.scale, best, any_hit)
 
 
 @inlined
@@ -308,7 +218,7 @@ def search_blocks(tree, rays, found, begin, end, any_hit):
     """``trace`` for a tree without nodes: every ray against every block."""
     for i in range(begin, end):
         ray, t_max = ray_at(rays, i)
-        _write(found, i, rays.scale, search_all_blocks(tree, ray, t_max, any_hit), any_hit)
+        write_hit(found, i, rays.scale, search_all_blocks(tree, ray, t_max, any_hit), any_hit)
 
 
 @kernel
@@ -330,3 +240,29 @@ def trace(tree, rays, found, begin, end, scratch, any_hit):
             count += 1
     if count > 0:
         _trace_stream(tree, rays, found, scratch, count, any_hit)
+
+
+@kernel
+def trace_chunk(words, rays, out, begin, end, any_hit, memory):
+    """Hits of the rays begin:end into ``out``: rows t, u, v and face, or with ``any_hit`` bools.
+
+    ``words`` are the tree's, which must have nodes. Returns the row of the first ray out of range, for which nothing
+    is traced, or -1.
+    """
+    tree = tree_pointers(words)
+    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
+    bad = first_bad_ray(source, begin, end)
+    if bad < 0:
+        trace(tree, source, found, begin, end, make_scratch(memory), any_hit)
+    return bad
+
+
+@kernel
+def search_chunk(words, rays, out, begin, end, any_hit):
+    """``trace_chunk`` for a tree without nodes."""
+    tree = tree_pointers(words)
+    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
+    bad = first_bad_ray(source, begin, end)
+    if bad < 0:
+        search_blocks(tree, source, found, begin, end, any_hit)
+    return bad

@@ -1,10 +1,11 @@
 """The server's routes: the page, what it fetches, and the WebSocket."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -16,10 +17,10 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from renderer.viewer.exhibit import Exhibit, open_file
 from renderer.viewer.payload import boxes_bytes, description, mesh_bytes
 from renderer.viewer.security import ResponseHeaders, SameOrigin, TokenRequired, allowed_hosts
-from renderer.viewer.session import Session, Wire
+from renderer.viewer.session import Connection, Session
+from renderer.viewer.shown import ShownScene, open_file
 
 PAGE = Path(__file__).parent / "page"
 # Each may keep all processors busy; beyond this many none would see its pictures move.
@@ -33,7 +34,7 @@ _TRY_LATER = 1013  # RFC 6455's registry of close codes
 class Viewer:
     """What all connections share: the scene on show, and the threads that compute."""
 
-    def __init__(self, shown: Exhibit) -> None:
+    def __init__(self, shown: ShownScene) -> None:
         self.shown = shown
         self.sessions: set[Session] = set()
         self._threads = ThreadPoolExecutor(_THREADS_A_SESSION * MAX_CONNECTIONS, "viewer")
@@ -53,7 +54,7 @@ class Viewer:
 
     async def mesh(self, _request: Request) -> Response:
         """GET /mesh."""
-        return Response(await run_in_threadpool(mesh_bytes, self.shown.stage), media_type=_BINARY)
+        return Response(await run_in_threadpool(mesh_bytes, self.shown.prepared), media_type=_BINARY)
 
     async def boxes(self, request: Request) -> Response:
         """GET /octree?level=K."""
@@ -61,13 +62,13 @@ class Viewer:
         # No tree has levels of three digits.
         if not (level.isascii() and level.isdigit() and len(level) < 3):
             return PlainTextResponse(f"level: expected an integer from 0 to 99, got {level[:40]!r}", 400)
-        return Response(await run_in_threadpool(boxes_bytes, self.shown.stage, int(level)), media_type=_BINARY)
+        return Response(await run_in_threadpool(boxes_bytes, self.shown.prepared, int(level)), media_type=_BINARY)
 
     async def connect(self, socket: WebSocket) -> None:
         """The WebSocket: one session, until the page leaves."""
         with suppress(WebSocketDisconnect):  # a page may leave before its answer
             await socket.accept()
-            session = Session(self, Wire(socket.send_text, socket.send_bytes), self._threads)
+            session = Session(self, Connection(_telling(socket.send_text), _telling(socket.send_bytes)), self._threads)
             if len(self.sessions) < MAX_CONNECTIONS:
                 return await self._attend(socket, session)
             await session.complain(ValueError(f"connections: expected at most {MAX_CONNECTIONS}, got another"))
@@ -88,6 +89,18 @@ class Viewer:
         self._threads.shutdown(wait=False, cancel_futures=True)
 
 
+def _telling(send: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:
+    """``send`` that says of a page that has gone meanwhile that it has gone, and not that we were wrong to send."""
+
+    async def tell(message: Any) -> None:
+        try:
+            await send(message)
+        except RuntimeError as error:
+            raise WebSocketDisconnect from error
+
+    return tell
+
+
 async def _receive_all(socket: WebSocket, session: Session) -> None:
     """Pass messages on until the page leaves."""
     while (message := await socket.receive())["type"] == "websocket.receive":
@@ -97,7 +110,7 @@ async def _receive_all(socket: WebSocket, session: Session) -> None:
             await session.complain(ValueError(f"message: expected JSON text, got {len(message['bytes'])} bytes"))
 
 
-def make_app(shown: Exhibit, host: str, port: int, token: str | None, ancestors: str) -> Starlette:
+def make_app(shown: ShownScene, host: str, port: int, token: str | None, ancestors: str) -> Starlette:
     """The application that shows ``shown`` on ``host`` and ``port``; without ``token`` to whoever reaches it.
 
     ``ancestors`` is the content security policy's rule about frames around the page.

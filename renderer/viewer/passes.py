@@ -13,8 +13,8 @@ from renderer.inspect.face_phong import face_colors
 from renderer.inspect.false_color import Limits, false_color, limits_of
 from renderer.picture.image import Image
 from renderer.trace.spawn import BOUNDED
-from renderer.viewer.exhibit import Exhibit, render_settings, varied
-from renderer.viewer.protocol import FACE_COLORS, JPEG, RGBA, View, packed
+from renderer.viewer.protocol import FACE_COLORS, JPEG, RGBA, CameraMessage, packed
+from renderer.viewer.shown import ShownScene, render_settings, varied
 from renderer.viewer.viewpoint import camera_of
 
 # Longest sides of the first passes: a sixteenth and a quarter of the pixels of a picture of 512 x 512.
@@ -33,7 +33,7 @@ class Pass:
     samples: int
 
 
-def passes_of(view: View) -> list[Pass]:
+def passes_of(view: CameraMessage) -> list[Pass]:
     """What is sent for ``view``: nothing for "gl", face colours for "phong", one picture or growing ones.
 
     Brute force takes one sample a pixel: of many samples it would take minutes.
@@ -58,15 +58,15 @@ class Answer(NamedTuple):
     limits: Limits | None
 
 
-def answer(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], None]) -> Answer:
+def answer(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[int], None]) -> Answer:
     """What answers one pass. ``finished(tiles)`` is called after each tile; what it raises ends the pass.
 
     The milliseconds told are from the pass's begin to its payload, the rays a second those of tracing alone.
     """
     began, limits = time.perf_counter(), None
     if view.mode == "phong":
-        stage = varied(shown.stage, view.settings)
-        payload = face_colors(stage.world, camera_of(view.m, view.fovy).eye, shown.threads).tobytes()
+        prepared = varied(shown.prepared, view.settings)
+        payload = face_colors(prepared.arrays, camera_of(view.m, view.fovy).eye, shown.threads).tobytes()
         kind, pace = FACE_COLORS, 0.0
     else:
         image = picture(shown, view, wanted, finished)
@@ -79,11 +79,13 @@ def answer(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], N
     return Answer(packed(kind, view, wanted.step, wanted.last, wanted.size, (ms, pace)) + payload, limits)
 
 
-def picture(shown: Exhibit, view: View, wanted: Pass, finished: Callable[[int], None] | None = None) -> Image:
+def picture(
+    shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[int], None] | None = None
+) -> Image:
     """What ``render`` gives for the view's camera and settings."""
-    stage = varied(shown.brute if view.mode == "brute" else shown.stage, view.settings)
+    prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)
     settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, wanted.last)
-    return stage.picture(camera_of(view.m, view.fovy), settings, BOUNDED, shown.threads, finished)
+    return prepared.picture(camera_of(view.m, view.fovy), settings, BOUNDED, shown.threads, finished)
 
 
 def _scaled(side: int, longest: int, of: int) -> int:

@@ -14,18 +14,18 @@ from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.material import Material
 from renderer.scene.needs import examine
 from renderer.shade.records import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
-from renderer.viewer.exhibit import Exhibit
 from renderer.viewer.protocol import MODES
+from renderer.viewer.shown import ShownScene
 
 MAGIC = 0x4853454D
 # Materials are told apart by a uint16.
 _MAX_MATERIALS = 65536
 
 
-def description(shown: Exhibit) -> dict[str, Any]:
+def description(shown: ShownScene) -> dict[str, Any]:
     """The answer to GET /scene: numbers, strings, lists and tables that JSON has."""
-    scene, mesh = shown.scene, shown.stage.mesh
-    settings, stats = scene.render, shown.stage.octree.stats
+    scene, mesh = shown.scene, shown.prepared.mesh
+    settings, stats = scene.render, shown.prepared.octree.stats
     return {
         "name": shown.name,
         "files": shown.files,
@@ -40,29 +40,29 @@ def description(shown: Exhibit) -> dict[str, Any]:
         "background": scene.background,
         "needs": {feature: [value, reason] for feature, value, reason in examine(scene)},
         "octree": {
-            "levels": levels(shown.stage.octree),
+            "levels": levels(shown.prepared.octree),
             "nodes": stats.nodes,
             "leaves": stats.leaves,
             "bytes": stats.bytes,
-            "build_seconds": shown.stage.build_seconds,
+            "build_seconds": shown.prepared.build_seconds,
         },
         "threads": shown.threads,
         "modes": MODES,
     }
 
 
-def mesh_bytes(stage: PreparedScene) -> bytes:
+def mesh_bytes(prepared: PreparedScene) -> bytes:
     """The answer to GET /mesh, little-endian: uint32 MAGIC and F, then for each of F faces the corners as 9 float32 and
     their shading normals as 9 float32, then the materials as F uint16, filled up to four bytes.
 
     Raises ``ValueError`` where there are more materials than a uint16 counts.
     """
-    world = stage.world
-    expect(len(world.materials) <= _MAX_MATERIALS, "materials", f"at most {_MAX_MATERIALS}", len(world.materials))
-    corners = world.vertices[world.faces]
-    normals = _normals(stage, corners)
-    material = (world.material // MATERIAL_COLUMNS).astype("<u2")
-    head = struct.pack("<2I", MAGIC, len(world.faces))
+    arrays = prepared.arrays
+    expect(len(arrays.materials) <= _MAX_MATERIALS, "materials", f"at most {_MAX_MATERIALS}", len(arrays.materials))
+    corners = arrays.vertices[arrays.faces]
+    normals = _normals(prepared, corners)
+    material = (arrays.material // MATERIAL_COLUMNS).astype("<u2")
+    head = struct.pack("<2I", MAGIC, len(arrays.faces))
     return b"".join(
         (
             head,
@@ -74,20 +74,20 @@ def mesh_bytes(stage: PreparedScene) -> bytes:
     )
 
 
-def boxes_bytes(stage: PreparedScene, level: int) -> bytes:
+def boxes_bytes(prepared: PreparedScene, level: int) -> bytes:
     """The answer to GET /octree, little-endian: uint32 n and the number of levels, then n boxes of 6 float32: the lower
     and the upper corner of each node of ``level``, the root's being 0.
     """
-    boxes = boxes_at(stage.octree, level).astype("<f4")
-    return struct.pack("<2I", len(boxes), levels(stage.octree)) + boxes.tobytes()
+    boxes = boxes_at(prepared.octree, level).astype("<f4")
+    return struct.pack("<2I", len(boxes), levels(prepared.octree)) + boxes.tobytes()
 
 
-def _normals(stage: PreparedScene, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normals(prepared: PreparedScene, corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """The normal at each corner, (F, 3, 3): the vertex's where a face is smooth, else the face's; 0 without area."""
-    world = stage.world
+    arrays = prepared.arrays
     normals = np.repeat(face_normals(corners)[:, None], 3, axis=1)
-    if len(world.smooth):
-        normals[world.smooth] = world.normals[world.faces[world.smooth]]
+    if len(arrays.smooth):
+        normals[arrays.smooth] = arrays.normals[arrays.faces[arrays.smooth]]
     return normals
 
 

@@ -5,49 +5,50 @@ from typing import Any
 
 import numpy as np
 
-from renderer.inspect.ray_path import Segment, ray_path, surface_of
+from renderer.inspect.ray_path import Segment, Vector, ray_path, surface_of
 from renderer.inspect.tree_boxes import visited
 from renderer.picture.prepare import PreparedScene
 from renderer.shade.records import MATERIAL_COLUMNS
 from renderer.trace.query import Hits
-from renderer.viewer.exhibit import Exhibit, varied
 from renderer.viewer.protocol import Pick
+from renderer.viewer.shown import ShownScene, varied
 from renderer.viewer.viewpoint import camera_of
 
 # Boxes told of one ray, the first that it opens: more cover each other on the screen. ``visited`` counts all.
 _MAX_BOXES = 512
 
 
-def picked(shown: Exhibit, pick: Pick) -> dict[str, Any]:
+def picked(shown: ShownScene, pick: Pick) -> dict[str, Any]:
     """The message for ``pick``: the ray through the pixel's centre; null in place of what a miss does not have."""
-    stage = varied(shown.stage, pick.settings)
+    prepared = varied(shown.prepared, pick.settings)
     rows = camera_of(pick.m, pick.fovy).rows(pick.w, pick.h)
     origin, direction = rows[0], rows[3] + (pick.x + 0.5) * rows[4] + (pick.y + 0.5) * rows[5]
     direction = direction / np.linalg.norm(direction)
-    hits = stage.octree.closest_hit(origin[None], direction[None])
+    x, y, z = direction.tolist()
+    hits = prepared.octree.closest_hit(origin[None], direction[None])
     path = ray_path(
-        stage,
+        prepared,
         origin,
         direction,
         pick.settings.max_depth,
         min_weight=shown.scene.render.min_weight,
         shadows=pick.settings.shadows,
     )
-    nodes = visited(stage.octree, origin, direction)
+    nodes = visited(prepared.octree, origin, direction)
     boxes = [
         {"level": level, "lower": lower.tolist(), "upper": upper.tolist(), "leaf": leaf}
         for level, lower, upper, leaf in nodes[:_MAX_BOXES]
     ]
-    met = _met(shown, stage, hits)
+    met = _met(shown, prepared, (x, y, z), hits)
     return {"type": "pick", "seq": pick.seq, **met, "path": _told(path), "nodes": boxes, "visited": len(nodes)}
 
 
-def _met(shown: Exhibit, stage: PreparedScene, hits: Hits) -> dict[str, Any]:
+def _met(shown: ShownScene, prepared: PreparedScene, direction: Vector, hits: Hits) -> dict[str, Any]:
     if not hits.hit[0]:
         return {"hit": False, "t": None, "face": None, "material": None, "point": None, "normal": None}
     face = int(hits.face[0])
-    material = list(shown.scene.materials)[int(stage.world.material[face]) // MATERIAL_COLUMNS]
-    surface = surface_of(stage.world, face, float(hits.u[0]), float(hits.v[0]))
+    material = list(shown.scene.materials)[int(prepared.arrays.material[face]) // MATERIAL_COLUMNS]
+    surface = surface_of(prepared.arrays, face, float(hits.u[0]), float(hits.v[0]), direction)
     return {
         "hit": True,
         "t": float(hits.t[0]),

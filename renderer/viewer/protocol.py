@@ -64,7 +64,7 @@ class ViewSettings(_Message):
         return value
 
 
-class View(_Message):
+class CameraMessage(_Message):
     """Show this: ``m`` camera to world as in ``viewpoint``, ``fovy`` in radians, a picture of ``w`` x ``h`` pixels."""
 
     type: Literal["view"]
@@ -127,7 +127,7 @@ class SaveCamera(_Message):
     walk: bool = False
 
 
-Message = View | Ack | Cancel | Pick | OpenScene | SaveCamera
+Message = CameraMessage | Ack | Cancel | Pick | OpenScene | SaveCamera
 _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
@@ -142,7 +142,9 @@ def parse(text: str) -> Message:
         raise ValueError(f"{where}: {fault['msg']}, got {repr(fault['input'])[:40]}") from None
 
 
-def packed(kind: int, view: View, step: int, last: bool, size: tuple[int, int], pace: tuple[float, float]) -> bytes:
+def packed(
+    kind: int, view: CameraMessage, step: int, last: bool, size: tuple[int, int], pace: tuple[float, float]
+) -> bytes:
     """The header of a picture or of face colours; ``size`` is (w, h), ``pace`` milliseconds and million rays a second.
 
     32 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 a face.

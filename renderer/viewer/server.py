@@ -11,9 +11,9 @@ import uvicorn
 
 from renderer.errors import expect
 from renderer.viewer.app import make_app
-from renderer.viewer.exhibit import Exhibit
 from renderer.viewer.protocol import MAX_MESSAGE_BYTES
 from renderer.viewer.security import is_loopback, new_token
+from renderer.viewer.shown import ShownScene
 
 # Seconds for connections to end; what they compute stops between tiles.
 _LAST_WORDS = 1
@@ -21,13 +21,13 @@ _LAST_WORDS = 1
 _PATIENCE = 0.5
 
 
-class Viewing:
+class ViewerServer:
     """A scene on show at ``url`` until ``close``. Notebooks show the page itself, by way of a frame.
 
     Use as a context manager, or call ``wait`` to stay until Ctrl-C.
     """
 
-    def __init__(self, shown: Exhibit, host: str, port: int, framed: bool) -> None:
+    def __init__(self, shown: ShownScene, host: str, port: int, framed: bool) -> None:
         """Listen on ``host`` and ``port``, 0 for a free one; ``framed`` lets pages of this machine frame this one.
 
         On a ``host`` that other machines reach, only who knows the address as printed, with its token, is served.
@@ -50,6 +50,7 @@ class Viewing:
             timeout_graceful_shutdown=_LAST_WORDS,
         )
         logging.getLogger("uvicorn.error").addFilter(_no_mere_refusal)
+        logging.getLogger("asyncio").addFilter(_no_lost_client)
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, args=([listening],), name="viewer", daemon=True)
         self._thread.start()
@@ -68,7 +69,7 @@ class Viewing:
         """Show the page in the usual browser; False where there is none."""
         return webbrowser.open(self.url)
 
-    def __enter__(self) -> "Viewing":
+    def __enter__(self) -> "ViewerServer":
         return self
 
     def __exit__(
@@ -88,6 +89,11 @@ class Viewing:
 def _no_mere_refusal(record: logging.LogRecord) -> bool:
     """Leaves out what uvicorn says of each WebSocket that is refused by an HTTP answer: 0.54 takes it for our fault."""
     return record.getMessage() != "ASGI callable returned without completing handshake."
+
+
+def _no_lost_client(record: logging.LogRecord) -> bool:
+    """Leaves out what asyncio says of words that our server sends to a page that has gone."""
+    return not (record.threadName == "viewer" and record.getMessage() == "socket.send() raised exception.")
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -15,10 +15,10 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from renderer.picture.prepare import tiles
-from renderer.viewer.exhibit import Exhibit
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
-from renderer.viewer.protocol import Ack, Cancel, OpenScene, Pick, SaveCamera, View, parse
+from renderer.viewer.protocol import Ack, CameraMessage, Cancel, OpenScene, Pick, SaveCamera, parse
+from renderer.viewer.shown import ShownScene
 from renderer.viewer.viewpoint import camera_of, camera_toml
 
 # Seconds between words of progress: ten a second look smooth and cost nothing.
@@ -57,17 +57,17 @@ class Newest(Generic[T]):
         await self._came.wait()
 
 
-class Hall(Protocol):
+class SceneHost(Protocol):
     """Where the scene is shown to all connections."""
 
-    shown: Exhibit
+    shown: ShownScene
 
     async def open(self, file: str) -> None:
         """Show another scene file to all. Raises ``ValueError`` and changes nothing where that fails."""
 
 
 @dataclass
-class Wire:
+class Connection:
     """How messages leave."""
 
     text: Callable[[str], Awaitable[None]]
@@ -78,10 +78,10 @@ class Wire:
 class Session:
     """One connection. ``threads`` runs what computes: a picture, one more whose last tiles end, and a click."""
 
-    hall: Hall
-    wire: Wire
+    host: SceneHost
+    connection: Connection
     threads: Executor
-    views: Newest[View] = field(default_factory=Newest)
+    views: Newest[CameraMessage] = field(default_factory=Newest)
     picks: Newest[Pick] = field(default_factory=Newest)
     scenes: Newest[str] = field(default_factory=Newest)
 
@@ -95,7 +95,7 @@ class Session:
         """Take one message in. What is wrong with it is told to the page."""
         try:
             message = parse(text)
-            if isinstance(message, View):
+            if isinstance(message, CameraMessage):
                 camera_of(message.m, message.fovy)
                 self.views.put(message)
             elif isinstance(message, Ack):
@@ -141,7 +141,7 @@ class Session:
             except Exception as error:  # where the connection itself has failed, complaining raises that again
                 await self.complain(error)
 
-    async def _show(self, view: View, wanted: Pass) -> None:
+    async def _show(self, view: CameraMessage, wanted: Pass) -> None:
         """Compute and send one pass. The first is always shown, however fast views come, or a slow machine would show
         none while the camera moves; brute force is not, as it takes seconds.
         """
@@ -156,13 +156,13 @@ class Session:
         self._acknowledged.clear()
         if limits is not None:
             await self._tell(type="legend", seq=view.seq, aov=view.settings.aov, low=limits[0], high=limits[1])
-        await self.wire.binary(message)
+        await self.connection.binary(message)
 
-    async def _computed(self, view: View, wanted: Pass, stubborn: bool) -> Answer:
+    async def _computed(self, view: CameraMessage, wanted: Pass, stubborn: bool) -> Answer:
         """The pass's answer. A newer view leaves the tiles under way to themselves: they end soon, the others never
         begin.
         """
-        shown, left, done = self.hall.shown, threading.Event(), 0
+        shown, left, done = self.host.shown, threading.Event(), 0
 
         def finished(tiles: int) -> None:
             nonlocal done
@@ -202,7 +202,7 @@ class Session:
         while True:
             pick = await self.picks.take()
             try:
-                running = asyncio.get_running_loop().run_in_executor(self.threads, picked, self.hall.shown, pick)
+                running = asyncio.get_running_loop().run_in_executor(self.threads, picked, self.host.shown, pick)
                 await self._tell(**await running)
             except Exception as error:  # as above
                 await self.complain(error)
@@ -211,7 +211,7 @@ class Session:
         while True:
             file = await self.scenes.take()
             try:
-                await self.hall.open(file)
+                await self.host.open(file)
             except Exception as error:  # as above
                 await self.complain(error)
 
@@ -219,11 +219,11 @@ class Session:
         """The camera as TOML. Its target is where its axis passes the middle of the scene, if that lies ahead."""
         camera = camera_of(message.m, message.fovy)
         if not message.walk:
-            middle = np.mean(self.hall.shown.stage.mesh.bounds, axis=0)
+            middle = np.mean(self.host.shown.prepared.mesh.bounds, axis=0)
             ahead = float((middle - camera.eye) @ camera.frame()[2])
             if ahead > 0.0:
                 camera = camera_of(message.m, message.fovy, ahead)
         return camera_toml(camera)
 
     async def _tell(self, **message: Any) -> None:
-        await self.wire.text(json.dumps(message, allow_nan=False))
+        await self.connection.text(json.dumps(message, allow_nan=False))

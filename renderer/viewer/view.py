@@ -8,12 +8,12 @@ from renderer.errors import expect, extra_hint
 from renderer.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from renderer.viewer.server import Viewing
+    from renderer.viewer.server import ViewerServer
 
 
 def view(
     scene: Scene | str | Path, *, host: str = "127.0.0.1", port: int = 0, browser: bool | None = None
-) -> "Viewing":
+) -> "ViewerServer":
     """Show ``scene``, or a scene file, in the interactive viewer, and return at once.
 
     host     where to listen; other than this machine's own addresses it takes a token, which ``url`` then holds
@@ -25,18 +25,18 @@ def view(
     """
     expect(isinstance(scene, Scene | str | Path), "scene", "a Scene or a path", type(scene).__name__)
     try:
-        from renderer.viewer.server import Viewing
+        from renderer.viewer.server import ViewerServer
     except ModuleNotFoundError as error:
         package = str(error.name).partition(".")[0]
         told = f"the viewer needs the package {package}; {extra_hint('viewer')}"
         raise ModuleNotFoundError(told, name=package) from None
     from renderer.precompile import compile_in_two
-    from renderer.viewer.exhibit import open_file, prepare
+    from renderer.viewer.shown import open_file, prepare
 
     compile_in_two()
     shown = prepare(scene) if isinstance(scene, Scene) else open_file(Path(scene))
     notebook = in_notebook()
-    viewing = Viewing(shown, host, port, framed=notebook)
+    viewing = ViewerServer(shown, host, port, framed=notebook)
     if browser if browser is not None else not notebook:
         viewing.open_browser()
     return viewing

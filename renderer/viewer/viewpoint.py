@@ -22,7 +22,8 @@ def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0) -> Perspec
     rest = columns[:, 3].tolist()
     expect(rest == [0.0, 0.0, 0.0, 1.0], "m", "a last row of 0, 0, 0, 1", rest)
     up, back, eye = columns[1, :3], columns[2, :3], columns[3, :3]
-    target = eye - distance * back
+    with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is not finite
+        target = eye - distance * back
     return PerspectiveCamera(eye=_vector(eye), target=_vector(target), up=_vector(up), fov=math.degrees(fovy))
 
 

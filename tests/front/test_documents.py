@@ -1,46 +1,257 @@
-"""What README and docs say to type works as it stands."""
+"""What README and docs say to type works as it stands, and what they name is there."""
 
+import argparse
+import ast
 import re
 import shlex
+import tomllib
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from renderer.cli import _parser
+from validation.__main__ import _parser as _validation_parser
+from validation.benchmark.__main__ import _parser as _benchmark_parser
+from validation.stability.section import CASES
+from validation.thresholds import HitLimits
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "reports" / "README.md"]
+README = ROOT / "README.md"
+DOCS = sorted((ROOT / "docs").glob("*.md"))
+PAGES = [README, *DOCS, ROOT / "reports" / "README.md"]
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
-COMMAND = re.compile(r"^    (?:\S*/)?octree-render (.*?)(?:\s+#.*)?$", re.MULTILINE)
+# A line of a block to type, without its comment, and commands within a sentence or a table.
+TYPED = re.compile(r"^    (\S.*?)(?:\s+#.*)?$", re.MULTILINE)
+SAID = re.compile(r"`([^`\n]+)`")
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+NAMED = re.compile(
+    r"(?<![\w/.-])((?:renderer|validation|tests|docs|scenes|reports|\.ci)/(?:[\w./-]*\w/?)?)(?:::(\w+))?"
+)
+HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
+# What commands write, and so may be absent.
+WRITTEN = {"reports/index.html", "reports/benchmark.html", "renderer/__pycache__", "renderer/compiled"}
+PARSERS = {
+    "octree-render": _parser,
+    "octree-validate": _validation_parser,
+    "python -m validation": _validation_parser,
+    "python -m validation.benchmark": _benchmark_parser,
+}
+MOST_LINES = 110
+
+
+def shown(value):
+    return value.name if isinstance(value, Path) else str(value)[:60]
 
 
 def snippets():
     return [(page, block) for page in PAGES for block in PYTHON.findall(page.read_text())]
 
 
-@pytest.mark.parametrize(("page", "block"), snippets(), ids=lambda value: getattr(value, "name", ""))
+def typed(page):
+    """The commands of a page's blocks, without folders of executables and variables of the environment before them."""
+    text = PYTHON.sub("", page.read_text())
+    lines = [re.sub(r"^(?:[A-Z_]+=\S+ )+", "", line) for line in TYPED.findall(text)]
+    return [re.sub(r"^\.venv/bin/", "", part.strip()) for line in lines for part in line.split("&&")]
+
+
+def said(page):
+    """The commands in a page's sentences that are whole: with an option, an argument or a target."""
+    found = [re.sub(r"^\.venv/bin/", "", words) for words in SAID.findall(page.read_text())]
+    return [words for words in found if " " in words]
+
+
+def commands(*starts):
+    """(page, command) of all commands with one of these first words, each once."""
+    pairs = [(page, line) for page in PAGES for line in [*typed(page), *said(page)] if line.startswith(starts)]
+    return list(dict.fromkeys(pairs))
+
+
+@pytest.mark.parametrize(("page", "block"), snippets(), ids=shown)
 def test_python_in_a_page_runs_as_it_stands(page, block, tmp_path, monkeypatch):
     """In a checkout, of which nothing is changed: pictures go elsewhere."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenes").symlink_to(ROOT / "scenes")
     names: dict[str, object] = {}
     exec(compile(block, str(page), "exec"), names)
-    if page.name == "README.md" and "closest_hit" in block:
+    if page == README and "closest_hit" in block:
         assert names["hits"].hit.tolist() == [True, False] and (tmp_path / "glass.png").stat().st_size > 10_000
 
 
 def test_the_readme_has_python_to_run():
-    assert any(page.name == "README.md" for page, _ in snippets())
+    assert any(page == README for page, _ in snippets())
 
 
-@pytest.mark.parametrize(("page", "line"), [(p, c) for p in PAGES for c in COMMAND.findall(p.read_text())], ids=str)
+@pytest.mark.parametrize(
+    ("page", "line"), [(p, line) for p in PAGES for line in typed(p) if line.startswith("octree-render ")], ids=shown
+)
 def test_commands_in_a_page_are_ones_that_there_are(page, line):
-    arguments = shlex.split(line)
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_args(shlex.split(line)[1:])
     assert not hasattr(options, "scene") or (ROOT / options.scene).is_file()
+
+
+@pytest.mark.parametrize(("page", "line"), commands("octree-", "python -m validation"), ids=shown)
+def test_options_in_a_page_are_ones_that_there_are(page, line):
+    words = shlex.split(line.split("[")[0])  # of a usage line what comes before its options
+    if any("..." in word for word in words):
+        return
+    start = max((s for s in PARSERS if words[: len(s.split())] == s.split()), key=len, default=None)
+    if start is None:
+        assert find_spec(words[2]), f"{page}: {line}"  # a module of its own
+        return
+    parser = PARSERS[start]()
+    arguments = words[len(start.split()) :]
+    try:
+        parser.parse_args(arguments)
+    except SystemExit as ended:
+        assert ended.code == 0, f"{page}: {line}"  # --help
+
+
+@pytest.mark.parametrize(("page", "line"), commands("python "), ids=shown)
+def test_programs_in_a_page_are_there(page, line):
+    words = shlex.split(line)
+    if words[1] == "-m":
+        assert words[2] in ("build", "wheel", "venv") or find_spec(words[2]), f"{page}: {line}"
+    elif words[1] != "script.py":
+        assert (ROOT / words[1]).is_file() or (ROOT / words[1] / "__main__.py").is_file(), f"{page}: {line}"
+
+
+@pytest.mark.parametrize(("page", "line"), commands("make "), ids=shown)
+def test_what_a_page_lets_make_make_is_a_target(page, line):
+    makefile = (ROOT / "Makefile").read_text()
+    targets, variables = (
+        set(re.findall(r"^(\w+):", makefile, re.MULTILINE)),
+        set(re.findall(r"^(\w+)\s*\?=", makefile, re.M)),
+    )
+    target, *given = shlex.split(line)[1:]
+    assert target in targets, f"{page}: {line}"
+    assert {word.partition("=")[0] for word in given} <= variables, f"{page}: {line}"
+    options = [word for text in given if text.startswith("ARGS=") for word in shlex.split(text[len("ARGS=") :])]
+    if target in ("validate", "bench") and options:
+        parser = _validation_parser() if target == "validate" else _benchmark_parser()
+        assert isinstance(parser.parse_args(options), argparse.Namespace)
 
 
 def test_no_page_promises_a_package_on_an_index():
     for page in PAGES:
         assert "pip install octree-renderer" not in page.read_text()
         assert "'octree-renderer[" not in page.read_text()
+
+
+def test_the_readme_stays_short():
+    assert len(README.read_text().splitlines()) <= MOST_LINES
+
+
+def test_the_readme_uses_nothing_before_it_is_installed():
+    """Line by line on a fresh clone: a .venv, then what is installed into it, then what that brings."""
+    there = {"python3", "make"}
+    for line in TYPED.findall(README.read_text()):
+        program = line.split()[0]
+        assert program in there, line
+        if line.startswith("python3 -m venv .venv"):
+            there |= {".venv/bin/pip", ".venv/bin/python"}
+        elif program == ".venv/bin/pip":
+            assert "install -e '.[viewer]'" in line  # what `view` needs as well
+            there |= {".venv/bin/octree-render"}
+        elif line.startswith("make "):
+            there |= {".venv/bin/octree-validate"}
+    assert ".venv/bin/octree-render" in there
+
+
+def anchors(page):
+    """The anchors of a page's headings, as GitHub makes them."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in HEADING.findall(text)}
+
+
+def links(page):
+    return [link for link in LINK.findall(PYTHON.sub("", page.read_text())) if "://" not in link]
+
+
+@pytest.mark.parametrize(("page", "link"), [(p, link) for p in PAGES for link in links(p)], ids=shown)
+def test_a_link_leads_somewhere(page, link):
+    path, _, anchor = link.partition("#")
+    there = page.parent / path if path else page
+    assert there.exists(), f"{page}: {link}"
+    assert not anchor or anchor in anchors(there), f"{page}: {link}"
+
+
+def test_every_page_is_reached_from_the_readme():
+    reached, pending = set(), [README]
+    while pending:
+        page = pending.pop().resolve()
+        if page not in reached:
+            reached.add(page)
+            pending += [page.parent / link.partition("#")[0] for link in links(page) if ".md" in link]
+    assert reached >= {page.resolve() for page in PAGES}
+
+
+@cache
+def defined(path):
+    """What a source file defines: functions, classes, constants and fields, at any depth."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names |= {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}
+    return names
+
+
+@pytest.mark.parametrize("page", PAGES, ids=shown)
+def test_what_a_page_names_is_there(page):
+    """Files and folders, and with ``::`` a function, class, constant or test that stands in the file."""
+    absent = []
+    for path, name in NAMED.findall(page.read_text()):
+        there = ROOT / path
+        if path.rstrip("/") in WRITTEN:
+            continue
+        if not there.exists() or (path.endswith("/") and not there.is_dir()) or (name and name not in defined(there)):
+            absent.append(f"{path}::{name}" if name else path)
+    assert absent == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("`renderer/trace/query.py::closest_hits`", ("renderer/trace/query.py", "closest_hits")),
+        ("see renderer/octree.py, and", ("renderer/octree.py", "")),
+        ("in `scenes/`.", ("scenes/", "")),
+        ("(tests/trace/test_order.py).", ("tests/trace/test_order.py", "")),
+    ],
+)
+def test_names_are_found_in_a_sentence(text, found):
+    assert NAMED.findall(text) == [found]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=shown)
+def test_extreme_cases_and_gates_that_a_page_names_are_there(page):
+    numbers = {case.number for case in CASES}
+    assert {int(number) for number in re.findall(r"\b[Cc]ase (\d+)\b", page.read_text())} <= numbers
+    gates = set(re.findall(r"`hits\.(\w+)`", page.read_text())) - {"t", "face", "u", "v", "points", "normals", "hit"}
+    assert gates <= set(HitLimits.model_fields)
+
+
+@pytest.mark.parametrize("package", ["renderer", "validation"])
+def test_the_diagram_of_the_rooms_has_the_order_of_the_contracts(package):
+    """Folder by folder from above, as import-linter checks them; names that may be absent need not be drawn."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    (layers,) = (contract["layers"] for contract in contracts if contract["id"] == package)
+    levels = {
+        name: level for level, line in enumerate(layers) for name in line.strip("()").replace(")", "").split(" | ")
+    }
+    there = {name for name in levels if (ROOT / package / name).is_dir() or (ROOT / package / f"{name}.py").is_file()}
+    lines = (ROOT / "docs" / "architecture.md").read_text().splitlines()
+    (top,) = (k for k, line in enumerate(lines) if re.fullmatch(r"    renderer/ +validation/", line))
+    column = (
+        slice(4, lines[top].index("validation/"))
+        if package == "renderer"
+        else slice(lines[top].index("validation/"), 999)
+    )
+    block = lines[top + 1 : lines.index("", top)]
+    # The names, less what is said of them three spaces further on.
+    drawn = [name.strip("/") for line in block for name in re.split(r" {3,}", line[column].strip())[0].split()]
+    assert set(drawn) == there
+    assert [levels[name] for name in drawn] == sorted(levels[name] for name in drawn)

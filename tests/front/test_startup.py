@@ -113,10 +113,10 @@ from renderer.inspect.tree_boxes import visited
 for name in ("three_models", "stairs", "glass"):
     for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
         render(load_scene(f"scenes/{name}.toml"), resolution=(3, 2), **options)
-    stage = prepare_scene(load_scene(f"scenes/{name}.toml"), needs_of(load_scene(f"scenes/{name}.toml")), "octree")
-    face_colors(stage.world, [0, 1, 5])
-    ray_path(stage, [0, 1, 5], [0, 0, -1], 2)
-    visited(stage.octree, [0, 1, 5], [0, 0, -1])
+    prepared = prepare_scene(load_scene(f"scenes/{name}.toml"), needs_of(load_scene(f"scenes/{name}.toml")), "octree")
+    face_colors(prepared.arrays, [0, 1, 5])
+    ray_path(prepared, [0, 1, 5], [0, 0, -1], 2)
+    visited(prepared.octree, [0, 1, 5], [0, 0, -1])
 vertices = np.random.default_rng(1).random((90, 3))
 for points in (vertices, vertices.astype(np.float32)):
     for target in (Octree(points, np.arange(90).reshape(-1, 3)), BruteForce(points, np.arange(90).reshape(-1, 3))):

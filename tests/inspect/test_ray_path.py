@@ -64,17 +64,17 @@ def zoo(smooth: bool, eye: Any = (0.0, 2.0, 6.0)) -> Scene:
     return scene(*parts, eye=eye, smooth=smooth, **shared)
 
 
-def paths_of(stage: PreparedScene, size: tuple[int, int], **options: Any) -> list[tuple[Segment, ...]]:
+def paths_of(prepared: PreparedScene, size: tuple[int, int], **options: Any) -> list[tuple[Segment, ...]]:
     """The path of each pixel's ray, in scanline order; the direction as the kernel has it, to the bit."""
-    rows = stage.scene.camera.rows(*size)
+    rows = prepared.scene.camera.rows(*size)
     centres = [(x + 0.5, y + 0.5) for y in range(size[1]) for x in range(size[0])]
-    return [ray_path(stage, rows[0], rows[3] + (x * rows[4] + y * rows[5]), **options) for x, y in centres]
+    return [ray_path(prepared, rows[0], rows[3] + (x * rows[4] + y * rows[5]), **options) for x, y in centres]
 
 
 def check_against_render(what: Scene, size: tuple[int, int], accelerator: Any = "octree", **options: Any) -> None:
     image = render(what, resolution=size, samples=1, threads=1, accelerator=accelerator, **options)
-    stage = stage_of(what, accelerator)
-    paths = paths_of(stage, size, **options)
+    prepared = stage_of(what, accelerator)
+    paths = paths_of(prepared, size, **options)
     assert max(len(path) for path in paths) < MAX_RAYS  # the bound cuts none off
     sums = np.array([np.sum([s.radiance for s in path], axis=0) for path in paths]).reshape(*size[::-1], 3)
     np.testing.assert_allclose(sums, image.radiance, rtol=REL, atol=2.0**-149)
@@ -158,8 +158,8 @@ def test_a_mirror() -> None:
 
 
 def test_glass_by_snell_and_fresnel() -> None:
-    stage = stage_of(scene((box(), GLASS)))
-    path = ray_path(stage, (-0.5, 2.0, 0.1), (1, -1, 0), 1)
+    prepared = stage_of(scene((box(), GLASS)))
+    path = ray_path(prepared, (-0.5, 2.0, 0.1), (1, -1, 0), 1)
     assert [(s.kind, s.parent) for s in path] == [("camera", -1), ("reflected", 0), ("refracted", 0)]
     way = np.subtract(path[2].end, path[2].start)
     sin_t = math.sin(math.pi / 4) / 1.5
@@ -173,8 +173,8 @@ def test_glass_by_snell_and_fresnel() -> None:
 
 def test_total_internal_reflection() -> None:
     """At 45 degrees, above glass's 41.8, light goes round in a box: a wall after a wall, and none of it leaves."""
-    stage = stage_of(scene((box((-1, -1, -1), (1, 1, 1)), GLASS), background=1.0))
-    path = ray_path(stage, (-0.5, 0, 0), (1, 1, 0), 3)
+    prepared = stage_of(scene((box((-1, -1, -1), (1, 1, 1)), GLASS), background=1.0))
+    path = ray_path(prepared, (-0.5, 0, 0), (1, 1, 0), 3)
     assert [s.kind for s in path] == ["camera", "reflected", "reflected", "reflected"]
     assert [s.parent for s in path] == [-1, 0, 1, 2]
     assert all(s.weight == (1, 1, 1) and s.hit for s in path)
@@ -212,12 +212,12 @@ def test_a_bounded_number_of_rays() -> None:
     """Of more rays than are told the deepest are left out: the rest is what a lower depth gives."""
     balls = tuple((icosphere(2).transformed(np.diag([r, r, r, 1.0])), CLEAR) for r in (0.4, 0.6, 0.8, 1.0))
     what = scene(*balls, lights=(PointLight(position=(0, 3, 0)),), background=0.5)
-    stage = stage_of(what)
-    path = ray_path(stage, (0.1, 0.2, 4), (0, 0, -1), 16)
+    prepared = stage_of(what)
+    path = ray_path(prepared, (0.1, 0.2, 4), (0, 0, -1), 16)
     rays = [s for s in path if s.kind != "shadow"]
     assert len(rays) == MAX_RAYS and len(path) <= 2 * MAX_RAYS
     assert rays[-1].depth > 6
-    shallow = ray_path(stage, (0.1, 0.2, 4), (0, 0, -1), rays[-1].depth - 1)
+    shallow = ray_path(prepared, (0.1, 0.2, 4), (0, 0, -1), rays[-1].depth - 1)
     assert path[: len(shallow)] == shallow and len(shallow) > 400
 
 
@@ -240,6 +240,6 @@ def test_without_faces_there_is_a_background() -> None:
     ],
 )
 def test_bad_arguments_are_named(origin: Any, direction: Any, max_depth: Any, message: str) -> None:
-    stage = stage_of(scene((box(), Phong())))
+    prepared = stage_of(scene((box(), Phong())))
     with pytest.raises(ValueError, match=message):
-        ray_path(stage, origin, direction, max_depth)
+        ray_path(prepared, origin, direction, max_depth)

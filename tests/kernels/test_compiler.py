@@ -193,20 +193,21 @@ PLAIN_AFTER_OURS = """
 import numpy as np
 from numba import njit
 from renderer import Octree
-from renderer.trace.batch import _found_pointers, _ray_pointers
 from renderer.trace.leaf import tree_pointers
 from renderer.mesh.shapes import icosphere
+from renderer.trace.rays import hit_pointers, ray_pointers
 from renderer.trace.traverse import make_memory, make_scratch, trace
 
 @njit(error_model="numpy")
 def mine(words, rays, out, memory):
     tree = tree_pointers(words)
-    trace(tree, _ray_pointers(rays, tree.scale), _found_pointers(out), 0, len(rays[1]), make_scratch(memory), False)
+    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
+    trace(tree, source, found, 0, len(rays[1]), make_scratch(memory), False)
 
 octree, rays = Octree.from_mesh(icosphere(3)), np.random.default_rng(0).normal(size=(50, 3)) * 3
 expected = octree.closest_hit(rays, -rays)
 octree.any_hit(rays, -rays)
-out = np.zeros(50), np.zeros(50, int), np.zeros(50), np.zeros(50), np.zeros(50, bool)
+out = np.zeros((4, 50))
 mine(octree.tree.words, (rays, -rays, np.zeros(50), np.full(50, np.inf)), out, make_memory(octree.tree.depth, 50))
 print((out[0] == expected.t).all())
 """

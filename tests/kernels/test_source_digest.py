@@ -40,7 +40,7 @@ def whole(tmp_path):
 
 def test_an_edit_of_the_layout_changes_the_kernels_over_it_alone(whole):
     changed = changed_by(whole, "trace/layout.py")
-    kernels = {"trace/intersect.py", "trace/traverse.py", "trace/batch.py", "tree/build.py", "shade/whitted.py"}
+    kernels = {"trace/intersect.py", "trace/traverse.py", "trace/singly.py", "tree/build.py", "shade/whitted.py"}
     assert {"trace/layout.py", *kernels} <= changed
     assert not changed & {"kernels/simd.py", "kernels/jit.py", "errors.py", "mesh/mesh.py", "process/parallel.py"}
 
@@ -48,7 +48,7 @@ def test_an_edit_of_the_layout_changes_the_kernels_over_it_alone(whole):
 @pytest.mark.parametrize("edited", ["cli.py", "viewer/session.py", "scene/needs.py", "scene/material.py"])
 def test_an_edit_beside_the_kernels_changes_none_of_them(whole, edited):
     kernels = {
-        "trace/batch.py", "tree/build.py", "tree/subtree.py", "tree/refit.py", "tree/blocks.py",
+        "trace/singly.py", "tree/build.py", "tree/subtree.py", "tree/refit.py", "tree/blocks.py",
         "shade/whitted.py", "shade/tile.py", "inspect/face_phong.py",
     }  # fmt: skip
 

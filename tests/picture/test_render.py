@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from renderer.mesh.shapes import icosphere
-from renderer.picture import prepare as stage
+from renderer.picture import prepare as preparing
 from renderer.picture.prepare import TILE
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
@@ -120,7 +120,7 @@ def test_arguments_are_checked_before_anything_is_built(monkeypatch: pytest.Monk
     def built(*_: object) -> None:
         raise AssertionError("built a tree for arguments that are no good")
 
-    monkeypatch.setattr(stage, "pack", built)
+    monkeypatch.setattr(preparing, "pack", built)
     for bad in ({"threads": 0}, {"samples": 3}, {"accelerator": "x"}, {"offset": "x"}, {"split": "x"}):
         with pytest.raises(ValueError):
             render(ball(), **bad)
@@ -151,7 +151,7 @@ def test_an_exception_in_a_tile_stops_the_rest(monkeypatch: pytest.MonkeyPatch, 
             raise error
         return True
 
-    monkeypatch.setattr(stage, "render_tile", interrupted)
+    monkeypatch.setattr(preparing, "render_tile", interrupted)
     with pytest.raises(error):
         render(ball(), resolution=(20 * TILE, 20 * TILE), threads=threads)
     # Each other thread may have had one tile under way and have taken one more before it saw the stop.
@@ -168,7 +168,7 @@ def test_each_tile_is_rendered_once_and_they_cover_the_film(monkeypatch: pytest.
         covered[y0:y1, x0:x1] += 1
         return True
 
-    monkeypatch.setattr(stage, "render_tile", count)
+    monkeypatch.setattr(preparing, "render_tile", count)
     render(ball(), resolution=covered.shape[::-1], threads=1)
     assert (covered == 1).all()
 
@@ -220,7 +220,7 @@ def test_without_shadows_every_light_reaches_what_faces_it() -> None:
 def test_a_stage_takes_pictures_with_other_cameras_as_render_does() -> None:
     """Also from within glass, where the media around the eye are the new camera's."""
     scene = load_scene(SCENES / "glass.toml")
-    ready = stage.prepare_scene(scene, needs_of(scene))
+    ready = preparing.prepare_scene(scene, needs_of(scene))
     glass = next(i.mesh for i in scene.instances if scene.materials[i.material].passes_light)
     inside = np.mean(glass.bounds, axis=0)
     for eye in ((4.0, 2.0, 5.0), tuple(inside.tolist())):

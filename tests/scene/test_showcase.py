@@ -81,5 +81,7 @@ def test_a_scene_is_written_over_no_mesh(tmp_path: Path, capsys: Any, through_li
         target = tmp_path / "it.toml"
         target.symlink_to(path)
     assert main(["render", str(path), "-o", str(tmp_path / "a.png"), "--write-scene", str(target)]) == 2
-    assert "path: expected a .toml file" in capsys.readouterr().err
+    assert "--write-scene: expected a new file" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="path: expected a .toml file, got .*" + ("a link to" if through_link else "")):
+        write_scene(path, target)
     assert path.read_bytes() == before

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.shade.shading import fresnel, reflect, refract, specular
-from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, offset_distance, spawn_origin
+from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule, offset_distance, spawn_origin
 
 U = 2.0**-53
 UP = (0.0, 1.0, 0.0)
@@ -302,11 +302,11 @@ def test_offset_does_not_vanish_on_a_plane_through_the_origin() -> None:
 
 
 def test_mitsubas_rule() -> None:
-    p, away = (3.0, -5.0, 1.0), (0.1, 0.9, 0.2)
+    p, away, mitsuba = (3.0, -5.0, 1.0), (0.1, 0.9, 0.2), OffsetRule(False, MITSUBA_EPSILON)
     # (1 + max|p|) epsilon along n_g, to the side of the new ray; the bound is not read.
-    assert spawn_origin(p, 1e9, UP, away, MITSUBA_EPSILON) == (3.0, -5.0 + 6 * MITSUBA_EPSILON, 1.0)
-    assert spawn_origin(p, 1e9, UP, (0.1, -0.9, 0.2), MITSUBA_EPSILON) == (3.0, -5.0 - 6 * MITSUBA_EPSILON, 1.0)
-    assert spawn_origin(p, 1e9, UP, away, 0.0) == p
+    assert spawn_origin(p, 1e9, UP, away, mitsuba) == (3.0, -5.0 + 6 * MITSUBA_EPSILON, 1.0)
+    assert spawn_origin(p, 1e9, UP, (0.1, -0.9, 0.2), mitsuba) == (3.0, -5.0 - 6 * MITSUBA_EPSILON, 1.0)
+    assert spawn_origin(p, 1e9, UP, away, OffsetRule(False, 0.0)) == p
     assert pytest.approx(8.940697e-05, rel=1e-7) == MITSUBA_EPSILON
 
 

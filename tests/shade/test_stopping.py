@@ -130,9 +130,9 @@ def test_finished_may_stop_a_tile_under_way() -> None:
         if len(heard) == 3:
             raise TimeoutError
 
-    stage, chosen = prepare(half_mirrors()), RenderSettings(resolution=(16, 16), max_depth=64, max_rays=2**61)
+    prepared, chosen = prepare(half_mirrors()), RenderSettings(resolution=(16, 16), max_depth=64, max_rays=2**61)
     with pytest.raises(TimeoutError):
-        stage.picture(stage.scene.camera, chosen, -1.0, 2, finished)
+        prepared.picture(prepared.scene.camera, chosen, -1.0, 2, finished)
     assert heard == [0, 0, 0]
 
 
@@ -220,13 +220,15 @@ def test_brute_force_in_small_chunks_has_the_same_bits(monkeypatch: pytest.Monke
 
 def test_the_viewers_first_picture_comes_soon_and_any_can_be_cancelled() -> None:
     """On a scene whose whole picture takes hours."""
-    from renderer.viewer.exhibit import prepare as exhibit
     from renderer.viewer.passes import Pass, picture
-    from renderer.viewer.protocol import View, ViewSettings
+    from renderer.viewer.protocol import CameraMessage, ViewSettings
+    from renderer.viewer.shown import prepare as prepare_shown
 
-    shown = exhibit(half_mirrors().altered(render=RenderSettings(max_depth=64, max_rays=2**61)))
+    shown = prepare_shown(half_mirrors().altered(render=RenderSettings(max_depth=64, max_rays=2**61)))
     m = [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]
-    view = View(type="view", seq=1, mode="octree", m=m, fovy=0.8, w=64, h=48, settings=ViewSettings(max_depth=64))
+    view = CameraMessage(
+        type="view", seq=1, mode="octree", m=m, fovy=0.8, w=64, h=48, settings=ViewSettings(max_depth=64)
+    )
     first = picture(shown, view, Pass(0, False, (32, 24), 1))
     assert 256 <= first.rays.max() <= 256 + 2 * 65
 

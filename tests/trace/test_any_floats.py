@@ -24,10 +24,11 @@ from renderer.kernels.simd import bits_float
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.trace.batch import _found_pointers, _ray_pointers
 from renderer.trace.leaf import tree_pointers
+from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
+from renderer.trace.singly import stack_size
 from renderer.trace.stream import _BOTTOM
-from renderer.trace.traverse import make_memory, make_scratch, search_blocks, stack_size, trace
+from renderer.trace.traverse import make_memory, make_scratch, search_blocks, trace
 
 # What arithmetic may end in, or begin with when nobody looked.
 WORST = np.array([0.0, 1.0, 0.3, 5e-324, 1e-310, 1e-30, 1e30, FARTHEST, 2.0**127, 3.5e38, 1e40, 1e300, 1.7e308, np.inf])
@@ -40,7 +41,8 @@ GUARD = 0x7EADBEEF
 def unchecked(words, rays, out, any_hit, memory, by_blocks):
     """``trace_chunk`` without its check of the rays."""
     tree = tree_pointers(words)
-    source, found, count = _ray_pointers(rays, tree.scale), _found_pointers(out), len(rays[1])
+    count = len(rays[1])
+    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
     if by_blocks:
         search_blocks(tree, source, found, 0, count, any_hit)
     else:
@@ -48,17 +50,15 @@ def unchecked(words, rays, out, any_hit, memory, by_blocks):
 
 
 def answers(octree, rays, any_hit, by_blocks=False):
-    """t, face, u, v, hit of rays that nobody checked; and that the words around the scratch are as they were."""
+    """t, u, v and face of rays that nobody checked, or hit; and that the words around the scratch are as they were."""
     count, memory = len(rays[1]), make_memory(octree.tree.depth, len(rays[1]))
     padded = np.full(len(memory.integers) + 128, GUARD, np.int64)
     memory = memory._replace(integers=padded[64:-64])
-    out = (
-        np.full(count, -7.0), np.full(count, -7), np.full(count, -7.0), np.full(count, -7.0), np.zeros(count, np.bool_)
-    )  # fmt: skip
+    out = np.full((HIT_ROWS, count), -7.0)
     unchecked(octree.tree.words, rays, out, any_hit, memory, by_blocks)
     assert (padded[:64] == GUARD).all()
     assert (padded[-64:] == GUARD).all()
-    return out
+    return out.view(np.bool_)[0, :count] if any_hit else out
 
 
 def any_rays(rng, count, alike):
@@ -96,13 +96,13 @@ def test_no_ray_leaves_its_stack_or_spoils_another(kind, alike, any_hit):
     good = in_range(*rays)
     assert 500 < good.sum() < 5500
     if any_hit:
-        np.testing.assert_array_equal(found[4][good], right[4][good])
+        np.testing.assert_array_equal(found[good], right[good])
         return
-    assert (right[1][good] >= 0).sum() > 450
-    for ours, brute in zip(found[:4], right[:4], strict=True):
-        np.testing.assert_array_equal(ours[good], brute[good])
-    assert (found[1] >= -1).all()
-    assert (found[1] < len(mesh.faces)).all()
+    faces = found[3].view(np.int64)
+    assert (faces[good] >= 0).sum() > 450
+    np.testing.assert_array_equal(found[:, good], right[:, good])
+    assert (faces >= -1).all()
+    assert (faces < len(mesh.faces)).all()
 
 
 def test_the_bottom_of_a_stack_is_beyond_no_limit():

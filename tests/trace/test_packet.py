@@ -14,7 +14,8 @@ from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, ro
 from renderer.trace.layout import NODE_WORDS
 from renderer.trace.packet import enter_beam, make_beam
 from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare
-from renderer.trace.traverse import Rays, are_coherent
+from renderer.trace.rays import RayPointers
+from renderer.trace.traverse import are_coherent
 
 SEEDS = st.integers(0, 2**20)
 
@@ -86,7 +87,9 @@ def test_a_packet_that_gives_up_is_traced_all_the_same():
 
 @kernel
 def _are_coherent(origins, directions, bound):
-    return are_coherent(Rays(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 0, 0, 1.0), 0)
+    return are_coherent(
+        RayPointers(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 0, 0, 1.0), 0
+    )
 
 
 def _coherent(origins, directions):

@@ -88,10 +88,10 @@ def stage_of(scenes: Path) -> PreparedScene:
     return prepare_scene(scene, needs_of(scene), "octree")
 
 
-def inside(faces: NDArray[np.int32], stage: PreparedScene) -> NDArray[np.bool_]:
+def inside(faces: NDArray[np.int32], prepared: PreparedScene) -> NDArray[np.bool_]:
     """The pixels whose neighbours show the same face, which is not of glass."""
-    glass = list(stage.scene.materials).index("glass")
-    opaque = np.append(stage.world.material // MATERIAL_COLUMNS != glass, False)[faces]
+    glass = list(prepared.scene.materials).index("glass")
+    opaque = np.append(prepared.arrays.material // MATERIAL_COLUMNS != glass, False)[faces]
     changes = np.zeros(faces.shape, bool)
     changes[:, 1:] |= faces[:, 1:] != faces[:, :-1]
     changes[1:] |= faces[1:] != faces[:-1]
@@ -121,10 +121,10 @@ def test_own_phong_shows_the_renderers_colors(viewer: Viewer, scenes: Path) -> N
     viewer.drag(40, -10)
     viewer.page.wait_for_timeout(50)
     viewer.settled("phong")
-    seen, shown, stage = viewer.pixels("gl"), viewer.camera, stage_of(scenes)
+    seen, shown, prepared = viewer.pixels("gl"), viewer.camera, stage_of(scenes)
     faces = picture_of(scenes, shown).face
-    expected = face_colors(stage.world, shown["m"][12:15])[faces]
-    sure = inside(faces, stage)
+    expected = face_colors(prepared.arrays, shown["m"][12:15])[faces]
+    sure = inside(faces, prepared)
     assert sure.mean() > 0.15
     assert np.array_equal(seen[sure][:, :3], expected[sure])
 
@@ -138,11 +138,11 @@ def test_a_change_of_mode_waits_a_moment_for_its_picture_and_draws_once(viewer: 
           const drawn = [], frame = () => new Promise(requestAnimationFrame), sent = viewer.seq;
           const noon = performance.now();
           performance.now = () => noon; // time stands still, so that a slow machine changes nothing
-          model.draw = (...a) => { drawn.push(viewer.stage.dataset.mode); draw.apply(model, a); };
+          model.draw = (...a) => { drawn.push(viewer.prepared.dataset.mode); draw.apply(model, a); };
           if (!answered) viewer.connection.send = () => {};
           viewer.setMode("phong");
           while (viewer.seq === sent) await frame();
-          for (let i = 0; i < 5 || (answered && viewer.stage.dataset.mode !== "phong"); i++) await frame();
+          for (let i = 0; i < 5 || (answered && viewer.prepared.dataset.mode !== "phong"); i++) await frame();
           const inTime = drawn.length;
           delete performance.now;
           for (let i = 0; i < 100 && !drawn.length; i++) await new Promise((r) => setTimeout(r, 50));
@@ -157,9 +157,9 @@ def test_a_change_of_mode_waits_a_moment_for_its_picture_and_draws_once(viewer: 
 
 def test_gl_lighting_is_phong(viewer: Viewer, scenes: Path) -> None:
     viewer.choose("gl")
-    seen, shown, stage = viewer.pixels("gl"), viewer.camera, stage_of(scenes)
+    seen, shown, prepared = viewer.pixels("gl"), viewer.camera, stage_of(scenes)
     traced = picture_of(scenes, shown, max_depth=0, shadows=False)
-    sure = inside(traced.face, stage)
+    sure = inside(traced.face, prepared)
     difference = np.abs(seen[..., :3].astype(int) - srgb(traced.radiance))[sure]
     # WebGL's float32 may fall on the other side of where a code begins.
     assert difference.max() <= 1
@@ -196,9 +196,9 @@ def test_the_picture_has_the_size_asked_for(viewer: Viewer, size: str, expected:
 
 
 def test_the_panel_tells_of_the_scene(viewer: Viewer, scenes: Path) -> None:
-    stage = stage_of(scenes)
+    prepared = stage_of(scenes)
     readings = viewer.page.inner_text("#readings")
-    for name, value in (("faces", len(stage.mesh.faces)), ("nodes", stage.octree.stats.nodes)):
+    for name, value in (("faces", len(prepared.mesh.faces)), ("nodes", prepared.octree.stats.nodes)):
         assert re.search(rf"{name}\s+{value:,}\b", readings, re.IGNORECASE), name
     assert "M rays/s" in readings and "final" in readings
     viewer.page.click("#needs summary")

@@ -17,11 +17,11 @@ from renderer.viewer.protocol import (
     MIN_FOVY,
     MODES,
     Ack,
+    CameraMessage,
     Cancel,
     OpenScene,
     Pick,
     SaveCamera,
-    View,
     ViewSettings,
     packed,
     parse,
@@ -52,7 +52,7 @@ def said(message: Any) -> str:
 @pytest.mark.parametrize(
     ("message", "kind"),
     [
-        (VIEW, View),
+        (VIEW, CameraMessage),
         (PICK, Pick),
         (CAMERA | {"walk": True}, SaveCamera),
         ({"type": "ack", "seq": 7, "step": 2}, Ack),
@@ -73,7 +73,7 @@ def test_a_message_is_what_it_says(message: dict[str, Any], kind: type) -> None:
 
 def test_what_is_left_out_is_as_a_scene_is_first_shown() -> None:
     left_out = parse(said({key: value for key, value in VIEW.items() if key != "settings"}))
-    assert isinstance(left_out, View)
+    assert isinstance(left_out, CameraMessage)
     assert left_out.settings == ViewSettings(max_depth=6, samples=1, aov="color", light=None, pixels="rgba")
     assert left_out.settings.shadows and left_out.settings.reflection and left_out.settings.refraction
     walk = parse(said(CAMERA))
@@ -194,11 +194,11 @@ def test_whatever_comes_is_a_message_or_a_value_error(text: str) -> None:
         read = parse(text)
     except ValueError:
         return
-    assert isinstance(read, View | Pick | Ack | Cancel | OpenScene | SaveCamera)
+    assert isinstance(read, CameraMessage | Pick | Ack | Cancel | OpenScene | SaveCamera)
 
 
 def test_the_header_is_32_bytes_little_endian() -> None:
-    view = View(type="view", seq=2**32 - 1, mode="octree", m=M, fovy=0.7, w=320, h=240)
+    view = CameraMessage(type="view", seq=2**32 - 1, mode="octree", m=M, fovy=0.7, w=320, h=240)
     header = packed(JPEG, view, 2, True, (128, 96), (1.5, 0.25))
     assert header == bytes.fromhex("02000000 ffffffff 02000000 01000000 80000000 60000000 0000c03f 0000803e")
     assert struct.unpack("<6I2f", header)[3] == 1

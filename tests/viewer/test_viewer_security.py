@@ -22,9 +22,9 @@ from websockets.sync.client import connect
 
 import renderer
 from renderer.viewer.app import MAX_CONNECTIONS
-from renderer.viewer.exhibit import Exhibit, open_file
 from renderer.viewer.protocol import MAX_MESSAGE_BYTES
-from renderer.viewer.server import Viewing
+from renderer.viewer.server import ViewerServer
+from renderer.viewer.shown import ShownScene, open_file
 
 # Of everything that is served, one of a kind.
 PATHS = ["/", "/scene", "/mesh", "/octree?level=0", "/static/main.js", "/nowhere"]
@@ -48,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def shown(folder: Path) -> Exhibit:
+def shown(folder: Path) -> ShownScene:
     return open_file(folder / "blocks.toml")
 
 
@@ -60,9 +60,9 @@ def port(folder: Path) -> Iterator[int]:
 
 
 @pytest.fixture(scope="module")
-def wide(shown: Exhibit) -> Iterator[Viewing]:
+def wide(shown: ShownScene) -> Iterator[ViewerServer]:
     """A server that other machines reach."""
-    with Viewing(shown, "0.0.0.0", 0, framed=False) as viewing:
+    with ViewerServer(shown, "0.0.0.0", 0, framed=False) as viewing:
         yield viewing
 
 
@@ -181,8 +181,8 @@ def test_a_refused_socket_is_told_the_rules_too(port: int) -> None:
     assert refused.body == f"Origin: expected 127.0.0.1:{port}, got http://evil.example"
 
 
-def test_a_notebook_of_this_machine_may_frame_the_page(shown: Exhibit) -> None:
-    with Viewing(shown, "127.0.0.1", 0, framed=True) as viewing:
+def test_a_notebook_of_this_machine_may_frame_the_page(shown: ShownScene) -> None:
+    with ViewerServer(shown, "127.0.0.1", 0, framed=True) as viewing:
         policy = asked(urlsplit(viewing.url).port, "/").headers["Content-Security-Policy"]
     assert policy.endswith("; frame-ancestors 'self' http://127.0.0.1:* http://localhost:*")
 
@@ -291,9 +291,9 @@ def test_a_client_that_floods_reads_nothing_and_leaves_disturbs_nobody(port: int
     ("host", "needed"),
     [("127.0.0.1", False), ("localhost", False), ("127.0.0.2", False), ("::1", False), ("0.0.0.0", True), ("::", True)],
 )
-def test_a_token_is_needed_where_other_machines_may_connect(shown: Exhibit, host: str, needed: bool) -> None:
+def test_a_token_is_needed_where_other_machines_may_connect(shown: ShownScene, host: str, needed: bool) -> None:
     try:
-        viewing = Viewing(shown, host, 0, framed=False)
+        viewing = ViewerServer(shown, host, 0, framed=False)
     except ValueError as error:
         pytest.skip(f"this machine has no such address: {error}")
     with viewing:
@@ -304,8 +304,8 @@ def test_a_token_is_needed_where_other_machines_may_connect(shown: Exhibit, host
         assert asked(url.port, f"/scene?{url.query}", named, address=url.hostname).status == 200
 
 
-def test_two_servers_have_two_tokens_of_256_bits(shown: Exhibit, wide: Viewing) -> None:
-    with Viewing(shown, "0.0.0.0", 0, framed=False) as other:
+def test_two_servers_have_two_tokens_of_256_bits(shown: ShownScene, wide: ViewerServer) -> None:
+    with ViewerServer(shown, "0.0.0.0", 0, framed=False) as other:
         tokens = [re.fullmatch(r"token=([\w-]{43})", urlsplit(viewing.url).query)[1] for viewing in (wide, other)]
         assert asked(urlsplit(other.url).port, f"/scene?token={tokens[0]}").status == 403
     assert tokens[0] != tokens[1]
@@ -315,7 +315,7 @@ def test_two_servers_have_two_tokens_of_256_bits(shown: Exhibit, wide: Viewing) 
 @pytest.mark.parametrize(
     "query", ["", "?token=", "?token=wrong", "?token=%ff%00", "?Token={}", "?token={}x", "?token={}%20"]
 )
-def test_without_the_token_nothing_is_served(wide: Viewing, path: str, query: str) -> None:
+def test_without_the_token_nothing_is_served(wide: ViewerServer, path: str, query: str) -> None:
     url = urlsplit(wide.url)
     given = query.format(url.query.removeprefix("token="))
     headers = {**HANDSHAKE, "Origin": f"http://127.0.0.1:{url.port}"} if path == "/ws" else {}
@@ -324,7 +324,7 @@ def test_without_the_token_nothing_is_served(wide: Viewing, path: str, query: st
     assert answer.body == "token: expected the one in the address that octree-render printed"
 
 
-def test_the_page_gets_the_token_as_a_cookie_for_what_it_links(wide: Viewing) -> None:
+def test_the_page_gets_the_token_as_a_cookie_for_what_it_links(wide: ViewerServer) -> None:
     url = urlsplit(wide.url)
     cookie, *attributes = asked(url.port, f"/?{url.query}").headers["Set-Cookie"].split("; ")
     assert set(attributes) == {"HttpOnly", "SameSite=Strict", "Path=/"}
@@ -337,7 +337,7 @@ def test_the_page_gets_the_token_as_a_cookie_for_what_it_links(wide: Viewing) ->
         assert asked(url.port, "/static/main.js", {"Cookie": sent}).status == 403
 
 
-def test_with_the_token_a_foreign_page_is_refused_and_a_program_let_in(wide: Viewing) -> None:
+def test_with_the_token_a_foreign_page_is_refused_and_a_program_let_in(wide: ViewerServer) -> None:
     url = urlsplit(wide.url)
     path = f"/ws?{url.query}"
     assert opening(url.port, path) == 101
@@ -347,7 +347,7 @@ def test_with_the_token_a_foreign_page_is_refused_and_a_program_let_in(wide: Vie
         assert opening(url.port, path, Origin=origin) == 403
 
 
-def test_tokens_are_compared_in_constant_time(wide: Viewing, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tokens_are_compared_in_constant_time(wide: ViewerServer, monkeypatch: pytest.MonkeyPatch) -> None:
     url = urlsplit(wide.url)
     monkeypatch.setattr("hmac.compare_digest", lambda _given, _token: False)
     assert asked(url.port, f"/scene?{url.query}").status == 403
@@ -364,11 +364,11 @@ def test_tokens_are_compared_in_constant_time(wide: Viewing, monkeypatch: pytest
         ("127.0.0.1", "80", "port: expected an integer from 0 to 65535, got '80'"),
     ],
 )
-def test_where_it_cannot_listen_it_says_so(shown: Exhibit, host: Any, port: Any, message: str) -> None:
+def test_where_it_cannot_listen_it_says_so(shown: ShownScene, host: Any, port: Any, message: str) -> None:
     with pytest.raises(ValueError, match=re.escape(message)):
-        Viewing(shown, host, port, framed=False)
+        ViewerServer(shown, host, port, framed=False)
 
 
-def test_a_busy_port_is_an_error(shown: Exhibit, port: int) -> None:
+def test_a_busy_port_is_an_error(shown: ShownScene, port: int) -> None:
     with pytest.raises(ValueError, match=f"host and port: expected a free port, got 127.0.0.1:{port}"):
-        Viewing(shown, "127.0.0.1", port, framed=False)
+        ViewerServer(shown, "127.0.0.1", port, framed=False)

@@ -40,9 +40,9 @@ from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.scene import Scene
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer import app, session
-from renderer.viewer.exhibit import Exhibit, open_file
 from renderer.viewer.passes import Answer
 from renderer.viewer.session import SupersededError
+from renderer.viewer.shown import ShownScene, open_file
 from renderer.viewer.viewpoint import camera_of, camera_toml
 
 # Seconds for an answer that should come at once: what a machine with other work may take.
@@ -198,7 +198,7 @@ def left(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     seen: list[int] = []
     answer = session.answer
 
-    def watched(shown: Exhibit, view: Any, *rest: Any) -> Answer:
+    def watched(shown: ShownScene, view: Any, *rest: Any) -> Answer:
         try:
             return answer(shown, view, *rest)
         except SupersededError:
@@ -293,7 +293,7 @@ def test_a_jpeg_looks_like_the_picture(client: Client) -> None:
 
 
 def test_own_phong_is_a_colour_a_face_for_camera_and_light(client: Client, folder: Path) -> None:
-    world = open_file(folder / "blocks.toml").stage.world
+    world = open_file(folder / "blocks.toml").prepared.arrays
     (got,) = client.passes(client.view(mode="phong"))
     assert (got.kind, got.step, got.last) == (3, 0, 1)
     assert got.payload == face_colors(world, (0.5, 2.6, 5.5)).tobytes()
@@ -307,11 +307,11 @@ def test_own_phong_of_glass_and_mirrors_alone_is_lit(tmp_path: Path) -> None:
     text = text.replace("[materials.red]", '[materials.red]\ntype = "mirror"')
     (tmp_path / "a.toml").write_text(text.replace("[materials.stone]", '[materials.stone]\ntype = "mirror"'))
     shown = open_file(tmp_path / "a.toml")
-    assert not shown.stage.needs.shadows
-    colors = face_colors(shown.stage.world, (0.5, 2.6, 5.5))
+    assert not shown.prepared.needs.shadows
+    colors = face_colors(shown.prepared.arrays, (0.5, 2.6, 5.5))
     assert len(np.unique(colors, axis=0)) > 3  # ambient light alone would give each material one
     view = looking((0.5, 2.6, 5.5))
-    seen = shown.stage.picture(camera_of(view["m"], view["fovy"]), shown.scene.render, BOUNDED, 1)
+    seen = shown.prepared.picture(camera_of(view["m"], view["fovy"]), shown.scene.render, BOUNDED, 1)
     expected = rendered(shown.scene, resolution=(320, 240), max_depth=3)
     assert np.array_equal(seen.rays, expected.rays)  # no ray goes to those lights
 
@@ -522,7 +522,7 @@ def test_of_many_scenes_asked_for_the_newest_is_opened(folder: Path, monkeypatch
     opened: list[str] = []
     open_one = app.open_file
 
-    def counting(path: Path) -> Exhibit:
+    def counting(path: Path) -> ShownScene:
         opened.append(path.name)
         return open_one(path)
 
@@ -568,7 +568,7 @@ def test_a_click_tells_what_the_ray_meets(client: Client, folder: Path, x: int, 
     assert got["seq"] == 7 and got["hit"] == (face >= 0) and (got["face"] == face or face < 0)
     assert len(got["path"]) == image.rays[y, x] and got["path"][0]["kind"] == "camera"
     start, end = (np.array(got["path"][0][k]) for k in ("start", "end"))
-    opened = visited(shown.stage.octree, start, end - start)
+    opened = visited(shown.prepared.octree, start, end - start)
     assert got["visited"] == len(opened) and [n["level"] for n in got["nodes"]] == [n.level for n in opened]
     if face < 0:
         assert [got[k] for k in ("t", "face", "material", "point", "normal")] == [None] * 5
@@ -617,8 +617,8 @@ def test_the_scene_is_described(url: str, folder: Path) -> None:
     assert told["files"] == sorted(path.name for path in folder.glob("*.toml"))
     assert told["camera"] == json.loads(scene.camera.model_dump_json())
     assert told["render"] == {"resolution": [320, 240], "samples": 1, "max_depth": 3, "shadows": True}
-    assert (told["faces"], told["vertices"]) == (len(shown.stage.mesh.faces), len(shown.stage.mesh.vertices))
-    assert told["bounds"] == np.asarray(shown.stage.mesh.bounds).tolist()
+    assert (told["faces"], told["vertices"]) == (len(shown.prepared.mesh.faces), len(shown.prepared.mesh.vertices))
+    assert told["bounds"] == np.asarray(shown.prepared.mesh.bounds).tolist()
     assert {m["name"]: m["type"] for m in told["materials"]} == {
         "red": "phong",
         "glass": "dielectric",
@@ -627,14 +627,14 @@ def test_the_scene_is_described(url: str, folder: Path) -> None:
     stone = next(m for m in told["materials"] if m["name"] == "stone")
     assert stone["diffuse"] == [0.6] * 3 and stone["reflectance"] == [0.2] * 3 and stone["transmittance"] == [0.0] * 3
     assert told["lights"] == [{"type": "directional", "direction": [-0.6, -1.4, -0.8], "color": [0.8] * 3}]
-    assert told["octree"]["nodes"] == shown.stage.octree.stats.nodes
+    assert told["octree"]["nodes"] == shown.prepared.octree.stats.nodes
     assert told["modes"] == ["gl", "phong", "brute", "octree"] and told["threads"] == shown.threads
     assert set(told["needs"]) >= {"reflection", "refraction", "shadows"}
 
 
 def test_the_mesh_and_the_boxes_are_fetched(url: str, folder: Path) -> None:
     shown = open_file(folder / "blocks.toml")
-    mesh, raw = shown.stage.mesh, fetched(url, "mesh")
+    mesh, raw = shown.prepared.mesh, fetched(url, "mesh")
     magic, count = struct.unpack("<2I", raw[:8])
     assert magic == 0x4853454D and count == len(mesh.faces)
     assert len(raw) == 8 + 72 * count + 2 * count + count % 2 * 2
@@ -650,7 +650,7 @@ def test_the_mesh_and_the_boxes_are_fetched(url: str, folder: Path) -> None:
         raw = fetched(url, f"octree?level={level}")
         n, levels = struct.unpack("<2I", raw[:8])
         boxes = np.frombuffer(raw, "<f4", offset=8).reshape(-1, 6)
-        assert np.array_equal(boxes, boxes_at(shown.stage.octree, level)) and n == len(boxes) >= 1 and levels > 2
+        assert np.array_equal(boxes, boxes_at(shown.prepared.octree, level)) and n == len(boxes) >= 1 and levels > 2
 
 
 # How it is started and ends

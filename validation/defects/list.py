@@ -81,7 +81,7 @@ HITS = (
             "_fit_nodes(nodes, links)", "pass"),
     _python("hits", "stale triangles after a refit", "refit_tree",
             "fill_blocks(vertices, faces, tree.faces, threads)", "tree.blocks"),
-    _kernel("hits", "any hit forgets what is near", "traverse._write",
+    _kernel("hits", "any hit forgets what is near", "write_hit",
             "put(found.hit, i, hit)", "put(found.hit, i, hit and t > 1.0)"),
     _kernel("hits", "a packet of any hits drops what waits beyond eight octants", "trace_packet",
             "limit = _most(floats, LIMIT)",
@@ -91,7 +91,8 @@ HITS = (
             "(code & (MAX_LEAF_BLOCKS - 1)) + 1",
             "np.int64((code & (MAX_LEAF_BLOCKS - 1)) == 0) + (code & (MAX_LEAF_BLOCKS - 1))"),
     _kernel("hits", "single rays are an ulp too far", "trace_few",
-            "t / tree.scale + 0.0", "t / tree.scale * (1.0 + 2.0**-52)"),
+            "best = search_singly(tree, ray, limit, stack)",
+            "t, face, u, v, w = search_singly(tree, ray, limit, stack)\nbest = t * (1.0 + 2.0**-52), face, u, v, w"),
     _python("hits", "bad rays are let through", "_run",
             "if bad:\n"
             "    _reject(rays, min(bad), tree.scale)",
@@ -148,8 +149,8 @@ PICTURES = (
     _python("pictures", "rays end below a weight of 0.05", "kernel_settings_of",
             "chosen.min_weight", "max(0.05, chosen.min_weight)"),
     _python("pictures", "offset 1e-2", "_offset",
-            'BOUNDED if offset == "bounded" else MITSUBA_EPSILON',
-            '0.01 if offset == "bounded" else MITSUBA_EPSILON'),
+            'BOUNDED if offset == "bounded" else OffsetRule(False, MITSUBA_EPSILON)',
+            'OffsetRule(False, 0.01) if offset == "bounded" else OffsetRule(False, MITSUBA_EPSILON)'),
     _python("pictures", "sRGB applied twice", "image._encoded",
             "return (encoded * 255.0 + 0.5).astype(np.uint8)",
             "encoded = 1.055 * encoded ** (1.0 / 2.4) - 0.055\n"
@@ -172,7 +173,7 @@ PICTURES = (
     _python("pictures", "the last pixel of a tile 1 % brighter", "PreparedScene.picture",
             *_before(_IMAGE, "film.radiance[TILE - 1::TILE, TILE - 1::TILE] *= 1.01")),
     _python("pictures", "a fixed offset 100 times too long", "_offset",
-            "return float(offset)", "return 100.0 * float(offset)"),
+            "OffsetRule(False, float(offset))", "OffsetRule(False, 100.0 * float(offset))"),
     _python("pictures", "depth along the view axis", "PreparedScene.picture",
             *_before(_IMAGE, "from renderer.scene.camera import primary_rays\n"
                              "cosines = primary_rays(camera, width, height)[1] @ camera.frame()[2]\n"

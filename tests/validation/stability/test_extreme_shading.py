@@ -23,6 +23,7 @@ from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import SceneObject
 from renderer.shade.shading import reflect, refract
+from renderer.trace.spawn import OffsetRule
 from validation.defects.syntax import find_place, replaced
 from validation.stability.cases.case import ExtremeCase
 from validation.stability.cases.refraction import critical_angle, nested_radiance, snell_residual, steep_indices
@@ -48,11 +49,11 @@ class TestJudgesFindABrokenOffset:
 
     def test_fixed_offset_jumps_through_a_small_ball(self) -> None:
         assert wrong_pixels(1e-6, 8, offset=1e-4) > 0 and wrong_pixels(1e-6, 8) == 0
-        assert self_hits(ball(1e-6), 10, offset=1e-4)[0] > 0
+        assert self_hits(ball(1e-6), 10, OffsetRule(False, 1e-4))[0] > 0
 
     def test_no_offset_meets_the_same_ball_again(self) -> None:
         for scale in (1e-6, 1.0, 1e6):
-            wrong, rays = self_hits(ball(scale), 100, offset=0.0)
+            wrong, rays = self_hits(ball(scale), 100, OffsetRule(False, 0.0))
             assert wrong > rays / 10
         assert wrong_pixels(1.0, 16, offset=0.0) > 0
 
@@ -284,7 +285,7 @@ def test_light_that_overflows_makes_no_nan(diffuse: Any, intensity: float) -> No
 
 
 def test_reflection_keeps_its_length_at_any_angle() -> None:
-    """A hall of mirrors at 64 bounces multiplies any drift of the direction's length."""
+    """A host of mirrors at 64 bounces multiplies any drift of the direction's length."""
     d: Vector = (0.6, -0.8, 0.0)
     for i in range(1000):
         angle = 0.1 * i

@@ -1,4 +1,4 @@
-"""``python -m validation.benchmark.measures.compiling``: where the time of compiling goes, by stage and by kernel.
+"""``python -m validation.benchmark.measures.compiling``: where the time of compiling goes, by prepared and by kernel.
 
 Compiles what ``octree-render compile --queries`` or ``--pictures`` does, into an empty folder, with clocks around
 Numba's passes and LLVM. Times are wall seconds of one thread, those of callees not included.
@@ -39,7 +39,7 @@ class _Clocks:
 
 
 def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
-    """Seconds by stage and by kernel, and in all, of compiling ``what``; for a process that has compiled nothing."""
+    """Seconds by prepared and by kernel, and in all, of compiling ``what``; for a process that has compiled nothing."""
     from numba.core import compiler_machinery, lowering
 
     from renderer.kernels import compiler
@@ -55,8 +55,8 @@ def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
         (lowering.BaseLower, "lower_normal_function", "write LLVM's instructions"),
         (compiler._PieceLibrary, "add_ir_module", "print and parse them"),
     )
-    for owner, method, stage in clocked:
-        setattr(owner, method, stages.around(lambda *a, stage=stage: stage, getattr(owner, method)))
+    for owner, method, prepared in clocked:
+        setattr(owner, method, stages.around(lambda *a, prepared=prepared: prepared, getattr(owner, method)))
     with tempfile.TemporaryDirectory() as folder:
         compile_into(Path(folder))
         began = time.perf_counter()

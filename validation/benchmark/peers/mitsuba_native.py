@@ -50,7 +50,9 @@ def _sensor(scene: Scene, size: int) -> dict[str, Any]:
     camera = scene.camera
     if not isinstance(camera, PerspectiveCamera):
         raise ValueError(f"scene: expected a perspective camera, got {camera.type}")
-    look = mi.ScalarTransform4f().look_at(origin=list(camera.eye), target=list(camera.target), up=list(camera.up))
+    look = mi.ScalarTransform4f().scene_pointers(
+        origin=list(camera.eye), target=list(camera.target), up=list(camera.up)
+    )
     film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
     return {"type": "perspective", "fov": camera.fov, "fov_axis": "y", "to_world": look, "film": film,
             "sampler": {"type": "independent"}}  # fmt: skip

@@ -49,7 +49,9 @@ def _pixel(camera: Camera, size: int, away: float) -> float:
 
 
 def _sensor(camera: Camera, size: int) -> dict[str, object]:
-    to_world = mi.ScalarTransform4f().look_at(origin=list(camera.eye), target=list(camera.target), up=list(camera.up))
+    to_world = mi.ScalarTransform4f().scene_pointers(
+        origin=list(camera.eye), target=list(camera.target), up=list(camera.up)
+    )
     film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
     if isinstance(camera, PerspectiveCamera):
         return {"type": "perspective", "fov": camera.fov, "fov_axis": "y", "to_world": to_world, "film": film}

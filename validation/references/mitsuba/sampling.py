@@ -40,7 +40,7 @@ class Film:
             raise ValueError(f"scene: expected diffuse surfaces and mirrors in perspective, got {fault}")
         self._scene, self._size = scene, size
         # Each with the edges of its longest path beyond the bounces: to what is seen, and from there to the light.
-        self._passes = [(self._lit(index), 2) for index in range(len(scene.lights))]
+        self._passes = [(self._hit_segments(index), 2) for index in range(len(scene.lights))]
         if any(scene.background):
             dark = source.meshes(scene, [_bsdf(scene, i.material, lit=False) for i in scene.instances])
             self._passes.append((source.assemble(dark, [source.background(scene.background)]), 1))
@@ -60,7 +60,7 @@ class Film:
             picture += np.array(made, dtype=np.float64)[..., :3]
         return picture
 
-    def _lit(self, index: int) -> mi.Scene:
+    def _hit_segments(self, index: int) -> mi.Scene:
         shapes = source.meshes(self._scene, [_bsdf(self._scene, i.material, lit=True) for i in self._scene.instances])
         return source.assemble(shapes, [source.emitter(self._scene.lights[index], 1.0 / _FADED)])
 
@@ -72,7 +72,7 @@ class Film:
             sampling = {"type": "stratified", "jitter": sampler == "stratified", "sample_count": samples}
         film = {"type": "hdrfilm", "width": self._size, "height": self._size, "rfilter": {"type": "box"}}
         film |= {"pixel_format": "rgb", "component_format": "float32"}
-        to_world = mi.ScalarTransform4f().look_at(
+        to_world = mi.ScalarTransform4f().scene_pointers(
             origin=list(camera.eye), target=list(camera.target), up=list(camera.up)
         )
         return {"type": "perspective", "fov": camera.fov, "fov_axis": "y", "to_world": to_world, "near_clip": 1e-3,

@@ -12,7 +12,7 @@ from renderer.mesh.shapes import icosphere
 from renderer.scene.light import DirectionalLight
 from renderer.scene.material import Phong
 from renderer.shade.shading import reflect, refract
-from renderer.trace.spawn import BOUNDED, offset_distance, spawn_origin
+from renderer.trace.spawn import BOUNDED, OffsetRule, offset_distance, spawn_origin
 from validation.references.mitsuba.whitted import whitted
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.scenes import (
@@ -49,7 +49,7 @@ def _prism(sides: int = 512, half: float = 500.0) -> Mesh:
     return Mesh(np.concatenate(ends), np.concatenate(walls + caps).astype(np.int32))
 
 
-def self_hits(mesh: Mesh, count: int, offset: float = BOUNDED) -> tuple[int, int]:
+def self_hits(mesh: Mesh, count: int, offset: OffsetRule = BOUNDED) -> tuple[int, int]:
     """Rays that ``count`` hits from outside and ``count`` from inside of a convex mesh spawn: (wrong ones, all).
 
     A ray spawned outwards must meet nothing, one spawned inwards must leave through a face that looks its way. Asked

@@ -16,7 +16,7 @@ _NEAR = 1e-8
 
 def split_side(beside: float) -> Mesh:
     """A tetrahedron whose slanted side has a corner more on one of its faces; the thin face [1, 3, 4] joins both."""
-    corners = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4], [1, beside, 3.0]]
+    corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0], [1.0, beside, 3.0]]
     return Mesh(corners, [[0, 2, 1], [0, 3, 2], [1, 2, 3], [0, 1, 4], [0, 4, 3], [1, 3, 4]])
 
 

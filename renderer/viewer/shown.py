@@ -18,16 +18,16 @@ from renderer.viewer.protocol import ViewSettings
 
 
 @dataclass(frozen=True, eq=False)
-class Exhibit:
+class ShownScene:
     """What the page shows.
 
     path   the scene file, or None for a scene made in Python
-    stage  the scene over its octree, ready for any number of bounces
+    prepared  the scene over its octree, ready for any number of bounces
     """
 
     scene: Scene
     path: Path | None
-    stage: PreparedScene
+    prepared: PreparedScene
     threads: int
 
     @property
@@ -49,37 +49,39 @@ class Exhibit:
     @cached_property
     def brute(self) -> PreparedScene:
         """The same scene with every ray tested against every face."""
-        octree = build_octree(self.stage.mesh, "brute", "midpoint", self.stage.needs, self.threads)
-        return replace(self.stage, octree=octree, tree=tree_for(octree, self.stage.needs))
+        octree = build_octree(self.prepared.mesh, "brute", "midpoint", self.prepared.needs, self.threads)
+        return replace(self.prepared, octree=octree, tree=tree_for(octree, self.prepared.needs))
 
 
-def prepare(scene: Scene, path: Path | None = None) -> Exhibit:
+def prepare(scene: Scene, path: Path | None = None) -> ShownScene:
     """Make ``scene`` ready and its kernels warm. Raises ``ValueError`` for a scene that cannot be shown."""
     expect(any(len(i.mesh.faces) for i in scene.instances), "scene", "at least one face", "none")
     # One bounce stands for any number of them: a panel may ask for more than the file does.
     threads, needs = available_threads(), needs_of(scene, max_depth=max(1, scene.render.max_depth))
-    stage = prepare_scene(scene, needs, "octree", "midpoint", threads)
+    prepared = prepare_scene(scene, needs, "octree", "midpoint", threads)
     # Mirrors and glass need no lights, and a scene of them alone has none packed; their colours a face do.
-    stage = replace(stage, world=stage.world._replace(lights=light_rows(scene, replace(stage.needs, shadows=True))))
+    prepared = replace(
+        prepared, arrays=prepared.arrays._replace(lights=light_rows(scene, replace(prepared.needs, shadows=True)))
+    )
     # The first call of a kernel loads or compiles it, which the first picture should not wait for.
     few = {"resolution": (8, 8), "samples": 1, "max_rays": 1}
-    stage.picture(scene.camera, scene.render.model_copy(update=few), BOUNDED, threads)
-    touch_viewing(stage)
-    return Exhibit(scene, path, stage, threads)
+    prepared.picture(scene.camera, scene.render.model_copy(update=few), BOUNDED, threads)
+    touch_viewing(prepared)
+    return ShownScene(scene, path, prepared, threads)
 
 
-def open_file(path: Path) -> Exhibit:
+def open_file(path: Path) -> ShownScene:
     """Load a scene file and make it ready. Raises ``ValueError``, which ``SceneError`` is, naming file and fault."""
     return prepare(load_scene(path), path)
 
 
-def varied(stage: PreparedScene, settings: ViewSettings) -> PreparedScene:
-    """``stage`` without what ``settings`` switch off and with its first directional light turned; no tree is rebuilt.
+def varied(prepared: PreparedScene, settings: ViewSettings) -> PreparedScene:
+    """``prepared`` without what ``settings`` switch off, its first directional light turned; no tree is rebuilt.
 
     Lights that are dark do not count, and without a directional light none is turned.
     """
-    materials, lights = stage.world.materials.copy(), stage.world.lights.copy()
-    needs, media = stage.needs, stage.world.media
+    materials, lights = prepared.arrays.materials.copy(), prepared.arrays.lights.copy()
+    needs, media = prepared.needs, prepared.arrays.media
     if not settings.reflection:
         materials[:, REFLECTANCE : REFLECTANCE + 3] = 0.0
         needs = replace(needs, reflection=False)
@@ -89,7 +91,9 @@ def varied(stage: PreparedScene, settings: ViewSettings) -> PreparedScene:
     sunny = (lights[:, 0] == DIRECTIONAL).nonzero()[0]
     if settings.light is not None and len(sunny):
         lights[sunny[0], 1:4] = -unit(settings.light)
-    return replace(stage, needs=needs, world=stage.world._replace(materials=materials, lights=lights, media=media))
+    return replace(
+        prepared, needs=needs, arrays=prepared.arrays._replace(materials=materials, lights=lights, media=media)
+    )
 
 
 # Rays a pixel of a first picture, of 16,384 pixels: a second of tracing at the most.

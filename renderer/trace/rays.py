@@ -1,0 +1,120 @@
+"""A batch of rays and their hits as kernels read and write them, and which rays are in range."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import (
+    address,
+    at,
+    bool_pointer,
+    float64_pointer,
+    get,
+    int64_pointer,
+    larger,
+    pointer,
+    put,
+    smaller,
+)
+from renderer.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.trace.intersect import Ray
+from renderer.trace.leaf import NO_FACE
+
+_MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
+_BYTES = 8
+# Rows of the array that closest hits are written to.
+HIT_ROWS = 4
+
+
+class RayPointers(NamedTuple):
+    """Pointers to rows of origins and directions, and to t_min and t_max.
+
+    All but the directions have a step from one ray to the next, 0 where all share one. ``scale`` is the tree's, a power
+    of two, so t goes in and out of its units exactly.
+    """
+
+    origins: Any
+    directions: Any
+    t_min: Any
+    t_max: Any
+    origin_step: int
+    min_step: int
+    max_step: int
+    scale: float
+
+
+class HitPointers(NamedTuple):
+    """Pointers to what is written: t, face, u and v as ``Hits`` has them, or for any hits only ``hit``, a bool."""
+
+    t: Any
+    face: Any
+    u: Any
+    v: Any
+    hit: Any
+
+
+@inlined
+def ray_pointers(rays, scale):
+    """``RayPointers`` of a batch (origins, directions, t_min, t_max); all but directions may have one row for all."""
+    origins, directions, t_min, t_max = rays
+    return RayPointers(
+        pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
+        3 * np.int64(len(origins) > 1), np.int64(len(t_min) > 1), np.int64(len(t_max) > 1), scale,
+    )  # fmt: skip
+
+
+@inlined
+def hit_pointers(out, count):
+    """``HitPointers`` into the memory of ``out``: rows t, u, v and face of ``count`` values, or ``count`` bools."""
+    first, row = address(out), _BYTES * count
+    return HitPointers(
+        float64_pointer(first), int64_pointer(first + 3 * row), float64_pointer(first + row),
+        float64_pointer(first + 2 * row), bool_pointer(first),
+    )  # fmt: skip
+
+
+@kernel
+def first_bad_ray(rays, begin, end):
+    """Row of the first ray of a range that is out of bounds, or -1. NaN fails every comparison, so it is too.
+
+    In range: components of ``scale`` times the origin up to FARTHEST, the largest component of the direction from
+    SHORTEST to LONGEST.
+    """
+    for i in range(begin, end):
+        far, largest, odd = 0.0, 0.0, 0.0
+        for k in range(3):
+            o, d = get(rays.origins, i * rays.origin_step + k), get(rays.directions, 3 * i + k)
+            far, largest = larger(far, abs(o)), larger(largest, abs(d))
+            # A NaN is never larger, but x - x is NaN for NaN and inf, and 0 otherwise.
+            odd += (o - o) + (d - d)
+        if not (odd == 0.0 and far * rays.scale <= FARTHEST and SHORTEST <= largest <= LONGEST):
+            return i
+    return -1
+
+
+@inlined
+def ray_at(rays, i):
+    """Ray ``i`` in the tree's units, and its t_max."""
+    o, d, s = at(rays.origins, i * rays.origin_step), at(rays.directions, 3 * i), rays.scale
+    least = get(rays.t_min, i * rays.min_step)
+    # Above 0 it stays so, that a hit at the start is still too near.
+    t_min = larger(s * least, _TINIEST) if least > 0.0 else least
+    ray = Ray(s * get(o, 0), s * get(o, 1), s * get(o, 2), get(d, 0), get(d, 1), get(d, 2), t_min)
+    # A hit beyond the largest number, in either unit, is none.
+    return ray, smaller(s * smaller(get(rays.t_max, i * rays.max_step), _MOST), _MOST)
+
+
+@inlined
+def write_hit(found, i, scale, best, any_hit):
+    """Write the best hit (t, face, u, v, w) of ray ``i``, or with ``any_hit`` only whether there is one."""
+    t, face, u, v, w = best
+    hit = face != NO_FACE
+    if any_hit:
+        put(found.hit, i, hit)
+        return
+    # No t, u or v is -0.0.
+    put(found.t, i, t / scale + 0.0 if hit else np.inf)
+    put(found.face, i, np.int64(face if hit else -1))
+    put(found.u, i, u / w + 0.0 if hit else np.nan)
+    put(found.v, i, v / w + 0.0 if hit else np.nan)
