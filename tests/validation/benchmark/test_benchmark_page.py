@@ -57,7 +57,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(knobs, "run", lambda *_: None)
         row = {"systems": {OURS: {"rest": 100, "peak": 200, "own": 90}}}
         patch.setattr(memory, "measure", lambda mesh, *_: row | {"mesh": mesh.name, "faces": len(mesh.faces)})
-        patch.setitem(systems._PEERS, "nobody", "pip install nobody")
+        patch.setitem(systems._PEERS, "nobody", ("nobody", "pip install nobody"))
         arguments = ["--quick", "--mesh", str(folder / "own.ply"), "--output", str(folder)]
         assert command.main(arguments) == 0
     return folder
