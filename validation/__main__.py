@@ -1,6 +1,6 @@
 """``octree-validate``: judge hits and pictures, write the report, exit 1 when a gate fails.
 
-``python -m validation`` is the same, for a checkout: it takes a folder ``validation`` of the current folder first.
+``python -m validation`` does the same in a checkout: Python prefers a folder ``validation`` in the current folder.
 
 Exit codes:
   0    every gate holds
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @interruptible("validation: interrupted, no report written")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do what the arguments ask for; returns the exit code."""
+    """Run the command line; returns the exit code."""
     parser = _parser()
     options = parser.parse_args(arguments)
     _check(parser, options)
@@ -77,7 +77,7 @@ def _sections(text: str) -> tuple[str, ...]:
 
 
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """End with exit code 2 where arguments are missing or at odds."""
+    """Exit with code 2 where arguments are missing or contradict each other."""
     check_output(parser, options)
     kinds = {kind for kind in ("scene", "mesh") if getattr(options, kind)}
     if options.defects or options.write_baseline:
@@ -94,22 +94,22 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
 
 
 def _run(options: argparse.Namespace, command: str) -> int:
-    # Imported here so that --help and wrong arguments answer at once, and a missing reference becomes one line.
+    # Imported here: --help and argument errors need no heavy import, and a missing reference becomes a one-line error.
     from validation import suite
 
     if options.write_baseline:
         print(f"validation: wrote {suite.write_baseline(options.output)}")
         return 0
-    asked = suite.Request(
+    request = suite.Request(
         command, options.quick, options.only, options.output, options.gate, tuple(options.scene), tuple(options.mesh)
     )
     if options.defects:
-        return _defects_verdict(suite.run_defects(asked), asked)
-    return _verdict(suite.run(asked), asked)
+        return _defects_verdict(suite.run_defects(request), request)
+    return _verdict(suite.run(request), request)
 
 
-def _verdict(metrics: Mapping[str, Any], asked: "Request") -> int:
-    """Print the failing gates and the summary in one line; returns the exit code."""
+def _verdict(metrics: Mapping[str, Any], request: "Request") -> int:
+    """Print the failing gates and a one-line summary; returns the exit code."""
     _print_failures(metrics["gates"])
     passed, gates, failed = (metrics["verdict"][key] for key in ("passed", "gates", "failed"))
     count = f"{gates - failed} of {gates} gates" if gates else "nothing judged"
@@ -117,17 +117,17 @@ def _verdict(metrics: Mapping[str, Any], asked: "Request") -> int:
     if "absent" not in metrics["baseline"]:
         better, worse = (len(metrics["baseline"][key]) for key in ("better", "worse"))
         against = f"; better {better}, worse {worse} than baseline"
-    state, page = "PASS" if passed else "FAIL", asked.output / "index.html"
+    state, page = "PASS" if passed else "FAIL", request.output / "index.html"
     print(f"validation: {state}, {count} in {metrics['seconds']:.0f} s{against}; see {page}")
     return 0 if passed else 1
 
 
-def _defects_verdict(gates: Sequence["Gate"], asked: "Request") -> int:
-    """The same for a run of the seeded defects, whose gates are the defects."""
+def _defects_verdict(gates: Sequence["Gate"], request: "Request") -> int:
+    """As ``_verdict``, for the gates of a run of the seeded defects."""
     _print_failures([gate.record() for gate in gates])
     held = sum(gate.passed for gate in gates)
     state = "PASS" if gates and held == len(gates) else "FAIL"
-    stored = asked.output / "defects.json"
+    stored = request.output / "defects.json"
     print(f"validation: {state}, {held} of {len(gates)} gates on seeded defects; see {stored}")
     return int(state == "FAIL")
 

@@ -1,4 +1,4 @@
-"""Where and with what a run was made, so that a reader can make it again."""
+"""The environment of a run: versions, processor and a digest of the sources, so that a reader can repeat it."""
 
 import hashlib
 import os

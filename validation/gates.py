@@ -1,4 +1,4 @@
-"""Gates: a measured value, its threshold, and why the threshold stands where it does."""
+"""Gates: a measured value, its threshold and the reason for the threshold."""
 
 import math
 from dataclasses import asdict, dataclass
@@ -7,7 +7,7 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Gate:
-    """Passes when ``value`` is at most, or at least, ``threshold``; a nan never passes."""
+    """Passes when ``value`` is at most, or at least, ``threshold``; a NaN never passes."""
 
     section: str
     subject: str
@@ -19,16 +19,16 @@ class Gate:
 
     @property
     def passed(self) -> bool:
-        """Whether the value keeps to its side of the threshold, which belongs to that side."""
+        """Whether the value is on the passing side of the threshold; a value equal to the threshold passes."""
         return self.value <= self.threshold if self.bound == "at most" else self.value >= self.threshold
 
     @property
     def margin(self) -> float:
-        """How far the value is on the right side of the threshold; negative when it fails."""
+        """Distance from the value to the threshold, positive on the passing side and negative when the gate fails."""
         return self.threshold - self.value if self.bound == "at most" else self.value - self.threshold
 
     def record(self) -> dict[str, object]:
-        """For JSON, which has no nan: a value that is not a number is None."""
+        """The gate as a table for JSON. JSON has no NaN or infinity, so a value that is not finite becomes None."""
         finite = math.isfinite(self.value)
         numbers = {"value": self.value if finite else None, "margin": self.margin if finite else None}
         return asdict(self) | numbers | {"passed": self.passed}

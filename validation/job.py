@@ -1,4 +1,4 @@
-"""What one run of the suite is asked for, and where its sections say how far they are."""
+"""The job of one run: its options, thresholds and folder, and the callback by which sections report progress."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from validation.thresholds import Thresholds
 
 @dataclass(frozen=True)
 class Job:
-    """Given to every section.
+    """The input of every section.
 
     quick       fewer rays and smaller pictures
-    thresholds  where the gates stand
+    thresholds  the gates' thresholds
     folder      an existing folder for pictures
-    step        called with the name of each step as it begins; a section's ``steps(job)`` says how many there will be
-    scenes      scene files of a user, to be judged instead of the suite's own
-    meshes      mesh files of a user, to be judged instead of the suite's own
+    step        called with the name of each step as it begins; a section's ``steps(job)`` is the number of calls
+    scenes      a user's scene files, to be judged instead of the suite's own
+    meshes      a user's mesh files, to be judged instead of the suite's own
     """
 
     quick: bool
@@ -28,5 +28,5 @@ class Job:
 
     @property
     def own(self) -> bool:
-        """Whether the suite judges what it brings along, and not a user's files."""
+        """Whether the run judges the suite's own scenes and meshes and not a user's files."""
         return not (self.scenes or self.meshes)

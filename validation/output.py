@@ -1,4 +1,4 @@
-"""Where the suite and the benchmark write: ``reports`` in a checkout of this project, elsewhere only where asked to."""
+"""The output folder of suite and benchmark: ``reports`` in a checkout of this project; elsewhere it must be given."""
 
 import argparse
 from pathlib import Path
@@ -13,7 +13,7 @@ def add_output(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def check_output(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Fill the option in, or end with exit code 2 where nobody asked for files in this folder."""
+    """Set the default of ``--output`` in a checkout; elsewhere exit with code 2 if the option is missing."""
     if options.output is None:
         if Path.cwd().resolve() != _CHECKOUT:
             parser.error("--output: expected a folder, as this one is no checkout of octree-renderer, got none")

@@ -1,4 +1,4 @@
-"""Where a run is: a bar on a terminal, a line for each step elsewhere."""
+"""Progress of a run: a bar on a terminal, a line for each step elsewhere."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -9,11 +9,11 @@ from renderer.process.terminal import on_terminal
 
 @contextmanager
 def steps(total: int | None = None) -> Iterator[Callable[[str], None]]:
-    """Yields a function to be called with the name of each step as it begins, ``total`` times if that is known.
+    """Yields a function to be called with the name of each step as it begins, ``total`` times where that is known.
 
-    A terminal shows a bar that fills as steps end, the time elapsed and the name of the step under way.
+    On a terminal a bar fills as steps end, with the elapsed time and the name of the current step.
     """
-    from tqdm import tqdm  # here, because --help need not wait for it
+    from tqdm import tqdm  # imported here, so that --help does not wait for it
 
     if on_terminal():
         shape = "{bar:24} {n}/{total}  {elapsed}  {desc}" if total else "{n} steps, {elapsed}  {desc}"
@@ -37,7 +37,7 @@ def steps(total: int | None = None) -> Iterator[Callable[[str], None]]:
 
 
 def _lines(total: int | None) -> Callable[[str], None]:
-    """Print each step with its number and the seconds since the first began."""
+    """A function that prints each step with its number and the seconds since the start."""
     began, number = time.perf_counter(), 0
 
     def step(name: str) -> None:

@@ -1,4 +1,4 @@
-"""The scenes that are checked, and where they lie."""
+"""The suite's own scenes and their files."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ SCENES = Path(__file__).resolve().parent.parent / "scenes"
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file, what it is there to show, and whether it has something for every rung of the ladder."""
+    """A scene file, what it tests, and whether every rung of the ladder adds something to it."""
 
     name: str
     shows: str

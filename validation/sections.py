@@ -1,4 +1,4 @@
-"""The sections of the suite: their names, the modules behind them, and which of them a run asks for."""
+"""The sections of the suite: their names and modules, and the choice of those that a run executes."""
 
 from collections.abc import Collection
 from typing import Literal, NamedTuple
@@ -7,7 +7,8 @@ from typing import Literal, NamedTuple
 class Section(NamedTuple):
     """A section's module has ``steps(job) -> int`` and ``run(job) -> (record, gates)``.
 
-    ``judges`` names what of a user's it can judge, if anything: files given by ``--scene`` or by ``--mesh``.
+    ``judges`` is the kind of user file that the section can judge, given by ``--scene`` or ``--mesh``; None for
+    neither.
     """
 
     name: str
@@ -15,7 +16,7 @@ class Section(NamedTuple):
     judges: Literal["scene", "mesh"] | None = None
 
 
-# In the order of the report.
+# In the report's order.
 SECTIONS = (
     Section("images", "validation.pictures.section", "scene"),
     Section("hits", "validation.hits.section", "mesh"),
@@ -28,8 +29,8 @@ NAMES = tuple(section.name for section in SECTIONS)
 def choose(only: Collection[str], given: Collection[str]) -> tuple[list[Section], dict[str, str]]:
     """The sections that run, and why each of the others does not.
 
-    ``only`` holds names of sections; ``given`` the kinds of a user's files, "scene" or "mesh", nothing where the suite
-    judges its own.
+    ``only`` holds names of sections; ``given`` holds the kinds of a user's files, "scene" or "mesh", and is empty where
+    the suite judges its own.
     """
     reasons = {section.name: _reason(section, only, given) for section in SECTIONS}
     left_out = {name: reason for name, reason in reasons.items() if reason}

@@ -1,4 +1,4 @@
-"""One run of the suite: its sections in turn, then everything that was found as metrics, page and JUnit file."""
+"""One run of the suite: it runs the sections in turn, then writes metrics, page and JUnit file."""
 
 import json
 import shutil
@@ -18,8 +18,7 @@ from validation import environment
 from validation.gates import Gate
 from validation.job import Job
 from validation.progress import steps
-from validation.report import baseline, junit, schema, summary
-from validation.report import page as report
+from validation.report import baseline, junit, page, schema, summary
 from validation.scenes import SCENES
 from validation.sections import Section, choose
 from validation.thresholds import Thresholds, load_thresholds
@@ -27,7 +26,7 @@ from validation.thresholds import Thresholds, load_thresholds
 
 @dataclass(frozen=True)
 class Request:
-    """What the command line asks for; ``gate`` is a file of thresholds or None for the suite's own."""
+    """The options of a run; ``gate`` is a file of thresholds, or None for the suite's own."""
 
     command: str
     quick: bool
@@ -38,56 +37,61 @@ class Request:
     meshes: tuple[Path, ...] = ()
 
 
-def run(asked: Request) -> dict[str, Any]:
-    """Run the sections, write the report into ``asked.output`` and return the metrics.
+def run(request: Request) -> dict[str, Any]:
+    """Run the sections, write the report into ``request.output`` and return the metrics.
 
-    What stood in that folder stays as it is until everything new is complete. Raises ``ValueError`` and ``OSError`` for
-    files of the user's that are no good, before any section runs, and ``ImportError`` where a reference is missing.
+    Old files in that folder stay unchanged until all new ones are complete. Raises ``ValueError`` and ``OSError`` for
+    invalid user files, before any section runs, and ``ImportError`` where a reference is missing.
     """
+    # Read all input before any section runs.
     began, started = time.perf_counter(), datetime.now(UTC)
-    thresholds = Thresholds() if asked.gate is None else load_thresholds(asked.gate)
-    _open(asked)
-    given = {kind for kind, files in (("scene", asked.scenes), ("mesh", asked.meshes)) if files}
-    chosen, left_out = choose(asked.only, given)
-    stored_baseline = baseline.read(asked.output / "baseline.json")
-    asked.output.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=asked.output, prefix=".run-") as folder:
+    thresholds = Thresholds() if request.gate is None else load_thresholds(request.gate)
+    _open(request)
+    given = {kind for kind, files in (("scene", request.scenes), ("mesh", request.meshes)) if files}
+    chosen, left_out = choose(request.only, given)
+    stored_baseline = baseline.read(request.output / "baseline.json")
+
+    # Run the sections, with pictures in a temporary folder.
+    request.output.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=request.output, prefix=".run-") as folder:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()
-        job = Job(asked.quick, thresholds, pictures, lambda _: None, asked.scenes, asked.meshes)
+        job = Job(request.quick, thresholds, pictures, lambda _: None, request.scenes, request.meshes)
         records, gates = _sections(chosen, job)
+
+        # Collect the metrics and write the report.
         metrics = {
             "schema": schema.VERSION,
-            "command": asked.command,
-            "quick": asked.quick,
+            "command": request.command,
+            "quick": request.quick,
             "own": job.own,
             "started": started.isoformat(timespec="seconds"),
-            "thresholds": {"file": asked.gate and str(asked.gate), "moved": thresholds.moved()},
+            "thresholds": {"file": request.gate and str(request.gate), "moved": thresholds.moved()},
             "left_out": left_out,
             "environment": environment.describe(),
             **records,
         }
-        metrics |= _outcome(records, [gate.record() for gate in gates], stored_defects(asked.output))
+        metrics |= _outcome(records, [gate.record() for gate in gates], stored_defects(request.output))
         metrics["baseline"] = baseline.compare(metrics, stored_baseline)
         metrics["seconds"] = time.perf_counter() - began
-        write(metrics, asked.output, pictures)
+        write(metrics, request.output, pictures)
     return metrics
 
 
-def _open(asked: Request) -> None:
-    """Read every file that the user gave, so that a bad one is an error now and not minutes later."""
-    if not (asked.scenes or asked.meshes or SCENES.is_dir()):
+def _open(request: Request) -> None:
+    """Read every user file first, so that an invalid one is an error at once and not minutes later."""
+    if not (request.scenes or request.meshes or SCENES.is_dir()):
         raise ValueError(
             f"expected --scene or --mesh, or the suite's own scenes in {SCENES}, which only a checkout has; got none"
         )
-    for scene in asked.scenes:
+    for scene in request.scenes:
         _ = load_scene(scene).instances
-    for mesh in asked.meshes:
+    for mesh in request.meshes:
         load_mesh(mesh)
 
 
 def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, Any]], list[Gate]]:
-    """Run each section with one progress bar over all; the references that a section needs are imported with it."""
+    """Run the sections with one progress bar for all; each section's references are imported with its module."""
     modules: dict[str, Any] = {section.name: import_module(section.module) for section in chosen}
     records: dict[str, dict[str, Any]] = {}
     gates: list[Gate] = []
@@ -96,7 +100,7 @@ def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, 
             began = time.perf_counter()
             record, found = module.run(replace(job, step=step))
             record |= {"seconds": time.perf_counter() - began}
-            # Here, because at the end of the run nobody would know which section it was.
+            # Checked here, because the end of the run could not name the section at fault.
             try:
                 json.dumps(record, allow_nan=False)
             except (TypeError, ValueError) as error:
@@ -116,10 +120,10 @@ def _outcome(
 
 
 def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
-    """Write metrics, page and JUnit file into ``output``, and move the folder ``pictures`` there instead of the old."""
+    """Write metrics, page and JUnit file into ``output``; the folder ``pictures`` replaces the old one there."""
     texts = {
         "metrics.json": schema.text(metrics),
-        "index.html": report.page(metrics, pictures).encode(),
+        "index.html": page.page(metrics, pictures).encode(),
         "junit.xml": junit.document(metrics),
     }
     kept = output / "pictures"
@@ -130,35 +134,35 @@ def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
         _write(output / name, text)
 
 
-def run_defects(asked: Request) -> list[Gate]:
-    """Inject the seeded defects, store what was found as ``defects.json`` and return the gates.
+def run_defects(request: Request) -> list[Gate]:
+    """Inject the seeded defects, store the results as ``defects.json`` and return the gates.
 
-    A report that lies in the same folder is drawn again with it.
+    A report in the same folder is drawn again with these results.
     """
     from validation.defects import run as defects
     from validation.defects.list import DEFECTS
 
     began, started = time.perf_counter(), datetime.now(UTC)
     sources = environment.sources_sha256()
-    chosen = [d for d in DEFECTS if not (asked.quick and d.kernel)]
-    asked.output.mkdir(parents=True, exist_ok=True)
+    chosen = [d for d in DEFECTS if not (request.quick and d.kernel)]
+    request.output.mkdir(parents=True, exist_ok=True)
     with steps(len(chosen) + 1) as step:
-        record, gates = defects.run(asked.quick, step)
+        record, gates = defects.run(request.quick, step)
     record |= {
         "sources": sources,
-        "quick": asked.quick,
-        "command": asked.command,
+        "quick": request.quick,
+        "command": request.command,
         "started": started.isoformat(timespec="seconds"),
         "seconds": time.perf_counter() - began,
     }
     text = json.dumps(record, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-    _write(asked.output / "defects.json", text.encode())
-    _draw_again(asked.output)
+    _write(request.output / "defects.json", text.encode())
+    _draw_again(request.output)
     return gates
 
 
 def _draw_again(output: Path) -> None:
-    """Put the stored defects into the report that lies in ``output``, if one of this schema does."""
+    """Draw the report in ``output`` again with the stored defects, if there is one of this schema."""
     try:
         metrics = schema.read(output / "metrics.json")
     except (ValueError, OSError):
@@ -168,7 +172,7 @@ def _draw_again(output: Path) -> None:
 
 
 def stored_defects(output: Path) -> dict[str, Any] | None:
-    """The last ``defects.json`` with ``changed``, whether the sources are others since; None where there is none."""
+    """The last ``defects.json``, None without one; its ``changed`` says whether the sources have changed since."""
     try:
         record = json.loads((output / "defects.json").read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -181,7 +185,7 @@ def stored_defects(output: Path) -> dict[str, Any] | None:
 
 
 def write_baseline(output: Path) -> Path:
-    """Make ``baseline.json`` from the ``metrics.json`` beside it; see ``baseline.summary`` for what is refused."""
+    """Make ``baseline.json`` from the ``metrics.json`` beside it; ``baseline.summary`` says what is refused."""
     text = baseline.text(schema.read(output / "metrics.json"))
     path = output / "baseline.json"
     _write(path, text)
@@ -189,5 +193,5 @@ def write_baseline(output: Path) -> Path:
 
 
 def _write(path: Path, text: bytes) -> None:
-    """The whole file or, where that fails, what was there before."""
+    """Write the whole file; on failure the old one stays."""
     write_atomically(path, lambda file: file.write(text))

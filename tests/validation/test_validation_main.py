@@ -17,7 +17,7 @@ from validation.job import Job
 from validation.report import page as report
 from validation.report import schema
 from validation.sections import SECTIONS
-from validation.stability import section as numerical
+from validation.stability import section as stability
 
 SCENE = Path(__file__).parents[2] / "scenes" / "stairs.toml"
 MESH = SCENE.parent / "models" / "stairs.ply"
@@ -248,17 +248,17 @@ def test_stability_counts_its_steps(monkeypatch: pytest.MonkeyPatch, tmp_path: P
         def record(self, *_: object) -> dict[str, object]:
             return {"holds": False}
 
-    monkeypatch.setattr(numerical, "CASES", (Answer(), Answer()))
-    few = numerical.watertight.closed_meshes()[:2]
-    monkeypatch.setattr(numerical.watertight, "closed_meshes", lambda: few)
+    monkeypatch.setattr(stability, "CASES", (Answer(), Answer()))
+    few = stability.watertight.closed_meshes()[:2]
+    monkeypatch.setattr(stability.watertight, "closed_meshes", lambda: few)
     for name in ("shoot", "shoot_embree"):
-        monkeypatch.setattr(numerical.watertight, name, lambda *_: [])
+        monkeypatch.setattr(stability.watertight, name, lambda *_: [])
     for name in ("judge", "leak_row"):
-        monkeypatch.setattr(numerical.stability, name, lambda *_: [])
-    monkeypatch.setattr(numerical.stability, "point", lambda *_: Answer())
+        monkeypatch.setattr(stability.sweeps, name, lambda *_: [])
+    monkeypatch.setattr(stability.sweeps, "point", lambda *_: Answer())
     taken: list[str] = []
     job = Job(True, suite.Thresholds(), tmp_path, taken.append)
-    record, gates = numerical.run(job)
-    assert len(taken) == numerical.steps(job)
+    record, gates = stability.run(job)
+    assert len(taken) == stability.steps(job)
     assert [gate.passed for gate in gates] == [False, False]
     assert set(record) == {"cases", "watertight", "curves", "costs"}

@@ -1,1 +1,1 @@
-"""Speed beside other systems, and error against run time: what `make bench` measures."""
+"""The benchmark of ``make bench``: speed beside other systems, and error against run time."""

@@ -1,7 +1,7 @@
 """``python -m validation.benchmark``: measure, write ``benchmark.json`` and ``benchmark.html``, print the ratios.
 
-Exit codes: 0 measured, 2 bad arguments or a missing mesh, 130 after Ctrl-C. Nothing is gated: speed on a shared machine
-proves nothing.
+Exit codes: 0 measured, 2 bad arguments or a missing mesh, 130 after Ctrl-C. Nothing has a gate, because speed on a
+shared machine proves nothing.
 """
 
 import argparse
@@ -24,7 +24,7 @@ RAYS, QUICK_RAYS = 1_000_000, 200_000
 
 @interruptible("benchmark: interrupted, nothing written")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what the arguments ask for; returns the exit code."""
+    """Run the command line; returns the exit code."""
     parser = _parser()
     options = parser.parse_args(arguments)
     check_output(parser, options)
@@ -48,7 +48,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace, command: str) -> int:
-    # Imported here so that --help answers at once.
+    # Imported here, so that --help does not wait for it.
     from renderer.process.files import write_atomically
     from validation.benchmark.page import page, record
     from validation.progress import steps
@@ -77,7 +77,7 @@ def measure(
     from validation.benchmark.measures import ablation, first_answers, frames, meshes, processes
     from validation.benchmark.measures.queries import fits
     from validation.benchmark.page import record, targets
-    from validation.benchmark.parameters import study as knobs
+    from validation.benchmark.parameters import study
     from validation.benchmark.peers.systems import available
 
     began, date, load = time.perf_counter(), datetime.now(UTC), record.load()
@@ -98,7 +98,7 @@ def measure(
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
         "first_answers": first_answers.measure(names, step),
-        "ablation": ablation.run(quick, step), "knobs": knobs.run(quick, step),
+        "ablation": ablation.run(quick, step), "knobs": study.run(quick, step),
     }  # fmt: skip
     return found | {"targets": targets.judged(found), "seconds": time.perf_counter() - began}
 
@@ -106,7 +106,7 @@ def measure(
 def _measure_mesh(
     mesh: Any, systems: Sequence[Any], count: int, rows: dict[str, list[Any]], step: Callable[[str], None]
 ) -> None:
-    """Add one mesh's rows. Memory first, while this process is small."""
+    """Add one mesh's rows, memory first, while this process is small."""
     from validation.benchmark.measures import builds, memory, queries
 
     grown = memory.measure(mesh, systems, step)

@@ -1,1 +1,1 @@
-"""Seeded defects: each breaks one rule of the renderer, and a gate must notice."""
+"""Seeded defects: each breaks one rule of the renderer, and at least one gate must fail."""

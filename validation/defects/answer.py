@@ -1,4 +1,7 @@
-"""The process that has a defect: inject it, run the checks, print what they say. Imports no renderer before."""
+"""Entry point of a process with a defect: inject it, run the checks, print the results.
+
+It must not import the renderer before the injection.
+"""
 
 import json
 from importlib import import_module
@@ -9,16 +12,16 @@ from validation.defects.inject import Replacement, inject
 if TYPE_CHECKING:
     from validation.gates import Gate
 
-# What the one line of the answer begins with.
+# Prefix of the one line of results.
 MARK = "gates: "
 
 
-def answer(asked: str) -> None:
-    """The other end of ``defects.ask``: inject, check, print the gates as one line of JSON."""
-    replacement, groups, checks = json.loads(asked)
+def answer(task: str) -> None:
+    """Counterpart of ``run.run_checks`` in the child process: inject, check, print the gates as a line of JSON."""
+    replacement, groups, checks = json.loads(task)
     if replacement is not None:
         inject(Replacement(**replacement))
-    # It loads the renderer, so not before.
+    # Imported only now, because it loads the renderer.
     found = import_module(checks).run(tuple(groups))
     names = [_name(gate) for gate in found]
     red = [name for name, gate in zip(names, found, strict=True) if not gate.passed]

@@ -1,6 +1,6 @@
-"""What runs against a defect: the suite's own sections with a small effort, so that one defect takes seconds.
+"""The checks that run against a defect: the suite's own sections with a small effort, so that each takes seconds.
 
-The gates are the sections' gates, by their names and with the suite's thresholds.
+The gates are the sections' gates, with their names and the suite's thresholds.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -17,31 +17,31 @@ from validation.gates import Gate
 from validation.hits import watertight
 from validation.hits.rays import float32_exact
 from validation.hits.refit import check_refit
-from validation.hits.section import Effort, check_leaks, check_mesh
+from validation.hits.section import HitEffort, check_leaks, check_mesh
 from validation.job import Job
-from validation.pictures import section as images
+from validation.pictures.section import PictureEffort, check_scene
 from validation.references.table import REFERENCES
 from validation.scenes import SCENES
-from validation.stability import section as numerical
-from validation.stability import sweeps as stability
+from validation.stability import sweeps
+from validation.stability.section import CASES, check_case
 from validation.thresholds import Thresholds
 
 SEED = 2029
-# Glass has what every rung of the ladder needs: mirrors, highlights, two lights, ambient light, smooth and flat meshes.
-# Random paths through it make a picture of their own. The stairs have the other camera.
-_SCENES = {"glass": images.Effort(size=128, lower=64), "stairs": images.Effort(size=64)}
-# Enough for packets and streams in every family; a defect that one ray in a thousand shows is still found. One
-# reference is enough to doubt us; which of the two is wrong, exact arithmetic says.
+# The scene glass has what every rung of the ladder needs: mirrors, highlights, two lights, ambient light, smooth and
+# flat meshes. Random paths through it make a separate picture. The scene stairs has the other camera.
+_SCENES = {"glass": PictureEffort(size=128, lower=64), "stairs": PictureEffort(size=64)}
+# Enough for packets and streams in every family; a defect that shows on one ray in a thousand is still found. One
+# reference is enough to raise a disagreement; exact arithmetic decides which side is wrong.
 _EMBREE = tuple(reference for reference in REFERENCES if reference.key == "embree_robust")
-_HITS = Effort(rays=3_000, exact=40, leaks=20_000, references=_EMBREE)
-# Leak rays of each kind in each place: the rarest of these defects lets one in 20,000 through.
+_HITS = HitEffort(rays=3_000, exact=40, leaks=20_000, references=_EMBREE)
+# Leak rays of each kind in each placement: the rarest of these defects leaks one in 20,000.
 _LEAKS = 200_000
-# A million triangles; what they say about size no defect here touches.
+# The extreme case of a million triangles; no defect here affects what it tests about size.
 _LARGE = 32
 
 
 def run(groups: tuple[str, ...]) -> list[Gate]:
-    """The gates of every check in ``groups``, which are names of ``GROUPS``."""
+    """The gates of every check in ``groups``, which are keys of ``GROUPS``."""
     with TemporaryDirectory(prefix="defect-") as folder:
         job = Job(True, Thresholds(), Path(folder), lambda _: None)
         return [gate for group in groups for check in GROUPS[group] for gate in check(job)]
@@ -50,17 +50,17 @@ def run(groups: tuple[str, ...]) -> list[Gate]:
 def pictures(job: Job) -> Iterator[Gate]:
     """Two scenes: AOVs, the ladder's rungs against their references, and random paths through glass."""
     for name, effort in _SCENES.items():
-        _, found = images.check_scene(name, "", load_scene(SCENES / f"{name}.toml"), effort, job)
+        _, found = check_scene(name, "", load_scene(SCENES / f"{name}.toml"), effort, job)
         yield from found
 
 
 def extreme(first: int, last: int) -> Callable[[Job], Iterator[Gate]]:
-    """A check of the extreme cases from ``first`` to ``last``, less the one whose mesh is too large for here."""
+    """A check of the extreme cases ``first`` to ``last``, without the one whose mesh is too large here."""
 
     def check(job: Job) -> Iterator[Gate]:
-        for case in numerical.CASES:
+        for case in CASES:
             if first <= case.number <= last and case.number != _LARGE:
-                yield numerical.check_case(case, job)[1]
+                yield check_case(case, job)[1]
 
     return check
 
@@ -68,23 +68,23 @@ def extreme(first: int, last: int) -> Callable[[Job], Iterator[Gate]]:
 def sweep(job: Job) -> list[Gate]:
     """Rays from inside a closed mesh at its edges and vertices: near zero, and far away in a crowded tree."""
     spheres = {f"icosphere {level}": icosphere(level) for level in (5, 3)}
-    shot: list[watertight.Shot] = []
+    counts: list[watertight.LeakCount] = []
     for (name, mesh), offset in zip(spheres.items(), (0.0, 1e4), strict=True):
-        closed = watertight.Closed(name, mesh, lambda rng, n: rng.uniform(-0.4, 0.4, (n, 3)))
+        closed = watertight.ClosedMesh(name, mesh, lambda rng, n: rng.uniform(-0.4, 0.4, (n, 3)))
         placement = watertight.Placement(closed, turned=True, offset=offset, scale=1.0)
-        build = watertight.Build("midpoint", 4, 32)
-        shot += watertight.shoot(placement, [build], _LEAKS / placement.weight, np.random.default_rng(SEED))
-    return watertight.gates(shot)
+        build = watertight.BuildOptions("midpoint", 4, 32)
+        counts += watertight.shoot(placement, [build], _LEAKS / placement.weight, np.random.default_rng(SEED))
+    return watertight.gates(counts)
 
 
 def curves(job: Job) -> list[Gate]:
     """Error of t against offset, scale, angle and sliver height."""
-    _, found = stability.run(job.quick, job.step)
+    _, found = sweeps.run(job.quick, job.step)
     return found
 
 
 def hits(job: Job) -> Iterator[Gate]:
-    """Every family of rays on a model and on triangles in no order, and rays from inside closed meshes."""
+    """Every family of rays on a model and on unordered triangles, and rays from inside closed meshes."""
     rng = np.random.default_rng(SEED)
     corners = float32_exact(rng.normal(size=(400, 1, 3)) + 0.1 * rng.normal(size=(400, 3, 3)))
     soup = Mesh(corners.reshape(-1, 3), np.arange(1200, dtype=np.int32).reshape(-1, 3))
@@ -94,7 +94,7 @@ def hits(job: Job) -> Iterator[Gate]:
     yield from check_refit(job)[1]
 
 
-# A defect of the picture's modules cannot change a hit, and one of a hit needs no picture to be seen.
+# A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
     "hits": (hits, extreme(1, 32), extreme(46, 46), extreme(49, 49), sweep, curves),
     "pictures": (pictures, extreme(33, 45), extreme(47, 48)),

@@ -1,9 +1,9 @@
-"""Loads one module of ``renderer`` with one rule broken: the only way in which a seeded defect enters.
+"""Loads one module of ``renderer`` with one rule broken: the only way in which a seeded defect takes effect.
 
-The files stay as they are. A process that shall have a defect calls ``inject`` before anything imports the renderer;
-from then on the module is compiled from altered text. The digest by which compiled kernels are found on disk sees that
-text too, so a defect gets kernels of its own, and those it does not reach are reused. Such a process needs a
-``NUMBA_CACHE_DIR`` of its own all the same: saving a kernel removes those of other texts.
+The files stay unchanged. A process that is to have a defect calls ``inject`` before it imports the renderer; from then
+on the module is compiled from altered text. The digest that identifies compiled kernels on disk reads that text too, so
+a defect gets its own kernels, and unaffected ones are reused. Such a process still needs its own ``NUMBA_CACHE_DIR``:
+saving a kernel removes those of other texts.
 """
 
 import sys
@@ -24,13 +24,13 @@ _LOADED = "renderer.kernels.loaded"
 
 @dataclass(frozen=True)
 class Replacement:
-    """The code ``rule``, which stands in ``place``, becomes ``broken``.
+    """Replace the code ``rule`` in ``place`` by ``broken``.
 
-    place   the end of a dotted name that one function, method or module-level constant has: "Mesh.normals", "_DOUBT";
+    place   the end of the dotted name of one function, method or module-level constant: "Mesh.normals", "_DOUBT";
             with its module where the name alone is not unique: "spawn._leave"
-    rule    one expression, or one or more statements, that stand there once. They are compared as syntax: layout and
+    rule    one expression, or one or more statements, that occur there once. They are compared as syntax: layout and
             comments do not count, and local variables may have other names
-    broken  what stands there instead, with the rule's own names for local variables
+    broken  the code that replaces them, with the rule's own names for local variables
     """
 
     place: str
@@ -57,10 +57,10 @@ class Replacement:
 
 
 def inject(replacement: Replacement) -> None:
-    """Let this process load the module with its rule broken.
+    """Make this process load the module with its rule broken.
 
-    Raises ``ValueError`` where the rule does not stand there exactly once, and ``RuntimeError`` where the renderer was
-    imported already: what is loaded would stay sound.
+    Raises ``ValueError`` unless the rule occurs there exactly once, and ``RuntimeError`` where the renderer was
+    imported already: loaded modules would stay sound.
     """
     loaded = sorted(_sound_modules())
     if loaded:
@@ -69,14 +69,14 @@ def inject(replacement: Replacement) -> None:
 
 
 def _sound_modules() -> Iterator[str]:
-    """Modules of the renderer that this process has, less the one that the package itself loads, for the time."""
+    """The renderer's modules in this process, except the package's own import clock and its parents."""
     for name in sys.modules:
         if name.startswith("renderer.") and not _LOADED.startswith(name):
             yield name
 
 
 class _Finder(MetaPathFinder):
-    """Finds the altered module, and the one that digests sources."""
+    """Finds the altered module, and the module that digests sources."""
 
     def __init__(self, replacement: Replacement) -> None:
         self._replacement, self._text = replacement, replacement.text()
@@ -96,14 +96,14 @@ class _Finder(MetaPathFinder):
 
 
 class _Loader(SourceFileLoader):
-    """Compiles a module from a given text, and gives the altered text to the module that digests sources."""
+    """Compiles a module from a given text, and passes the altered text to the module that digests sources."""
 
     def __init__(self, fullname: str, path: str, text: str, altered: dict[Path, bytes]) -> None:
         super().__init__(fullname, path)
         self._text, self._altered = text, altered
 
     def get_code(self, fullname: str) -> CodeType:
-        # Not the base class's, which would take what __pycache__ holds of the sound text.
+        # Not the base class's method, which would use the sound text's bytecode from __pycache__.
         return compile(self._text, self.path, "exec", dont_inherit=True)
 
     def exec_module(self, module: ModuleType) -> None:

@@ -1,7 +1,7 @@
-"""Seeded defects: each is injected into a process of its own, and must turn at least one gate red there.
+"""Seeded defects: each is injected into its own process, where at least one gate must fail.
 
-First the sound renderer goes the same way and must turn none red. Its compiled kernels are what each defect starts
-from, in a folder of its own, so the kernels of this checkout stay as they are.
+First the sound renderer runs the same way, and no gate may fail. Each defect starts from its compiled kernels, in a
+separate folder, so this checkout's kernels stay unchanged.
 """
 
 import json
@@ -22,14 +22,14 @@ from validation.defects.inject import Replacement
 from validation.defects.list import DEFECTS, Defect
 from validation.gates import Gate
 
-# Ten times what the slowest defect takes on two busy cores: beyond it a kernel does not end.
+# Ten times the time of the slowest defect on two busy cores: beyond it a kernel does not terminate.
 _PATIENCE = 600.0
-# Each compiles on one core.
+# Each process compiles on one core.
 _AT_ONCE = 2
 _CHECKS = "validation.defects.checks"
 
 _PATHS = "checks the other reference, whose recursion is like ours: a rule that both have wrong shows on paths alone"
-# Quantities that are another view of a measure: the same over other pixels, or the same verdict on other rays.
+# Quantities that measure the same as another: over other pixels, or the same verdict on other rays.
 _VIEWS = {
     "ssim_foreground": "ssim",
     "fragile share of the glass": "fragile_share",
@@ -38,7 +38,7 @@ _VIEWS = {
     "wrong verdicts": "rays on which we are wrong",
     "t beyond its bound": "rays on which we are wrong",
 }
-# Kinds of gates that stay though they catch no defect alone, by how they begin, each with its reason.
+# Kinds of gates that are kept though they catch no defect alone, by the beginning of their names, with the reasons.
 KEPT = {
     "extreme case": "each is a promise for one construct, and says in words what broke",
     "ssim": "others publish it, and it tells broken structure from wrong brightness; FLIP and the maximum see more",
@@ -52,9 +52,9 @@ KEPT = {
 
 @dataclass(frozen=True)
 class Answer:
-    """What the checks said in one process: names of all gates, of the red ones, the error that ended it, seconds.
+    """Results of the checks in one process: names of all gates and of the failing ones, its error, its seconds.
 
-    A gate's name is its section, subject and quantity. An error is no verdict of any gate.
+    A gate's name is its section, subject and quantity. An error is not a verdict of any gate.
     """
 
     gates: tuple[str, ...]
@@ -66,11 +66,11 @@ class Answer:
 def run(
     quick: bool, step: Callable[[str], None], defects: Iterable[Defect] = DEFECTS, checks: str = _CHECKS
 ) -> tuple[dict[str, Any], list[Gate]]:
-    """Inject every defect, with ``quick`` only those that need no compiler; returns a record for JSON and the gates.
+    """Inject every defect, with ``quick`` only those without recompilation; returns a record for JSON and the gates.
 
     checks : the module whose ``run(groups)`` gives the gates that judge a defect.
 
-    One gate says that the sound renderer turns no gate red, and one for each defect that it turns some red. A run of
+    One gate requires that no gate fails for the sound renderer, and one for each defect that some gate fails. A run of
     the whole list has one more, ``idle``.
     """
     chosen = [d for d in defects if not (quick and d.kernel)]
@@ -78,7 +78,7 @@ def run(
         sound_cache = Path(folder) / "sound"
         step("defects: none, as the control")
         groups = tuple(dict.fromkeys(d.group for d in chosen))
-        control = ask(None, groups, sound_cache, checks)
+        control = run_checks(None, groups, sound_cache, checks)
 
         def answer(numbered: tuple[int, Defect]) -> Answer:
             number, defect = numbered
@@ -86,7 +86,7 @@ def run(
             cache = Path(folder) / str(number)
             shutil.copytree(sound_cache, cache)
             try:
-                return ask(defect.replacement, (defect.group,), cache, checks)
+                return run_checks(defect.replacement, (defect.group,), cache, checks)
             finally:
                 shutil.rmtree(cache, ignore_errors=True)
 
@@ -96,12 +96,12 @@ def run(
     return found, [*judged, idle(found)] if set(chosen) >= set(DEFECTS) else judged
 
 
-def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, checks: str = _CHECKS) -> Answer:
+def run_checks(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, checks: str = _CHECKS) -> Answer:
     """Run the checks of ``groups`` in a new process with one replacement, or none; its kernels go to ``cache``."""
     began = time.perf_counter()
     cache.mkdir(parents=True, exist_ok=True)
-    asked = json.dumps([None if replacement is None else asdict(replacement), groups, checks])
-    command = child.command("validation.defects.answer:answer", asked)
+    task = json.dumps([None if replacement is None else asdict(replacement), groups, checks])
+    command = child.command("validation.defects.answer:answer", task)
     environment = child.environment(NUMBA_CACHE_DIR=str(cache))
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False)
@@ -117,11 +117,11 @@ def ask(replacement: Replacement | None, groups: tuple[str, ...], cache: Path, c
 
 
 def record(chosen: list[Defect], control: Answer, answers: list[Answer]) -> dict[str, Any]:
-    """For JSON: a row for each defect with the gates that it turned red, and what each kind of gate caught.
+    """For JSON: a row for each defect with the gates that failed, and the defects that each kind of gate caught.
 
-    A kind is a measure: a gate's quantity without the place where it is taken, be that a section, a mesh, rays, a
-    rung of the ladder, a reference or an offset rule. ``alone`` lists the defects that no other kind caught; ``kept``
-    says why a kind stays though it catches none alone, None where nothing says so.
+    A kind is a measure: a gate's quantity without the place where it is measured, i.e. the section, mesh, rays, rung of
+    the ladder, reference or offset rule. ``alone`` lists the defects that no other kind caught; ``kept`` says why a
+    kind is kept though it catches none alone, None without a reason.
     """
     rows = [_row(defect, answer) for defect, answer in zip(chosen, answers, strict=True)]
     caught = Counter(kind for row in rows for kind in row["kinds"])
@@ -154,7 +154,7 @@ def _row(defect: Defect, answer: Answer) -> dict[str, Any]:
 
 
 def gates(chosen: list[Defect], control: Answer, answers: list[Answer]) -> list[Gate]:
-    """The control turns no gate red; each defect at least one. A process that ended with an error says neither."""
+    """The control must fail no gate; each defect at least one. A process that ended with an error proves neither."""
     red = float("nan") if control.error else float(len(control.red))
     found = [Gate("defects", "no defect", "gates turned red", red, "at most", 0.0, "what is sound must pass")]
     for defect, answer in zip(chosen, answers, strict=True):
@@ -165,14 +165,14 @@ def gates(chosen: list[Defect], control: Answer, answers: list[Answer]) -> list[
 
 
 def idle(found: dict[str, Any]) -> Gate:
-    """Of a record of the whole list: each kind of gate caught a defect that no other kind did, or says why it stays."""
+    """Gate on a record of the whole list: each kind of gate caught a defect alone, or has a reason to be kept."""
     count = sum(not (row["alone"] or row["kept"]) for row in found["gates"])
     quantity, reason = "that caught no defect alone and are not kept", "a measure that tells nothing new is dropped"
     return Gate("defects", "kinds of gates", quantity, float(count), "at most", 0.0, reason)
 
 
 def kind_of(name: str) -> str:
-    """The measure that a gate's name stands for, see ``record``; an extreme case has no quantity and is its own."""
+    """The measure in a gate's name, see ``record``; an extreme case has no quantity and is its own kind."""
     _, _, measured = name.partition(": ")
     subject, _, quantity = measured.rpartition(": ")
     if subject.startswith("extreme case"):

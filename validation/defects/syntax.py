@@ -1,4 +1,4 @@
-"""Finds a rule in a package's source by syntax, and replaces it: the address of a seeded defect.
+"""Finds a rule in a package's source by its syntax, and replaces it: the address of a seeded defect.
 
 A place is found by the end of its dotted name, so it may move to another file or folder. A rule is found by its syntax
 tree, so its layout may change, and so may the names of local variables.
@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-# Nodes that hold statements, and what a rule is looked for in.
+# Nodes in which a rule is searched.
 _Definition = ast.FunctionDef | ast.ClassDef | ast.Assign | ast.AnnAssign
 _Match = tuple[list[ast.AST], dict[str, str]]
 
@@ -67,7 +67,7 @@ def _places(path: Path, module: str) -> Iterator[Place]:
 
 
 def _bound_at_top(tree: ast.Module) -> Iterator[str]:
-    """Names that a module binds: what it imports, defines and assigns."""
+    """Names that a module binds by imports, definitions and assignments."""
     for node in tree.body:
         if isinstance(node, ast.Import | ast.ImportFrom):
             yield from (alias.asname or alias.name.partition(".")[0] for alias in node.names)
@@ -84,8 +84,8 @@ def _names(nodes: Sequence[ast.AST]) -> list[str]:
 def replaced(place: Place, rule: str, broken: str) -> str:
     """The file's text with ``rule`` in ``place`` replaced by ``broken``.
 
-    Raises ``ValueError`` unless the rule stands there exactly once. Where no code is the rule letter by letter, code
-    counts that differs in the names of local variables alone.
+    Raises ``ValueError`` unless the rule occurs there exactly once. Where no code equals the rule letter by letter,
+    code that differs only in the names of local variables counts.
     """
     rule, broken = textwrap.dedent(rule).strip(), textwrap.dedent(broken).strip()
     expression = _expression(rule) if _expression(broken) else None
@@ -112,7 +112,7 @@ def _expression(text: str) -> ast.expr | None:
 
 
 def _candidates(place: Place, pattern: list[ast.AST]) -> Iterator[_Match | None]:
-    """Each run of code in ``place`` that matches, with the names that local variables have there."""
+    """Each run of code in ``place`` that matches, with the names of its local variables."""
     local = frozenset(_locals(place.node))
 
     def match(nodes: list[ast.AST]) -> _Match | None:
@@ -140,7 +140,7 @@ def _locals(node: ast.AST) -> Iterator[str]:
 
 
 def _same(pattern: object, node: object, names: dict[str, str], known: frozenset[str], local: frozenset[str]) -> bool:
-    """Whether two syntax trees are the same but for names of local variables, which go to ``names``."""
+    """Whether two syntax trees are equal except for names of local variables, which are recorded in ``names``."""
     if isinstance(pattern, ast.Name) and isinstance(node, ast.Name):
         free = pattern.id not in known and node.id in local
         return (pattern.id == node.id or free) and names.setdefault(pattern.id, node.id) == node.id
@@ -158,7 +158,7 @@ def _same(pattern: object, node: object, names: dict[str, str], known: frozenset
 
 
 def _spliced(text: str, nodes: list[ast.AST], new: str) -> str:
-    """``text`` with the code of ``nodes``, which follow one another, replaced; columns count bytes."""
+    """``text`` with the code of the consecutive ``nodes`` replaced; columns count bytes."""
     first, last = nodes[0], nodes[-1]
     assert isinstance(first, ast.expr | ast.stmt) and isinstance(last, ast.expr | ast.stmt)
     lines = text.encode().splitlines(keepends=True)

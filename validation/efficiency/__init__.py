@@ -1,1 +1,1 @@
-"""The section that measures error against run time."""
+"""The section on efficiency: error against run time."""

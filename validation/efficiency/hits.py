@@ -1,9 +1,9 @@
-"""Closest hits: throughput against the error of t, and against leaks, of ours and of every reference.
+"""Closest hits: throughput against the error of t and against leaks, for ours and every reference.
 
-The mesh's vertices are no float32 numbers, so that it shows who rounds them. The rays of the errors are float32
-numbers, so that all see the same ones. The truth is exact arithmetic on the unrounded mesh: an error holds what
-rounding the vertices did as well as the kernel's own. Ours stores t as float64 and the references as float32, so that
-no error of theirs can be far below 2^-24 = 6e-8, nor of ours below 2^-53 = 1e-16.
+The mesh's vertices are not float32 numbers, so that contenders that round them show it. The rays of the errors are
+float32 numbers, so that all contenders get the same ones. The truth is exact arithmetic on the unrounded mesh: an error
+includes the rounding of the vertices as well as the kernel's own. Ours stores t as float64 and the references as
+float32, so no error of theirs can be far below 2^-24 = 6e-8, nor of ours below 2^-53 = 1e-16.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,25 +20,26 @@ from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.process.parallel import available_threads
 from renderer.trace.query import Hits
+from validation.error_curves import front
 from validation.hits.compare import HitArrays
 from validation.hits.rays import RayBatch, camera_rays, float32_exact, leak_rays
 from validation.oracle import exact
 from validation.references.table import REFERENCES
-from validation.tradeoff import front, median_seconds, spending, timed
+from validation.timing import median_seconds, spending, timed
 
 SEED = 20
 
 
 @dataclass(frozen=True)
-class Effort:
-    """How much to measure.
+class HitTimingEffort:
+    """Size of the measurement.
 
     level   of the icosphere
     rays    timed
-    judged  of these, against exact arithmetic
+    judged  of these, by exact arithmetic
     leaks   rays at edges, and as many at vertices
     runs    of the clock
-    few     most rays of each set for trimesh, which needs up to 10 ms a ray
+    few     largest number of rays of each set for trimesh, which needs up to 10 ms a ray
     """
 
     level: int
@@ -49,14 +50,14 @@ class Effort:
     few: int = 100
 
 
-QUICK = Effort(level=4, rays=50_000, judged=1000, leaks=20_000, runs=3)
-FULL = Effort(level=5, rays=200_000, judged=5000, leaks=100_000, runs=5)
+QUICK = HitTimingEffort(level=4, rays=50_000, judged=1000, leaks=20_000, runs=3)
+FULL = HitTimingEffort(level=5, rays=200_000, judged=5000, leaks=100_000, runs=5)
 
 _COMPARED = ("embree_default", "embree_robust", "igl", "mitsuba", "trimesh")
 
 
 class Contender(NamedTuple):
-    """One way to answer closest hits: what it is called, its threads, who answers, and its most rays of each set."""
+    """One implementation of closest hits: its label, its threads, its query, and its most rays of each set."""
 
     label: str
     threads: int
@@ -64,8 +65,8 @@ class Contender(NamedTuple):
     most: int
 
 
-def run(effort: Effort, costs: dict[str, float]) -> dict[str, object]:
-    """Measure; adds to ``costs`` the seconds spent in each reference."""
+def run(effort: HitTimingEffort, costs: dict[str, float]) -> dict[str, object]:
+    """Measure; adds the seconds spent in each reference to ``costs``."""
     mesh = turned_mesh(effort.level)
     contenders = _contenders(mesh, effort, costs)
     rays = camera_rays(mesh.vertices, effort.rays)
@@ -96,8 +97,8 @@ def run(effort: Effort, costs: dict[str, float]) -> dict[str, object]:
 def fronts(points: list[dict[str, Any]]) -> dict[str, list[str]]:
     """Names on the Pareto fronts of seconds a ray against the p99 error and against leaks, fastest first.
 
-    A contender that never hit where the truth does has no error and stands on no front of errors; one that was given
-    fewer rays than another stands on none, for its percentile and its share say less.
+    A contender that never hit where the truth does has no error and is on no front of errors; one that got fewer rays
+    than another is on no front, because its percentile and its share are less certain.
     """
     points = [p for p in points if p["leak_rays"] == max(p["leak_rays"] for p in points)]
     known = [p for p in points if p["errors"]["p99"] is not None]
@@ -108,7 +109,7 @@ def fronts(points: list[dict[str, Any]]) -> dict[str, list[str]]:
 
 
 def turned_mesh(level: int) -> Mesh:
-    """A wavy sphere scaled by pi and turned by a radian about two axes: hardly a vertex that float32 holds."""
+    """A wavy sphere scaled by pi and rotated by a radian about two axes: float32 holds hardly any vertex."""
     ball = icosphere(level)
     x, y, z = ball.vertices.T
     wavy = ball.vertices * (1.0 + 0.08 * np.sin(9.0 * x) * np.sin(7.0 * y) * np.sin(8.0 * z))[:, None]
@@ -119,9 +120,9 @@ def turned_mesh(level: int) -> Mesh:
 
 
 def errors(found: HitArrays, truth: list[exact.ExactHit | None]) -> dict[str, object]:
-    """Verdicts that are wrong, and the relative error of t where both hit, whatever the face.
+    """Wrong verdicts, and the relative error of t where both hit, whatever the face.
 
-    ``wrong_face`` counts faces that do not attain the exact t; the three percentiles are None where nothing is hit.
+    ``wrong_face`` counts faces that do not attain the exact t; the three percentiles are None without common hits.
     """
     hit = np.array([h is not None for h in truth])
     pairs = [(ray, h) for ray in np.flatnonzero(hit & found.hit).tolist() if (h := truth[ray]) is not None]
@@ -139,12 +140,14 @@ def errors(found: HitArrays, truth: list[exact.ExactHit | None]) -> dict[str, ob
 
 
 def answer(found: Hits | tuple[NDArray[np.float64], NDArray[np.int64]]) -> HitArrays:
-    """Ours or a reference's closest hits in one form."""
+    """Closest hits of ours or of a reference in one form."""
     return HitArrays(found.t, found.face) if isinstance(found, Hits) else HitArrays(*found)
 
 
-def _contenders(mesh: Mesh, effort: Effort, costs: dict[str, float]) -> Mapping[str, Contender]:
-    """By name. Ours stores float64, or float32 where it is given rounded vertices; one thread and all are told apart,
+def _contenders(mesh: Mesh, effort: HitTimingEffort, costs: dict[str, float]) -> Mapping[str, Contender]:
+    """The contenders by name.
+
+    Ours stores float64, or float32 where it gets rounded vertices. One thread and all threads are separate contenders,
     because the references have one.
     """
     rounded = Mesh(float32_exact(mesh.vertices), mesh.faces)
@@ -160,8 +163,8 @@ def _contenders(mesh: Mesh, effort: Effort, costs: dict[str, float]) -> Mapping[
     references = {reference.key: reference for reference in REFERENCES}
     for key in _COMPARED:
         name = references[key].name
-        asked = spending(costs, name, references[key].make(mesh.vertices, mesh.faces).closest_hit)
-        found[key] = Contender(name, 1, asked, every)
+        query = spending(costs, name, references[key].make(mesh.vertices, mesh.faces).closest_hit)
+        found[key] = Contender(name, 1, query, every)
     slowest = found["trimesh"]
     label = f"{slowest.label}, {effort.few:,} rays of each set"
     found["trimesh"] = slowest._replace(label=label, most=effort.few)
@@ -169,21 +172,21 @@ def _contenders(mesh: Mesh, effort: Effort, costs: dict[str, float]) -> Mapping[
 
 
 def _rows(rays: int, most: int) -> NDArray[np.int64]:
-    """All rows of so many rays, or ``most`` of them in their order: always the same ones."""
+    """All rows of so many rays, or ``most`` of them in ascending order: always the same ones."""
     if most >= rays:
         return np.arange(rays)
     return np.sort(np.random.default_rng(SEED).choice(rays, most, replace=False))
 
 
 def _judged(contender: Contender, rays: RayBatch, truth: list[exact.ExactHit | None]) -> dict[str, object]:
-    """The errors of a contender on as many of the rays as it is given."""
+    """Errors of a contender on as many of the rays as it takes."""
     rows = _rows(len(rays), contender.most)
     given = rays.select(rows)
     return errors(answer(contender.closest_hit(given.origins, given.directions)), [truth[row] for row in rows.tolist()])
 
 
 def _leaks(contender: Contender, inside: Sequence[RayBatch]) -> dict[str, int]:
-    """Rays from inside the closed mesh that meet nothing, and of how many."""
+    """Rays from inside the closed mesh that a contender misses, and the number of these rays."""
     given = [rays.select(_rows(len(rays), contender.most)) for rays in inside]
     missed = sum(int((~answer(contender.closest_hit(r.origins, r.directions)).hit).sum()) for r in given)
     return {"leaks": missed, "leak_rays": sum(len(rays) for rays in given)}

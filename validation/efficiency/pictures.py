@@ -1,9 +1,8 @@
-"""Pictures: error against seconds of ours and of Mitsuba over samples, depth and the least weight, and what the error
-is made of.
+"""Pictures: error against seconds, ours and Mitsuba's, over samples, depth and the least weight; the error's causes.
 
-Samples are judged by a picture that we have no part in: Mitsuba's film, converged, see ``mitsuba_sampling``. Depth and
-least weight are judged by the same renderer's own picture at a deeper setting, which measures truncation and no
-correctness: that is what the picture gates are for.
+Mitsuba's converged film, in which no code of ours takes part, is the truth for samples; see
+``validation.references.mitsuba.sampling``. The truth for depth and least weight is the same renderer's own picture at a
+deeper setting, which measures truncation and not correctness: the picture gates judge that.
 """
 
 import time
@@ -17,11 +16,12 @@ from numpy.typing import NDArray
 
 from renderer.picture.render import render
 from renderer.scene.scene import UNLIMITED_RAYS, Scene
+from validation.error_curves import front, slope
 from validation.pictures.compare import compare
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba import scene as mitsuba_scene
 from validation.references.mitsuba.sampling import Film, Sampler
-from validation.tradeoff import RUNS, front, median_seconds, slope, spending
+from validation.timing import RUNS, median_seconds, spending
 
 Picture = NDArray[Any]
 Point = dict[str, Any]
@@ -30,23 +30,23 @@ METRICS = ("rmse", "flip", "dissimilarity")
 FILM = "Mitsuba's film"
 
 DEEP = 16
-# Beyond six bounces the view of the mirrors that is measured shows nothing new.
+# Beyond six bounces the measured view of the mirrors shows nothing new.
 DEPTH = 8
 SAMPLES = (1, 4, 9, 16, 25, 64)
 DEPTHS = (0, 1, 2, 3, 4, 6, 8)
-# The mirrors reflect 0.85 to 0.94: what lies lower stops no ray that is still seen.
+# The mirrors reflect 0.85 to 0.94: a lower weight stops no visible ray.
 WEIGHTS = (0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
-# A square number four times the largest that is judged: its own error is a third of that one's, or less.
+# A square number four times the largest that is judged: its own error is at most a third of that one's.
 CONVERGED = 256
-# The depth whose truncation the split of the error states.
+# The depth whose truncation the split of the error reports.
 SHALLOW = 3
 
 
 @dataclass(frozen=True)
-class Effort:
-    """Pixels a side, Mitsuba's samples over which it is timed and those of the converged pictures, timed ``runs``.
+class PictureTimingEffort:
+    """Pixels a side, Mitsuba's timed numbers of samples, samples of the converged pictures, and ``runs`` of the clock.
 
-    The converged picture is the mean of two of ``truth`` stratified samples each, a square number.
+    The converged picture is the mean of two with ``truth`` stratified samples each, a square number.
     """
 
     size: int
@@ -55,26 +55,26 @@ class Effort:
     runs: int
 
 
-QUICK = Effort(size=48, theirs=(1, 4, 16, 64), truth=256, runs=1)
-FULL = Effort(size=64, theirs=(1, 4, 16, 64, 256), truth=576, runs=3)
+QUICK = PictureTimingEffort(size=48, theirs=(1, 4, 16, 64), truth=256, runs=1)
+FULL = PictureTimingEffort(size=64, theirs=(1, 4, 16, 64, 256), truth=576, runs=3)
 
 
 class Drawn(NamedTuple):
-    """Linear radiance (size, size, 3), and the seconds that tracing it took, without building a tree."""
+    """Linear radiance (size, size, 3), and the seconds spent tracing it, without building a tree."""
 
     radiance: Picture
     seconds: float
 
 
 class Bench:
-    """One scene with what draws it; adds to ``costs`` the seconds spent in Mitsuba's film."""
+    """One scene with its renderers; adds the seconds spent in Mitsuba's film to ``costs``."""
 
-    def __init__(self, scene: Scene, effort: Effort, costs: dict[str, float]) -> None:
+    def __init__(self, scene: Scene, effort: PictureTimingEffort, costs: dict[str, float]) -> None:
         self.scene, self.effort = scene, effort
         self._film, self._costs = Film(scene, effort.size), costs
 
     def ours(self, samples: int = 1, max_depth: int = DEPTH, min_weight: float = 0.0, **settings: Any) -> Drawn:
-        """Our picture; ``settings`` as for ``render``."""
+        """Our picture; ``settings`` are those of ``render``."""
         settings |= {"samples": samples, "max_depth": max_depth, "min_weight": min_weight, "max_rays": UNLIMITED_RAYS}
         image = render(self.scene, resolution=(self.effort.size, self.effort.size), **settings)
         return Drawn(image.radiance, image.render_seconds)
@@ -88,8 +88,10 @@ class Bench:
         return Drawn(radiance, seconds)
 
 
-def run(scene: Scene, name: str, effort: Effort, costs: dict[str, float]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The records of the curves and of the split; adds to ``costs`` the seconds spent in each reference."""
+def run(
+    scene: Scene, name: str, effort: PictureTimingEffort, costs: dict[str, float]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The records of the curves and of the split; adds the seconds spent in each reference to ``costs``."""
     bench = Bench(scene, effort, costs)
     halves = [bench.theirs(effort.truth, sampler="stratified", seed=seed).radiance for seed in (1, 2)]
     curves = [*_sampling(bench, (halves[0] + halves[1]) / 2.0), *_truncation(bench)]
@@ -134,16 +136,18 @@ def _truncation(bench: Bench) -> list[dict[str, Any]]:
     ]
 
 
-def _curve(who: str, knob: str, draws: Mapping[Any, Callable[[], Drawn]], truth: Picture, runs: int) -> dict[str, Any]:
+def _curve(
+    who: str, parameter: str, draws: Mapping[Any, Callable[[], Drawn]], truth: Picture, runs: int
+) -> dict[str, Any]:
     """Seconds and errors of every setting."""
     pictures = {value: draw().radiance for value, draw in draws.items()}
     seconds = median_seconds({str(value): partial(_seconds, draw) for value, draw in draws.items()}, runs, unseen=0)
     points = [{"value": v, "seconds": seconds[str(v)]} | _errors(picture, truth) for v, picture in pictures.items()]
-    return {"who": who, "knob": knob, "points": points}
+    return {"who": who, "knob": parameter, "points": points}
 
 
 def _slopes(curve: dict[str, Any]) -> dict[str, Any]:
-    """The exponents of the errors in the number of samples and in the seconds."""
+    """Exponents of the errors in the number of samples and in the seconds."""
     points = curve["points"]
     return {
         f"slope_{key}": {m: slope([p[key] for p in points], [p[m] for p in points]) for m in METRICS}
@@ -166,8 +170,10 @@ def _rmse(a: Picture, b: Picture) -> float:
 
 
 def _split(bench: Bench, costs: dict[str, float]) -> dict[str, Any]:
-    """The error of a picture of one sample a pixel and ``SHALLOW`` bounces by its causes, each measured with the others
-    equal on both sides: RMSE, and by which factor the seconds rise where the knob halves it.
+    """The error of a picture of one sample a pixel and ``SHALLOW`` bounces, split into its causes.
+
+    Each cause is measured with the others equal on both sides: its RMSE, and the factor by which the seconds rise where
+    the parameter halves it.
     """
     converged, deep = bench.ours(samples=CONVERGED).radiance, bench.ours(max_depth=DEEP).radiance
     sampling = _costed([partial(bench.ours, samples=n) for n in SAMPLES], converged)
@@ -196,8 +202,6 @@ def _costed(draws: Sequence[Callable[[], Drawn]], truth: Picture) -> list[tuple[
 
 
 def _halved(path: Sequence[tuple[float, float]]) -> float | None:
-    """By which factor the seconds rise from the first setting to the first with at most half its error; None where
-    none has.
-    """
+    """The factor in seconds from the first setting to the first with at most half its error; None where none has."""
     seconds, error = path[0]
     return next((s / seconds for s, e in path if e <= 0.5 * error), None)

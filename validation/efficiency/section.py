@@ -1,6 +1,6 @@
-"""The section on run time: rays a second beside Embree's, the origin's table, and error against seconds.
+"""The section on efficiency: rays a second beside Embree's, the student program's table, and error against seconds.
 
-Nothing here is gated, because speed on a shared machine proves nothing.
+Nothing here has a gate, because speed on a shared machine proves nothing.
 """
 
 import statistics
@@ -14,47 +14,47 @@ from renderer.octree import Octree
 from renderer.picture.render import render
 from renderer.process.parallel import available_threads
 from renderer.scene.scene import load_scene
-from validation.efficiency import hits as tradeoff_hits
-from validation.efficiency import pictures as tradeoff_pictures
+from validation.efficiency import hits, pictures
 from validation.gates import Gate
 from validation.hits.rays import camera_rays, random_rays
 from validation.job import Job
 from validation.references.embree import Embree
 from validation.scenes import SCENES
-from validation.tradeoff import RUNS, interleaved, ratio, spending, timed
+from validation.timing import RUNS, interleaved, ratio, spending, timed
 
-# The origin timed each of its configurations three times.
-ORIGIN_RUNS = 3
-# What the C++ program that this grew out of printed, on another machine and other models: 100 x 100, depth 3.
-_ORIGIN_ROWS: tuple[tuple[Literal["octree", "brute"], int, int], ...] = (
+# The student's program timed each of its configurations three times.
+STUDENT_RUNS = 3
+# Times printed by the student's C++ program from which this renderer grew, on another machine and other models: 100 x
+# 100, depth 3.
+_STUDENT_ROWS: tuple[tuple[Literal["octree", "brute"], int, int], ...] = (
     ("brute", 100, 3),
     ("octree", 100, 3),
     ("octree", 500, 6),
 )
-ORIGIN = {"brute_seconds": 205.4, "octree_seconds": 0.411}
+STUDENT_SECONDS = {"brute_seconds": 205.4, "octree_seconds": 0.411}
 
 
 def steps(job: Job) -> int:
-    """How often ``run`` calls ``job.step``: for two families of rays, the origin's rows, and error against run time."""
-    return 2 + len(_ORIGIN_ROWS) + 2
+    """Number of calls of ``job.step``: two families of rays, the student program's rows, two of error against time."""
+    return 2 + len(_STUDENT_ROWS) + 2
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Time hits and pictures; returns a record for JSON and no gate."""
     costs: dict[str, float] = {}
     record: dict[str, Any] = {"hits": _hits(200_000 if job.quick else 1_000_000, job.step, costs)}
-    record["origin"] = _origin(job.step)
+    record["origin"] = _student_program(job.step)
     job.step("efficiency: error of hits against run time")
-    record["tradeoff_hits"] = tradeoff_hits.run(tradeoff_hits.QUICK if job.quick else tradeoff_hits.FULL, costs)
+    record["tradeoff_hits"] = hits.run(hits.QUICK if job.quick else hits.FULL, costs)
     job.step("efficiency: error of pictures against run time")
-    effort = tradeoff_pictures.QUICK if job.quick else tradeoff_pictures.FULL
+    effort = pictures.QUICK if job.quick else pictures.FULL
     scene = load_scene(SCENES / "mirrors.toml")
-    record["tradeoff_pictures"], record["split"] = tradeoff_pictures.run(scene, "mirrors", effort, costs)
+    record["tradeoff_pictures"], record["split"] = pictures.run(scene, "mirrors", effort, costs)
     return record | {"costs": costs}, []
 
 
 def _hits(count: int, step: Callable[[str], None], costs: dict[str, float]) -> dict[str, object]:
-    """Rays a second of ours and Embree's on one mesh and the same rays, in turn, after a warm-up."""
+    """Rays a second of ours and Embree's on one mesh with the same rays, in turn, after a warm-up."""
     mesh = load_mesh(SCENES / "models" / "displaced_sphere.ply")
     octree, embree = Octree.from_mesh(mesh), Embree(mesh.vertices, mesh.faces)
     single = Octree.from_mesh(mesh, threads=1)
@@ -80,17 +80,19 @@ def _hits(count: int, step: Callable[[str], None], costs: dict[str, float]) -> d
     return {"mesh": "displaced_sphere", "faces": len(mesh.faces), "runs": RUNS, "families": families}
 
 
-def _origin(step: Callable[[str], None]) -> dict[str, object]:
-    """The origin's table on our main scene: build and render, every run a new tree."""
+def _student_program(step: Callable[[str], None]) -> dict[str, object]:
+    """The student program's table on our main scene: build and render, with a new tree in every run."""
     scene = load_scene(SCENES / "three_models.toml")
     # Compile both kernels before any clock starts.
-    for accelerator, _, _ in _ORIGIN_ROWS:
+    for accelerator, _, _ in _STUDENT_ROWS:
         render(scene, resolution=(4, 4), max_depth=1, accelerator=accelerator)
+    # Time each row of the table, with a new tree in every run.
     rows: list[dict[str, Any]] = []
-    for accelerator, size, depth in _ORIGIN_ROWS:
-        step(f"efficiency: origin, {accelerator} {size} x {size}")
+    for accelerator, size, depth in _STUDENT_ROWS:
+        step(f"efficiency: student program, {accelerator} {size} x {size}")
         images = [
-            render(scene, resolution=(size, size), max_depth=depth, accelerator=accelerator) for _ in range(ORIGIN_RUNS)
+            render(scene, resolution=(size, size), max_depth=depth, accelerator=accelerator)
+            for _ in range(STUDENT_RUNS)
         ]
         seconds = [i.build_seconds + i.render_seconds for i in images]
         rows.append(
@@ -104,6 +106,7 @@ def _origin(step: Callable[[str], None]) -> dict[str, object]:
                 "rays": int(images[0].rays.sum()),
             }
         )
+    # Compare with brute force, and with the times that the student's program printed.
     brute, octree = rows[0], rows[1]
     return {
         "faces": sum(len(i.mesh.faces) for i in scene.instances),
@@ -111,5 +114,5 @@ def _origin(step: Callable[[str], None]) -> dict[str, object]:
         "rows": rows,
         "speedup": brute["median"] / octree["median"],
         "render_speedup": brute["render_median"] / octree["render_median"],
-        "origin": ORIGIN | {"speedup": ORIGIN["brute_seconds"] / ORIGIN["octree_seconds"]},
+        "origin": STUDENT_SECONDS | {"speedup": STUDENT_SECONDS["brute_seconds"] / STUDENT_SECONDS["octree_seconds"]},
     }

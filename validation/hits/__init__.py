@@ -1,1 +1,1 @@
-"""The section that checks hits: rays, comparison, verdicts, leaks."""
+"""The section on hits: ray families, comparison, verdicts, leaks, refitted trees."""

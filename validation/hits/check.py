@@ -1,4 +1,4 @@
-"""One mesh, every family of rays: our closest hits against exact arithmetic and against each reference."""
+"""One mesh and every family of rays: our closest hits against exact arithmetic and against each reference."""
 
 import hashlib
 import time
@@ -12,7 +12,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.trace.ray_lanes import WIDTH
 from validation.gates import Gate
-from validation.hits import compare as compare_hits
+from validation.hits import compare
 from validation.hits.compare import ExactErrors, HitArrays, HitComparison
 from validation.hits.errors import ErrorSizes, error_sizes, truth
 from validation.hits.rays import RayBatch, face_rays, families, float32_exact
@@ -22,39 +22,38 @@ from validation.oracle import exact
 from validation.oracle.rounding import FLOAT32_ROUNDOFF, FLOAT64_ROUNDOFF
 from validation.references.table import REFERENCES, HitReference
 from validation.thresholds import HitLimits
-from validation.tradeoff import spending
+from validation.timing import spending
 
 Ints = NDArray[np.int64]
 
 SEED = 2026
 EXACT = "exact arithmetic"
 
-# Families whose rays are aimed at nothing in particular: there, a hit that float64 cannot decide (the ray passes an
-# edge closer than the rounding of the edge function) has a chance of 1e-9 a ray, so one would be suspicious. Rays
-# aimed at edges and vertices, that begin on a face or come from far away are undecidable by design; they are counted
-# and shown.
+# Families whose rays have no particular target. There a hit that float64 cannot decide (the ray passes an edge closer
+# than the rounding of the edge function) has a chance of 1e-9 a ray, so one would be suspicious. Rays that are aimed at
+# edges and vertices, begin on a face or come from far away are undecidable by design; they are counted and shown.
 UNAIMED = ("camera", "camera_squares", "random", "grazing", "from_inside", "face")
-# These begin in the box of the mesh. Where that has no thickness they begin on faces, which is undecidable as well.
+# These begin in the box of the mesh. In a box without thickness they begin on faces, which is undecidable as well.
 _IN_THE_BOX = ("random", "from_inside")
-# Rays begin up to 1e5 radii away, and their numbers and those of hits must be float32's, which end at 3e38 and lose
+# Rays begin up to 1e5 radii away. Their numbers and those of hits must be float32 numbers, which end at 3e38 and lose
 # digits below 1e-38.
 _SMALLEST, _LARGEST = 1e-30, 1e30
 
 # Rays of a family that are not plainly right get a slow judgement, 5 ms each. The sound renderer needs it for a few
-# hundred; beyond these all count as wrong.
+# hundred; all rays beyond this number count as wrong.
 _JUDGED = 1_500
 
 _ROUNDOFF = {"float32": FLOAT32_ROUNDOFF, "float64": FLOAT64_ROUNDOFF}
 
 
 @dataclass(frozen=True)
-class Effort:
-    """How much to check.
+class HitEffort:
+    """How many rays to check, and against which references.
 
-    rays        a family and mesh
+    rays        of each family on each mesh
     exact       of these, judged by exact arithmetic whether or not a reference disagrees
     leaks       rays of each kind from inside each closed mesh
-    references  who is asked
+    references  that are compared
     """
 
     rays: int
@@ -63,24 +62,24 @@ class Effort:
     references: tuple[HitReference, ...] = REFERENCES
 
 
-class Asked(NamedTuple):
-    """A reference and what it made of the mesh; ``seconds`` holds its build and its queries."""
+class LoadedReference(NamedTuple):
+    """A reference with the mesh loaded; ``seconds`` sums its build and its queries."""
 
     reference: HitReference
     tree: Any
     seconds: dict[str, float]
 
     def closest_hit(self, rays: RayBatch) -> HitArrays:
-        """Its closest hits, timed."""
+        """Closest hits of the reference, timed."""
         answer = spending(self.seconds, "query", self.tree.closest_hit)
         return HitArrays(*answer(rays.origins, rays.directions))
 
 
-def ask(reference: HitReference, mesh: Mesh) -> Asked:
-    """Give the mesh to the reference, timed."""
+def load_reference(reference: HitReference, mesh: Mesh) -> LoadedReference:
+    """Build the reference's structure over the mesh, timed."""
     began = time.perf_counter()
     tree = reference.make(mesh.vertices, mesh.faces)
-    return Asked(reference, tree, {"build": time.perf_counter() - began, "query": 0.0})
+    return LoadedReference(reference, tree, {"build": time.perf_counter() - began, "query": 0.0})
 
 
 def can_judge(reference: HitReference, mesh: Mesh) -> str | None:
@@ -96,13 +95,15 @@ class _Target(NamedTuple):
     name: str
     mesh: Mesh
     octree: Octree
-    asked: tuple[Asked, ...]
+    references: tuple[LoadedReference, ...]
     costs: dict[str, float]
 
 
 class _Findings(NamedTuple):
-    """Of one family: our errors on the exact sample, comparisons and error sizes by reference, any-hit differences, and
-    rays of the sample whose hit is another one when they are asked a few at a time.
+    """Results of one family: errors on the exact sample, comparisons and error sizes by reference, and counts.
+
+    ``any_hit_differs`` counts rays whose any hit differs from the closest hit, ``few_differ`` rays of the sample that
+    have another hit when traced a few at a time.
     """
 
     errors: ExactErrors
@@ -112,18 +113,18 @@ class _Findings(NamedTuple):
     few_differ: int
 
 
-def check_mesh(name: str, mesh: Mesh, effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+def check_mesh(name: str, mesh: Mesh, effort: HitEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Check all families of rays on ``mesh``; returns a record for JSON and the gates.
 
-    A reference that cannot judge the mesh stands with its reason under ``left_out``; exact arithmetic always judges.
+    A reference that cannot judge the mesh is listed with its reason under ``left_out``; exact arithmetic always judges.
     Raises ``ValueError`` for a mesh without faces, or of a size for which rays cannot be float32 numbers.
     """
     size = float(np.abs(mesh.vertices[mesh.faces]).max(initial=0.0))
     if not _SMALLEST <= size <= _LARGEST:
         raise ValueError(f"{name}: expected faces whose largest coordinate is 1e-30 to 1e30, got {size:g}")
     reasons = {reference: can_judge(reference, mesh) for reference in effort.references}
-    asked = tuple(ask(reference, mesh) for reference, reason in reasons.items() if reason is None)
-    target = _Target(name, mesh, Octree.from_mesh(mesh), asked, {EXACT: 0.0})
+    loaded = tuple(load_reference(reference, mesh) for reference, reason in reasons.items() if reason is None)
+    target = _Target(name, mesh, Octree.from_mesh(mesh), loaded, {EXACT: 0.0})
     records: list[dict[str, Any]] = []
     gates: list[Gate] = []
     for rays in (*families(mesh.vertices, mesh.faces, effort.rays, SEED), face_rays(mesh.vertices, mesh.faces)):
@@ -134,27 +135,32 @@ def check_mesh(name: str, mesh: Mesh, effort: Effort, job: Job) -> tuple[dict[st
     return {
         "name": name,
         "faces": len(mesh.faces),
-        "references": [describe(one) for one in asked],
+        "references": [describe(one) for one in loaded],
         "left_out": {reference.name: reason for reference, reason in reasons.items() if reason is not None},
         "families": records,
-        "costs": target.costs | {one.reference.name: sum(one.seconds.values()) for one in asked},
+        "costs": target.costs | {one.reference.name: sum(one.seconds.values()) for one in loaded},
     }, gates
 
 
-def describe(asked: Asked) -> dict[str, Any]:
-    """Who was asked, for JSON."""
-    reference = asked.reference
+def describe(loaded: LoadedReference) -> dict[str, Any]:
+    """The reference and its seconds, for JSON."""
+    reference = loaded.reference
     named = {"key": reference.key, "name": reference.name, "version": reference.version}
-    return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in asked.seconds.items()}}
+    return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in loaded.seconds.items()}}
 
 
-def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
+def _check(target: _Target, rays: RayBatch, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
+    # Trace the rays and compare with every reference.
     hits = target.octree.closest_hit(rays.origins, rays.directions)
     ours = HitArrays(hits.t, hits.face)
     found = _find(target, rays, ours, effort)
+
+    # Count the rays on which we are wrong, or which rounding decides.
     wrong = frozenset[int]().union(*(comparison.wrong_rays for comparison in found.comparisons))
     disagreements = [*found.errors.disagreements, *(d for one in found.comparisons for d in one.disagreements)]
     near_edge = len({d.ray for d in disagreements if d.verdict == NEAR_EDGE})
+
+    # Write the record.
     record = {
         "family": rays.name,
         "rays": len(rays),
@@ -167,9 +173,11 @@ def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -
         "exact": found.errors.record(),
         "references": [
             {"key": one.reference.key} | comparison.record() | {"sizes": asdict(sizes)}
-            for one, comparison, sizes in zip(target.asked, found.comparisons, found.sizes, strict=True)
+            for one, comparison, sizes in zip(target.references, found.comparisons, found.sizes, strict=True)
         ],
     }
+
+    # Make the gates; a family that is not aimed at edges must not come within rounding of one.
     judge = "exact arithmetic says so"
     quantities = [
         ("rays on which we are wrong", len(wrong), limits.wrong, judge),
@@ -185,33 +193,36 @@ def _check(target: _Target, rays: RayBatch, effort: Effort, limits: HitLimits) -
     return record, [Gate("hits", subject, q, float(v), "at most", most, why) for q, v, most, why in quantities]
 
 
-def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: Effort) -> _Findings:
-    """Ask everybody. Who takes few rays gets the first of one seeded order, so that all samples lie in each other."""
+def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: HitEffort) -> _Findings:
+    """Compare with exact arithmetic and every reference.
+
+    A slow reference gets the first rays of one seeded order, so that every smaller sample is part of every larger one.
+    """
     vertices, faces = target.mesh.vertices, target.mesh.faces
     order = np.random.default_rng(SEED).permutation(len(rays))
     sample = np.sort(order[: effort.exact])
     picked = rays.select(sample)
     exactly = spending(target.costs, EXACT, exact.closest_hits)(vertices, faces, picked.origins, picked.directions)
-    judged = spending(target.costs, EXACT, compare_hits.exact_errors)
+    judged = spending(target.costs, EXACT, compare.exact_errors)
     errors = judged(ours.select(sample), exactly, vertices, faces, picked, _JUDGED, sample)
     known = truth(exactly)
 
     comparisons, sizes = [], []
-    for one in target.asked:
+    for one in target.references:
         rows = np.sort(order[: one.reference.most_rays])
-        asked, roundoff = rays.select(rows), _ROUNDOFF[one.reference.stored or one.reference.precision]
-        theirs = one.closest_hit(asked)
-        comparisons.append(compare_hits.compare(ours.select(rows), theirs, vertices, faces, asked, roundoff, rows))
+        given, roundoff = rays.select(rows), _ROUNDOFF[one.reference.stored or one.reference.precision]
+        theirs = one.closest_hit(given)
+        comparisons.append(compare.compare(ours.select(rows), theirs, vertices, faces, given, roundoff, rows))
         _, here, there = np.intersect1d(rows, sample, assume_unique=True, return_indices=True)
         sizes.append(error_sizes(theirs.t[here], theirs.face[here], known.select(there)))
-    comparisons = spending(target.costs, EXACT, compare_hits.judge_all)(comparisons, vertices, faces, _JUDGED)
+    comparisons = spending(target.costs, EXACT, compare.judge_all)(comparisons, vertices, faces, _JUDGED)
     occluded = target.octree.any_hit(rays.origins, rays.directions)
     any_differs = int(np.count_nonzero(occluded != ours.hit))
     return _Findings(errors, comparisons, sizes, any_differs, _few_differ(target.octree, picked, ours.select(sample)))
 
 
 def _few_differ(octree: Octree, rays: RayBatch, ours: HitArrays) -> int:
-    """How many rays have another hit in calls of one ray, two, and so on up to a packet less one, and then again."""
+    """Number of rays with another hit in calls of one ray, two, and so on up to a packet less one, and then again."""
     differ, begin, count = 0, 0, 1
     while begin < len(rays):
         rows = np.arange(begin, min(begin + count, len(rays)))

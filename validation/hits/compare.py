@@ -1,6 +1,6 @@
-"""Compare our closest hits with a reference's, ray by ray, and count the exact verdicts on the disagreements.
+"""Comparison of our closest hits with a reference's, ray by ray, with counts of the exact verdicts.
 
-Faces are never compared where t agrees: at a tie any of them is right.
+Faces are not compared where t agrees: at a tie any of them is right.
 """
 
 from collections import Counter
@@ -20,9 +20,9 @@ from validation.hits.verdicts import (
     Disagreement,
     Point,
     judged,
+    judgements,
     listed,
     theirs_right,
-    views,
     with_truth,
 )
 from validation.oracle import exact
@@ -36,8 +36,7 @@ Ints = NDArray[np.int64]
 # 6e-8) and 8e-8 / angle grazing; 2e-7 / |cos| leaves a factor of 2.5 on the latter.
 RTOL = 3e-7
 RTOL_GRAZING = 2e-7
-# Flatter than this the tolerance above says nothing: the ray is left to the exact judge as soon as t differs
-# by 2e-4.
+# At a flatter angle the tolerance above is meaningless: exact arithmetic judges the ray as soon as t differs by 2e-4.
 MIN_COSINE = 1e-3
 
 
@@ -87,22 +86,22 @@ class HitComparison:
 
     @property
     def verdicts(self) -> dict[str, int]:
-        """How many disagreements each verdict has, all verdicts listed."""
+        """Number of disagreements by verdict, for all verdicts."""
         counts = Counter(d.verdict for d in self.disagreements)
         return {verdict: counts[verdict] for verdict in VERDICTS}
 
     @property
     def wrong_rays(self) -> frozenset[int]:
-        """Rays on which ours is wrong beyond rounding, and those nobody judged."""
+        """Rays on which ours is wrong beyond rounding, and rays that were not judged."""
         return frozenset(d.ray for d in self.disagreements if d.verdict in OURS_WRONG)
 
     @property
     def ours_wrong(self) -> int:
-        """How many rays ``wrong_rays`` has: what a gate wants to be 0."""
+        """Number of ``wrong_rays``; its gate requires 0."""
         return len(self.wrong_rays)
 
     def record(self) -> dict[str, object]:
-        """Plain numbers, strings and tables, ready for JSON; of the disagreements those of ``listed``."""
+        """Plain numbers, strings and tables, ready for JSON; the disagreements are those of ``listed``."""
         counts = {"disagreements": len(self.disagreements), "verdicts": self.verdicts, "unjudged": self.unjudged}
         rest = asdict(replace(self, disagreements=()))
         return rest | counts | {"ours_wrong": self.ours_wrong, "listed": listed(self.disagreements)}
@@ -117,7 +116,7 @@ class ExactErrors:
     hits: int
     wrong: int
     near_edge: int
-    near_edge_flipped: int  # of these, hit where exact arithmetic misses or the reverse; the others are neighbours
+    near_edge_flipped: int  # of these, a hit where exact arithmetic misses or the reverse; the others hit a neighbour
     sizes: ErrorSizes
     disagreements: tuple[Disagreement, ...]  # every ray counted in wrong or near_edge
 
@@ -127,7 +126,7 @@ class ExactErrors:
         return self.sizes.ulp_max
 
     def record(self) -> dict[str, object]:
-        """Plain numbers, strings and tables, ready for JSON; of the disagreements those of ``listed``."""
+        """Plain numbers, strings and tables, ready for JSON; the disagreements are those of ``listed``."""
         return asdict(replace(self, disagreements=())) | {
             "disagreements": len(self.disagreements),
             "listed": listed(self.disagreements),
@@ -145,26 +144,30 @@ def compare(
 ) -> HitComparison:
     """Compare two sets of closest hits of ``rays`` on the mesh ``vertices`` (V, 3), ``faces`` (F, 3).
 
-    ``theirs`` comes from a reference of unit roundoff ``roundoff`` that was given the same numbers. Two hits agree
-    when |t - t'| <= (RTOL + RTOL_GRAZING / |n.d|) max(|t|, |t'|), with n the unit normal of our face and d the unit
-    direction: smaller errors, of a float64 reference too, are what ``exact_errors`` is for. ``numbers`` (n,) names the
-    rays in the disagreements; None counts them.
+    ``theirs`` comes from a reference of unit roundoff ``roundoff`` with the same input numbers. Two hits agree when |t
+    - t'| <= (RTOL + RTOL_GRAZING / |n.d|) max(|t|, |t'|), with n the unit normal of our face and d the unit direction;
+    ``exact_errors`` finds smaller errors, also for a float64 reference. ``numbers`` (n,) names the rays in the
+    disagreements; with None they are counted from 0.
     """
     if not len(ours.t) == len(theirs.t) == len(rays):
         got = f"{len(ours.t)}, {len(theirs.t)} and {len(rays)}"
         raise ValueError(f"ours, theirs, rays: expected equal numbers of rays, got {got}")
+
+    # Compute the relative difference of t where both hit.
     corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
     both = np.flatnonzero(ours.hit & theirs.hit)
     t, other = ours.t[both], theirs.t[both]
     larger = np.maximum(np.abs(t), np.abs(other))
     error = np.divide(np.abs(t - other), larger, out=np.zeros(len(both)), where=larger > 0)
 
-    # Write "not within" rather than "beyond", so that a nan is a disagreement.
+    # Collect the disagreements: "not within" rather than "beyond", so that a NaN is one.
     rtol = _relative_tolerance(corners[ours.face[both]], rays.directions[both])
     beyond = both[~(error <= rtol)]
     flipped = np.flatnonzero(ours.hit != theirs.hit)
     found = [_disagreement(ray, "hit or miss", ours, theirs, rays, numbers) for ray in flipped.tolist()]
     found += [_disagreement(ray, "t", ours, theirs, rays, numbers) for ray in beyond.tolist()]
+
+    # Count.
     p50, p99, largest = percentiles(error)
     return HitComparison(
         family=rays.name,
@@ -189,11 +192,11 @@ def judge(comparison: HitComparison, vertices: ArrayLike, faces: ArrayLike, most
 def judge_all(
     comparisons: Sequence[HitComparison], vertices: ArrayLike, faces: ArrayLike, most: int = 2000
 ) -> list[HitComparison]:
-    """Comparisons of the same answers of ours with an exact verdict on each disagreement; hits count at t >= 0.
+    """Comparisons of the same answers of ours with an exact verdict on each disagreement; hits have t >= 0.
 
     A ray on which several references disagree with us is judged once. Of the rays on which ours is not plainly right
-    only the first ``most`` are looked at, and none once the verdict is settled (``hit_verdicts.SETTLED``), so that a
-    broken kernel ends in minutes; the others count as ``ours_wrong``.
+    only the first ``most`` are judged, and none once the verdict is settled (``verdicts.SETTLED``), so that a broken
+    kernel ends in minutes; the others count as ``ours_wrong``.
     """
     points, triangles = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     unique = {d.answered: d for c in comparisons for d in c.disagreements}
@@ -204,14 +207,16 @@ def judge_all(
     misses = [one is None for one in face]
     ours = HitArrays(np.where(misses, np.inf, t).astype(np.float64), np.where(misses, -1, face).astype(np.int64))
     exactly = exact.closest_hits(points, triangles, rays.origins, rays.directions)
-    seen = views(ours.t, ours.face, exactly, points, triangles, rays, most)
+    seen = judgements(ours.t, ours.face, exactly, points, triangles, rays, most)
     known = {ray: (hit, seen.get(row, "right")) for row, (ray, hit) in enumerate(zip(unique, exactly, strict=True))}
     judged_all = []
     for c in comparisons:
         found = [known[d.answered] for d in c.disagreements]
         right = theirs_right(c.disagreements, [hit for hit, _ in found], points[triangles], c.roundoff)
         rows = zip(c.disagreements, found, right, strict=True)
-        judged_all.append(replace(c, disagreements=tuple(judged(d, hit, view, one) for d, (hit, view), one in rows)))
+        judged_all.append(
+            replace(c, disagreements=tuple(judged(d, hit, ours_is, one) for d, (hit, ours_is), one in rows))
+        )
     return judged_all
 
 
@@ -231,13 +236,17 @@ def exact_errors(
     if not len(ours.t) == len(exact_hits) == len(rays):
         got = f"{len(ours.t)}, {len(exact_hits)} and {len(rays)}"
         raise ValueError(f"ours, exact_hits, rays: expected equal numbers of rays, got {got}")
+
+    # List the rays whose answer is not right, with the exact hit and a verdict.
     points, triangles = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     found = []
-    for row, view in views(ours.t, ours.face, exact_hits, points, triangles, rays, most).items():
-        if view != "right":
+    for row, judgement in judgements(ours.t, ours.face, exact_hits, points, triangles, rays, most).items():
+        if judgement != "right":
             d = with_truth(_disagreement(row, "exact", ours, None, rays, numbers), exact_hits[row])
-            verdict = {"near edge": NEAR_EDGE, "wrong": THEIRS_RIGHT, None: None}[view]
-            found.append(replace(d, ours_right=None if view is None else False, verdict=verdict))
+            verdict = {"near edge": NEAR_EDGE, "wrong": THEIRS_RIGHT, None: None}[judgement]
+            found.append(replace(d, ours_right=None if judgement is None else False, verdict=verdict))
+
+    # Count them, those within rounding of an edge apart.
     near_edge = [d for d in found if d.verdict == NEAR_EDGE]
     return ExactErrors(
         family=rays.name,

@@ -1,4 +1,4 @@
-"""How far hits are from exact ones: the error of t, relative and in ulp, as percentiles and as a histogram."""
+"""Errors of hits against exact ones: the error of t, relative and in ulp, as percentiles and as a histogram."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Bins of relative errors: below 1e-17, which no float64 but the exact one reaches; decades; and 0.1 or more.
+# Bins of relative errors: below 1e-17, which only the exact float64 reaches; decades; and 0.1 or more.
 EXPONENTS = tuple(range(-17, 0))
 _EDGES = (0.0, *(10.0**exponent for exponent in EXPONENTS), np.inf)
 
@@ -22,7 +22,7 @@ _EDGES = (0.0, *(10.0**exponent for exponent in EXPONENTS), np.inf)
 class Truth:
     """Exact closest hits of n rays as arrays.
 
-    ``t`` (n,) float64 is the exact distance rounded, inf on a miss, and ``rest`` (n,) what rounding took from it;
+    ``t`` (n,) float64 is the exact distance rounded, inf on a miss, and ``rest`` (n,) is the exact distance minus it;
     ``faces`` (n,) holds all faces that attain it, none on a miss.
     """
 
@@ -35,12 +35,12 @@ class Truth:
         return np.isfinite(self.t)
 
     def select(self, rows: Ints) -> "Truth":
-        """The truth about the rays at ``rows``."""
+        """The exact hits of the rays at ``rows``."""
         return Truth(self.t[rows], self.rest[rows], tuple(self.faces[row] for row in rows.tolist()))
 
 
 def truth(exact_hits: Sequence[ExactHit | None]) -> Truth:
-    """Of the answers of ``exact.closest_hits``."""
+    """The results of ``exact.closest_hits`` as arrays."""
     rounded = [np.inf if hit is None else float(hit.t) for hit in exact_hits]
     rest = [0.0 if hit is None else float(hit.t - Fraction(t)) for hit, t in zip(exact_hits, rounded, strict=True)]
     return Truth(np.array(rounded), np.array(rest), tuple(() if hit is None else hit.faces_at_t for hit in exact_hits))
@@ -48,9 +48,9 @@ def truth(exact_hits: Sequence[ExactHit | None]) -> Truth:
 
 @dataclass(frozen=True)
 class ErrorSizes:
-    """Rays by what became of them, and errors of t over those that name a face at the exact distance.
+    """Rays by outcome, and errors of t over those that name a face at the exact distance.
 
-    Percentiles are 0 where there are none. ``histogram`` counts relative errors in the bins of ``EXPONENTS``. An exact
+    Percentiles are 0 without such rays. ``histogram`` counts relative errors in the bins of ``EXPONENTS``. An exact
     distance of 0 has no relative error and is left out of both.
     """
 
@@ -74,7 +74,7 @@ def error_sizes(t: Floats, face: Ints, exactly: Truth) -> ErrorSizes:
     names_it = [named in exactly.faces[ray] for ray, named in zip(both.tolist(), face[both].tolist(), strict=True)]
     right = both[np.array(names_it, dtype=np.bool_)]
     rows = right[exactly.t[right] > 0]
-    # Near the truth the first difference is exact, so that what is left errs by a roundoff of the error itself.
+    # Near the exact t the first difference is exact, so the result errs by a roundoff of the error itself.
     error = np.abs((t[rows] - exactly.t[rows]) - exactly.rest[rows])
     relative, ulp = error / exactly.t[rows], error / np.spacing(exactly.t[rows])
     return ErrorSizes(
@@ -90,7 +90,7 @@ def error_sizes(t: Floats, face: Ints, exactly: Truth) -> ErrorSizes:
 
 
 def percentiles(values: Floats) -> tuple[float, float, float]:
-    """Median, 99th percentile and maximum; 0 of nothing."""
+    """Median, 99th percentile and maximum; 0 for an empty array."""
     if not len(values):
         return 0.0, 0.0, 0.0
     p50, p99 = np.percentile(values, (50, 99))

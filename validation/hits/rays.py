@@ -1,7 +1,7 @@
 """Seeded families of rays around a mesh.
 
-Every number of ``families`` is exact in float32, though stored as float64, so a float32 reference sees the
-very same rays. The mesh should be too: see ``float32_exact``. Directions are not unit length unless stated.
+Every number of ``families`` is exact in float32, though stored as float64, so a float32 reference gets the very same
+rays. The mesh should be exact too: see ``float32_exact``. Directions are not unit length unless stated.
 """
 
 from collections.abc import Callable
@@ -38,8 +38,9 @@ def float32_exact(values: ArrayLike) -> Floats:
 
 
 def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayBatch, ...]:
-    """All ten families, ``count`` rays each, of "on_surface" a quarter. Equal arguments give equal rays; each family
-    has a seed of its own.
+    """All ten families with ``count`` rays each, "on_surface" with a quarter.
+
+    Equal arguments give equal rays; each family has its own seed.
     """
     makers: tuple[Callable[[Floats, int, Generator], RayBatch], ...] = (
         random_rays,
@@ -61,14 +62,14 @@ def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayB
 
 
 def camera_rays(vertices: Floats, count: int) -> RayBatch:
-    """Pinhole camera that just sees all of ``vertices`` (V, 3), scanline by scanline; unit directions."""
+    """Rays of a pinhole camera that just sees all of ``vertices`` (V, 3), scanline by scanline; unit directions."""
     side = max(int(np.ceil(np.sqrt(count))), 1)
     row, column = np.divmod(np.arange(count), side)
     return _pinhole("camera", vertices, row, column, side)
 
 
 def camera_square_rays(vertices: Floats, count: int) -> RayBatch:
-    """The camera's rays in squares of 4 x 4 pixels: each 16 consecutive rays are near each other in both directions."""
+    """The camera's rays in squares of 4 x 4 pixels: each 16 consecutive rays are close together in both directions."""
     squares = max(int(np.ceil(np.sqrt(count) / 4)), 1)  # along one side of the picture
     square, pixel = np.divmod(np.arange(count), 16)
     row, column = (4 * part + rest for part, rest in zip(divmod(square, squares), divmod(pixel, 4), strict=True))
@@ -76,9 +77,7 @@ def camera_square_rays(vertices: Floats, count: int) -> RayBatch:
 
 
 def random_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    """Half between two points on a sphere around the mesh's ``corners`` (F, 3, 3), half between points in its
-    box.
-    """
+    """Half between two points on a sphere around the mesh's ``corners`` (F, 3, 3), half between points in its box."""
     centre, radius = _sphere(corners.reshape(-1, 3))
     from_sphere = centre + 1.1 * radius * _sphere_points(count, rng)
     to_sphere = centre + 1.1 * radius * _sphere_points(count, rng)
@@ -90,9 +89,7 @@ def random_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
 
 
 def axis_parallel_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    """Along +-x, +-y, +-z with exact zeros of both signs; half the rays share two or three coordinates with a
-    vertex.
-    """
+    """Along +-x, +-y, +-z with exact zeros of both signs; half share two or three coordinates with a vertex."""
     lower, upper = _bounds(corners)
     margin = 0.25 * (upper - lower)
     axis = np.arange(count) % 3
@@ -112,9 +109,7 @@ def axis_parallel_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
 
 
 def edge_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    """At random points of random edges, alternately from outside and from near the mesh's centre; t is about
-    1.
-    """
+    """At random points of random edges, alternately from outside and from near the mesh's centre; t is about 1."""
     return _aimed("edge", corners, _edge_points(corners, count, rng), rng)
 
 
@@ -126,9 +121,8 @@ def vertex_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
 def leak_rays(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayBatch, RayBatch]:
     """From near the centre at points of edges and at vertices, ``count`` rays each, aimed in full float64.
 
-    Not float32-exact, and not for a float32 reference: a direction rounded to float32 passes its edge at a
-    distance that float64 resolves easily, so only these rays put a float64 kernel's watertightness to the
-    test.
+    They are not float32-exact, and not for a float32 reference: a direction rounded to float32 passes its edge at a
+    distance that float64 resolves easily, so only these rays test a float64 kernel's watertightness.
     """
     corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
     rng = np.random.default_rng(seed)
@@ -143,9 +137,7 @@ def leak_rays(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[Ray
 
 
 def grazing_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    """Aimed from outside at random points of random faces, 1e-4 to 1e-1 radians (log-uniform) above their
-    planes.
-    """
+    """From outside at random points of random faces, 1e-4 to 1e-1 radians (log-uniform) above their planes."""
     triangle = _pick(corners, count, rng)
     weights = rng.dirichlet((1.0, 1.0, 1.0), count)
     target = np.einsum("nk,nkj->nj", weights, triangle)
@@ -157,17 +149,15 @@ def grazing_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
 
 
 def from_inside_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    """From near the middle of the mesh's box into every direction: no ray leaves a closed, star-shaped mesh
-    unhit.
-    """
+    """From near the middle of the mesh's box in all directions: every ray hits a closed, star-shaped mesh."""
     return _batch("from_inside", _near_centre(corners, count, rng), _sphere_points(count, rng))
 
 
 def on_surface_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
     """From random points of random faces, alternately in any direction and along the face; unit directions.
 
-    A third begin at a vertex, where t = 0 is exact and counts; the others as near their face as float32 can be, on
-    either side of it.
+    A third begin at a vertex, where t = 0 is exact and counts; the others begin as near their face as float32 allows,
+    on either side of it.
     """
     triangle = _pick(corners, count, rng)
     weights = rng.dirichlet((1.0, 1.0, 1.0), count)
@@ -181,14 +171,13 @@ def on_surface_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
 
 
 def _quarter_on_surface(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    # There a float32 reference answers every fourth ray otherwise than we, and each of them takes an exact verdict.
+    # Every fourth ray gets another answer from a float32 reference than from us, and each of them takes an exact
+    # verdict.
     return on_surface_rays(corners, -(-count // 4), rng)
 
 
 def far_away_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
-    """From 1e3 to 1e5 radii (log-uniform) of the mesh away, alternately at points of its faces and of its box; t is
-    about 1.
-    """
+    """From 1e3 to 1e5 radii (log-uniform) away, alternately at points of the mesh's faces and its box; t is about 1."""
     centre, radius = _sphere(corners.reshape(-1, 3))
     distance = radius * 10.0 ** rng.uniform(3, 5, (count, 1))
     # Round first: the direction must start at the origin that the ray will have.
@@ -209,9 +198,7 @@ def _edge_points(corners: Floats, count: int, rng: Generator) -> Floats:
 
 
 def face_rays(vertices: Floats, faces: Ints) -> RayBatch:
-    """One ray at the centre of every face, so that not one can be missing: from its own size above or below
-    it.
-    """
+    """One ray at the centre of every face, from the face's own size above or below it, so that each must be found."""
     corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
     centre = corners.mean(axis=1)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -222,13 +209,13 @@ def face_rays(vertices: Floats, faces: Ints) -> RayBatch:
 
 
 def _pinhole(name: str, vertices: Floats, row: Ints, column: Ints, side: int) -> RayBatch:
-    """Through the pixels (``row``, ``column``) of a picture, ``side`` pixels wide and high, of all ``vertices``."""
+    """Rays through the pixels (``row``, ``column``) of a picture of all ``vertices``, ``side`` pixels wide and high."""
     centre, radius = _sphere(vertices)
     forward = _unit(np.array([[-0.6, -0.45, -0.66]]))[0]
     right = _unit(np.cross(forward, [0.0, 1.0, 0.0])[None])[0]
     up = np.cross(right, forward)
 
-    # The bounding sphere, 3 radii away, subtends a half angle of asin(1/3): the picture holds it.
+    # The bounding sphere, 3 radii away, subtends a half angle of asin(1/3), so the picture contains it.
     half_width = np.tan(np.arcsin(1 / 3))
     x = half_width * ((2 * column + 1) / side - 1)
     y = half_width * (1 - (2 * row + 1) / side)
@@ -247,7 +234,7 @@ def _aimed(name: str, corners: Floats, targets: Floats, rng: Generator) -> RayBa
 
 
 def _batch(name: str, origins: Floats, directions: Floats) -> RayBatch:
-    """Round to float32; a direction that is or rounds to zero (a target at its origin) becomes +z."""
+    """Rays rounded to float32; a direction that is or rounds to zero (a target at its origin) becomes +z."""
     exact = float32_exact(directions)
     exact[~exact.any(axis=1)] = (0.0, 0.0, 1.0)
     return RayBatch(name, float32_exact(origins), exact)
@@ -267,7 +254,7 @@ def _sphere_points(count: int, rng: Generator) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Unit vectors; zero stays zero."""
+    """Unit vectors; zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     unit: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
     return unit
@@ -279,6 +266,6 @@ def _bounds(corners: Floats) -> tuple[Floats, Floats]:
 
 
 def _sphere(points: Floats) -> tuple[Floats, float]:
-    """Centre of the bounds of ``points`` and the largest distance from it; the radius of one point is 1."""
+    """Centre of the bounds of ``points`` and the largest distance from it; 1 for a single point."""
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     return centre, float(np.linalg.norm(points - centre, axis=1).max()) or 1.0

@@ -1,4 +1,4 @@
-"""A refitted tree against a new build over the same vertices and faces: the same hits, bit for bit."""
+"""A refitted tree against a new build over the same vertices and faces: the hits must be the same, bit for bit."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from validation.job import Job
 
 _SEED = 2030
 _RAYS = 3_000
-# Each moves faces out of the boxes that they had: stretched and moved away, and turned inside out along one axis.
+# Each change moves faces out of their old boxes: stretched and moved away, and turned inside out along one axis.
 _CHANGES = {
     "stretched and moved": (np.array([2.0, 0.5, 1.0]), np.array([3.0, 0.0, 0.0])),
     "mirrored": (np.array([-1.0, 1.0, 1.0]), np.zeros(3)),
@@ -20,9 +20,9 @@ _CHANGES = {
 
 
 def check_refit(job: Job) -> tuple[list[dict[str, Any]], list[Gate]]:
-    """Refit a sphere's tree and shoot at it; returns records for JSON and a gate for each change and family of rays.
+    """Refit a sphere's tree and trace rays; returns records for JSON and a gate for each change and family of rays.
 
-    What exact arithmetic says of a new build is judged elsewhere, so equal bits are as right as that.
+    Other checks judge new builds by exact arithmetic, so a refitted tree with equal bits is as right as they are.
     """
     job.step("hits: refitted trees")
     records: list[dict[str, Any]] = []

@@ -1,4 +1,4 @@
-"""Closest hits of our octree against every reference, with each disagreement judged by exact arithmetic."""
+"""The section on hits: our octree's closest hits against every reference, disagreements judged by exact arithmetic."""
 
 from collections import Counter
 from typing import Any
@@ -9,7 +9,7 @@ from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from validation.gates import Gate
-from validation.hits.check import SEED, Effort, check_mesh
+from validation.hits.check import SEED, HitEffort, check_mesh
 from validation.hits.errors import EXPONENTS
 from validation.hits.leaks import check_leaks, closed_meshes
 from validation.hits.rays import families, float32_exact
@@ -18,17 +18,17 @@ from validation.hits.verdicts import LISTED
 from validation.job import Job
 from validation.scenes import SCENES
 
-__all__ = ["FULL", "QUICK", "Effort", "check_leaks", "check_mesh", "meshes", "run", "steps"]
+__all__ = ["FULL", "QUICK", "HitEffort", "check_leaks", "check_mesh", "meshes", "run", "steps"]
 
-QUICK = Effort(rays=4_000, exact=200, leaks=100_000)
-FULL = Effort(rays=20_000, exact=2_000, leaks=1_000_000)
+QUICK = HitEffort(rays=4_000, exact=200, leaks=100_000)
+FULL = HitEffort(rays=20_000, exact=2_000, leaks=1_000_000)
 
 
 def meshes() -> dict[str, Mesh]:
-    """What is shot at, all float32-exact: our models, spheres far away, small and large, and triangles in no order."""
+    """The suite's meshes, all float32-exact: our models, spheres far away, small and large, and unordered triangles."""
     models = {name: load_mesh(SCENES / "models" / f"{name}.ply") for name in ("teapot", "torus_knot", "stairs")}
     ball, coarse = icosphere(5), icosphere(3)
-    # The powers of ten are no powers of two: they change every digit, and so the shape by a rounding.
+    # These powers of ten are not powers of two: they change every digit, and so the shape by a rounding.
     placed = {
         "sphere_far_away": Mesh(float32_exact(ball.vertices + np.array([1000.0, -2000.0, 500.0])), ball.faces),
         "sphere_times_1e-3": Mesh(float32_exact(coarse.vertices * 1e-3), coarse.faces),
@@ -41,9 +41,7 @@ def meshes() -> dict[str, Mesh]:
 
 
 def steps(job: Job) -> int:
-    """How often ``run`` calls ``job.step``: once a family of rays on each mesh, twice a closed mesh of the leaks, once
-    for refitted trees.
-    """
+    """Number of calls of ``job.step``: one a family and mesh, two a closed mesh of the leaks, one for refits."""
     triangle = np.eye(3), np.array([[0, 1, 2]])
     a_mesh = len(families(*triangle, 1, SEED)) + 1
     return len(meshes()) * a_mesh + 2 * len(closed_meshes()) + 1 if job.own else len(job.meshes) * a_mesh

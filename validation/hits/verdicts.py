@@ -1,9 +1,9 @@
-"""The verdict on one ray on which we and a reference disagree, from exact arithmetic.
+"""The verdict of exact arithmetic on one ray on which we and a reference disagree.
 
-It needs no trust in either side: an answer is *right* when exact arithmetic gives the same hit or miss and t lies
-within the derived rounding bound of the exact distance of the face that it names. An answer of ours that is not right
-can still be one that rounding permits a watertight kernel (``rounding.RayView``): then exact arithmetic decides the
-ray by less than float64 resolves, and it is counted apart.
+It trusts neither side. An answer is *right* when exact arithmetic gives the same hit or miss and t lies within the
+derived rounding bound of the exact distance of the named face. If an answer of ours is not right, rounding may still
+permit it in a watertight kernel (``rounding.RayView``): then the exact decision rests on less than float64 resolves,
+and the ray is counted apart.
 """
 
 from collections.abc import Sequence
@@ -22,31 +22,31 @@ from validation.oracle.rounding import FLOAT64_ROUNDOFF, RayView, t_bounds
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Point = tuple[float, float, float]
-# What an answer of ours is: "near edge" where rounding permits it, None where nobody looked.
-View = Literal["right", "near edge", "wrong"] | None
+# The judgement of an answer of ours: "near edge" where rounding permits it, None where it was not judged.
+Judgement = Literal["right", "near edge", "wrong"] | None
 
 OURS_RIGHT = "ours right"
 THEIRS_RIGHT = "theirs right"
 BOTH_RIGHT = "both right (each within its rounding)"
-# Or of t = 0, where a ray begins: the other end of what a hit is.
+# Or of t = 0, where a ray begins: the other boundary of a hit.
 NEAR_EDGE = "within float64 rounding of an edge"
 BOTH_WRONG = "both wrong"
 VERDICTS = (OURS_RIGHT, THEIRS_RIGHT, BOTH_RIGHT, NEAR_EDGE, BOTH_WRONG)
 OURS_WRONG: tuple[str | None, ...] = (THEIRS_RIGHT, BOTH_WRONG, None)
 
-# A look at a ray takes milliseconds. Once so many were wrong the kernel is broken and the verdict settled: the rays
-# that nobody has looked at count as wrong then.
+# Judging a ray takes milliseconds. After this many wrong ones the kernel is broken and the verdict settled: all rays
+# that are not judged then count as wrong.
 SETTLED = 30
 
-# Disagreements that a record shows one by one; all are counted.
+# Disagreements that a record lists one by one; it counts all.
 LISTED = 3
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """One ray with different answers; t and face are None on a miss. The rest is None until judged.
+    """One ray with different answers; t and face are None on a miss. The other fields are None until judged.
 
-    ``verdict`` stays None where ours is not plainly right and nobody looked, see ``views``.
+    ``verdict`` stays None where ours is not plainly right and the ray was not judged, see ``judgements``.
     """
 
     ray: int
@@ -65,17 +65,20 @@ class Disagreement:
 
     @property
     def answered(self) -> tuple[Point, Point, float | None, int | None]:
-        """The ray and our answer. Both, because 0 and -0 in a direction are equal and could be answered differently."""
+        """The ray and our answer, as the key of a judgement.
+
+        Both, because 0 and -0 in a direction are equal and could have different answers.
+        """
         return self.origin, self.direction, self.ours_t, self.ours_face
 
 
 def listed(disagreements: Sequence[Disagreement]) -> list[dict[str, object]]:
-    """The first few as tables for JSON; those that speak against us stand in front."""
+    """The first few as tables for JSON, those against us first."""
     order = (*OURS_WRONG, NEAR_EDGE, OURS_RIGHT, BOTH_RIGHT)
     return [asdict(d) for d in sorted(disagreements, key=lambda d: order.index(d.verdict))[:LISTED]]
 
 
-def views(
+def judgements(
     t: Floats,
     face: Ints,
     exact_hits: Sequence[ExactHit | None],
@@ -83,42 +86,42 @@ def views(
     faces: Ints,
     rays: RayBatch,
     most: int,
-) -> dict[int, View]:
-    """What our answers ``t``, ``face`` (n,) are, by row, where they are not plainly right.
+) -> dict[int, Judgement]:
+    """Judgements of our answers ``t``, ``face`` (n,), by row, where they are not plainly right.
 
-    None where nobody looked: beyond the first ``most`` rows, and after ``SETTLED`` wrong ones.
+    None where the ray was not judged: beyond the first ``most`` rows, and after ``SETTLED`` wrong ones.
     """
-    seen: dict[int, View] = {}
+    seen: dict[int, Judgement] = {}
     wrong = 0
     for row in _rows_to_judge(t, face, exact_hits, vertices[faces], rays):
         seen[row] = None
         if len(seen) <= most and wrong < SETTLED:
             answer = (float(t[row]), int(face[row])) if face[row] >= 0 else (None, None)
-            view = RayView(vertices, faces, tuple(rays.origins[row]), tuple(rays.directions[row]), FLOAT64_ROUNDOFF)
-            seen[row] = "right" if view.is_right(*answer) else "near edge" if view.is_permitted(*answer) else "wrong"
+            ray = RayView(vertices, faces, tuple(rays.origins[row]), tuple(rays.directions[row]), FLOAT64_ROUNDOFF)
+            seen[row] = "right" if ray.is_right(*answer) else "near edge" if ray.is_permitted(*answer) else "wrong"
             wrong += seen[row] == "wrong"
     return seen
 
 
-def judged(d: Disagreement, hit: ExactHit | None, view: View, theirs_right: bool) -> Disagreement:
-    """The disagreement with its verdict, from the truth, from what ours is and from whether theirs is right."""
+def judged(d: Disagreement, hit: ExactHit | None, ours: Judgement, theirs_right: bool) -> Disagreement:
+    """The disagreement with its verdict, from the exact hit, our answer's judgement and whether theirs is right."""
     verdict = {
         "right": BOTH_RIGHT if theirs_right else OURS_RIGHT,
         "near edge": NEAR_EDGE,
         "wrong": THEIRS_RIGHT if theirs_right else BOTH_WRONG,
         None: None,
-    }[view]
-    ours_right = None if view is None else view == "right"
+    }[ours]
+    ours_right = None if ours is None else ours == "right"
     return replace(with_truth(d, hit), ours_right=ours_right, theirs_right=theirs_right, verdict=verdict)
 
 
 def theirs_right(
     disagreements: Sequence[Disagreement], exact_hits: Sequence[ExactHit | None], corners: Floats, roundoff: float
 ) -> list[bool]:
-    """Whether answers in arithmetic of ``roundoff`` are right; ``corners`` are those of all faces, (F, 3, 3).
+    """Whether answers in arithmetic of ``roundoff`` are right; ``corners`` (F, 3, 3) are those of all faces.
 
-    Right is the same hit or miss, a face that is exactly hit, t within its bound, and no farther from the closest face
-    than the bounds of both.
+    Right means the same hit or miss, a face that is exactly hit, t within its bound, and t no farther from the closest
+    face than the bounds of both.
     """
     pairs = list(zip(disagreements, exact_hits, strict=True))
     right = [hit is None and d.theirs_face is None for d, hit in pairs]
@@ -135,7 +138,7 @@ def theirs_right(
 def _on_planes(
     rays: Sequence[tuple[Disagreement, int]], corners: Floats, roundoff: float
 ) -> list[tuple[Fraction | None, float]]:
-    """Where each ray exactly hits its face, None where it does not, and the bound on t there."""
+    """Exact t where each ray hits its face, None where it does not, and the bound on t there."""
     if not rays:
         return []
     triangles = corners[[face for _, face in rays]]
@@ -149,20 +152,20 @@ def _on_planes(
 
 
 def with_truth(d: Disagreement, hit: ExactHit | None) -> Disagreement:
-    """The disagreement with what is exactly hit."""
+    """The disagreement with the exact hit."""
     return d if hit is None else replace(d, exact_t=float(hit.t), exact_faces=hit.faces_at_t)
 
 
 def _rows_to_judge(
     t: Floats, face: Ints, exact_hits: Sequence[ExactHit | None], corners: Floats, rays: RayBatch
 ) -> list[int]:
-    """Rays that are not plainly right, where right is a common miss, or a closest face and t in bounds."""
+    """Rows that are not plainly right, where right is a common miss, or a closest face with t in bounds."""
     rows, named, errors = [], [], []
     for row, (ours, name, hit) in enumerate(zip(t.tolist(), face.tolist(), exact_hits, strict=True)):
         if hit is None or name not in hit.faces_at_t:
             if hit is not None or name >= 0:
                 rows.append(row)
-        # Every bound is at least 10 u |t|; look at the triangle only beyond 8 u (the rounding of hit.t takes 1).
+        # Every bound is at least 10 u |t|: compute the triangle's own only beyond 8 u (the rounding of hit.t takes 1).
         elif not abs(ours - float(hit.t)) <= 8 * FLOAT64_ROUNDOFF * abs(ours):
             named.append(row)
             errors.append(float(abs(Fraction(ours) - hit.t)))

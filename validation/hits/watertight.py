@@ -1,7 +1,7 @@
-"""No ray leaves a closed mesh unseen: a sweep over shapes, places, sizes and ways to build the tree.
+"""Leak test: a sweep over closed meshes, placements, sizes and tree builds in which every ray must hit.
 
-From points inside a closed mesh every ray hits, so each miss is a leak, and nobody's arithmetic need be trusted to
-say so. The rays are aimed in float64 at points of edges and at vertices, where neighbours must agree to the last bit.
+From points inside a closed mesh every ray hits, so each miss is a leak, and no reference's arithmetic is needed. The
+rays are aimed in float64 at points of edges and at vertices, where neighbours must agree to the last bit.
 """
 
 import math
@@ -29,24 +29,25 @@ Floats = NDArray[np.float64]
 SEED = 2027
 OFFSETS = (0.0, 1e2, 1e4, 1e6)
 SCALES = (1e-6, 1.0, 1e6)
-# Where float32 boxes cannot tell one face from another each ray meets all faces, and fewer rays take as long.
+# Weight of placements whose float32 boxes cannot separate the faces: each ray meets all faces, and fewer rays take as
+# long.
 CROWDED = 0.1
 KINDS = ("edge", "vertex")
-# The offset has this direction, so that no coordinate is as far as another.
+# Direction of the offset: its three coordinates differ.
 _AWAY = np.array([1.0, -0.75, 0.375])
 # An orthogonal matrix with no structure; its rounding moves vertices, but neighbours still share them.
 _TURN = np.linalg.qr(np.array([[2.0, 3.0, 1.0], [-1.0, 2.0, 5.0], [4.0, -1.0, 1.0]]))[0]
 
 
-class Closed(NamedTuple):
-    """A closed mesh and points within it, (n, 3) for a generator and n."""
+class ClosedMesh(NamedTuple):
+    """A closed mesh, and a function of a generator and n that gives points (n, 3) inside it."""
 
     name: str
     mesh: Mesh
     inside: Callable[[Generator, int], Floats]
 
 
-class Build(NamedTuple):
+class BuildOptions(NamedTuple):
     """Options of ``Octree``."""
 
     split: Literal["midpoint", "sah"]
@@ -55,20 +56,20 @@ class Build(NamedTuple):
 
 
 SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
-BUILDS = tuple(Build(*options) for options in product(SPLITS, (1, 4, 32), (1, 8, 32)))
+BUILDS = tuple(BuildOptions(*options) for options in product(SPLITS, (1, 4, 32), (1, 8, 32)))
 
 
 @dataclass(frozen=True)
-class Effort:
-    """Rays of each kind in all, how many of ``BUILDS`` each placement is built with, rays of each kind for Embree."""
+class LeakEffort:
+    """Total rays of each kind, number of ``BUILDS`` for each placement, and rays of each kind for Embree."""
 
     rays: int
     builds: int
     embree: int
 
 
-class Shot(NamedTuple):
-    """What one kernel let through of the rays of one kind in one place; the build's options are of ours alone."""
+class LeakCount(NamedTuple):
+    """Leak count for one (kernel, mesh, ray kind, placement, build); the build's options are of our kernel alone."""
 
     kernel: str
     mesh: str
@@ -82,21 +83,21 @@ class Shot(NamedTuple):
     leaks: int
 
 
-QUICK = Effort(rays=100_000, builds=1, embree=500)
-FULL = Effort(rays=1_000_000, builds=9, embree=5_000)
+QUICK = LeakEffort(rays=100_000, builds=1, embree=500)
+FULL = LeakEffort(rays=1_000_000, builds=9, embree=5_000)
 
 
 @dataclass(frozen=True)
 class Placement:
-    """A closed mesh turned or not, scaled, then moved; ``place`` does the same to any point."""
+    """A closed mesh, possibly rotated, then scaled, then moved; ``place`` transforms any point alike."""
 
-    closed: Closed
+    closed: ClosedMesh
     turned: bool
     offset: float
     scale: float
 
     def place(self, points: Floats) -> Floats:
-        """Points (n, 3) of the mesh's own frame where they are in this placement."""
+        """Transform points (n, 3) of the mesh's own frame into this placement."""
         return self._turn(points) * self.scale + self.offset * _AWAY
 
     def vertices(self) -> Floats:
@@ -108,18 +109,18 @@ class Placement:
         return aimed(kind, self.vertices(), self.closed.mesh.faces, self.place(self.closed.inside(rng, count)), rng)
 
     def keeps_sides(self, vertices: Floats) -> bool:
-        """Whether the rounded ``vertices`` leave every face an area, on the side where it was."""
+        """Whether the rounded ``vertices`` leave every face an area, with its orientation unchanged."""
         before = _area_vectors(self._turn(self.closed.mesh.vertices), self.closed.mesh.faces)
         after = _area_vectors(vertices, self.closed.mesh.faces)
         return bool(((before * after).sum(axis=1) > 0).all())
 
     @property
     def weight(self) -> float:
-        """How many rays it gets beside the others: ``CROWDED`` where float32's ulp is as large as the mesh."""
+        """Weight in the share of rays: ``CROWDED`` where float32's ulp is as large as the mesh."""
         return CROWDED if self.scale <= self.offset * 2.0**-23 else 1.0
 
     def record(self) -> dict[str, object]:
-        """For JSON."""
+        """The placement, for JSON."""
         return {"mesh": self.closed.name, "turned": self.turned, "offset": self.offset, "scale": self.scale}
 
     def _turn(self, points: Floats) -> Floats:
@@ -129,8 +130,8 @@ class Placement:
 def aimed(kind: str, vertices: Floats, faces: NDArray[np.int32], origins: Floats, rng: Generator) -> RayBatch:
     """One ray from each of ``origins`` (n, 3) at a random vertex, or at a random point of a random edge.
 
-    The corners are seen from the origin before a point between them is taken: far from zero that keeps the ray within
-    rounding of the edge as the kernel sees it; through a rounded point it would pass the edge at a distance.
+    Subtract the origin from the corners before a point between them is taken: far from zero that keeps the ray within
+    rounding of the edge as the kernel sees it; a rounded point would lie at a distance from the edge.
     """
     count = len(origins)
     corners = vertices[faces[rng.integers(0, len(faces), count)]] - origins[:, None]
@@ -143,31 +144,31 @@ def aimed(kind: str, vertices: Floats, faces: NDArray[np.int32], origins: Floats
 
 
 def leaks(octree: Octree, rays: RayBatch) -> int:
-    """Rays that closest hit or any hit lets through."""
+    """Number of rays that closest hit or any hit misses."""
     missed = ~octree.closest_hit(rays.origins, rays.directions).hit
     missed |= ~octree.any_hit(rays.origins, rays.directions)
     return int(np.count_nonzero(missed))
 
 
 def embree_leaks(embree: Embree, rays: RayBatch) -> int:
-    """Rays that Embree's closest hit lets through."""
+    """Number of rays that Embree's closest hit misses."""
     return int(np.count_nonzero(embree.closest_hit(rays.origins, rays.directions)[1] < 0))
 
 
-def closed_meshes() -> tuple[Closed, ...]:
-    """What is shot at from inside: convex and not, a knot, and a box whose every number is an integer."""
-    balls = (Closed(f"icosphere {level}", icosphere(level), _cube(0.0, 0.4)) for level in (3, 4, 5, 6))
+def closed_meshes() -> tuple[ClosedMesh, ...]:
+    """The closed meshes: convex and not, a knot, and a box of which every number is an integer."""
+    balls = (ClosedMesh(f"icosphere {level}", icosphere(level), _cube(0.0, 0.4)) for level in (3, 4, 5, 6))
     ring = torus(1.0, 0.4, 100, 40)
     knot = load_mesh(SCENES / "models" / "torus_knot.ply")
-    # Its vertices lie section by section, 50 to each: the mean of a section is in the middle of the tube.
+    # Its vertices are ordered by cross-section, 50 each: the mean of a section is in the middle of the tube.
     core = knot.vertices.reshape(-1, 50, 3).mean(axis=1)
     hills = icosphere(4)
     return (
         *balls,
-        Closed("integer box", integer_box(), _cube(4.0, 3.0)),
-        Closed("torus", ring, _in_ring),
-        Closed("hilly sphere", Mesh(hilly(hills.vertices), hills.faces), _cube(0.0, 0.2)),
-        Closed("torus knot", knot, lambda rng, count: core[rng.integers(0, len(core), count)]),
+        ClosedMesh("integer box", integer_box(), _cube(4.0, 3.0)),
+        ClosedMesh("torus", ring, _in_ring),
+        ClosedMesh("hilly sphere", Mesh(hilly(hills.vertices), hills.faces), _cube(0.0, 0.2)),
+        ClosedMesh("torus knot", knot, lambda rng, count: core[rng.integers(0, len(core), count)]),
     )
 
 
@@ -184,21 +185,21 @@ def integer_box(size: int = 8) -> Mesh:
 
 
 def hilly(points: Floats) -> Floats:
-    """Points of the unit sphere moved along their radius by up to 0.3: not convex, seen whole from the centre."""
+    """Points of the unit sphere moved along their radius by up to 0.3: not convex, but star-shaped about the centre."""
     x, y, z = 6.0 * points.T
     return points * (1.0 + 0.3 * np.sin(x) * np.sin(y + 1.0) * np.sin(z + 2.0))[:, None]
 
 
-def placements(closed: Closed) -> Iterator[Placement]:
-    """One closed mesh in every place."""
+def placements(closed: ClosedMesh) -> Iterator[Placement]:
+    """All placements of one closed mesh."""
     for turned, offset, scale in product((False, True), OFFSETS, SCALES):
         yield Placement(closed, turned, offset, scale)
 
 
 def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:
-    """Sweep all; returns a record for JSON and a gate for each mesh and kind of ray."""
+    """Run the sweep; returns a record for JSON and a gate for each mesh and kind of ray."""
     effort = QUICK if quick else FULL
-    shot: list[Shot] = []
+    counts: list[LeakCount] = []
     left_out = []
     meshes = closed_meshes()
     share = effort.rays / effort.builds / sum(p.weight for closed in meshes for p in placements(closed))
@@ -208,69 +209,69 @@ def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], li
             if not placement.keeps_sides(placement.vertices()):
                 left_out.append(placement.record())
                 continue
-            # Seeded by place, so that leaving one out changes no other.
+            # Seeded by placement, so that leaving one out changes no other.
             rng = np.random.default_rng([SEED, index, place])
-            shot += shoot(placement, builds(place, effort.builds), share, rng)
-            shot += shoot_embree(placement, effort.embree, rng)
+            counts += shoot(placement, builds(place, effort.builds), share, rng)
+            counts += shoot_embree(placement, effort.embree, rng)
     record = {
-        "meshes": sums(shot, "mesh", "kind"),
-        "places": sums(shot, "offset", "scale"),
-        "builds": sums([s for s in shot if s.kernel == "ours"], "split", "leaf_size", "max_depth"),
+        "meshes": sums(counts, "mesh", "kind"),
+        "places": sums(counts, "offset", "scale"),
+        "builds": sums([c for c in counts if c.kernel == "ours"], "split", "leaf_size", "max_depth"),
         "left_out": left_out,
         "seed": SEED,
     }
-    return record, gates(shot)
+    return record, gates(counts)
 
 
-def gates(shot: Sequence[Shot]) -> list[Gate]:
-    """No leak of ours in any mesh, for each kind of ray."""
+def gates(counts: Sequence[LeakCount]) -> list[Gate]:
+    """Gates on our leaks, one for each mesh and kind of ray; none is allowed."""
     reason = "a closed mesh has no holes, wherever it lies and however its tree is built"
     found = []
-    for row in sums([s for s in shot if s.kernel == "ours"], "mesh", "kind"):
+    for row in sums([c for c in counts if c.kernel == "ours"], "mesh", "kind"):
         subject = f"{row['mesh']}, {row['ours_rays']:,} {row['kind']} rays from inside, all places and builds"
         found.append(Gate("stability", subject, "leaks", row["ours"], "at most", 0.0, reason))
     return found
 
 
-def sums(shot: Sequence[Shot], *keys: str) -> list[dict[str, Any]]:
-    """One row for each combination of ``keys`` that occurs: rays and leaks of each kernel in ``shot``.
+def sums(counts: Sequence[LeakCount], *keys: str) -> list[dict[str, Any]]:
+    """Rays and leaks of each kernel in ``counts``, one row for each combination of ``keys`` that occurs.
 
     Leaks are None where a kernel got no rays.
     """
-    kernels = sorted({s.kernel for s in shot}, reverse=True)
+    kernels = sorted({c.kernel for c in counts}, reverse=True)
     rows: dict[tuple[object, ...], Counter[str]] = {}
     leaked: dict[tuple[object, ...], Counter[str]] = {}
-    for s in shot:
-        row = tuple(getattr(s, key) for key in keys)
-        rows.setdefault(row, Counter())[s.kernel] += s.rays
-        leaked.setdefault(row, Counter())[s.kernel] += s.leaks
+    for c in counts:
+        row = tuple(getattr(c, key) for key in keys)
+        rows.setdefault(row, Counter())[c.kernel] += c.rays
+        leaked.setdefault(row, Counter())[c.kernel] += c.leaks
     found = []
     for row, rays in rows.items():
-        counts = {f"{k}_rays": rays[k] for k in kernels} | {k: leaked[row][k] if rays[k] else None for k in kernels}
-        found.append(dict(zip(keys, row, strict=True)) | counts)
+        columns = {f"{k}_rays": rays[k] for k in kernels} | {k: leaked[row][k] if rays[k] else None for k in kernels}
+        found.append(dict(zip(keys, row, strict=True)) | columns)
     return found
 
 
-def builds(place: int, count: int) -> list[Build]:
-    """``count`` builds for a mesh's place: with 1 each mesh meets all, with 9 it does at each offset and scale."""
-    # As the mesh is and turned are half the places apart, and must take builds of different parity.
+def builds(place: int, count: int) -> list[BuildOptions]:
+    """``count`` builds for a mesh's placement: with 1 each mesh gets all of them, with 9 at each offset and scale."""
+    # The two orientations are half the placements apart, and must take builds of different parity.
     first = place - place // (len(OFFSETS) * len(SCALES))
     return [BUILDS[(first + 2 * i) % len(BUILDS)] for i in range(count)]
 
 
-def shoot(placement: Placement, built: Sequence[Build], share: float, rng: Generator) -> Iterator[Shot]:
-    """Our rays in one placement, ``share`` times its weight of each kind through each of the trees ``built``."""
+def shoot(placement: Placement, built: Sequence[BuildOptions], share: float, rng: Generator) -> Iterator[LeakCount]:
+    """Trace our rays in one placement: ``share`` times its weight of each kind through each of the trees ``built``."""
     vertices = placement.vertices()
     count = math.ceil(share * placement.weight)
     for build in built:
         octree = Octree(vertices, placement.closed.mesh.faces, **build._asdict())
         for kind in KINDS:
             lost = leaks(octree, placement.rays(kind, count, rng))
-            yield Shot("ours", placement.closed.name, kind, placement.offset, placement.scale, *build, count, lost)
+            yield LeakCount("ours", placement.closed.name, kind, placement.offset, placement.scale, *build, count, lost)
 
 
-def shoot_embree(placement: Placement, count: int, rng: Generator) -> Iterator[Shot]:
-    """The same by Embree for information, on vertices and origins as float32 holds them, if the mesh survives that."""
+def shoot_embree(placement: Placement, count: int, rng: Generator) -> Iterator[LeakCount]:
+    """The same by Embree, for information, on float32 vertices and origins, if no face flips in float32."""
     vertices, faces = float32_exact(placement.vertices()), placement.closed.mesh.faces
     if not placement.keeps_sides(vertices):
         return
@@ -281,7 +282,7 @@ def shoot_embree(placement: Placement, count: int, rng: Generator) -> Iterator[S
             embree = Embree(vertices, faces, robust=mode == "robust")
             lost = embree_leaks(embree, rays)
             where = placement.closed.name, kind, placement.offset, placement.scale
-            yield Shot(f"embree_{mode}", *where, "", 0, 0, count, lost)
+            yield LeakCount(f"embree_{mode}", *where, "", 0, 0, count, lost)
 
 
 def _area_vectors(vertices: Floats, faces: NDArray[np.int32]) -> Floats:

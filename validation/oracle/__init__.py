@@ -1,1 +1,1 @@
-"""Exact arithmetic, which shares no code with what it judges."""
+"""Exact arithmetic, the oracle of the suite. It shares no code with the renderer."""

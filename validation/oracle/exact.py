@@ -6,11 +6,11 @@ o, b = p1 - o, c = p2 - o:
 
     U = d . (b x c),  V = d . (c x a),  W = d . (a x b),  T = a . (b x c),  t = T / (U + V + W).
 
-Semantics: a triangle is closed (its edges and vertices belong to it) and two-sided; a ray in the triangle's
-plane and a triangle of zero area are missed; t counts in units of |direction|; t_min <= t <= t_max is closed;
-the closest hit is the smallest exact t and, at equal t, the lowest face.
+Semantics: a triangle is closed (its edges and vertices belong to it) and two-sided; a ray in the triangle's plane and a
+triangle of zero area are missed; t counts in units of |direction|; t_min <= t <= t_max is closed; the closest hit is
+the smallest exact t and, at equal t, the lowest face.
 
-In front of the rational test stands a float64 filter that only discards what it proves to be missed.
+A float64 filter runs before the rational test; it discards only faces that it proves to be missed.
 """
 
 import math
@@ -48,9 +48,7 @@ _RAYS_AT_ONCE = 4096
 
 @dataclass(frozen=True)
 class ExactHit:
-    """Closest hit of one ray: exact ``t``, the lowest ``face`` at that t, and all faces that attain it,
-    ascending.
-    """
+    """Closest hit of one ray: exact ``t``, the lowest ``face`` at that t, and all faces that attain it, ascending."""
 
     t: Fraction
     face: int
@@ -58,8 +56,7 @@ class ExactHit:
 
 
 def intersect(triangle: ArrayLike, origin: ArrayLike, direction: ArrayLike) -> Fraction | None:
-    """Exact t (of any sign) at which the line ``origin + t direction`` meets ``triangle`` (3, 3), or None on
-    a miss.
+    """Exact t (of any sign) at which the line ``origin + t direction`` meets ``triangle`` (3, 3), or None on a miss.
 
     >>> intersect([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [0.25, 0.25, 1], [0, 0, -3])
     Fraction(1, 3)
@@ -73,7 +70,7 @@ def intersect(triangle: ArrayLike, origin: ArrayLike, direction: ArrayLike) -> F
 def determinants(
     triangle: ArrayLike, origin: ArrayLike, direction: ArrayLike
 ) -> tuple[Fraction, Fraction, Fraction, Fraction]:
-    """Exact (U, V, W, T) of the module's docstring: the three edge determinants and the numerator of t."""
+    """Exact (U, V, W, T) as the module defines them: the three edge determinants and the numerator of t."""
     corners, origins, directions = (
         _finite(triangle, "triangle"),
         _rows(origin, "origin"),
@@ -96,9 +93,7 @@ def closest_hit(
     t_max: float = math.inf,
     candidates: Iterable[int] | None = None,
 ) -> ExactHit | None:
-    """Exact closest hit of one ray with t_min <= t <= t_max, or None; only ``candidates`` are tested where
-    given.
-    """
+    """Exact closest hit of one ray with t_min <= t <= t_max, or None; only ``candidates`` are tested where given."""
     points, triangles = _mesh(vertices, faces)
     query = _Scaled(points, _rows(origin, "origin"), _rows(direction, "direction"))
     tested = range(len(triangles)) if candidates is None else sorted(candidates)
@@ -120,11 +115,13 @@ def closest_hits(
     finite. ``filtered=False`` judges every face for every ray rationally; the answer is the same. Raises
     ``ValueError`` for wrong shapes, numbers that are not finite and face indices out of range.
     """
+    # Check the input.
     points, triangles = _mesh(vertices, faces)
     o, d = _rows(origins, "origins"), _rows(directions, "directions")
     if o.shape != d.shape:
         raise ValueError(f"directions: expected the shape of origins {o.shape}, got {d.shape}")
 
+    # Scale to integers; without the filter test every face.
     query = _Scaled(points, o, d)
     named = [(face, i, j, k) for face, (i, j, k) in enumerate(triangles.tolist())]
     if not filtered:
@@ -132,6 +129,7 @@ def closest_hits(
     if not len(triangles):
         return [None] * len(o)
 
+    # Filter the faces for many rays at once, then test each ray's candidates exactly.
     hits: list[ExactHit | None] = []
     boxes = _BoxTree(points[triangles])
     for start in range(0, len(o), _RAYS_AT_ONCE):
@@ -152,11 +150,10 @@ def possible_faces(
     direction: ArrayLike,
     unit_roundoff: float = FLOAT64_ROUNDOFF,
 ) -> Ints:
-    """All faces, ascending, that arithmetic with ``unit_roundoff`` might call hit by the line through the
-    ray.
+    """All faces, ascending, that arithmetic with ``unit_roundoff`` might call hit by the line through the ray.
 
-    Every face that is exactly hit is among them. No broad phase is used: a face that the ray passes by
-    within rounding can have a box that the ray does not meet at all.
+    Every face that is exactly hit is among them. There is no broad phase: where a ray passes a face within rounding, it
+    may miss the face's box altogether.
     """
     points, triangles = _mesh(vertices, faces)
     o, d = _rows(origin, "origin"), _rows(direction, "direction")
@@ -164,9 +161,7 @@ def possible_faces(
 
 
 def determinant_bounds(relative: Floats, directions: Floats, unit_roundoff: float = FLOAT64_ROUNDOFF) -> Floats:
-    """Bounds (n, 3) on the error of U, V, W in arithmetic with ``unit_roundoff``; corners - origin are (n, 3,
-    3).
-    """
+    """Bounds (n, 3) on the error of U, V, W in arithmetic with ``unit_roundoff``; corners - origin are (n, 3, 3)."""
     size = np.abs(relative).sum(axis=2)
     longest = np.abs(directions).max(axis=1)[:, None]
     products = np.stack((size[:, 1] * size[:, 2], size[:, 2] * size[:, 0], size[:, 0] * size[:, 1]), axis=1)
@@ -179,9 +174,7 @@ def determinant_bounds(relative: Floats, directions: Floats, unit_roundoff: floa
 
 
 class _Scaled:
-    """Mesh and rays as integers: positions times 2^-position_exponent, directions times
-    2^-direction_exponent.
-    """
+    """Mesh and rays as integers: positions times 2^-position_exponent, directions times 2^-direction_exponent."""
 
     def __init__(self, vertices: Floats, origins: Floats, directions: Floats) -> None:
         self.position_exponent = _common_exponent(vertices, origins)
@@ -198,7 +191,7 @@ class _Scaled:
         """Closest hit of ``ray`` among ``candidates`` (face, i, j, k), given in ascending order of face."""
         first, last = self._limit(t_min), self._limit(t_max)
         o, d = self.origins[ray], self.directions[ray]
-        best: Ratio = (1, 0)  # 1/0 stands for infinity and is beaten by every fraction
+        best: Ratio = (1, 0)  # 1/0 is infinity: every fraction is smaller
         tied: list[int] = []
         for face, i, j, k in candidates:
             found = _ratio(self.vertices[i], self.vertices[j], self.vertices[k], o, d)
@@ -212,7 +205,7 @@ class _Scaled:
         return ExactHit(Fraction(*best) * self.t_unit, tied[0], tuple(tied)) if tied else None
 
     def _limit(self, t: float) -> Ratio:
-        """``t`` in the integers' units; -1/0 and 1/0 stand for the infinities."""
+        """``t`` in the integers' units; -1/0 and 1/0 are the infinities."""
         if math.isnan(t):
             raise ValueError("t_min, t_max: expected numbers, got nan")
         if math.isinf(t):
@@ -237,7 +230,7 @@ def _ratio(p0: Vector, p1: Vector, p2: Vector, o: Vector, d: Vector) -> Ratio | 
 
 
 def _edge_determinants(p0: Vector, p1: Vector, p2: Vector, o: Vector, d: Vector) -> Vector:
-    """U, V, W: each the triple product of d and two corners as seen from o."""
+    """U, V, W: each the triple product of d and two corners relative to o."""
     ox, oy, oz = o
     dx, dy, dz = d
     ax, ay, az = p0[0] - ox, p0[1] - oy, p0[2] - oz
@@ -282,12 +275,10 @@ def _integers(values: Floats, exponent: int) -> list[Vector]:
 
 
 def _possible(corners: Floats, origins: Floats, directions: Floats, unit_roundoff: float) -> Bools:
-    """Mask (n,) of pairs not proved a miss: a miss has two determinants beyond their bounds with opposite
-    signs.
+    """Mask (n,) of pairs not proved a miss: a miss has two determinants beyond their bounds with opposite signs.
 
-    Overflow makes the bound infinite (it holds the same products without cancellation), so nothing is
-    discarded; a sum that the library contracts to fused multiply-adds has fewer roundings, so the bound
-    holds.
+    Overflow makes the bound infinite (it holds the same products without cancellation), so nothing is discarded. Where
+    the library contracts a sum to fused multiply-adds there are fewer roundings, so the bound holds.
     """
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         relative = corners - origins[:, None, :]
@@ -314,9 +305,7 @@ def _triple(d: Floats, p: Floats, q: Floats) -> Floats:
 
 
 class _BoxTree:
-    """Complete binary tree of exact bounding boxes; node i of level L holds places (i F >> L) ... ((i + 1) F
-    >> L).
-    """
+    """Complete binary tree of exact bounding boxes; node i of level L holds places (i F >> L) ... ((i + 1) F >> L)."""
 
     def __init__(self, corners: Floats) -> None:
         self.corners = corners
@@ -369,9 +358,8 @@ def _may_meet_box(
 ) -> Bools:
     """Mask (n,) of pairs whose ray is not proved to miss its box.
 
-    Each distance to a plane is moved outwards by more than its rounding and underflow. Where a difference
-    overflows the axis proves nothing; where a quotient overflows the true one is no smaller than the largest
-    float64.
+    Each distance to a plane is moved outwards by more than its rounding and underflow. Where a difference overflows,
+    the axis proves nothing; where a quotient overflows, the true one is no smaller than the largest float64.
     """
     with np.errstate(all="ignore"):
         to_lower, to_upper = lower - origins, upper - origins

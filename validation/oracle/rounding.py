@@ -1,7 +1,7 @@
-"""What floating-point arithmetic may answer for a ray, seen from exact arithmetic.
+"""Which answers floating-point arithmetic may give for a ray, derived from exact arithmetic.
 
-A face is judged by the exact determinants of ``validation.oracle.exact`` and by derived bounds on what rounding
-makes of them. ``RayView`` tells whether an answer is the exact one, and if not, whether rounding permits it.
+The exact determinants of ``validation.oracle.exact`` and derived bounds on their rounding judge each face. ``RayView``
+decides whether an answer is the exact one, and if not, whether rounding permits it.
 """
 
 from collections import Counter
@@ -25,13 +25,13 @@ FLOAT64_ROUNDOFF = exact.FLOAT64_ROUNDOFF
 
 @dataclass(frozen=True)
 class SeenFace:
-    """One face as a ray and arithmetic with some unit roundoff see it."""
+    """One face as arithmetic with some unit roundoff sees it from a ray."""
 
     face: int
     t: Fraction | None  # where the ray meets its plane; None when parallel
     t_bound: float
     hit: bool  # exactly hit at t >= 0
-    surely_hit: bool  # hit whatever the rounding
+    surely_hit: bool  # hit under any rounding
     edges: dict[Edge, float]  # determinant of each edge, 0 where it is below its bound
 
     @property
@@ -40,10 +40,10 @@ class SeenFace:
 
 
 class RayView:
-    """One ray in front of the mesh ``vertices`` (V, 3), ``faces`` (F, 3), for hits at t >= 0.
+    """Exact and rounding-tolerant verdicts on one ray's hits at t >= 0 on a mesh ``vertices`` (V, 3), ``faces`` (F, 3).
 
-    ``seen`` are all faces that are hit or that rounding might call hit; ``closest`` is the exact closest t,
-    None on a miss, and ``closest_faces`` all faces that attain it.
+    ``seen`` holds all faces that are hit or that rounding might call hit; ``closest`` is the exact closest t, None on a
+    miss, and ``closest_faces`` holds all faces that attain it.
     """
 
     def __init__(self, vertices: Floats, faces: Ints, origin: Point, direction: Point, unit_roundoff: float) -> None:
@@ -68,8 +68,8 @@ class RayView:
     def is_permitted(self, t: float | None, face: int | None) -> bool:
         """Whether rounding can give this answer in a watertight kernel.
 
-        It must not pass by a face that is surely hit (three determinants and t farther from 0 than their
-        bounds), nor by a sheet that is: see ``_sheets``. A named face must be one that may be hit, at its t.
+        The kernel must not pass a face that is surely hit (three determinants and t farther from 0 than their bounds),
+        nor a sheet that is surely hit: see ``_sheets``. A named face must be one that may be hit, at its t.
         """
         stops = [(f.t, f.t_bound) for f in self.seen if f.surely_hit and f.t is not None] + self._sheets()
         if t is None:
@@ -109,15 +109,13 @@ class RayView:
         return seen
 
     def _sheets(self) -> list[tuple[Fraction, float]]:
-        """(t, bound) of each set of joined faces that a watertight kernel must hit, though none of them
-        surely.
+        """(t, bound) of each set of joined faces that a watertight kernel must hit, though no single one is sure.
 
-        Such a kernel shears each vertex once and takes the signs of the edges between the sheared points
-        without error, so it sees a slightly moved mesh without gaps. Take the faces joined by common edges,
-        and the edges that an odd number of them have: these close to polygons. Where all of them lie farther
-        from the ray than rounding moves them, the parity with which they enclose the ray is not changed by
-        rounding, and odd means that some face of the set covers the ray. (At a silhouette two layers cover
-        it: even.)
+        Such a kernel shears each vertex once and takes the signs of the edges between the sheared points without error,
+        so it sees a slightly moved mesh without gaps. Take the faces joined by common edges, and the edges that an odd
+        number of them have: these close to polygons. Where all of them lie farther from the ray than rounding moves
+        them, rounding does not change the parity with which they enclose the ray, and an odd parity means that some
+        face of the set covers the ray. (At a silhouette two layers cover it: even.)
         """
         sheets = []
         for joined in _joined(self.seen):
@@ -145,7 +143,7 @@ class RayView:
 
 
 def _joined(seen: Sequence[SeenFace]) -> list[list[SeenFace]]:
-    """The faces in groups that are connected by common edges."""
+    """Groups of faces that are connected by common edges."""
     by_edge: dict[Edge, list[SeenFace]] = {}
     for face in seen:
         for edge in face.edges:
@@ -171,7 +169,7 @@ def t_bounds(
     determinants: Floats,
     unit_roundoff: float = FLOAT64_ROUNDOFF,
 ) -> Floats:
-    """Bounds (n,) on the error of t that rounding explains, inf where the determinant itself drowns in it.
+    """Bounds (n,) on the error of t that rounding explains; inf where rounding exceeds the determinant itself.
 
     With z_i the distances of the corners (n, 3, 3) along the ray's longest axis, Woop's kernel computes t' =
     sum U_i' z_i' / sum U_i', where |U_i' - U_i| <= B_i (``exact.determinant_bounds``) and z_i' has 3
@@ -184,6 +182,7 @@ def t_bounds(
     and by at most 8 u sum |n_j a_j| / |det|. The sum of all covers both. ``determinants`` are U, V, W (n, 3),
     well known.
     """
+    # Express the corners relative to the origin, and bound the determinants.
     u = unit_roundoff
     relative = corners - origins[:, None, :]
     bounds = exact.determinant_bounds(relative, directions, u)
@@ -193,6 +192,7 @@ def t_bounds(
     rows = np.arange(len(directions))
     normal = np.cross(relative[:, 1] - relative[:, 0], relative[:, 2] - relative[:, 0])
 
+    # Sum the terms of the bound.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         depth = relative[rows, :, axis] / directions[rows, axis][:, None]
         t = (determinants * depth).sum(axis=1) / det

@@ -1,1 +1,1 @@
-"""The section that checks pictures: the ladder of rungs, comparison, placement, random paths."""
+"""The section on pictures: the ladder of rungs, comparison, placement, random paths."""

@@ -1,4 +1,4 @@
-"""What the primary rays meet, ours against Mitsuba's: the lowest rung, geometry and camera apart from shading."""
+"""Primary hits, ours against Mitsuba's: the lowest rung, which tests geometry and camera apart from shading."""
 
 from typing import Any
 
@@ -10,13 +10,13 @@ from renderer.scene.camera import primary_rays
 from renderer.scene.scene import Scene
 from validation.gates import Gate
 from validation.references.mitsuba.whitted import Aovs
-from validation.thresholds import Aovs as Limits
+from validation.thresholds import AovLimits
 
-# What stands in for the largest error where no ray was hit by both.
+# The largest error where no ray was hit by both.
 _NONE = 0.0
 
 
-def compare(name: str, scene: Scene, ours: Image, theirs: Aovs, limits: Limits) -> tuple[dict[str, Any], list[Gate]]:
+def compare(name: str, scene: Scene, ours: Image, theirs: Aovs, limits: AovLimits) -> tuple[dict[str, Any], list[Gate]]:
     """Shares of pixels whose distance, position, geometric or shading normal is off, and the largest errors.
 
     ours : a picture of one sample a pixel, of the same size as ``theirs``.
@@ -37,13 +37,13 @@ def compare(name: str, scene: Scene, ours: Image, theirs: Aovs, limits: Limits) 
     return {"shares": shares, "largest": largest}, found
 
 
-def _limited(errors: dict[str, NDArray[np.float64]], limits: Limits) -> dict[str, tuple[NDArray[np.float64], float]]:
+def _limited(errors: dict[str, NDArray[np.float64]], limits: AovLimits) -> dict[str, tuple[NDArray[np.float64], float]]:
     bounds = (limits.depth, limits.position, limits.normal, limits.normal)
     return {quantity: (error, bound) for (quantity, error), bound in zip(errors.items(), bounds, strict=True)}
 
 
 def _errors(scene: Scene, ours: Image, theirs: Aovs, both: NDArray[np.bool_]) -> dict[str, NDArray[np.float64]]:
-    """Of each pixel that both hit, in the order of the picture."""
+    """Errors of each pixel that both hit, in the picture's order."""
     height, width = ours.depth.shape
     origins, directions = (rays[both.ravel()] for rays in primary_rays(scene.camera, width, height))
     depth, met = ours.depth[both], theirs.depth[both]

@@ -1,4 +1,4 @@
-"""One picture of ours against one reference: its gates, its record, and its files."""
+"""Check of one picture of ours against one reference: its gates, its record and its files."""
 
 import hashlib
 import math
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from renderer.picture.image import Image
 from validation.gates import Gate
 from validation.job import Job
-from validation.pictures import compare as compare_images
+from validation.pictures import compare
 from validation.pictures.compare import ImageComparison, Picture
 from validation.pictures.files import write_failed, write_shown
 from validation.thresholds import REASONS, Pictures
 
-# Half a step of an 8-bit picture is what rounding to whole numbers leaves; beside it float64's rounding of that half.
+# Half a step of an 8-bit picture is the rounding to whole numbers; the rest is float64's rounding of that half.
 _STEPS = 0.5 + 1e-9
 _MAPS = ("difference", "flip_map")
 
@@ -27,7 +27,7 @@ Rule = Literal["matched", "own"]
 
 
 class Pair(NamedTuple):
-    """A picture of ours, made under an offset rule, and somebody else's; which pixels are fragile, (h, w) bool."""
+    """A picture of ours, made under an offset rule, a reference's picture, and the mask (h, w) of fragile pixels."""
 
     ours: Image
     rule: Rule
@@ -38,11 +38,11 @@ class Pair(NamedTuple):
 def check(subject: str, pair: Pair, job: Job, *, shown: bool) -> tuple[dict[str, Any], list[Gate]]:
     """Compare a pair; returns the record and the gates.
 
-    shown : whether the report shows it, so that its PNGs are written even if it passes. A pair that fails leaves its
+    shown : whether the report shows the pair, so that its PNGs are written even if it passes. A failing pair leaves its
         PNGs and EXRs in ``job.folder``/failed.
     """
     ours, hit = pair.ours.radiance, pair.ours.face >= 0
-    result = compare_images.compare(ours, pair.reference, pair.fragile, hit if hit.any() else None)
+    result = compare.compare(ours, pair.reference, pair.fragile, hit if hit.any() else None)
     found = [*_gates(subject, pair.rule, result, job.thresholds.pictures), _encoding(subject, pair)]
     stem = re.sub(r"\W+", "-", subject)
     record: dict[str, Any] = {
@@ -66,7 +66,7 @@ def _gates(subject: str, rule: Rule, result: ImageComparison, pictures: Pictures
             continue
         value = getattr(result, quantity)
         bound: Literal["at least", "at most"] = "at least" if quantity.startswith("ssim") else "at most"
-        # A picture without foreground shows nothing of the scene, and that is not passed.
+        # A picture without foreground shows nothing of the scene and must not pass.
         number = math.nan if value is None else value
         found.append(Gate("images", subject, quantity, number, bound, limit, REASONS[quantity]))
     if limits.max_error is not None:
@@ -77,9 +77,9 @@ def _gates(subject: str, rule: Rule, result: ImageComparison, pictures: Pictures
 
 
 def _encoding(subject: str, pair: Pair) -> Gate:
-    """What ``Image.save`` makes of the reference's radiance against the formula of sRGB."""
+    """Gate on ``Image.save``: the reference's radiance, saved and read back, against the formula of sRGB."""
     radiance = pair.reference.astype(np.float32)
-    off = np.abs(_saved(replace(pair.ours, radiance=radiance)) - 255.0 * compare_images.srgb(radiance)).max()
+    off = np.abs(_saved(replace(pair.ours, radiance=radiance)) - 255.0 * compare.srgb(radiance)).max()
     reason = "a saved picture is the formula's sRGB, rounded"
     return Gate("images", subject, "8-bit steps from the formula", float(off), "at most", _STEPS, reason)
 

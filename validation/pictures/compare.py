@@ -1,8 +1,8 @@
-"""One picture of ours against a reference: the numbers that it is gated on, and which pixels may not count.
+"""Comparison of one picture of ours with a reference: the numbers of its gates, and the fragile pixels.
 
-SSIM sees structure: an edge out of place, a wrong normal, a missing bounce. It is nearly blind to brightness
-(a gain of 1.10 leaves .998), so it never stands alone: the share of pixels that differ visibly, the mean
-error, the largest error and FLIP go with it. sRGB is what people see; linear radiance is what a renderer computes.
+SSIM measures structure: an edge out of place, a wrong normal, a missing bounce. It is nearly blind to brightness (a
+gain of 1.10 leaves .998), so it is never used alone: the share of pixels that differ visibly, the mean error, the
+largest error and FLIP complement it. sRGB is what people see; linear radiance is what a renderer computes.
 """
 
 from collections.abc import Callable
@@ -17,14 +17,14 @@ from validation.references.flip import flip_map
 
 Picture = NDArray[np.floating[Any]]
 
-# The smallest difference that an 8-bit picture shows.
+# The smallest visible difference of 8-bit pictures.
 VISIBLE = 1.0 / 255.0
 
-# A pixel is fragile when one of these small changes moves it by half of what is visible. The offsets are
-# those by which renderers lift spawned rays off a surface: 1e-7 of the scene is as small as double precision
-# cares for, 3e-4 is more than Mitsuba's. The steps around Mitsuba's 8.94e-5 are small, because a ray that starts
-# just inside a facet's reach is caught by it at some offsets and not at others. 0.002 pixel is how far a
-# silhouette moves when float32 rounds rays and vertices.
+# A pixel is fragile when one of these small changes moves it by half of what is visible. The offsets are those by which
+# renderers lift spawned rays off a surface: 1e-7 of the scene is the smallest sensible offset in double precision, 3e-4
+# is more than Mitsuba's. The steps around Mitsuba's 8.94e-5 are small, because a ray that starts just within reach of a
+# facet hits it at some offsets and not at others. Rounding rays and vertices to float32 moves a silhouette by 0.002
+# pixel.
 BASE_OFFSET = 1e-7
 OFFSETS = (1e-5, 3e-5, 6e-5, 9e-5, 1e-4, 3e-4)
 SHIFT = 0.002
@@ -38,7 +38,7 @@ _WINDOW = 11
 
 @dataclass(frozen=True)
 class ImageComparison:
-    """How far ``ours`` is from the reference.
+    """The differences between our picture and the reference.
 
     ssim : mean structural similarity of the sRGB pictures, 1 when they are the same.
     ssim_foreground : its mean over the foreground's pixels, which a wide background cannot raise; None
@@ -88,12 +88,16 @@ def compare(
     that is not finite.
     """
     _check(ours, reference, fragile, foreground)
+
+    # Compute the differences of each pixel.
     encoded, expected = srgb(ours), srgb(reference)
     similarity = _similarity(encoded, expected)
     difference = np.abs(encoded - expected).max(axis=2)
     error = np.abs(np.subtract(ours, reference, dtype=np.float64))
     judged = np.ones(difference.shape, dtype=bool) if fragile is None else ~fragile
     visible = flip_map(encoded, expected)
+
+    # Reduce them to numbers.
     return ImageComparison(
         ssim=_inner_mean(similarity),
         ssim_foreground=None if foreground is None else float(similarity[foreground].mean()),
@@ -126,7 +130,7 @@ def _similarity(ours: Picture, reference: Picture) -> NDArray[np.float64]:
 
 
 def _inner_mean(similarity: NDArray[np.float64]) -> float:
-    """The published mean leaves out the rim, where the window reaches beyond the picture."""
+    """Mean SSIM as published: without the rim, where the window reaches beyond the picture."""
     rim = _WINDOW // 2
     return float(similarity[rim:-rim, rim:-rim].mean())
 
@@ -138,9 +142,9 @@ def fragile_pixels(render: Callable[[float, tuple[float, float]], Picture]) -> N
         ``offset`` and primary rays moved by ``shift`` pixels in x and y.
 
     Where a ray passes an edge by less than two renderers' roundings, or a spawned ray starts so near another
-    surface that the offset decides what it meets, both of their pictures are right. Only our own picture is
-    asked, so an error of ours cannot excuse itself by differing from the reference: a pixel that is wrong but
-    steady is not fragile.
+    surface that the offset decides its hit, both of their pictures are right. The mask depends on our own picture
+    alone, so a difference from the reference excuses no error of ours: a pixel that is wrong but steady is not
+    fragile.
     """
     base = srgb(render(BASE_OFFSET, (0.0, 0.0)))
     changes = [(offset, (0.0, 0.0)) for offset in OFFSETS]

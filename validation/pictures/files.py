@@ -1,4 +1,4 @@
-"""Files of compared pictures: what the report shows, and what a failing gate leaves behind."""
+"""Files of compared pictures: those that the report shows, and those of a failing gate."""
 
 from pathlib import Path
 
@@ -9,12 +9,12 @@ from renderer.picture.image import srgb, write_exr
 from renderer.process.files import write_atomically
 from validation.pictures.compare import ImageComparison, Picture
 
-# One step of an 8-bit picture becomes a grey that is seen.
+# This makes one step of an 8-bit picture a visible grey.
 _ENLARGED = 16.0
 
 
 def write_shown(folder: Path, stem: str, ours: Picture, reference: Picture, result: ImageComparison) -> dict[str, str]:
-    """Ours, the reference, 16 times the difference and FLIP's map as PNGs; returns their names in ``folder``."""
+    """Write ours, the reference, 16 times the difference and FLIP's map as PNGs; returns their names in ``folder``."""
     pictures = {
         "ours": srgb(ours),
         "reference": srgb(reference),
@@ -28,7 +28,7 @@ def write_shown(folder: Path, stem: str, ours: Picture, reference: Picture, resu
 
 
 def write_failed(folder: Path, stem: str, ours: Picture, reference: Picture, result: ImageComparison) -> list[str]:
-    """The same PNGs and, without loss, ours, the reference and ours - reference as EXR, all in ``folder``/failed.
+    """Write the same PNGs and, without loss, ours, the reference and ours - reference as EXR, all in ``folder``/failed.
 
     Returns the names in ``folder``.
     """

@@ -1,16 +1,16 @@
-"""A scene as a ladder: each rung adds one thing that light does, so that the lowest one that fails says what is wrong.
+"""The ladder of a scene: each rung adds one effect of light, so that the lowest failing rung names the wrong effect.
 
-    diffuse     diffuse light alone. Its light is a lamp at the eye in place of the scene's: what the eye sees, that
-                lamp lights, so no shadow is to be seen and no renderer needs a switch for shadows. Mirrors and glass
-                are painted grey, and there is no ambient light
+    diffuse     diffuse light alone. A lamp at the eye replaces the scene's lights: it lights all that the eye sees,
+                so no shadow is visible and no renderer needs a switch for shadows. Mirrors and glass are painted
+                grey, and there is no ambient light
     highlights  Phong's highlights, under the same lamp
     shadows     the scene's own lights, and with them their shadows
     mirrors     mirrors and constant reflectances
     glass       dielectrics and constant transmittances
-    everything  the scene as it is; ambient light is what it adds
+    everything  the scene as it is, which adds ambient light
 
-Below them all are the AOVs, ``compare_aovs``: what the primary rays meet. The background stays, for a ray that misses
-must see something. A rung that adds nothing to a scene is left out.
+The check of AOVs (``aovs``), which compares the primary hits, is below all rungs. Every rung keeps the background,
+which the rays that miss see. A rung that adds nothing to a scene is left out.
 """
 
 from dataclasses import dataclass
@@ -35,15 +35,15 @@ NAMES = tuple(_ADDS)
 _HIGHLIGHTS, _SHADOWS, _MIRRORS, _GLASS, _EVERYTHING = range(1, len(NAMES))
 
 _BLACK = (0.0, 0.0, 0.0)
-# What mirrors and glass are painted with until their rung.
+# The grey of mirrors and glass until their rung.
 _GREY = Phong(diffuse=(0.5, 0.5, 0.5))
-# What the lamp at the eye sheds on the camera's target: below 1, so that what is a little nearer is not clipped.
+# Irradiance from the lamp at the camera's target: below 1, so that a point a little nearer is not clipped.
 _LAMP = 0.7
 
 
 @dataclass(frozen=True)
 class Rung:
-    """A scene of which something is left out, by name, and what it adds to the rung below."""
+    """A scene with something left out, its name, and what it adds to the rung below."""
 
     name: str
     adds: str
@@ -51,7 +51,7 @@ class Rung:
 
 
 def rungs(scene: Scene) -> tuple[list[Rung], dict[str, str]]:
-    """The rungs of ``scene`` from the lowest on, the last of them ``scene`` itself; and why others are left out.
+    """The rungs of ``scene`` from the lowest up, the last being ``scene`` itself; and why others are left out.
 
     >>> from renderer.scene.camera import PerspectiveCamera
     >>> empty = Scene(camera=PerspectiveCamera(eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0)), materials={})
@@ -86,14 +86,14 @@ def _needless(scene: Scene) -> dict[str, str]:
 
 
 def _derived(scene: Scene, level: int) -> Scene:
-    """The scene of a rung below everything; its meshes are not loaded again."""
+    """The scene of a rung below everything; meshes are not loaded again."""
     lights = scene.lights if level >= _SHADOWS else (_lamp(scene),)
     materials = {name: _reduced(material, level) for name, material in scene.materials.items()}
     return scene.altered(lights=lights, materials=materials, ambient=_BLACK)
 
 
 def _reduced(material: Material, level: int) -> Material:
-    """What a material is on a rung."""
+    """A material's reduction for a rung."""
     if isinstance(material, Mirror):
         return material if level >= _MIRRORS else _GREY
     if isinstance(material, Dielectric):
@@ -109,7 +109,7 @@ def _reduced(material: Material, level: int) -> Material:
 
 
 def _lamp(scene: Scene) -> Light:
-    """A white light that shines from the eye along every primary ray."""
+    """A white light at the eye that shines along every primary ray."""
     eye, target = np.asarray(scene.camera.eye), np.asarray(scene.camera.target)
     towards = target - eye
     if isinstance(scene.camera, OrthographicCamera):
@@ -118,7 +118,7 @@ def _lamp(scene: Scene) -> Light:
 
 
 def _same(derived: Scene, scene: Scene) -> bool:
-    """Whether two scenes with the same meshes show the same; ambient light shows on Phong surfaces alone."""
+    """Whether two scenes with the same meshes give the same picture; only Phong surfaces show ambient light."""
     used = {instance.material for instance in scene.instances}
     alike = all(derived.materials[name] == scene.materials[name] for name in used)
     return alike and derived.lights == scene.lights and derived.ambient == scene.ambient

@@ -1,8 +1,8 @@
-"""Glass by Mitsuba's own path integrator: no recursion of ours, but a branch drawn at random at every surface.
+"""Glass judged by Mitsuba's own path integrator: no recursion of ours, but a random branch at every surface.
 
 Whitted follows both branches of glass; a path takes one, by Fresnel's share. So the mean over N paths of a pixel tends
-to our picture, and two things are judged: that the error falls as 1 / sqrt(N), which an error of ours would stop, and
-that what is left of it is no more than the paths' own scatter explains.
+to our picture, and two properties are judged: the error falls as 1 / sqrt(N), which an error of ours would stop, and
+the remaining error is no more than the paths' own scatter explains.
 """
 
 import math
@@ -18,12 +18,12 @@ from renderer.picture.render import render
 from renderer.scene.camera import primary_rays
 from renderer.scene.material import Dielectric, Phong
 from renderer.scene.scene import UNLIMITED_RAYS, Scene
+from validation.error_curves import slope
 from validation.gates import Gate
 from validation.pictures.compare import fragile_pixels
 from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba import whitted as mitsuba_whitted
-from validation.tradeoff import slope
 
 PATHS = "random paths of Mitsuba's native path integrator (scalar_rgb)"
 STEPS = 2
@@ -31,37 +31,39 @@ STEPS = 2
 # Paths a pixel; each number uses the paths of those before it.
 _COUNTS = (4, 16, 64, 256)
 _QUICK_COUNTS = _COUNTS[:3]
-# Glass pixels that are judged, spread over all that there are: the slope below needs as many. They are looked for in
-# the smallest of these pictures that has them.
+# Glass pixels that are judged, spread over all of them: the slope below needs as many. The smallest of these pictures
+# that has so many is used.
 _PIXELS = 1024
 _SIZES = (128, 256, 512)
 # Least squares over 3 or 4 numbers of paths gives the slope .51 or .32 times the deviation of the RMSEs' logarithms.
 # Twenty disjoint runs of 64 paths over glass.toml had a mean of -.5007 and a deviation of .008; where paths are rarer
-# and brighter it is up to .013, and 4 of these are allowed. An ior of 1.501 for 1.5 flattens the slope by .12.
+# and brighter the deviation is up to .013, and 4 of these are allowed. An ior of 1.501 for 1.5 flattens the slope by
+# .12.
 _SLOPE = 0.05
-# Neighbouring pixels are judged by their mean, for where Fresnel's share is 4 % a pixel of 64 paths sees the rare
-# branch three times, or never: its sample variance then says nothing. 32 pixels see it 80 times, and resampling the
-# paths of glass.toml then gave uniform p-values, a little high because the channels go together; 4 pixels gave p < .001
-# in every sixth run.
+# Neighbouring pixels are judged by their mean: where Fresnel's share is 4 %, the 64 paths of one pixel take the rare
+# branch three times, or never, and their sample variance then means nothing. 32 pixels take it 80 times, and resampling
+# the paths of glass.toml then gave uniform p-values, a little high because the channels are correlated; 4 pixels gave p
+# < .001 in every sixth run.
 _GROUP = 32
-# How often a sound picture fails: once in 10,000 scenes. The paths are the same in every run, so it is no flicker.
+# The rate of false alarms: a sound picture fails once in 10,000 scenes. The paths are the same in every run, so the
+# result does not vary.
 _FALSE_ALARMS = 1e-4
-# Float32 against float64 under the same offset rule, as in thresholds.py; beside it a group without scatter is judged.
+# Float32 against float64 under the same offset rule, as in thresholds.py; it is the scale for a group without scatter.
 _FLOAT32 = 2e-5
-# Of the glass pixels. Edges and total reflection make glass far more fragile than a whole picture's .24 %: 4 % were
-# measured for glass.toml. At 1 nothing would be judged.
+# Share of the glass pixels. Edges and total reflection make glass far more fragile than a whole picture's .24 %: 4 %
+# were measured for glass.toml. At 1 nothing would be judged.
 _FRAGILE_SHARE = 0.15
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """How our picture lies among the means of random paths.
+    """Our picture against the scatter of random paths.
 
     rmse : of the mean over each number of paths, over pixels and channels.
     slope : exponent of the RMSE against the number of paths; -1/2 without bias, None where no error has a logarithm.
-    bias : root mean square of what the paths' scatter does not explain at the largest number; about 0 or noise.
+    bias : root mean square of the error beyond the paths' scatter at the largest number; about 0 or noise.
     z_max : largest deviation of a group's mean, in standard errors.
-    p_value : how probable a larger one is in a sound picture, for all groups and channels together.
+    p_value : probability of a larger one in a sound picture, for all groups and channels together.
     groups : of up to 32 neighbouring pixels.
     """
 
@@ -74,7 +76,7 @@ class Scatter:
 
 
 def can_judge(scene: Scene) -> str | None:
-    """Why random paths say nothing about ``scene``; None if they do."""
+    """Why random paths cannot judge ``scene``; None if they can."""
     if not scene.render.shadows:
         return mitsuba_path.SHADOWLESS
     if any(isinstance(scene.materials[i.material], Dielectric) for i in scene.instances):
@@ -85,7 +87,7 @@ def can_judge(scene: Scene) -> str | None:
 def run(scene: Scene, name: str, quick: bool, step: Callable[[str], None]) -> tuple[dict[str, Any], list[Gate]]:
     """Judge our picture of the glass in ``scene``; returns a record for JSON and the gates, none for too little glass.
 
-    Raises ``ValueError`` if ``can_judge`` says why not.
+    Raises ``ValueError`` if ``can_judge`` gives a reason.
     """
     fault = can_judge(scene)
     if fault is not None:
@@ -113,9 +115,9 @@ def run(scene: Scene, name: str, quick: bool, step: Callable[[str], None]) -> tu
 
 
 def scatter_of(ours: NDArray[np.float64], paths: NDArray[np.float64], counts: tuple[int, ...]) -> Scatter:
-    """Our radiance (n, 3) among random paths (count, n, 3), pixels in an order in which neighbours follow each other.
+    """Our radiance (n, 3) against random paths (count, n, 3); consecutive pixels are neighbours.
 
-    counts : ascending numbers of paths, of which the last is all of them.
+    counts : ascending numbers of paths; the last is the number of all.
     """
     largest = counts[-1]
     rmse = [float(np.sqrt(np.mean((paths[:count].mean(axis=0) - ours) ** 2))) for count in counts]
@@ -137,16 +139,16 @@ def scatter_of(ours: NDArray[np.float64], paths: NDArray[np.float64], counts: tu
 
 
 def _sidak(z: float, tests: int) -> float:
-    """Probability that of so many normal deviates one is beyond z in size: 1 - (1 - p)^tests (Sidak 1967).
+    """Probability that the largest of ``tests`` normal deviates exceeds z in size: 1 - (1 - p)^tests (Sidak 1967).
 
-    Exact for independent tests; for channels, which go together, it is on the side of no alarm.
+    Exact for independent tests; for channels, which are correlated, it errs towards no alarm.
     """
     p = math.erfc(z / math.sqrt(2.0))
     return -math.expm1(tests * math.log1p(-p)) if p < 1.0 else 1.0
 
 
 def _without_transmission(scene: Scene) -> tuple[Scene, list[str]]:
-    """The scene without what Mitsuba has no surface for, and what that was."""
+    """The scene without features that no surface of Mitsuba has, and their names."""
     black = {"transmittance": (0.0, 0.0, 0.0)}
     opaque = {
         name: material.model_copy(update=black)
@@ -160,7 +162,7 @@ def _without_transmission(scene: Scene) -> tuple[Scene, list[str]]:
 def _glass(scene: Scene) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
     """The picture's size, its pixels (flat) whose primary ray meets glass, and those of them that are not fragile.
 
-    Mitsuba says which show glass, so that no error of ours can leave a pixel out.
+    Mitsuba finds the pixels that show glass, so that no error of ours can leave a pixel out.
     """
     glass = [i for i, of in enumerate(scene.instances) if isinstance(scene.materials[of.material], Dielectric)]
     for size in _SIZES:
@@ -172,7 +174,7 @@ def _glass(scene: Scene) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
 
 
 def _picture(scene: Scene, size: int, offset: Any = "mitsuba") -> NDArray[np.float64]:
-    """Ours through the pixels' centres, (size, size, 3); paths know no smallest weight, so neither do we here."""
+    """Our picture through the pixels' centres, (size, size, 3), without a smallest weight, as in the random paths."""
     image = render(scene, resolution=(size, size), samples=1, min_weight=0.0, max_rays=UNLIMITED_RAYS, offset=offset)
     return image.radiance.astype(np.float64)
 

@@ -1,6 +1,6 @@
-"""The objects of a scene against trimesh: their files read, turned, moved and given vertex normals by somebody else.
+"""A scene's objects against trimesh, which reads, rotates and moves their files and computes vertex normals on its own.
 
-Mitsuba is given our meshes as they stand in the world, so no picture could tell that one was read or placed wrongly.
+Mitsuba gets our meshes in world coordinates, so no picture could show that one was read or placed wrongly.
 """
 
 import time
@@ -19,21 +19,23 @@ from validation.gates import Gate
 
 NAME = "trimesh, files and their places"
 
-# Of the scene's radius. Files hold float32, and a matrix of float64 adds nothing that shows: 1e-7 at most.
+# Share of the scene's radius. Files hold float32, and a float64 matrix adds no visible error: 1e-7 at most.
 _VERTICES = 1e-6
-# Length of the difference of unit vectors, as for the normals of AOVs: 1e-4 rad would show on no picture.
+# Length of the difference of unit vectors, as for the normals of AOVs: 1e-4 rad is invisible in any picture.
 _NORMALS = 1e-4
 
 
 def check(name: str, scene: Scene) -> tuple[dict[str, Any], list[Gate]]:
     """Judge every object that comes from a file; returns a record for JSON and a gate each for vertices and normals.
 
-    An object that trimesh cuts into other triangles is left out with the reason, and so are normals that leave a
-    choice. No gate where no object is left to judge.
+    An object that trimesh cuts into other triangles is left out with the reason, and so are ambiguous normals. Where no
+    object is left to judge there is no gate.
     """
     began = time.perf_counter()
     corners = [instance.mesh.vertices for instance in scene.instances]
     radius = float(np.linalg.norm(np.concatenate(corners), axis=1).max()) if corners else 0.0
+
+    # Compare each object with trimesh's, or note why it cannot be compared.
     vertices: list[float] = []
     normals: list[float] = []
     left_out: dict[str, str] = {}
@@ -48,13 +50,15 @@ def check(name: str, scene: Scene) -> tuple[dict[str, Any], list[Gate]]:
             theirs, ours = _extents(placed.triangles), _extents(instance.mesh.triangles)
             apart = _apart(theirs, ours) if len(ours) else 0.0
             vertices.append(apart / radius)
-            # One by one they are hardly farther apart then.
+            # In the same order the triangles also match one by one, up to a small multiple of that distance.
             in_order = bool(np.abs(theirs - ours).max(initial=0.0) <= 4.0 * apart + _VERTICES * radius)
             open_to_choice = _normals_open(placed, instance.mesh, thing, in_order) if instance.smooth else None
             if open_to_choice is not None:
                 left_out[f"{where}, normals"] = open_to_choice
             elif instance.smooth:
                 normals.append(_between(placed, instance))
+
+    # Make the record and the gates.
     record = {"reference": NAME, "objects": len(vertices), "smooth": len(normals), "left_out": left_out}
     record["seconds"] = time.perf_counter() - began
     gates = []
@@ -70,7 +74,7 @@ def check(name: str, scene: Scene) -> tuple[dict[str, Any], list[Gate]]:
 
 
 def _placed(thing: SceneObject) -> trimesh.Trimesh | None:
-    """The object in the world: scaled, turned about x, y and z in this order, moved. None if trimesh has no mesh."""
+    """The object in the world: scaled, rotated about x, y and z in this order, moved. None if trimesh has no mesh."""
     untyped: Any = transformations
     try:
         read: Any = trimesh.load(str(thing.mesh), process=False, force="mesh")
@@ -83,21 +87,21 @@ def _placed(thing: SceneObject) -> trimesh.Trimesh | None:
 
 
 def _extents(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Means and bounds of the corners (F, 3, 3), (F, 9): their order in a face says nothing about its place."""
+    """Means and bounds of the corners (F, 3, 3), as (F, 9): independent of the order of the corners in a face."""
     return np.concatenate([triangles.mean(axis=1), triangles.min(axis=1), triangles.max(axis=1)], axis=1)
 
 
 def _apart(theirs: NDArray[np.float64], ours: NDArray[np.float64]) -> float:
-    """How far the farthest triangle of either side is from the nearest of the other, by their extents.
+    """Largest distance from a triangle of either side to the nearest of the other, by their extents.
 
-    The order of the triangles says nothing either: trimesh puts those of a file's quads behind the others.
+    The result does not depend on the order of the triangles: trimesh puts those of a file's quads behind the others.
     """
     pairs = ((theirs, ours), (ours, theirs))
     return max(float(cKDTree(a).query(b, p=np.inf)[0].max(initial=0.0)) for a, b in pairs)
 
 
 def _normals_open(placed: trimesh.Trimesh, mesh: Mesh, thing: SceneObject, in_order: bool) -> str | None:
-    """Why two programs may have other vertex normals, both rightly, or in another order; None where they may not."""
+    """Why two programs may rightly have different vertex normals, or in another order; None where they may not."""
     if not in_order:
         return "trimesh has its faces in another order"
     if mesh.normals is not None:

@@ -1,7 +1,7 @@
-"""Our pictures against Mitsuba's, scene by scene and rung by rung: first what primary rays meet, then radiance.
+"""The section on pictures: ours against Mitsuba's, scene by scene and rung by rung, primary hits first, then radiance.
 
-Each rung of ``ladder`` is rendered by us under two rules for where spawned rays start, Mitsuba's ("matched") and ours
-("own"), and compared with every reference that can judge it. A rung that none can judge fails a gate.
+We render each rung of ``ladder`` under two rules for the start of spawned rays, Mitsuba's ("matched") and ours ("own"),
+and compare it with every reference that can judge it. A rung that none can judge fails a gate.
 """
 
 import time
@@ -16,9 +16,7 @@ from renderer.picture.render import render
 from renderer.scene.scene import UNLIMITED_RAYS, Scene, load_scene
 from validation.gates import Gate
 from validation.job import Job
-from validation.pictures import aovs as compare_aovs
-from validation.pictures import check as check_picture
-from validation.pictures import ladder, monte_carlo, placement
+from validation.pictures import aovs, check, ladder, monte_carlo, placement
 from validation.pictures.check import Pair, Rule
 from validation.pictures.compare import Picture, fragile_pixels
 from validation.pictures.files import write_png
@@ -39,7 +37,7 @@ _RULES: dict[Rule, _Offset] = {"matched": "mitsuba", "own": "bounded"}
 
 
 class Reference(NamedTuple):
-    """Somebody else's renderer: a short name for files, a name for people, why it cannot judge a scene, its picture."""
+    """Another renderer: a short name for files, a name for people, why it cannot judge a scene, its picture."""
 
     key: str
     name: str
@@ -54,12 +52,12 @@ REFERENCES = (
 
 
 @dataclass(frozen=True)
-class Effort:
-    """How large the pictures of a scene are: the longer side, in pixels.
+class PictureEffort:
+    """Picture sizes of one scene: the longer side, in pixels.
 
     size    of the scene as it is
     lower   of the ladder's rungs below it; None leaves those out
-    paths   whether glass is judged by random paths too, in a picture of their own size
+    paths   whether random paths judge glass too, in a picture of their own size
     """
 
     size: int
@@ -68,7 +66,7 @@ class Effort:
 
 
 class _Task(NamedTuple):
-    """A rung, its picture's width and height, the references that judge it, and why the others cannot."""
+    """A rung, its picture's width and height, the references that judge it, and the others with the reason why not."""
 
     rung: Rung
     resolution: tuple[int, int]
@@ -91,7 +89,7 @@ class _Plan(NamedTuple):
 
 
 def steps(job: Job) -> int:
-    """How often ``run`` calls ``job.step``: once for the main scene, the rest as the scenes' plans say."""
+    """Number of calls of ``job.step`` in ``run``: one for the main scene, the others by the scenes' plans."""
     return job.own + sum(_plan(load_scene(path), effort).steps for _, _, path, effort in _scenes(job))
 
 
@@ -110,11 +108,13 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     return result, found
 
 
-def check_scene(name: str, shows: str, scene: Scene, effort: Effort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+def check_scene(
+    name: str, shows: str, scene: Scene, effort: PictureEffort, job: Job
+) -> tuple[dict[str, Any], list[Gate]]:
     """Check one scene; returns its record for JSON and the gates.
 
-    A rung that no reference can judge fails a gate; a rung or reference that is left out stands with its reason in the
-    record. Rays are judged without a smallest weight, which no reference has, and one goes through each pixel.
+    A rung that no reference can judge fails a gate; the record lists each rung or reference that is left out with its
+    reason. Pictures have one ray a pixel and no smallest weight, which no reference has.
     """
     plan = _plan(scene, effort)
     record: dict[str, Any] = {
@@ -141,17 +141,21 @@ def check_scene(name: str, shows: str, scene: Scene, effort: Effort, job: Job) -
     return record, found
 
 
-def _scenes(job: Job) -> list[tuple[str, str, Path, Effort]]:
-    """Names, what they show, files and efforts: a user's scenes, or else the suite's own."""
+def _scenes(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
+    """Names, descriptions, files and efforts of a user's scenes, or else of the suite's own."""
     size, lower = (256, 128) if job.quick else (512, 256)
     if not job.own:
         stems = Counter(path.stem for path in job.scenes)
         names = [path.stem if stems[path.stem] == 1 else str(path) for path in job.scenes]
-        return [(name, str(path), path, Effort(size, lower)) for name, path in zip(names, job.scenes, strict=True)]
-    return [(case.name, case.shows, case.path, Effort(size, lower if case.every_rung else None)) for case in CASES]
+        return [
+            (name, str(path), path, PictureEffort(size, lower)) for name, path in zip(names, job.scenes, strict=True)
+        ]
+    return [
+        (case.name, case.shows, case.path, PictureEffort(size, lower if case.every_rung else None)) for case in CASES
+    ]
 
 
-def _plan(scene: Scene, effort: Effort) -> _Plan:
+def _plan(scene: Scene, effort: PictureEffort) -> _Plan:
     rungs, left_out = ladder.rungs(scene)
     if effort.lower is None:
         left_out = {rung.name: "climbed on another scene" for rung in rungs[:-1]} | left_out
@@ -172,14 +176,14 @@ def _plan(scene: Scene, effort: Effort) -> _Plan:
 
 
 def _resolution(scene: Scene, size: int) -> tuple[int, int]:
-    """Width and height of the scene's own shape whose longer side is ``size``."""
+    """Width and height in the scene's own aspect ratio, with the longer side ``size``."""
     width, height = scene.render.resolution
     scale = size / max(width, height)
     return max(_SMALLEST, round(width * scale)), max(_SMALLEST, round(height * scale))
 
 
 def _check_aovs(name: str, scene: Scene, resolution: tuple[int, int], job: Job) -> tuple[dict[str, Any], list[Gate]]:
-    """The camera's rays against those of Mitsuba's own sensor, and what they meet."""
+    """Compare the camera's rays with those of Mitsuba's own sensor, and then their hits."""
     shift = mitsuba_camera.largest_distance(scene.camera, max(resolution))
     limit, reason = job.thresholds.pictures.camera_pixels, "our primary rays are Mitsuba's; both pictures use ours"
     camera = Gate("images", f"{name}, camera", "pixels between rays", shift, "at most", limit, reason)
@@ -187,13 +191,13 @@ def _check_aovs(name: str, scene: Scene, resolution: tuple[int, int], job: Job) 
     theirs = mitsuba_whitted.aovs(scene, *resolution)
     seconds = time.perf_counter() - began
     ours = render(scene, resolution=resolution, samples=1, max_depth=0)
-    record, found = compare_aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
+    record, found = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
     made = {"reference_name": AOVS, "reference_seconds": seconds, "size": list(resolution), "camera_pixels": shift}
     return made | record, [camera, *found]
 
 
 def _check_rung(name: str, task: _Task, job: Job) -> tuple[dict[str, Any], list[Gate]]:
-    """One rung under both rules against its references."""
+    """Compare one rung under both rules with its references."""
     scene, size, subject = task.rung.scene, task.resolution, f"{name}, {task.rung.name}"
     job.step(f"pictures: {subject}, ours")
     images = {rule: _ours(scene, size, offset) for rule, offset in _RULES.items()}
@@ -208,10 +212,10 @@ def _check_rung(name: str, task: _Task, job: Job) -> tuple[dict[str, Any], list[
         seconds = time.perf_counter() - began
         made = {"reference": reference.key, "reference_name": reference.name, "reference_seconds": seconds}
         for rule, image in images.items():
-            # The report shows what users get, beside the first reference.
+            # The report shows our own rule, which users get, beside the first reference.
             shown = rule == "own" and reference is task.references[0]
             against = f"{subject} against {reference.key}, {rule} offset"
-            record, passed = check_picture.check(against, Pair(image, rule, radiance, fragile), job, shown=shown)
+            record, passed = check.check(against, Pair(image, rule, radiance, fragile), job, shown=shown)
             comparisons.append(made | {"offset": rule} | record)
             found += passed
     return _rung_record(task, images["own"], comparisons), found
@@ -235,7 +239,7 @@ def _ours(scene: Scene, resolution: tuple[int, int], offset: _Offset) -> Image:
 
 
 def _costs(scenes: list[dict[str, Any]]) -> dict[str, float]:
-    """Seconds spent in each reference; one picture of it is compared under both rules."""
+    """Seconds spent in each reference; both rules share one picture of it."""
     spent: dict[str, float] = {}
     for scene in scenes:
         made = [scene["aovs"]] if "aovs" in scene else []
@@ -250,7 +254,7 @@ def _costs(scenes: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def _hero(job: Job) -> dict[str, Any]:
-    """The main scene for the head of the report."""
+    """Render the main scene for the head of the report."""
     image = render(load_scene(CASES[0].path), resolution=(960, 540), samples=9)
     write_png(job.folder / "hero.png", srgb(image.radiance))
     return {"file": "hero.png", "seconds": image.render_seconds, "rays": int(image.rays.sum()), "samples": 9}

@@ -1,4 +1,4 @@
-"""A scene seen through a film moved by a part of a pixel, as ``compare_images.fragile_pixels`` asks for."""
+"""A scene with its film shifted by a fraction of a pixel, for ``compare.fragile_pixels``."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,6 @@ def _shift_rows(rows: NDArray[np.float64], shift: Shift) -> NDArray[np.float64]:
 
 
 def shifted(scene: Scene, shift: Shift) -> Scene:
-    """The scene with its film moved by ``shift`` pixels in x and y; the meshes are not loaded again."""
+    """The scene with its film shifted by ``shift`` pixels in x and y; meshes are not loaded again."""
     kind = _ShiftedPerspective if isinstance(scene.camera, PerspectiveCamera) else _ShiftedOrthographic
     return scene.altered(camera=kind(**scene.camera.model_dump(), shift=shift))

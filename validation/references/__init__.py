@@ -1,1 +1,1 @@
-"""Adapters of the references: each answers our questions by another system."""
+"""Adapters of the reference systems to our interfaces: closest hits, pictures and FLIP."""

@@ -1,6 +1,6 @@
 """Our own ``BruteForce`` as a reference for hits: the octree's triangle test without the octree.
 
-It shares the triangle test, so it judges what the octree leaves out, and not the test.
+It shares the octree's triangle test, so it judges which faces the octree skips, and not the test.
 """
 
 import numpy as np

@@ -1,9 +1,8 @@
 """Embree, through ``embreex``, as a reference for hits. The only file that imports it.
 
-Embree works in float32: vertices, origins and directions are rounded to float32 here, whatever they come in
-as. Compare it only on numbers that float32 holds exactly, else it judges another scene. ``robust=False``
-leaks at edges. Embree drops faces with NaN, infinite or out-of-range corners silently, and at equal t its
-face is arbitrary.
+Embree works in float32: this adapter rounds vertices, origins and directions to float32, whatever their type. Compare
+it only on numbers that float32 holds exactly, else it judges another scene. ``robust=False`` leaks at edges. Embree
+drops faces with NaN, infinite or out-of-range corners silently, and at equal t its face is arbitrary.
 """
 
 from importlib import metadata
@@ -20,8 +19,7 @@ def version() -> str:
 
 
 class Embree:
-    """An Embree scene of one triangle mesh: ``vertices`` (V, 3), ``faces`` (F, 3); copied, rounded to
-    float32.
+    """An Embree scene of one triangle mesh: ``vertices`` (V, 3), ``faces`` (F, 3); copied, rounded to float32.
 
     >>> embree = Embree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> embree.closest_hit([[0.25, 0.25, 1], [2, 2, 1]], [[0, 0, -2], [0, 0, -2]])
@@ -38,14 +36,14 @@ class Embree:
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest hits of ``origins``, ``directions`` (n, 3): (t, face), t in units of |direction|.
 
-        ``t`` is float64 that holds Embree's float32, inf on a miss; ``face`` is int64, -1 on a miss.
+        ``t`` is Embree's float32 stored as float64, inf on a miss; ``face`` is int64, -1 on a miss.
         """
         o, d = _float32(origins), _float32(directions)
         if not self._faces or not len(o):
             return np.full(len(o), np.inf), np.full(len(o), -1, dtype=np.int64)
         found = self._scene.run(o, d, query="INTERSECT", output=True)
         face = found["primID"].astype(np.int64)
-        # Embree leaves its start value 1e37 in t where nothing is hit; the face tells hits from misses.
+        # Embree leaves its start value 1e37 in t where nothing is hit; the face distinguishes hits from misses.
         return np.where(face >= 0, found["tfar"].astype(np.float64), np.inf), face
 
     def any_hit(self, origins: ArrayLike, directions: ArrayLike) -> NDArray[np.bool_]:

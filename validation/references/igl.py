@@ -1,7 +1,6 @@
 """libigl's ``AABB`` as a reference for hits. The only file that imports ``igl``.
 
-It takes float64 vertices and rays, but its answer holds t to float32 only: hit or miss and the face compare in
-float64, t to 2**-24.
+It takes float64 vertices and rays, but returns t as float32: hit or miss and the face compare in float64, t to 2**-24.
 """
 
 from importlib import metadata
@@ -34,7 +33,7 @@ class Igl:
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest hits of ``origins``, ``directions`` (n, 3): (t, face), t in units of |direction|.
 
-        ``t`` is float64 that holds libigl's float32, inf on a miss; ``face`` is int64, -1 on a miss.
+        ``t`` is libigl's float32 stored as float64, inf on a miss; ``face`` is int64, -1 on a miss.
         """
         o = np.ascontiguousarray(origins, dtype=np.float64).reshape(-1, 3)
         d = np.ascontiguousarray(directions, dtype=np.float64).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Who else answers closest hits: one table, one interface."""
+"""The table of references for closest hits, behind one interface."""
 
 from collections.abc import Callable
 from functools import partial
@@ -21,10 +21,10 @@ Ints = NDArray[np.int64]
 
 
 class Caster(Protocol):
-    """One triangle mesh that can be asked for hits."""
+    """A hit query over one triangle mesh."""
 
     def closest_hit(self, origins: Floats, directions: Floats) -> tuple[Floats, Ints]:
-        """Of ``origins``, ``directions`` (n, 3): ``t`` (n,), inf on a miss, and ``face`` (n,), -1 on a miss."""
+        """Closest hits of rays (n, 3): ``t`` (n,), inf on a miss, and ``face`` (n,), -1 on a miss."""
 
 
 class HitReference(NamedTuple):
@@ -32,12 +32,12 @@ class HitReference(NamedTuple):
 
     key         its name in records
     name        its name in the report
-    version     of the package it comes from
-    precision   what its hit test works in; a float32 reference rounds all that it is given
-    most_rays   how many rays of a family it is asked for
-    most_faces  the largest mesh it is given
-    make        from vertices, float64 (V, 3), and faces, (F, 3)
-    stored      what its t is stored in; None where that is what it works in
+    version     of its package
+    precision   of its hit test; a float32 reference rounds all its input
+    most_rays   the largest number of rays that it gets from a family
+    most_faces  the size of the largest mesh that it gets
+    make        builds it from vertices, float64 (V, 3), and faces, (F, 3)
+    stored      the precision of its t; None where it equals ``precision``
     """
 
     key: str
@@ -52,8 +52,8 @@ class HitReference(NamedTuple):
 
 _ALL = 10**9
 
-# Measured a ray on two cores: Embree and libigl 1 us or less; Mitsuba from Python 1 to 5 us, and Embree, which it asks,
-# has all rays anyway; brute force 2.5 ns a face; trimesh 0.2 ms at 2,000 faces and 10 ms at 16,000.
+# Measured a ray on two cores: Embree and libigl 1 us or less; Mitsuba from Python 1 to 5 us, and Embree, which finds
+# its hits, has all rays anyway; brute force 2.5 ns a face; trimesh 0.2 ms at 2,000 faces and 10 ms at 16,000.
 REFERENCES: tuple[HitReference, ...] = (
     HitReference("embree_robust", "Embree robust", embree.version(), "float32", _ALL, _ALL, Embree),
     HitReference(

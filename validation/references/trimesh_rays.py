@@ -1,13 +1,13 @@
-"""trimesh's own ray caster as a reference for hits: NumPy in float64 over an R-tree. It needs the package rtree.
+"""trimesh's own ray caster as a reference for hits: NumPy in float64 over an R-tree. The package rtree is required.
 
-It has tolerances of its own: a hit may lie 1e-6 behind the origin and 1e-8 beside its face. About 0.1 ms a ray.
+It has its own tolerances: a hit may lie 1e-6 behind the origin and 1e-8 beside its face. A ray takes about 0.1 ms.
 """
 
 from importlib import metadata
 from typing import Any
 
 import numpy as np
-import rtree  # noqa: F401  # trimesh imports it late; its absence must show here
+import rtree  # noqa: F401  # trimesh imports it late; a missing package must fail here
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 from trimesh.ray import ray_triangle
@@ -34,7 +34,7 @@ class TrimeshRays:
         untyped: Any = ray_triangle
         self._caster = untyped.RayMeshIntersector(mesh)
         if self._faces:
-            mesh.triangles_tree  # noqa: B018  # built by the first who asks; built here, no query pays for it
+            mesh.triangles_tree  # noqa: B018  # trimesh builds it on first use; built here, it slows no query
 
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest hits of ``origins``, ``directions`` (n, 3): (t, face), t in units of |direction|.
@@ -48,6 +48,6 @@ class TrimeshRays:
             return t, face
         named, row, points = self._caster.intersects_id(o, d, multiple_hits=False, return_locations=True)
         face[row] = named
-        # Without a single hit trimesh returns no points at all, whatever their dimension.
+        # Without any hit trimesh returns an empty array of another dimension.
         t[row] = ((np.reshape(points, (-1, 3)) - o[row]) * d[row]).sum(axis=1) / (d[row] ** 2).sum(axis=1)
         return t, face

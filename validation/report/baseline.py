@@ -1,14 +1,15 @@
-"""What got better or worse than the committed baseline, ``reports/baseline.json``.
+"""Comparison with the committed baseline, ``reports/baseline.json``: which gates got better or worse.
 
 Only full runs on the suite's own scenes and meshes are compared: quick ones use fewer rays and smaller pictures, so
-their numbers are others. Of a run with ``--only`` those sections are compared that ran. Rules against noise:
+their numbers differ. A run with ``--only`` compares the sections that ran. Rules against noise:
 
-  a gate's error    changes when it differs by more than 10 % and by more than 1 % of what its threshold allows: our
-                    side is deterministic, but another processor or version of a reference moves last digits
-  seconds, ratios   are mentioned beyond a factor of 1.5: load alone moves them by tens of percent on a shared machine
-  verdicts          always count, whatever the numbers
+  a gate's error    counts as changed when it differs by more than 10 % and by more than 1 % of the error that its
+                    threshold allows: our side is deterministic, but another processor or version of a reference
+                    moves last digits
+  seconds, ratios   are listed beyond a factor of 1.5: load alone moves them by tens of percent on a shared machine
+  verdicts          always count, for any change of the numbers
 
-Nothing here decides the exit code; a gate that fails does.
+The comparison does not affect the exit code; only a failing gate does.
 """
 
 import json
@@ -21,7 +22,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 RELATIVE = 0.10
 OF_THRESHOLD = 0.01
 TIMING_FACTOR = 1.5
-# Its gates are judged on seconds, which say nothing finer than their verdict.
+# Its gates compare seconds, so only a change of verdict counts.
 TIMED = ("efficiency",)
 
 _Positive = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -32,14 +33,14 @@ class _Strict(BaseModel):
 
 
 class BaselineGate(_Strict):
-    """What is kept of a gate."""
+    """The stored part of a gate."""
 
     value: float | None
     passed: bool
 
 
 class Baseline(_Strict):
-    """The file. ``gates`` by "section: subject: quantity", ``outputs`` and ``ratios`` by their path in the metrics."""
+    """The file: ``gates`` by "section: subject: quantity", ``outputs`` and ``ratios`` by their path in the metrics."""
 
     version: Literal[1] = Field(alias="schema")
     started: str
@@ -52,9 +53,9 @@ class Baseline(_Strict):
 
 
 def summary(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """What a baseline keeps of checked metrics.
+    """The part of checked metrics that a baseline stores.
 
-    Raises ``ValueError`` unless they are of a whole run on the suite's own scenes and meshes, and it passed.
+    Raises ``ValueError`` unless the metrics are of a passing whole run on the suite's own scenes and meshes.
     """
     if metrics["quick"] or not metrics["own"] or metrics["left_out"]:
         kind = "a quick run" if metrics["quick"] else "a run with files given" if not metrics["own"] else "a part"
@@ -82,12 +83,12 @@ def _summary(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def text(metrics: Mapping[str, Any]) -> bytes:
-    """The bytes of a baseline file made from metrics; see ``summary``."""
+    """The bytes of a baseline file from metrics; see ``summary``."""
     return (json.dumps(summary(metrics), indent=0, sort_keys=True, ensure_ascii=False) + "\n").encode()
 
 
 def read(path: Path) -> dict[str, Any] | None:
-    """A checked baseline, None where there is no such file. Raises ``ValueError`` that names the key at fault."""
+    """A checked baseline, or None without such a file. Raises ``ValueError`` that names the key at fault."""
     if not path.exists():
         return None
     try:
@@ -99,7 +100,7 @@ def read(path: Path) -> dict[str, Any] | None:
 
 
 def compare(metrics: Mapping[str, Any], baseline: Mapping[str, Any] | None) -> dict[str, Any]:
-    """For the report: ``absent`` with the reason, or what changed, each change as one line of text."""
+    """The comparison for the report: ``absent`` with the reason, or the changes, each as one line of text."""
     if metrics["quick"]:
         return {"absent": "Quick runs use fewer rays and smaller pictures than the baseline and are not compared."}
     if not metrics["own"]:
@@ -159,14 +160,17 @@ def _change(gate: Mapping[str, Any], old: Mapping[str, Any]) -> int:
 
 
 def _error(value: float, gate: Mapping[str, Any]) -> float:
-    """The smaller the better. A bound from below is on a similarity, whose best value is 1, or on a count of finds."""
+    """A value as an error: smaller is better.
+
+    A bound from below is on a similarity, whose best value is 1, or on a count of finds.
+    """
     if gate["bound"] == "at most":
         return value
     return 1.0 - value if gate["threshold"] <= 1.0 else -value
 
 
 def _timings(now: Mapping[str, Any], baseline: Mapping[str, Any]) -> tuple[list[str], list[str]]:
-    """Seconds, less of which is faster, and ratios of speed, more of which is; those within the factor are left out."""
+    """Seconds and ratios of speed that changed beyond the factor, as (faster, slower)."""
     faster: list[str] = []
     slower: list[str] = []
     for kind, unit in (("seconds", " s"), ("ratios", " ×")):
@@ -179,14 +183,14 @@ def _timings(now: Mapping[str, Any], baseline: Mapping[str, Any]) -> tuple[list[
 
 
 def _versions(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """What differs between the two machines, since it may be why numbers do."""
+    """Differences between the two machines, which may explain other numbers."""
     flat = [{**{k: e.get(k) for k in ("processor", "threads", "python")}, **e.get("packages", {})} for e in (old, new)]
     names = dict.fromkeys([*flat[0], *flat[1]])
     return [f"{n}: {flat[0].get(n)} before, {flat[1].get(n)} now" for n in names if flat[0].get(n) != flat[1].get(n)]
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, str, Any]]:
-    """Path, last key and value of everything in a record that is no table or list."""
+    """Path, last key and value of everything in a record that is not a table or list."""
     if isinstance(value, Mapping | list):
         items = value.items() if isinstance(value, Mapping) else enumerate(value)
         for key, below in items:
@@ -196,7 +200,7 @@ def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, str, Any]]:
 
 
 def _is_ratio(key: str, value: Any) -> bool:
-    """Ratios of speed are named so in every record; the larger the faster."""
+    """Whether a value is a ratio of speed: every record names them so, and larger is faster."""
     return ("speedup" in key or key.startswith("ratio")) and isinstance(value, float) and value >= 0.0
 
 

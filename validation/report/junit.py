@@ -1,4 +1,4 @@
-"""The gates as JUnit XML, which CI systems show: a test suite for each section, a test case for each gate."""
+"""The gates as JUnit XML for CI systems: a test suite for each section, a test case for each gate."""
 
 import re
 from collections.abc import Mapping
@@ -7,7 +7,7 @@ from xml.etree import ElementTree as ET
 
 from validation.report import summary
 
-# XML 1.0 has no way to write these, and a file name may hold them.
+# XML 1.0 cannot represent these characters, and a file name may contain them.
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 

@@ -1,11 +1,11 @@
-"""The error of random paths against their number as a plot, from the record of ``pictures.monte_carlo.run``."""
+"""Plot of the error of random paths against their number, from the record of ``pictures.monte_carlo.run``."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from validation.report.plots import Series, loglog
 
-# The grey, dotted row of the looks: a law is no measurement.
+# The grey, dotted look, because a law is not a measurement.
 _LAW = 8
 
 

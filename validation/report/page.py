@@ -1,4 +1,4 @@
-"""Metrics to one self-contained HTML page. Draws what the JSON says and computes nothing new."""
+"""The report page: renders the metrics as one self-contained HTML file and computes nothing new."""
 
 import base64
 import hashlib
@@ -8,19 +8,19 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation.report import monte_carlo_figure, tradeoff_figures
+from validation.report import efficiency_figures, monte_carlo_figure
 from validation.report.plots import stability_figures
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
-# What templates may call to draw curves from a record: figures with a title and an SVG, or the SVG alone.
+# Functions for templates that draw curves from a record: figures with a title and an SVG, or the SVG alone.
 FIGURES: dict[str, Callable[..., Any]] = {
     "figures": stability_figures,
-    "tradeoff_figures": tradeoff_figures.figures,
+    "efficiency_figures": efficiency_figures.figures,
     "monte_carlo_figure": monte_carlo_figure.figure,
 }
 
-# The sections in the order of the page: title and template, which reads the section's record as m.<section>.
+# The sections in the page's order: title and template, which reads the section's record as m.<section>.
 PARTIALS = {
     "images": ("Pictures", "pictures.html"),
     "hits": ("Hits", "hits.html"),
@@ -30,11 +30,11 @@ PARTIALS = {
 
 
 def page(metrics: dict[str, Any], pictures: Path) -> str:
-    """The report as HTML with every picture of ``pictures`` that it shows inside it."""
+    """The report as HTML, with every picture of ``pictures`` that it shows embedded."""
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    shown = Pictures(pictures)
+    shown = PictureClasses(pictures)
     environment.filters["number"] = number
     environment.globals |= FIGURES
     environment.globals["picture"] = lambda name: _data_uri(pictures / name)
@@ -45,8 +45,8 @@ def page(metrics: dict[str, Any], pictures: Path) -> str:
     return environment.get_template("report.html").render(m=metrics)
 
 
-class Pictures:
-    """The PNGs of a folder as CSS classes, so that equal ones stand in the page once however often they are shown."""
+class PictureClasses:
+    """The PNGs of a folder as CSS classes, so that the page contains equal ones only once."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -60,7 +60,7 @@ class Pictures:
         return css_class
 
     def rules(self) -> str:
-        """A CSS rule for each picture that was asked for."""
+        """A CSS rule for each picture that was used."""
         return "\n".join(
             f'.{name} {{ aspect-ratio: {_size(path)}; background-image: url("{_data_uri(path)}"); }}'
             for name, path in self._paths.items()
@@ -68,9 +68,9 @@ class Pictures:
 
 
 def failed_files(metrics: dict[str, Any], gate: dict[str, Any]) -> list[str]:
-    """Names, in the pictures folder, of what a failing gate left behind.
+    """Names, in the pictures folder, of the files of a failing gate.
 
-    They stand in its section's record, in a table with the gate's ``subject`` and a list or table ``failed``.
+    The section's record has them in a table with the gate's ``subject`` and a list or table ``failed``.
     """
     found: dict[str, None] = {}
     tables = [metrics[gate["section"]]]
@@ -85,13 +85,13 @@ def failed_files(metrics: dict[str, Any], gate: dict[str, Any]) -> list[str]:
 
 
 def number(value: float | int | None) -> str:
-    """A measured value for people: four significant digits, whole numbers whole, none as a dash."""
+    """A measured value for people: four significant digits, integers without a point, None as a dash."""
     if value is None:
         return "–"
     if float(value).is_integer() and abs(value) < 1e15:
         return f"{int(value):,}"
     if 1e-3 <= abs(value) < 1e4:
-        # Values just below 1 (an SSIM) keep the digits that tell them from 1.
+        # Values just below 1 (an SSIM) keep the digits that distinguish them from 1.
         if 0.99 < value < 1.0:
             return f"{value:.7f}" if 1.0 - value > 5e-8 else f"1 − {1.0 - value:.0e}"
         return f"{value:.4g}"

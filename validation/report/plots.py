@@ -1,4 +1,4 @@
-"""Curves as inline SVG, for light and dark pages: drawn from stored records, with no font, link or date inside."""
+"""Curves as inline SVG for light and dark pages, drawn from stored records, without embedded fonts, links or dates."""
 
 import hashlib
 import io
@@ -13,9 +13,9 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-# Errors of 0 have no place on a logarithmic axis; this lies below the roundoff of float64, 1.1e-16.
+# Errors of 0 cannot be drawn on a logarithmic axis; this is below the roundoff of float64, 1.1e-16.
 FLOOR = 1e-17
-# Okabe and Ito's blue, vermilion and green, which colour-blind readers tell apart, at a lightness between a white and
+# Okabe and Ito's blue, vermilion and green, which colour-blind readers distinguish, at a lightness between a white and
 # a dark page; markers and strokes differ as well.
 _LOOKS = (
     ("#2f86c9", "o", "-"), ("#dd6b20", "s", "-"), ("#169b74", "^", "--"), ("#b86fa0", "D", "-."),
@@ -23,7 +23,7 @@ _LOOKS = (
     ("#808790", "", ":"),
 )  # fmt: skip
 _GREY = "#808790"
-# Text takes the page's own colour: this one, which nothing else has, is replaced.
+# Text takes the page's own colour: it is drawn in this unique one, which is then replaced.
 _INK = "#010203"
 _SVG = "http://www.w3.org/2000/svg"
 _HREF = "{http://www.w3.org/1999/xlink}href"
@@ -34,9 +34,9 @@ _NAMES = {"ours": "ours (float64)", "embree_default": "Embree default", "embree_
 
 
 class Series(NamedTuple):
-    """One curve; a y that is None, as where nothing was hit, is left out.
+    """One curve; a y of None, as where nothing was hit, is left out.
 
-    ``look`` is a row of the colours and strokes, for curves that keep theirs from panel to panel; None: by position.
+    ``look`` is a row of the colours and strokes, for a curve with the same look in all panels; None: by position.
     """
 
     name: str
@@ -62,14 +62,14 @@ class Panel:
 def loglog(series: Sequence[Series], *, x_label: str, y_label: str, title: str) -> str:
     """One panel of 600 x 360 pixels, both axes logarithmic; a y of 0 is drawn at ``FLOOR``.
 
-    Returns an ``<svg>`` element to be put into a page: equal arguments give equal text, and its ids are its own as
-    long as no other plot of the page has the same arguments. Raises ``ValueError`` for an x that is not positive.
+    Returns an ``<svg>`` element for a page. Equal arguments give equal text, and its ids are unique as long as no other
+    plot of the page has the same arguments. Raises ``ValueError`` for an x that is not positive.
     """
     return draw([Panel(series, y_label)], x_label=x_label, title=title)
 
 
 def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
-    """Panels one below the other, the first the largest, with one x axis and one legend; see ``loglog``."""
+    """Panels below each other, the first one the largest, with one x axis and one legend; see ``loglog``."""
     bad = [x for panel in panels for s in panel.series for x in s.x if not 0.0 < x < math.inf]
     if bad:
         raise ValueError(f"series: expected positive, finite x for {title!r}, got {bad[0]}")
@@ -100,7 +100,7 @@ def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
 
 
 def stability_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The figures of the record of ``stability.sweeps.run``: for each a title (its caption too) and an SVG."""
+    """Figures of the record of ``stability.sweeps.run``: for each a title (also its caption) and an SVG."""
     sweeps = {name: part for name, part in record.items() if isinstance(part, dict) and "points" in part}
     return [_error_figure(name, part) for name, part in sweeps.items()] + [_leak_figure(record["leaks"])]
 
@@ -121,7 +121,7 @@ def _error_figure(name: str, sweep: Mapping[str, Any]) -> dict[str, str]:
 
 def _leak_figure(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     x = [row["faces"] for row in rows]
-    # Half a ray stands for none: the most that this many rays can say.
+    # No leak is drawn as half a ray, the resolution of this many rays.
     floor = 0.5e6 / max(row["rays"] for row in rows)
     series = [Series(s, x, [1e6 * row[k] / row["rays"] or floor for row in rows]) for k, s in _NAMES.items()]
     title = (
@@ -162,10 +162,10 @@ def _relative(ulp: Any) -> Any:
 
 
 def _inline(svg: str, title: str, prefix: str) -> str:
-    """The bare element, its ids under ``prefix``, named for readers that do not see it."""
+    """The bare element with its ids under ``prefix`` and a title for screen readers."""
     ElementTree.register_namespace("", _SVG)
     root = ElementTree.fromstring(svg)
-    # Within a page a <style> would hold for all of it; these two properties are inherited as well.
+    # Within a page a <style> would apply to all of it; these two properties are inherited as well.
     for parent in list(root.iter()):
         for child in [c for c in parent if c.tag in (f"{{{_SVG}}}metadata", f"{{{_SVG}}}style")]:
             parent.remove(child)
@@ -187,7 +187,7 @@ def _local(name: str) -> str:
 
 
 def _own(name: str, value: str, prefix: str) -> str:
-    """An attribute's value with ids made this plot's own and the ink made the page's."""
+    """An attribute's value, with this plot's prefix on ids and the page's colour for the ink."""
     if name == "id":
         return f"{prefix}-{value}"
     if name in ("href", _HREF) and value.startswith("#"):

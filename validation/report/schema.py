@@ -1,4 +1,4 @@
-"""What ``metrics.json`` holds; reports/README.md explains the keys. Checked when written and when read back."""
+"""Schema of ``metrics.json``, checked on writing and reading; reports/README.md explains the keys."""
 
 import json
 from pathlib import Path
@@ -16,7 +16,7 @@ class _Strict(BaseModel):
 
 
 class GateRecord(_Strict):
-    """A gate as ``Gate.record`` gives it; None stands for a value that is no number, which never passes."""
+    """A gate as ``Gate.record`` gives it; None is a value that is not a number, which never passes."""
 
     section: str
     subject: str
@@ -30,7 +30,7 @@ class GateRecord(_Strict):
 
     @model_validator(mode="after")
     def _verdict_follows(self) -> "GateRecord":
-        """A stored verdict must be the one that its own numbers give."""
+        """A stored verdict must follow from its own numbers."""
         low, high = (self.value, self.threshold) if self.bound == "at most" else (self.threshold, self.value)
         holds = low is not None and high is not None and low <= high
         if holds is not self.passed:
@@ -39,7 +39,7 @@ class GateRecord(_Strict):
 
 
 class SectionRecord(BaseModel):
-    """What every section says; the rest is its own. A cost of None is part of the section's seconds, untold apart."""
+    """The keys of every section's record, which has more of its own; a cost of None is unknown within the seconds."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -56,14 +56,14 @@ class Verdict(_Strict):
 
 
 class Fact(_Strict):
-    """One number for the head of the report."""
+    """One number at the head of the report."""
 
     value: float | None
     label: str
 
 
 class MatrixRow(_Strict):
-    """A section with its gates, and for each of the report's references whether it judged and for how long."""
+    """A section with its gates, and the seconds of each reference that judged it, None where they are unknown."""
 
     section: str
     gates: int
@@ -72,15 +72,15 @@ class MatrixRow(_Strict):
     references: dict[str, _Seconds | None]
 
 
-class Thresholds(_Strict):
-    """Which file moved thresholds, and from where to where, by the key's path."""
+class ThresholdChanges(_Strict):
+    """The file that changed thresholds, and each change by the key's path: from and to."""
 
     file: str | None
     moved: dict[str, tuple[float | None, float | None]]
 
 
 class Metrics(_Strict):
-    """The whole file. Sections that did not run are absent, and ``left_out`` says why."""
+    """The whole file. Sections that did not run are absent; ``left_out`` gives the reasons."""
 
     version: Literal[2] = Field(alias="schema")
     command: str
@@ -91,7 +91,7 @@ class Metrics(_Strict):
     verdict: Verdict
     facts: list[Fact]
     matrix: list[MatrixRow]
-    thresholds: Thresholds
+    thresholds: ThresholdChanges
     gates: list[GateRecord]
     left_out: dict[str, str]
     baseline: dict[str, Any]
@@ -104,7 +104,7 @@ class Metrics(_Strict):
 
 
 def check(metrics: Any, name: str = "metrics") -> None:
-    """Raises ``ValueError`` that names the key, what was expected and what stood there."""
+    """Raises ``ValueError`` that names the key, the expected value and the one found."""
     try:
         Metrics.model_validate(metrics)
     except ValidationError as error:
@@ -115,7 +115,7 @@ def check(metrics: Any, name: str = "metrics") -> None:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """A checked ``metrics.json``. Raises ``ValueError`` where it is none, ``OSError`` where it cannot be read."""
+    """A checked ``metrics.json``. Raises ``ValueError`` for an invalid file, ``OSError`` for an unreadable one."""
     try:
         metrics = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:

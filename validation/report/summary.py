@@ -1,4 +1,4 @@
-"""The outcome of a run in a few numbers: the verdict, facts for the head of the report, sections by references."""
+"""Summary of a run: the verdict, facts for the head of the report, sections by references."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,13 +7,13 @@ Record = Mapping[str, Any]
 
 
 def verdict(gates: Sequence[Record]) -> dict[str, Any]:
-    """Passed, and how many gates there were and failed. Where nothing was judged nothing passed."""
+    """Whether the run passed, and the numbers of gates and failures. A run without gates does not pass."""
     failed = sum(not gate["passed"] for gate in gates)
     return {"passed": bool(gates) and not failed, "gates": len(gates), "failed": failed}
 
 
 def failure(gate: Record) -> str:
-    """What a failing gate's value is and should be; as many digits as tell the two apart."""
+    """A failing gate in words: its value and the bound, with enough digits to distinguish them."""
     value, threshold = gate["value"], f"{gate['threshold']:.12g}"
     if value is None:
         shown = "not a number"
@@ -24,7 +24,7 @@ def failure(gate: Record) -> str:
 
 
 def matrix(records: Mapping[str, Record], gates: Sequence[Record]) -> list[dict[str, Any]]:
-    """A row a section that ran: its gates, its seconds, and its references with what each cost."""
+    """A row for each section that ran: its gates, its seconds, and the cost of each of its references."""
     rows = []
     for section, record in records.items():
         own = [gate for gate in gates if gate["section"] == section]
@@ -35,7 +35,7 @@ def matrix(records: Mapping[str, Record], gates: Sequence[Record]) -> list[dict[
 
 
 def facts(rows: Sequence[Record], gates: Sequence[Record], defects: Record | None) -> list[dict[str, Any]]:
-    """Up to six numbers that a reader asks for first; those whose gates did not run are left out."""
+    """Up to six numbers for the head of the report; those whose gates did not run are left out."""
     wrong = [gate for gate in gates if "on which we are wrong" in gate["quantity"]]
     leaks = [gate for gate in gates if gate["quantity"] == "leaks"]
     cases = [gate for gate in gates if gate["quantity"] == "holds"]
@@ -58,6 +58,6 @@ def facts(rows: Sequence[Record], gates: Sequence[Record], defects: Record | Non
 
 
 def _sum(gates: Sequence[Record]) -> float | None:
-    """None where a value is not a number."""
+    """The sum of the values, None where one is not a number."""
     values = [gate["value"] for gate in gates]
     return None if None in values else sum(values)

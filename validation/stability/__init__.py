@@ -1,1 +1,1 @@
-"""The section that checks numerical stability: sweeps and extreme cases."""
+"""The section on numerical stability: sweeps and extreme cases."""

@@ -1,26 +1,25 @@
-"""The section on numerical stability: the table of extreme cases, the watertight sweep, the error curves."""
+"""The section on numerical stability: extreme cases, the watertight sweep, the error curves."""
 
 from validation.gates import Gate
 from validation.hits import watertight
 from validation.job import Job
-from validation.stability import sweeps as stability
-from validation.stability.cases import hits as extreme_hits
-from validation.stability.cases import shading as extreme_shading
+from validation.stability import sweeps
+from validation.stability.cases import hits, shading
 from validation.stability.cases.case import ExtremeCase
 
-CASES = (*extreme_hits.CASES, *extreme_shading.CASES)
+CASES = (*hits.CASES, *shading.CASES)
 
-# Who judges here. Each is asked in the middle of a case or sweep, so that its seconds are not told apart.
+# The judges of this section. Each works within a case or sweep, so its seconds are not measured apart.
 JUDGES = ("exact arithmetic", "analytic", "Embree robust", "Embree default", "brute force")
 
 
 def steps(job: Job) -> int:
-    """How often ``run`` calls ``job.step``: for each case, closed mesh and sweep, and for the leaks."""
-    return len(CASES) + len(watertight.closed_meshes()) + len(stability.SWEEPS) + 1
+    """Number of calls of ``job.step`` in ``run``: one for each case, closed mesh and sweep, and one for the leaks."""
+    return len(CASES) + len(watertight.closed_meshes()) + len(sweeps.SWEEPS) + 1
 
 
 def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
-    """Run everything; returns a record for JSON and the gates, one for each case among them."""
+    """Run all cases and sweeps; returns a record for JSON and the gates, one for each case among them."""
     cases = []
     gates = []
     for case in CASES:
@@ -28,7 +27,7 @@ def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
         cases.append(record)
         gates.append(gate)
     sweep, sweep_gates = watertight.run(job.quick, job.step)
-    curves, curve_gates = stability.run(job.quick, job.step)
+    curves, curve_gates = sweeps.run(job.quick, job.step)
     record = {"cases": cases, "watertight": sweep, "curves": curves, "costs": dict.fromkeys(JUDGES)}
     return record, [*gates, *sweep_gates, *curve_gates]
 

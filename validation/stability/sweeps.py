@@ -1,7 +1,7 @@
-"""How the error of hit distances grows with offset, scale, grazing angle and sliver height, against exact arithmetic.
+"""Error of hit distances against offset, scale, grazing angle and sliver height, judged by exact arithmetic.
 
-Three kernels answer the same rays: ours in float64, and Embree's default and robust modes, whose input is rounded to
-float32 as it is for everybody who uses them. Each error is against the exact hit of the float64 input.
+Three kernels trace the same rays: ours in float64, and Embree's default and robust modes, whose input is rounded to
+float32, as for all their users. Each error is against the exact hit of the float64 input.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,13 +28,13 @@ Floats = NDArray[np.float64]
 
 SEED = 2028
 KERNELS = ("ours", "embree_default", "embree_robust")
-# A triangle of one grazing or sliver sample is turned at random; so many share the rays of a point.
+# Number of random rotations of the triangle in a grazing or sliver sample; they share the rays of a point.
 _TURNS = 10
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A mesh and the rays that are sent at it."""
+    """A mesh and the rays to trace."""
 
     vertices: Floats
     faces: NDArray[np.int32]
@@ -43,7 +43,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Sweep:
-    """One curve: what x is, where it is sampled, and the samples of so many rays at one x."""
+    """One curve: the meaning of x, its values, and the function that makes the samples of so many rays at one x."""
 
     name: str
     label: str
@@ -52,15 +52,15 @@ class Sweep:
 
 
 @dataclass(frozen=True)
-class Effort:
+class SweepEffort:
     """Rays at each x, and leak rays of each kind and mesh."""
 
     rays: int
     leaks: int
 
 
-QUICK = Effort(rays=60, leaks=20_000)
-FULL = Effort(rays=200, leaks=200_000)
+QUICK = SweepEffort(rays=60, leaks=20_000)
+FULL = SweepEffort(rays=200, leaks=200_000)
 
 
 def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:
@@ -81,7 +81,7 @@ def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], li
 
 @dataclass(frozen=True)
 class Errors:
-    """What one kernel answered at one x, over all rays: verdicts, and errors of t where it and the truth hit."""
+    """Results of one kernel at one x over all rays: verdicts, and errors of t where it and exact arithmetic hit."""
 
     missed: int
     false_hits: int
@@ -92,11 +92,11 @@ class Errors:
 
     @property
     def wrong(self) -> int:
-        """Rays with a wrong verdict."""
+        """Number of rays with a wrong verdict."""
         return self.missed + self.false_hits + self.wrong_face
 
     def record(self, rays: int) -> dict[str, object]:
-        """For JSON: medians and maxima, None where nothing was hit in common."""
+        """The errors for JSON: medians and maxima, None without a common hit."""
         errors = {"relative": self.relative, "ulp": self.ulp}
         summary: dict[str, object] = {f"{k}_median": float(np.median(v)) if len(v) else None for k, v in errors.items()}
         summary |= {f"{k}_max": float(v.max()) if len(v) else None for k, v in errors.items()}
@@ -106,23 +106,23 @@ class Errors:
 
 @dataclass(frozen=True)
 class Point:
-    """All kernels at one x of a curve."""
+    """Errors of all kernels at one x of a curve."""
 
     x: float
     rays: int
     errors: dict[str, Errors]
 
     def record(self) -> dict[str, object]:
-        """For JSON."""
+        """The point for JSON."""
         kernels = {name: errors.record(self.rays) for name, errors in self.errors.items()}
-        # The bound is that of float64; a float32 kernel on rounded input is beyond it by design.
+        # The bound holds for float64; a float32 kernel on rounded input exceeds it by design.
         for name in KERNELS[1:]:
             del kernels[name]["beyond_bound"]
         return {"x": self.x, "rays": self.rays, **kernels}
 
 
 def point(sweep: Sweep, x: float, rays: int, rng: Generator) -> Point:
-    """Send the rays of one x through every kernel and judge them exactly."""
+    """Trace the rays of one x with every kernel and judge them exactly."""
     samples = sweep.samples(x, rays, rng)
     truth = [exact.closest_hits(s.vertices, s.faces, s.rays.origins, s.rays.directions) for s in samples]
     errors = {}
@@ -133,20 +133,20 @@ def point(sweep: Sweep, x: float, rays: int, rng: Generator) -> Point:
 
 
 def answer(kernel: str, sample: Sample) -> HitArrays:
-    """The closest hits of one kernel."""
+    """Closest hits of one kernel."""
     rays = sample.rays
     if kernel == "ours":
         hits = Octree(sample.vertices, sample.faces).closest_hit(rays.origins, rays.directions)
         return HitArrays(hits.t, hits.face)
     embree = Embree(sample.vertices, sample.faces, robust=kernel == "embree_robust")
     t, face = embree.closest_hit(rays.origins, rays.directions)
-    # In default mode an overflow can leave a face with a t that is no number: nothing to compare.
+    # In default mode an overflow can leave a face with a t that is not finite, which cannot be compared.
     face = np.where(np.isfinite(t), face, -1)
     return HitArrays(np.where(face >= 0, t, np.inf), face)
 
 
 def errors_of(found: HitArrays, sample: Sample, truth: list[ExactHit | None]) -> Errors:
-    """Compare answers with exact hits, ray by ray."""
+    """Compare hits with exact ones, ray by ray."""
     hit = np.array([h is not None for h in truth])
     both = np.flatnonzero(found.hit & hit)
     pairs = [(ray, float(found.t[ray]), h) for ray in both.tolist() if (h := truth[ray]) is not None]
@@ -166,7 +166,7 @@ def errors_of(found: HitArrays, sample: Sample, truth: list[ExactHit | None]) ->
 
 
 def judge(name: str, points: list[Point]) -> list[Gate]:
-    """Ours must be exact on hit, miss and face, and t within the bound that rounding derives for that very ray."""
+    """Gates on ours: hit, miss and face must be exact, and t within the bound that rounding derives for the ray."""
     rays = sum(p.rays for p in points)
     wrong = sum(p.errors["ours"].wrong for p in points)
     beyond = sum(p.errors["ours"].beyond_bound for p in points)
@@ -179,7 +179,7 @@ def judge(name: str, points: list[Point]) -> list[Gate]:
 
 
 def leak_row(level: int, count: int) -> dict[str, object]:
-    """Leaks of ``count`` edge and ``count`` vertex rays from inside an icosphere, by kernel."""
+    """Leaks of ``count`` edge rays and ``count`` vertex rays from inside an icosphere, by kernel."""
     mesh = icosphere(level)
     rng = np.random.default_rng([SEED, level])
     counts = dict.fromkeys(KERNELS, 0)
@@ -206,13 +206,13 @@ def scaled(scale: float, count: int, rng: Generator) -> list[Sample]:
 
 
 def grazing(angle: float, count: int, rng: Generator) -> list[Sample]:
-    """Triangles turned at random, met at ``angle`` radians from their planes."""
+    """Randomly rotated triangles, hit at ``angle`` radians from their planes."""
     flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, 0.9, 0.0]])
     return _at_triangles(flat, count, rng, lambda n: np.full(n, angle))
 
 
 def slivers(height: float, count: int, rng: Generator) -> list[Sample]:
-    """Triangles of length 1 and ``height``, turned at random, met at 30 to 90 degrees."""
+    """Randomly rotated triangles of length 1 and ``height``, hit at 30 to 90 degrees."""
     flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, height, 0.0]])
     return _at_triangles(flat, count, rng, lambda n: rng.uniform(np.pi / 6, np.pi / 2, n))
 
@@ -232,7 +232,7 @@ SWEEPS = (
 
 
 def _around_sphere(count: int, rng: Generator) -> tuple[Floats, Floats]:
-    """Origins 3 radii away or inside, by turns, and targets within faces."""
+    """Origins 3 radii away or inside, alternately, and targets within faces."""
     origins = rng.standard_normal((count, 3))
     origins *= np.where(np.arange(count) % 2, 3.0, 0.5)[:, None] / np.linalg.norm(origins, axis=1, keepdims=True)
     corners = _SPHERE.triangles[rng.integers(0, len(_SPHERE.faces), count)]
@@ -240,7 +240,7 @@ def _around_sphere(count: int, rng: Generator) -> tuple[Floats, Floats]:
 
 
 def _at_triangles(flat: Floats, count: int, rng: Generator, angles: Callable[[int], Floats]) -> list[Sample]:
-    """One triangle of z = 0 in several turns, with rays from 2 away at points within, ``angles(n)`` off its plane."""
+    """One triangle of z = 0 in several rotations, with rays from 2 away at inner points, ``angles(n)`` off it."""
     return list(_turned(flat, -(-count // _TURNS), rng, angles))
 
 
@@ -256,7 +256,7 @@ def _turned(flat: Floats, count: int, rng: Generator, angles: Callable[[int], Fl
 
 
 def _within(corners: Floats, rng: Generator) -> Floats:
-    """A point of each triangle (n, 3, 3), at least 1 % of its height from its edges."""
+    """A point inside each triangle (n, 3, 3), at least 1 % of its height from its edges."""
     weights = 0.01 + 0.97 * rng.dirichlet((1.0, 1.0, 1.0), len(corners))
     return np.einsum("nk,nkj->nj", weights, corners)
 
@@ -266,7 +266,7 @@ def _towards(origins: Floats, targets: Floats) -> RayBatch:
 
 
 def _bounds(sample: Sample, faces: NDArray[np.int64], rows: NDArray[np.int64]) -> list[float]:
-    """The float64 bound on t for the rays at ``rows`` and the faces that they name."""
+    """The float64 bound on t for the rays at ``rows`` and the faces of their hits."""
     if not len(rows):
         return []
     corners = sample.vertices[sample.faces[faces]]

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from validation import tradeoff
+from validation import timing
 from validation.benchmark.measures import frames, processes
 from validation.benchmark.measures.fit import log_fit
 from validation.benchmark.page.targets import Target, judged
 from validation.benchmark.peers import libllvm
-from validation.tradeoff import interleaved, ratio
+from validation.timing import interleaved, ratio
 
 
 def test_a_fit_finds_the_law_that_made_the_costs() -> None:
@@ -39,8 +39,8 @@ def test_two_sizes_fit_nothing() -> None:
 def test_contenders_take_turns_after_a_rest_and_the_first_round_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     order: list[str] = []
     rests: list[tuple[float, int]] = []
-    monkeypatch.setattr(tradeoff, "REST", 0.25)
-    monkeypatch.setattr(tradeoff.time, "sleep", lambda seconds: rests.append((seconds, len(order))))
+    monkeypatch.setattr(timing, "REST", 0.25)
+    monkeypatch.setattr(timing.time, "sleep", lambda seconds: rests.append((seconds, len(order))))
 
     def call(name: str) -> Callable[[], float]:
         def seconds() -> float:

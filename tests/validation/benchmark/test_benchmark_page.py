@@ -10,7 +10,7 @@ from renderer.mesh.load import save_ply
 from validation.benchmark import __main__ as command
 from validation.benchmark.measures import ablation, first_answers, frames, memory, meshes, processes
 from validation.benchmark.page import page, record
-from validation.benchmark.parameters import study as knobs
+from validation.benchmark.parameters import study
 from validation.benchmark.peers import systems
 from validation.benchmark.peers.ours import OURS, OURS_ONE
 
@@ -54,7 +54,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(processes, "measure", _processes)
         patch.setattr(first_answers, "measure", _first_answers)
         patch.setattr(ablation, "run", _ablation)
-        patch.setattr(knobs, "run", lambda *_: None)
+        patch.setattr(study, "run", lambda *_: None)
         row = {"systems": {OURS: {"rest": 100, "peak": 200, "own": 90}}}
         patch.setattr(memory, "measure", lambda mesh, *_: row | {"mesh": mesh.name, "faces": len(mesh.faces)})
         patch.setitem(systems._PEERS, "nobody", ("nobody", "pip install nobody"))

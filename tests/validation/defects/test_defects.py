@@ -118,7 +118,7 @@ def page_of(record: dict[str, Any]) -> str:
 def test_an_error_is_no_verdict(tmp_path: Path, tiny_checks: str) -> None:
     """A replacement that breaks the program itself must not pass for one that was caught."""
     nonsense = Replacement("image._encoded", "encoded * 255.0 + 0.5", "nowhere")
-    answer = defects.ask(nonsense, ("pictures",), tmp_path, tiny_checks)
+    answer = defects.run_checks(nonsense, ("pictures",), tmp_path, tiny_checks)
     assert answer.error == "NameError: name 'nowhere' is not defined"
     assert answer.red == ()
     defect = Defect("nonsense", "pictures", nonsense, kernel=False)

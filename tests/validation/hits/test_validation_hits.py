@@ -27,7 +27,7 @@ from validation.report import page as report
 from validation.thresholds import HitLimits, Thresholds
 
 QUICK = tuple(one for one in REFERENCES if one.key in ("embree_robust", "embree_default", "igl"))
-EFFORT = hits.Effort(rays=300, exact=60, leaks=2_000, references=QUICK)
+EFFORT = hits.HitEffort(rays=300, exact=60, leaks=2_000, references=QUICK)
 
 
 def ball() -> Mesh:
@@ -39,7 +39,7 @@ def job(**changes: Any) -> Job:
     return Job(True, Thresholds(), Path(), lambda _: None, **changes)
 
 
-def checked(mesh: Mesh, effort: hits.Effort = EFFORT) -> tuple[dict[str, Any], list[Gate]]:
+def checked(mesh: Mesh, effort: hits.HitEffort = EFFORT) -> tuple[dict[str, Any], list[Gate]]:
     return hits.check_mesh("ball", mesh, effort, job())
 
 

@@ -6,7 +6,7 @@ import pytest
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.hits import watertight
-from validation.hits.watertight import BUILDS, Closed, Effort, Placement
+from validation.hits.watertight import BUILDS, ClosedMesh, LeakEffort, Placement
 
 SHAPES = {closed.name: closed for closed in watertight.closed_meshes()}
 BALL = SHAPES["icosphere 3"]
@@ -84,7 +84,7 @@ def test_no_ray_leaks_in_any_place():
 def test_a_hole_fails_every_gate(name):
     closed = SHAPES[name]
     # The rays are aimed at what is left, so only those at the rim of the holes can leak.
-    holed = Closed(
+    holed = ClosedMesh(
         name, Mesh(closed.mesh.vertices, closed.mesh.faces[np.arange(len(closed.mesh.faces)) % 8 > 0]), closed.inside
     )
     gates = watertight.gates(shots(holed))
@@ -115,7 +115,7 @@ def test_a_place_that_flattens_faces_is_known():
 
 
 def test_run_counts_all_rays_and_names_what_it_left_out(monkeypatch):
-    monkeypatch.setattr(watertight, "QUICK", Effort(rays=3_000, builds=1, embree=20))
+    monkeypatch.setattr(watertight, "QUICK", LeakEffort(rays=3_000, builds=1, embree=20))
     monkeypatch.setattr(watertight, "closed_meshes", lambda: (BALL, SHAPES["integer box"]))
     monkeypatch.setattr(watertight, "OFFSETS", (0.0, 1e12))
     steps = []

@@ -21,14 +21,14 @@ from validation.gates import Gate
 from validation.job import Job
 from validation.pictures import ladder, monte_carlo
 from validation.pictures import section as images
-from validation.pictures.section import Effort, Reference
+from validation.pictures.section import PictureEffort, Reference
 from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba.whitted import whitted
 from validation.scenes import SCENES
 from validation.thresholds import Thresholds
 
-SMALL = Effort(64, paths=False)
+SMALL = PictureEffort(64, paths=False)
 
 
 @cache
@@ -70,7 +70,7 @@ def reference_balls() -> Any:
     return whitted(balls(), 64, 64, max_depth=6)
 
 
-def check(folder: Path, scene: Scene, effort: Effort = SMALL) -> tuple[dict[str, Any], list[Gate]]:
+def check(folder: Path, scene: Scene, effort: PictureEffort = SMALL) -> tuple[dict[str, Any], list[Gate]]:
     said: list[str] = []
     job = Job(True, Thresholds(), folder, said.append)
     result = images.check_scene("small", "a test", scene, effort, job)
@@ -84,7 +84,7 @@ def failing(gates: list[Gate]) -> list[str]:
 
 
 def test_the_whole_ladder_passes_and_leaves_what_the_report_shows(tmp_path: Path) -> None:
-    record, gates = check(tmp_path, balls(), Effort(64, 32))
+    record, gates = check(tmp_path, balls(), PictureEffort(64, 32))
     assert failing(gates) == []
     judged = {rung["name"]: {c["reference"] for c in rung["comparisons"]} for rung in record["rungs"]}
     of_glass = ("glass", "everything")
@@ -111,7 +111,7 @@ def test_a_scene_without_shadows_is_judged_by_who_can(tmp_path: Path) -> None:
 
 
 def test_a_second_run_has_the_same_bits(tmp_path: Path) -> None:
-    runs = [check(tmp_path, stairs(), Effort(24, paths=False))[0]["rungs"][-1]["comparisons"] for _ in range(2)]
+    runs = [check(tmp_path, stairs(), PictureEffort(24, paths=False))[0]["rungs"][-1]["comparisons"] for _ in range(2)]
     kept = [[{k: v for k, v in c.items() if k != "reference_seconds"} for c in run] for run in runs]
     assert kept[0] == kept[1] and len(kept[0][0]["ours_sha256"]) == 64
 
@@ -190,14 +190,14 @@ def test_srgb_applied_twice_is_seen_in_what_is_saved(tmp_path: Path, monkeypatch
 
     right = module.srgb
     monkeypatch.setattr(module, "srgb", lambda linear: right(right(linear) / 255.0))
-    _, gates = check(tmp_path, stairs(), Effort(24, paths=False))
+    _, gates = check(tmp_path, stairs(), PictureEffort(24, paths=False))
     assert {gate.quantity for gate in gates if not gate.passed} == {"8-bit steps from the formula"}
 
 
 def test_a_rung_that_nobody_judges_is_not_passed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nobody = Reference("path", mitsuba_path.NAME, lambda _: "no reason", whitted)
     monkeypatch.setattr(images, "REFERENCES", (nobody,))
-    record, gates = check(tmp_path, stairs(), Effort(24, paths=False))
+    record, gates = check(tmp_path, stairs(), PictureEffort(24, paths=False))
     assert failing(gates) == ["small, everything: references that judge it is 0"]
     assert record["rungs"][0]["left_out"] == {mitsuba_path.NAME: "no reason"}
 
@@ -218,7 +218,7 @@ def test_a_picture_of_nothing_is_not_passed(tmp_path: Path) -> None:
 
 def test_a_users_scene_keeps_its_shape_and_climbs_the_ladder(tmp_path: Path) -> None:
     wide = stairs().altered(render=stairs().render.model_copy(update={"resolution": (1000, 500)}))
-    record, gates = check(tmp_path, wide, Effort(64, 32))
+    record, gates = check(tmp_path, wide, PictureEffort(64, 32))
     assert failing(gates) == []
     sizes = {rung["name"]: rung["size"] for rung in record["rungs"]}
     assert sizes == {"diffuse": [32, 16], "everything": [64, 32]}

@@ -9,7 +9,7 @@ from validation.hits.compare import HitArrays
 from validation.oracle import exact
 from validation.stability import sweeps as stability
 
-EFFORT = stability.Effort(rays=20, leaks=300)
+EFFORT = stability.SweepEffort(rays=20, leaks=300)
 
 
 def judged(sweep, x, monkeypatch, change):

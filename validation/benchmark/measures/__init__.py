@@ -1,1 +1,1 @@
-"""What is measured: builds, queries, frames, memory, whole processes."""
+"""The benchmark's measurements: builds, queries, frames, memory, whole processes."""

@@ -1,4 +1,4 @@
-"""What leaving out saves: what a scene does not need is forced on, and time, memory and picture are compared."""
+"""Savings by leaving out unneeded features: each is forced on, and time, memory and picture are compared."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
@@ -25,11 +25,11 @@ RUNS = 5
 
 
 def run(quick: bool, step: Callable[[str], None]) -> dict[str, Any]:
-    """Force each needless feature on in every scene of ``scenes/`` and a few made here.
+    """Force each unneeded feature on, in every scene of ``scenes/`` and in a few made here.
 
-    Returns, ready for JSON, ``rows`` (one a scene and feature: what ``compare`` gives) and ``passed``: whether no
-    picture changed. Each pair is rendered ``RUNS`` times in turn; ``quick`` makes the pictures small. ``step`` is told
-    what comes next.
+    Returns, ready for JSON, ``rows`` (one a scene and feature: the result of ``compare``) and ``passed``: whether no
+    picture changed. Each pair is rendered ``RUNS`` times in turn; ``quick`` makes the pictures small. ``step`` is
+    called with the name of each step.
     """
     size = 64 if quick else 512
     rows = []
@@ -63,22 +63,23 @@ def _made(material: Any, thing: SceneObject, floor: bool = True) -> Scene:
 
 
 def additions(scene: Scene) -> Iterator[tuple[str, Needs]]:
-    """Each feature that ``scene`` does not need, and its needs with that one switched on."""
+    """Each feature that ``scene`` does not need, and the scene's needs with this feature on."""
     needs = needs_of(scene)
     for feature, value in asdict(needs).items():
         if feature == "lights":
             if value < len(scene.lights) and needs.shadows:
                 yield feature, replace(needs, lights=len(scene.lights))
         elif not value:
-            # Shadow rays go to lights, so those come with them.
+            # Shadow rays go to lights, so the lights are needed too.
             lights = len(scene.lights) if feature == "shadows" else needs.lights
             yield feature, replace(needs, lights=lights, **{feature: True})
 
 
 def compare(scene: Scene, more: Needs, size: int) -> dict[str, Any]:
-    """The picture with what it needs and with ``more``: median seconds, bytes and rays of both, and what changed.
+    """The picture with its own needs and with ``more``: median seconds, bytes and rays of both, and their differences.
 
-    ``difference`` is the largest of the radiance, which must be 0; ``identical`` covers depth, normal and face too.
+    ``difference`` is the largest difference of radiance, which must be 0; ``identical`` covers depth, normal and face
+    too.
     """
     both = {"without": needs_of(scene), "with": more}
     pictures = {key: _render(scene, needs, size) for key, needs in both.items()}

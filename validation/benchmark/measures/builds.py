@@ -1,4 +1,4 @@
-"""Seconds to build, and to refit where the octree can: the first answered query counts, a warm one is taken off."""
+"""Seconds to build, up to the first query less the time of a warm one, and to refit where the octree can."""
 
 import statistics
 import time
@@ -9,15 +9,15 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.benchmark.peers import ours
 from validation.benchmark.peers.contender import System
-from validation.tradeoff import RUNS, interleaved, ratio, timed
+from validation.timing import RUNS, interleaved, ratio, timed
 
 REFIT = "ours_refit"
-# Above this size a round of all builds takes half a minute, so there are three and not five of them.
+# Above this size a round of all builds takes half a minute, so there are three rounds instead of five.
 _LARGE, _LARGE_RUNS = 2_000_000, 3
 
 
 def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) -> dict[str, Any]:
-    """One row: builds of ``mesh`` by our split rules and every system that has a build of its own."""
+    """One row: builds of ``mesh`` by our split rules and by every system with its own build."""
     step(f"{mesh.name}: builds")
     peers = [s for s in systems if s.times_build and s.name != ours.OURS and s.takes(len(mesh.faces))]
     contenders = ours.builds() + peers
@@ -43,14 +43,14 @@ def _build_clock(system: System, mesh: Mesh) -> Callable[[], float]:
             peer = build()
             peer.touch()
             built = time.perf_counter()
-        # What any warm query costs is no part of the build.
+        # The cost of a warm query is not part of the build.
         return max(built - began - timed(peer.touch)(), 0.0)
 
     return seconds
 
 
 def _refit_clock(mesh: Mesh) -> Callable[[], float]:
-    """An octree whose vertices move to and fro, by a power of two: float32 holds both places."""
+    """An octree whose vertices move back and forth by a power of two, so that float32 holds both positions."""
     octree: Any = Octree.from_mesh(mesh)
     places = [mesh.vertices * 0.5, mesh.vertices.copy()]
 

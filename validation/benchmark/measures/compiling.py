@@ -1,4 +1,4 @@
-"""``python -m validation.benchmark.measures.compiling``: where the time of compiling goes, by prepared and by kernel.
+"""``python -m validation.benchmark.measures.compiling``: where the time of compiling goes, by stage and by kernel.
 
 Compiles what ``octree-render compile --queries`` or ``--pictures`` does, into an empty folder, with clocks around
 Numba's passes and LLVM. Times are wall seconds of one thread, those of callees not included.
@@ -15,14 +15,14 @@ from typing import Any
 
 
 class _Clocks:
-    """Seconds by name, those of calls within left out."""
+    """Seconds by name, without those of nested calls."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = defaultdict(float)
         self._within: list[float] = []
 
     def around(self, name: Callable[..., str], call: Callable[..., Any]) -> Callable[..., Any]:
-        """``call`` with a clock, whose name its arguments tell."""
+        """``call`` with a clock, whose name is a function of the arguments."""
 
         def timed(*arguments: Any, **keywords: Any) -> Any:
             self._within.append(0.0)
@@ -39,7 +39,7 @@ class _Clocks:
 
 
 def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
-    """Seconds by prepared and by kernel, and in all, of compiling ``what``; for a process that has compiled nothing."""
+    """Seconds by stage, by kernel and in total of compiling ``what``; for a process that has compiled nothing."""
     from numba.core import compiler_machinery, lowering
 
     from renderer.kernels import compiler
@@ -55,8 +55,8 @@ def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
         (lowering.BaseLower, "lower_normal_function", "write LLVM's instructions"),
         (compiler._PieceLibrary, "add_ir_module", "print and parse them"),
     )
-    for owner, method, prepared in clocked:
-        setattr(owner, method, stages.around(lambda *a, prepared=prepared: prepared, getattr(owner, method)))
+    for owner, method, stage in clocked:
+        setattr(owner, method, stages.around(lambda *a, stage=stage: stage, getattr(owner, method)))
     with tempfile.TemporaryDirectory() as folder:
         compile_into(Path(folder))
         began = time.perf_counter()
@@ -65,7 +65,7 @@ def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
 
 
 def _stage(name: str) -> str:
-    """What a pass of Numba's is a part of."""
+    """The stage of a Numba pass."""
     known = {
         "translate_bytecode": "read bytecode",
         "nopython_type_inference": "infer types",

@@ -1,4 +1,4 @@
-"""The ray families of the benchmark, seeded and exact in float32: camera, shadow, random and bounce."""
+"""The benchmark's ray families, seeded and exact in float32: camera, shadow, random and bounce."""
 
 import numpy as np
 
@@ -7,20 +7,20 @@ from validation.benchmark.peers.contender import Family, Floats
 from validation.hits.rays import camera_rays, float32_exact, random_rays
 
 _SEED = 11
-# Spawned rays start off their surface by this share of the mesh's size: a thousand times float32's rounding, so that
-# every contender agrees, and less than a tenth of an edge at 10 million faces.
+# Spawned rays start at this share of the mesh's size off their surface: a thousand times float32's rounding, so that
+# all contenders agree, and less than a tenth of an edge at 10 million faces.
 _OFFSET = 5e-5
 
 
 def families(octree: Octree, count: int) -> tuple[Family, ...]:
-    """``count`` rays each. Shadow and bounce rays start where camera rays hit, in the order of the pixels."""
+    """``count`` rays of each family; shadow and bounce rays start where camera rays hit, in the pixels' order."""
     mesh = octree.mesh
     camera = camera_rays(mesh.vertices, count)
     hits = octree.closest_hit(camera.origins, camera.directions)
     seen = np.flatnonzero(hits.hit)
     if not len(seen):
         raise ValueError(f"mesh {mesh.name}: expected camera rays that hit, got none of {count}")
-    # Every hit starts as many rays as it takes, and rays of one hit follow each other.
+    # Every hit starts as many rays as needed, and rays from one hit are consecutive.
     rows = seen[np.arange(count) * len(seen) // count]
     normals = hits.normals[rows]
     normals *= -np.sign(np.einsum("ij,ij->i", normals, camera.directions[rows]))[:, None]
@@ -43,6 +43,6 @@ def cosine_distributed(normals: Floats, rng: np.random.Generator) -> Floats:
     points = rng.standard_normal(normals.shape)
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     directions = normals + points
-    # Opposite to the normal to within rounding: no direction at all.
+    # A point opposite to the normal within rounding gives no direction.
     directions[np.linalg.norm(directions, axis=1) < 1e-6] = (0.0, 0.0, 1.0)
     return directions

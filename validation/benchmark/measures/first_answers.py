@@ -1,7 +1,7 @@
-"""How long the first answers take: with nothing compiled, with kernels compiled ahead, and call by call afterwards.
+"""Seconds to the first results: with nothing compiled, with kernels compiled ahead, and call by call afterwards.
 
-CPU seconds are those of a process and its children, as the system counts them: what compiles in two processes at once
-does not look cheaper. Each process begins with a cache folder of its own.
+CPU seconds are those of a process and its children, as the system counts them, so that compiling in two processes at
+once does not look cheaper. Each process starts with its own cache folder.
 """
 
 import json
@@ -21,22 +21,24 @@ from validation.scenes import SCENES
 
 _RUNS = 3
 _HERE = "validation.benchmark.measures.first_answers"
-# float32 does not hold thirds, and does hold these vertices as they are.
+# Sizes of the mesh: float32 does not hold its vertices times a third, and holds them as they are.
 _FLOAT64, _FLOAT32 = "0.3333333333333333", "1.0"
-# Calls of one ray or few whose time is taken together: some milliseconds.
+# Number of calls with one or few rays that are timed together: some milliseconds.
 _CALLS = 1_000
 
 
 class Spent(NamedTuple):
-    """What a process took: seconds on the wall, and CPU seconds with those of its children."""
+    """Wall seconds of a process, and CPU seconds including its children's."""
 
     wall: float
     cpu: float
 
 
 def measure(installed: set[str], step: Callable[[str], None]) -> dict[str, Any] | None:
-    """``rows`` by name, with ``unit``, the ``values`` of all runs and their ``median``; and ``level``, of the kernels
-    compiled ahead. None where the system does not count what children spend.
+    """The first results as ``rows`` by name, and ``level``, the level of the kernels compiled ahead.
+
+    Each row has ``unit``, the ``values`` of all runs and their ``median``. None where the system does not count the
+    seconds of children.
     """
     if os.name != "posix":
         return None
@@ -61,7 +63,7 @@ def measure(installed: set[str], step: Callable[[str], None]) -> dict[str, Any] 
 
 
 def _one_round(cache: Path, ahead: Path) -> dict[str, float]:
-    """Each first answer once, with an empty cache where it shall be cold."""
+    """Each first result once, with an empty cache for the cold ones."""
     render = [sys.executable, "-P", "-m", "renderer", "render", str(SCENES / "three_models.toml"), "-o",
               f"{cache}.png", "--resolution", "512x512", "--quiet"]  # fmt: skip
     hit = child.command(f"{_HERE}:first_hit", _FLOAT64)
@@ -82,7 +84,7 @@ def _one_round(cache: Path, ahead: Path) -> dict[str, float]:
 
 
 def _spend(command: list[str], **more: str) -> Spent:
-    """Run a process; a child of ours, so that it counts to its last child."""
+    """Run a process as our child, so that the system counts it and its children."""
     import resource  # only where ``supported``
 
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
@@ -94,11 +96,11 @@ def _spend(command: list[str], **more: str) -> Spent:
 
 
 def _kernels_ahead(folder: Path) -> tuple[str, Path]:
-    """The best level that this machine runs but the last, and a folder of all kernels compiled for it."""
+    """The level for which kernels are compiled ahead, and a folder of all kernels for it."""
     from renderer.kernels.store import runnable_levels
 
     levels = runnable_levels()
-    # x86-64-v3 is what most machines of today have; where there is only one, that.
+    # Most machines of today have x86-64-v3; without it, the best level that this machine runs.
     level = "x86-64-v3" if "x86-64-v3" in levels else levels[0]
     ahead = folder / "ahead"
     command = [sys.executable, "-P", "-m", "renderer", "compile", "--level", level, "-o", str(ahead), "--quiet"]
@@ -107,7 +109,7 @@ def _kernels_ahead(folder: Path) -> tuple[str, Path]:
 
 
 def first_hit(size: str) -> None:
-    """In a process of its own: an octree over a small mesh of this size, and the hits of three rays."""
+    """In its own process: build an octree over a small mesh of this size and trace three rays."""
     import numpy as np
 
     from renderer import Octree
@@ -120,7 +122,7 @@ def first_hit(size: str) -> None:
 
 
 def _level_speed(folder: Path, ahead: Path) -> dict[str, list[float]]:
-    """Seconds of native kernels over those for the level, ray by ray the same hits, in turn; 1 is as fast."""
+    """Ratio of seconds, native kernels over those for the level, in turn, with equal hits; 1 means equal speed."""
     command, rounds = child.command(f"{_HERE}:trace"), []
     places = {"native": {"NUMBA_CACHE_DIR": f"{folder}/native"},
               "level": {"NUMBA_CACHE_DIR": f"{folder}/empty", AHEAD_VARIABLE: str(ahead)}}  # fmt: skip
@@ -140,7 +142,7 @@ def _level_speed(folder: Path, ahead: Path) -> dict[str, list[float]]:
 
 
 def trace() -> None:
-    """In a process of its own: print seconds of camera and of random rays, and a digest of their hits."""
+    """In its own process: print the seconds of camera and of random rays, and a digest of their hits."""
     import hashlib
 
     import numpy as np
@@ -163,7 +165,7 @@ def trace() -> None:
 
 
 def _calls(installed: set[str]) -> dict[str, list[float]]:
-    """Microseconds of a call with few rays, in our arrays and in the peers' own; all take turns."""
+    """Microseconds of a call with few rays, in our arrays and in the peers' own, in turn."""
     import numpy as np
 
     from renderer.mesh.shapes import icosphere

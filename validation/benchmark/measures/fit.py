@@ -1,4 +1,4 @@
-"""The law that an octree's cost should follow: a log2 N + b."""
+"""Fit of the expected cost law of an octree: a log2 N + b."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,19 +7,19 @@ import numpy as np
 
 
 class Fit(NamedTuple):
-    """``a`` and ``b`` of cost = a log2 N + b, and the root mean square of what is left, all in the cost's unit."""
+    """``a`` and ``b`` of cost = a log2 N + b, and the root mean square of the residuals, all in the cost's unit."""
 
     a: float
     b: float
     residual: float
 
     def at(self, faces: float) -> float:
-        """The fitted cost for so many faces."""
+        """The fitted cost for a number of faces."""
         return float(self.a * np.log2(faces) + self.b)
 
 
 def log_fit(faces: Sequence[int], cost: Sequence[float]) -> Fit | None:
-    """By least squares; None for fewer than three sizes, through which some line passes exactly.
+    """Least-squares fit; None for fewer than three sizes, through which some line passes exactly.
 
     >>> fit = log_fit([1024, 2048, 4096], [30.0, 33.0, 36.0])
     >>> round(fit.a, 9), round(fit.b, 9)

@@ -1,4 +1,4 @@
-"""Whole Whitted pictures: ours beside what Mitsuba needs for the same rays, and beside its own integrators."""
+"""Whole Whitted pictures: ours beside Mitsuba's with the same rays, and beside its own integrators."""
 
 import statistics
 import time
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from renderer.picture.render import render
 from renderer.scene.scene import Scene, load_scene
 from validation.scenes import SCENES
-from validation.tradeoff import RUNS, interleaved, ratio, timed
+from validation.timing import RUNS, interleaved, ratio, timed
 
 OURS, OURS_BUILT, LISTS = "ours", "ours_with_build", "mitsuba_llvm_lists"
 SCALAR = "mitsuba_scalar_recursion"
@@ -60,13 +60,13 @@ def _add_mitsuba(
     scene: Scene, size: int, llvm: bool, calls: dict[str, Any], counts: dict[str, Any], pictures: dict[str, Any]
 ) -> None:
     from validation.benchmark.peers.mitsuba_native import drawing
-    from validation.references.mitsuba import scene as source
+    from validation.references.mitsuba import scene as mitsuba_scene
     from validation.references.mitsuba import whitted as mitsuba_whitted
 
-    rays = source.camera_rays(scene, size, size, 1)[0]
+    rays = mitsuba_scene.camera_rays(scene, size, size, 1)[0]
 
     def recursion() -> float:
-        """From the end of the picture's first row, of background, to its end: scene and rays were made before."""
+        """Seconds from the end of the first row, which shows background, to the picture's end: setup is excluded."""
         marks: list[float] = []
         pictures[SCALAR] = mitsuba_whitted.whitted(
             scene, size, size, max_depth=_DEPTH, rays=rays, progress=lambda *_: marks.append(time.perf_counter())

@@ -1,11 +1,11 @@
-"""Memory of a built system, measured in a process of its own.
+"""Memory of a built system, measured in its own process.
 
-Its command is ``python -m validation.benchmark.measures.memory NAME FOLDER``.
+``measure`` starts that process with the entry point ``answer``.
 
-The process reads the mesh (``vertices.npy``, ``faces.npy``), imports the system, builds a small mesh once so that
-libraries and compiled kernels are there, and brings the mesh into the system's own arrays. From then on everything by
-which its resident memory grows is the system's: at rest once it is built, and at its highest while building. Linux
-only: VmRSS and VmHWM of /proc/self/status, the latter reset through /proc/self/clear_refs.
+The process reads the mesh (``vertices.npy``, ``faces.npy``), imports the system, builds a small mesh once to load
+libraries and compiled kernels, and converts the mesh to the system's own arrays. From then on all growth of resident
+memory is the system's: at rest once it is built, and at its highest while building. Linux only: VmRSS and VmHWM of
+/proc/self/status, the latter reset through /proc/self/clear_refs.
 """
 
 import ctypes
@@ -31,7 +31,7 @@ _STATUS = Path("/proc/self/status")
 
 
 def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) -> dict[str, Any] | None:
-    """One row: bytes at rest and at peak of every system that builds; None where the kernel does not tell."""
+    """One row: bytes at rest and at peak of every system that builds; None where the kernel does not report them."""
     if not _STATUS.exists():
         return None
     found: dict[str, Any] = {}
@@ -48,9 +48,10 @@ def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) 
 
 
 def grown(system: System, folder: Path) -> dict[str, int | None]:
-    """Bytes ``rest`` and ``peak`` by which this process grows, and ``own``: what our octree says of itself."""
+    """Bytes ``rest`` and ``peak`` by which this process grows, and ``own``: our octree's own count."""
     vertices, faces = np.load(folder / "vertices.npy"), np.load(folder / "faces.npy")
-    # In float32 like the meshes of the series, and large enough that its tree is built in parts: so all kernels load.
+    # In float32 like the meshes of the series, and large enough for a tree that is built in parts, so that all kernels
+    # load.
     small = displaced_spheres(20_000)
     system.loaded(small.vertices, small.faces)
     build = system.load(vertices, faces)
@@ -67,7 +68,7 @@ def grown(system: System, folder: Path) -> dict[str, int | None]:
 
 
 def _trim() -> None:
-    """Give freed memory back to the system, so that what is left is in use."""
+    """Return freed memory to the system, so that the rest is in use."""
     gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
@@ -82,5 +83,5 @@ def _bytes(field: str) -> int:
 
 
 def answer(name: str, folder: str) -> None:
-    """The other end of ``measure``: print what one system takes."""
+    """Entry point of the child process of ``measure``: print one system's memory."""
     print(json.dumps(grown(next(s for s in available()[0] if s.name == name), Path(folder))))

@@ -1,4 +1,4 @@
-"""Generated meshes of one shape and any size, so that cost against N compares nothing but N."""
+"""Generated meshes of one shape and any size, so that only N differs when costs are compared."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,9 +20,9 @@ _SEED = 7
 def displaced_spheres(faces: int) -> Mesh:
     """Eight spheres with seeded hills, at the corners of a cube and nearly touching: about ``faces`` faces, 96 n^2.
 
-    Eight, because a lone sphere hides no light from itself: here a third of the shadow and bounce rays hit something.
-    The hills are the same at every size. Vertices are exact in float32. The six n x n lattices of a sphere share no
-    vertices along their borders, where rounding may part them by an ulp.
+    Eight spheres, because a single sphere does not shadow itself: here a third of the shadow and bounce rays hit
+    something. The hills are the same at every size. Vertices are exact in float32. The six n x n lattices of a sphere
+    share no vertices along their borders, where rounding may separate them by an ulp.
     """
     n = max(1, round((faces / 96) ** 0.5))
     sphere = _cube_sphere(n)
@@ -34,8 +34,8 @@ def displaced_spheres(faces: int) -> Mesh:
 
 
 def _cube_sphere(n: int) -> Floats:
-    """Points of the unit sphere: (n + 1) x (n + 1) of each side of a cube, row by row, outside counter-clockwise."""
-    # Equal angles rather than equal lengths: cells at the cube's corners are then nearly as large as in the middle.
+    """Points of the unit sphere: (n + 1) x (n + 1) on each side of a cube, row by row, counter-clockwise outside."""
+    # Equal angles rather than equal lengths: then cells at the cube's corners are nearly as large as in the middle.
     along = np.tan(np.linspace(-np.pi / 4, np.pi / 4, n + 1))
     x, y = (a.ravel() for a in np.meshgrid(along, along))
     z = np.ones_like(x)

@@ -1,4 +1,4 @@
-"""Whole processes, from the shell's command to its end: a picture with compiled kernels, and imports."""
+"""Whole processes, from command to exit: a picture with compiled kernels, and imports."""
 
 import statistics
 import subprocess
@@ -9,14 +9,14 @@ from typing import Any
 
 from renderer.process import child
 from validation.scenes import SCENES
-from validation.tradeoff import interleaved, timed
+from validation.timing import interleaved, timed
 
 _RUNS = 3
 WARM, IMPORT = "render_warm", "import_renderer"
 
 
 def measure(llvm: bool, installed: set[str], step: Callable[[str], None]) -> dict[str, Any]:
-    """By name: the command and its seconds, of three runs in turn after one unseen."""
+    """By name: the command and its seconds, of three runs in turn after one untimed."""
     step("processes")
     with tempfile.TemporaryDirectory() as folder:
         render = ["-m", "renderer", "render", str(SCENES / "three_models.toml"), "-o", f"{folder}/out.png",

@@ -1,4 +1,4 @@
-"""Closest and any hits of every contender on one mesh, in turn, and whether they agree on what is hit."""
+"""Closest and any hits of every contender on one mesh, in turn, and whether their hits agree."""
 
 import statistics
 from collections.abc import Callable, Sequence
@@ -11,11 +11,11 @@ from validation.benchmark.measures.families import families
 from validation.benchmark.measures.fit import log_fit
 from validation.benchmark.peers.contender import Family, Peer, Query, System
 from validation.benchmark.peers.ours import OURS, OURS_ONE, Ours
-from validation.tradeoff import RUNS, interleaved, ratio, timed
+from validation.timing import RUNS, interleaved, ratio, timed
 
 KINDS = ("closest", "any")
 # Between float32 and float64 only rays within about 1e-6 of a silhouette may differ; a picture of 1e6 rays has some
-# thousand rays at silhouettes a pixel wide. One ray in a thousand is far beyond that: a wrong scene, not rounding.
+# thousand rays at silhouettes a pixel wide. One ray in a thousand is far more: a wrong scene, not rounding.
 MAX_DIFFERING = 1e-3
 
 
@@ -31,14 +31,14 @@ def measure(mesh: Mesh, systems: Sequence[System], count: int, step: Callable[[s
             step(f"{mesh.name}: {family.name} rays, {kind} hit")
             rays = {name: family.at_most(labels[name].most_rays or count) for name in peers}
             queries = {name: _query(peer, kind, rays[name]) for name, peer in peers.items()}
-            asked = {name: query for name, query in queries.items() if query is not None}
+            offered = {name: query for name, query in queries.items() if query is not None}
             rows.append({"mesh": mesh.name, "faces": len(mesh.faces), "family": family.name, "query": kind}
-                        | _row(family, asked, rays))  # fmt: skip
+                        | _row(family, offered, rays))  # fmt: skip
     return rows
 
 
 def _peers(mesh: Mesh, systems: Sequence[System]) -> dict[str, Peer]:
-    """Each system with the mesh; our one thread shares the octree of all threads."""
+    """Each system with the mesh; our one-thread contender shares the octree of all threads."""
     peers: dict[str, Peer] = {}
     for system in systems:
         if system.takes(len(mesh.faces)):
@@ -59,7 +59,7 @@ def _row(family: Family, queries: dict[str, Query], rays: dict[str, Family]) -> 
         hit, count = _hit(query, query.trace()), len(rays[name])
         same = expected if count == len(family) else expected[np.linspace(0, len(family) - 1, count).astype(np.int64)]
         contenders[name] = {"rays": count, "hits": int(hit.sum()), "differing": int((hit != same).sum())}
-    # The answers above were the unseen round.
+    # The queries above were the untimed round.
     seconds = interleaved({name: timed(query.trace) for name, query in queries.items()}, RUNS, unseen=0)
     for name, runs in seconds.items():
         median, count = statistics.median(runs), len(rays[name])

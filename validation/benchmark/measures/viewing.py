@@ -1,8 +1,8 @@
-"""Milliseconds from a view to its pictures in the viewer, over a real socket.
+"""Milliseconds from a camera message to its pictures in the viewer, over a real socket.
 
     python -m validation.benchmark.measures.viewing [SCENE] [--views N]
 
-Medians over views along a turn, each acknowledged as the page does. What a browser needs to draw is not in them.
+Medians over cameras along a turn, each picture acknowledged as by the page. The browser's drawing time is not included.
 """
 
 import argparse
@@ -24,14 +24,14 @@ from renderer.viewer.protocol import HEADER
 from validation.scenes import SCENES
 
 _SIZE = 512
-# A turn in so many steps; each shows other parts of the scene.
+# Radians of one step of the turn; each step shows other parts of the scene.
 _STEP = 0.05
-# Views at first that are not timed: kernels load, threads start.
+# First views that are not timed: kernels load, threads start.
 _UNSEEN = 3
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print the results."""
     parser = argparse.ArgumentParser(description="Time the viewer's answers.")
     parser.add_argument("scene", nargs="?", type=Path, default=SCENES / "three_models.toml")
     parser.add_argument("--views", type=int, default=25)

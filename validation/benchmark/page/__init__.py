@@ -1,1 +1,1 @@
-"""The benchmark's page: records, figures and targets."""
+"""The benchmark's page: record, figures and targets."""

@@ -8,9 +8,9 @@ from validation.benchmark.peers.ours import OURS
 from validation.report.plots import Panel, Series, draw
 
 Record = Mapping[str, Any]
-# The look of ``validation.report.plots`` without markers; there are seven contenders before it.
+# The look of ``validation.report.plots`` without markers; seven contenders come before it.
 _FIT_LOOK = 7
-# The memory of smaller meshes is a few pages of 4 kB, or none where the allocator had some left.
+# The memory of smaller meshes is a few pages of 4 kB, or none where the allocator had free ones.
 _FEWEST_FACES = 5_000
 
 
@@ -75,7 +75,7 @@ def _a_face(rows: Sequence[Record], name: str, key: str) -> tuple[list[float], l
 
 
 def _curves(record: Record, rows: Sequence[Record], value: Any, slow: bool) -> list[Series]:
-    """One a contender; ``slow`` says whether those that got fewer rays are shown too."""
+    """One curve a contender; ``slow`` says whether those with fewer rays are shown too."""
     names = dict.fromkeys(name for r in rows for name in r["contenders"])
     shown = [n for n in names if slow or record["systems"][n]["most_rays"] is None]
     curves = []
@@ -96,7 +96,7 @@ def _series(record: Record, rows: Sequence[Record]) -> list[Record]:
 
 
 def _look(record: Record, name: str) -> int | None:
-    """A contender keeps its colour in every figure."""
+    """The contender's look, so that it has the same colour in every figure."""
     return list(record["systems"]).index(name) if name in record["systems"] else None
 
 

@@ -1,4 +1,4 @@
-"""The record to one self-contained page, and to the table of ratios on the terminal. Computes nothing new."""
+"""The benchmark's page and its table of ratios on the terminal, from the record; computes nothing new."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -10,7 +10,8 @@ from validation.benchmark.page import figures, pareto
 from validation.benchmark.peers.ours import OURS
 from validation.report.page import number
 
-# Half a processor taken by others moves a two-thread contender by a quarter, more than most ratios here differ from 1.
+# Other processes on half a processor slow a two-thread contender by a quarter, more than most ratios here differ from
+# 1.
 BUSY = 0.5
 _TEMPLATES = Path(__file__).resolve().parents[2] / "report" / "templates"
 
@@ -24,13 +25,13 @@ def html(record: Mapping[str, Any]) -> str:
     plots = {
         "query_figures": figures.query_figures(record),
         "build_figures": figures.build_figures(record),
-        "knob_figures": pareto.figures(record["knobs"]) if record["knobs"] else [],
+        "parameter_figures": pareto.figures(record["knobs"]) if record["knobs"] else [],
     }
     return environment.get_template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **plots)
 
 
 def ratios(record: Mapping[str, Any]) -> str:
-    """What the terminal shows: every ratio of ours to a peer, larger is faster, then the targets."""
+    """The terminal's text: every ratio of ours to a peer, larger is faster, then the targets."""
     return "\n".join(_lines(record))
 
 

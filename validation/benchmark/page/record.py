@@ -1,15 +1,15 @@
-"""The record of a run, ``benchmark.json``: what is in it, how it is written and read. The page is drawn from it alone.
+"""The record of a run, ``benchmark.json``: its keys, reading and writing. The page is drawn from it alone.
 
 schema            SCHEMA; another number is refused
 command, date, commit, quick, seconds      how the record was made; commit is null outside a git checkout
 environment       processor, processors, threads, python, platform, packages (version or null), libllvm (or null),
-                  load: processes that wanted to run in the minute before, or null; above 0 the others' share counts
+                  load: mean number of processes that wanted to run in the minute before the run, or null
 systems           by name: label, threads, precision, most_rays (null: no limit)
-missing           by name: how to get a peer that is not here
-series            names of the generated meshes, which differ in nothing but size
+missing           by name: how to install a peer that is absent
+series            names of the generated meshes, which differ in size only
 queries[]         one a mesh, family and kind of query
   mesh, faces, family, query     family: camera, shadow, random, bounce; query: closest, any
-  rays, hit_share, agree         agree: all contenders hit the same rays, but for float32's silhouettes, and some
+  rays, hit_share, agree         agree: some rays hit, and all contenders hit the same ones except at silhouettes
   contenders        by name: rays, hits, differing (hit flags unlike ours), seconds (all runs), median, mrays, ns
   ratios            by peer: the median over the rounds of its time a ray over ours
 fits[]            family, query, contender, and a, b, residual of ns = a log2 N + b
@@ -19,7 +19,7 @@ frames            scene, size, max_depth, faces, labels, contenders, ratios, ray
                   mean_error, pixel_share against ours
 processes         by name: command, seconds, median
 first_answers     level, for which kernels were compiled ahead; rows by name: unit, values, median; null where not run
-ablation, knobs   see ``ablation.run`` and ``knobs.run``; null where not run
+ablation, knobs   see ``ablation.run`` and ``study.run``; null where not run
 targets[]         see ``targets.Target``; met and aimed are null where nothing was measured
 """
 
@@ -44,7 +44,7 @@ _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 
 
 def describe(libllvm: str | None, load: float | None) -> dict[str, Any]:
-    """Where and with what: ``validation.environment`` and what only the benchmark uses."""
+    """The environment: ``validation.environment`` and what only the benchmark uses."""
     found: dict[str, Any] = environment.describe()
     packages = {name: _version(name) for name in _MORE_PACKAGES}
     return found | {"packages": found["packages"] | packages, "libllvm": libllvm, "load": load}
@@ -59,7 +59,7 @@ def described(systems: Sequence[System]) -> dict[str, Any]:
 
 
 def load() -> float | None:
-    """How many processes wanted a processor, on average over the last minute; None where the system does not tell."""
+    """Mean number of processes that wanted a processor in the last minute; None where the system does not report it."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
@@ -77,14 +77,14 @@ def commit() -> str | None:
 
 
 def write(record: Mapping[str, Any], path: Path) -> None:
-    """Whole or not at all; ``ValueError`` for NaN and infinities, which are no JSON."""
+    """Write the whole file or nothing; raises ``ValueError`` for NaN and infinities, which JSON lacks."""
     _expect_keys(record, "record")
     text = json.dumps(record, indent=1, allow_nan=False)
     write_atomically(path, lambda file: file.write(text.encode()))
 
 
 def read(path: Path) -> dict[str, Any]:
-    """What ``write`` wrote. Raises ``ValueError`` for another schema or missing parts."""
+    """A stored record. Raises ``ValueError`` for another schema or missing parts."""
     record = json.loads(path.read_text(encoding="utf-8"))
     got = record.get("schema") if isinstance(record, dict) else type(record).__name__
     if got != SCHEMA:

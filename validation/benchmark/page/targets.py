@@ -1,4 +1,4 @@
-"""What was to be reached, why there, and whether it was: computed from the record alone."""
+"""The benchmark's targets, their reasons, and whether each was reached: computed from the record alone."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -7,13 +7,14 @@ from typing import Any
 from validation.benchmark.measures import frames, processes
 from validation.benchmark.peers.ours import OURS
 
-# The meshes on which rays and builds are judged: smaller ones fit into the caches and time the loop around them.
+# Sizes of the meshes on which rays and builds are judged: smaller ones fit into the caches and time the loop around
+# them.
 FEWEST_FACES, MOST_FACES = 70_000, 5_000_000
 
 
 @dataclass(frozen=True)
 class Target:
-    """One quantity with its two bounds. ``better`` is "above" or "below"; None measured: nothing to judge by here.
+    """One quantity with its two bounds. ``better`` is "above" or "below"; ``measured`` is None without a measurement.
 
     measured : the worst of the meshes that count, or the median of a single thing.
     """
@@ -34,7 +35,7 @@ class Target:
         return self.measured >= bound if self.better == "above" else self.measured <= bound
 
     def record(self) -> dict[str, Any]:
-        """Ready for JSON."""
+        """The target, ready for JSON."""
         return asdict(self) | {"met": self.reaches(self.at_least), "aimed": self.reaches(self.aim)}
 
 
@@ -51,7 +52,7 @@ _RAYS = (
 
 
 def judged(record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """All targets with what ``record`` says of them."""
+    """All targets with their values in ``record``."""
     makers: tuple[Callable[[Mapping[str, Any]], Iterator[Target]], ...]
     makers = (_rays, _builds, _memory, _frames, _processes, _first_answers)
     return [target.record() for make in makers for target in make(record)]

@@ -1,1 +1,1 @@
-"""How speed and error depend on the parameters."""
+"""Speed and error as functions of the parameters."""

@@ -1,9 +1,9 @@
-"""Knobs of a ray query: float32 or float64 storage, which trade error for time, and the tree's, which may not.
+"""Parameters of a ray query: float32 or float64 storage, which trade error for time, and tree options, which may not.
 
-The mesh's vertices are no float32 numbers, so that storage matters: the octree keeps them as float64, and as float32
-only where it is given rounded ones. The rays are float32 numbers, so that Embree sees the same ones. Every error is
-against exact arithmetic on the unrounded mesh: it holds what rounding the vertices did as well as the kernel's own.
-One thread throughout, because embreex allows no more.
+The mesh's vertices are not float32 numbers, so that storage matters: the octree keeps them as float64, and as float32
+only where it gets rounded ones. The rays are float32 numbers, so that Embree gets the same ones. Every error is against
+exact arithmetic on the unrounded mesh: it includes the rounding of the vertices as well as the kernel's own. All
+contenders use one thread, because embreex allows no more.
 """
 
 from collections.abc import Callable
@@ -18,10 +18,11 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.trace.query import Hits
 from validation.efficiency.hits import answer, errors, turned_mesh
+from validation.error_curves import front
 from validation.hits.rays import RayBatch, camera_rays, float32_exact, random_rays
 from validation.oracle import exact
 from validation.references.embree import Embree
-from validation.tradeoff import front, median_seconds, timed
+from validation.timing import median_seconds, timed
 
 SEED = 20
 SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
@@ -30,8 +31,8 @@ DEPTHS = (1, 2, 4, 8, 16, 32)
 
 
 @dataclass(frozen=True)
-class Effort:
-    """``level`` of the icosphere, ``rays`` timed and ``judged`` in each family, timed ``runs``."""
+class HitStudyEffort:
+    """The icosphere's ``level``, the numbers of rays timed and judged in each family, and ``runs`` of the clock."""
 
     level: int
     rays: int
@@ -39,7 +40,7 @@ class Effort:
     runs: int
 
 
-class Tree(NamedTuple):
+class TreeOptions(NamedTuple):
     """Options of an octree."""
 
     split: Literal["midpoint", "sah"] = "midpoint"
@@ -48,28 +49,28 @@ class Tree(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As shown."""
+        """The name in records and figures."""
         return f"{self.split}, leaf {self.leaf_size}, depth {self.max_depth}"
 
 
-class Contender(NamedTuple):
-    """One way to answer closest hits, with what it took to build; bytes are None where nothing tells them."""
+class StorageContender(NamedTuple):
+    """One implementation of closest hits, with the cost of its build; bytes are None where they are unknown."""
 
     query: Callable[[NDArray[np.float64], NDArray[np.float64]], Any]
     build_seconds: float
     bytes: int | None
 
 
-def run(effort: Effort, step: Callable[[str], None]) -> dict[str, object]:
+def run(effort: HitStudyEffort, step: Callable[[str], None]) -> dict[str, object]:
     """Measure; see ``validation.benchmark.parameters.study`` for the record."""
     mesh = turned_mesh(effort.level)
     batches = (
         camera_rays(mesh.vertices, effort.rays),
         random_rays(mesh.triangles, effort.rays, np.random.default_rng(SEED)),
     )
-    step("knobs: storage")
+    step("parameters: storage")
     storage = _storage(mesh, batches, effort)
-    step("knobs: the tree's")
+    step("parameters: tree")
     return {
         "mesh": {"name": mesh.name, "faces": len(mesh.faces), "float32": mesh.is_float32},
         "rays": effort.rays,
@@ -78,7 +79,7 @@ def run(effort: Effort, step: Callable[[str], None]) -> dict[str, object]:
         "threads": 1,
         "seed": SEED,
         "storage": storage,
-        "tree": tree_knobs(mesh, batches, effort.runs),
+        "tree": tree_parameters(mesh, batches, effort.runs),
     }
 
 
@@ -90,13 +91,14 @@ def differing_rays(a: Hits, b: Hits) -> int:
     return int(changed.sum())
 
 
-def tree_knobs(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dict[str, object]:
-    """Seconds, bytes and nanoseconds a ray of every tree, and how many rays it answers in other bits than the
-    default tree: none, or the option is no mere trade of time.
+def tree_parameters(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dict[str, object]:
+    """Seconds, bytes and nanoseconds a ray of every tree, and the number of rays with other bits than the default tree.
+
+    That number must be 0, else the option trades more than time.
     """
-    sweeps = {f"leaf_size, {split}": [Tree(split, size) for size in LEAF_SIZES] for split in SPLITS}
-    sweeps["max_depth"] = [Tree(max_depth=depth) for depth in DEPTHS]
-    trees = dict.fromkeys([Tree()] + [tree for row in sweeps.values() for tree in row])
+    sweeps = {f"leaf_size, {split}": [TreeOptions(split, size) for size in LEAF_SIZES] for split in SPLITS}
+    sweeps["max_depth"] = [TreeOptions(max_depth=depth) for depth in DEPTHS]
+    trees = dict.fromkeys([TreeOptions()] + [tree for row in sweeps.values() for tree in row])
     builders = {tree.name: partial(_built, mesh, tree) for tree in trees}
     build_seconds = median_seconds({name: timed(build) for name, build in builders.items()}, runs)
     octrees = {name: build() for name, build in builders.items()}
@@ -111,7 +113,7 @@ def tree_knobs(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dict[str
     ]
     names = list(octrees)
     return {
-        "default": Tree().name,
+        "default": TreeOptions().name,
         "points": points,
         "sweeps": {name: [tree.name for tree in row] for name, row in sweeps.items()},
         "differing_rays": sum(differing.values()),
@@ -123,17 +125,17 @@ def tree_knobs(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dict[str
 
 
 def _differing(octrees: dict[str, Octree], batches: tuple[RayBatch, ...]) -> dict[str, int]:
-    """Rays of all families that each tree answers in other bits than the default tree."""
+    """Number of rays of all families for which each tree gives other bits than the default tree."""
     counts = dict.fromkeys(octrees, 0)
     for batch in batches:
-        expected = octrees[Tree().name].closest_hit(batch.origins, batch.directions)
+        expected = octrees[TreeOptions().name].closest_hit(batch.origins, batch.directions)
         for name, octree in octrees.items():
             counts[name] += differing_rays(octree.closest_hit(batch.origins, batch.directions), expected)
     return counts
 
 
-def _storage(mesh: Mesh, batches: tuple[RayBatch, ...], effort: Effort) -> list[dict[str, object]]:
-    """One record a family of rays."""
+def _storage(mesh: Mesh, batches: tuple[RayBatch, ...], effort: HitStudyEffort) -> list[dict[str, object]]:
+    """One record for each family of rays."""
     contenders = _contenders(mesh, effort.runs)
     records: list[dict[str, object]] = []
     for batch in batches:
@@ -149,34 +151,34 @@ def _storage(mesh: Mesh, batches: tuple[RayBatch, ...], effort: Effort) -> list[
         fronts = {}
         for quantity in ("p50", "p99", "max"):
             plane = [(p["ns_per_ray"], p["errors"][quantity]) for p in points if p["errors"][quantity] is not None]
-            # All are None or none is: the truth's hits are the same, and no contender misses all of them.
+            # All are None or none is: the exact hits are the same for all, and no contender misses all of them.
             fronts[quantity] = [points[i]["name"] for i in front(plane)] if len(plane) == len(points) else []
         records.append({"rays": batch.name, "judged": len(sample), "points": points, "fronts": fronts})
     return records
 
 
-def _contenders(mesh: Mesh, runs: int) -> dict[str, Contender]:
+def _contenders(mesh: Mesh, runs: int) -> dict[str, StorageContender]:
     rounded = Mesh(float32_exact(mesh.vertices), mesh.faces)
     builders: dict[str, Callable[[], Any]] = {
-        "float64": partial(_built, mesh, Tree()),
-        "float32": partial(_built, rounded, Tree()),
+        "float64": partial(_built, mesh, TreeOptions()),
+        "float32": partial(_built, rounded, TreeOptions()),
         "embree_default": partial(Embree, mesh.vertices, mesh.faces, robust=False),
         "embree_robust": partial(Embree, mesh.vertices, mesh.faces, robust=True),
     }
     seconds = median_seconds({name: timed(_ready, build) for name, build in builders.items()}, runs)
     built = {name: build() for name, build in builders.items()}
     return {
-        name: Contender(b.closest_hit, seconds[name], b.stats.bytes if isinstance(b, Octree) else None)
+        name: StorageContender(b.closest_hit, seconds[name], b.stats.bytes if isinstance(b, Octree) else None)
         for name, b in built.items()
     }
 
 
-def _built(mesh: Mesh, tree: Tree) -> Octree:
+def _built(mesh: Mesh, tree: TreeOptions) -> Octree:
     return Octree.from_mesh(mesh, **tree._asdict(), threads=1)
 
 
 def _ready(build: Callable[[], Any]) -> None:
-    """Build and shoot one ray: Embree builds at its first."""
+    """Build and trace one ray, because Embree builds on its first."""
     build().closest_hit(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
 
 

@@ -1,1 +1,1 @@
-"""The systems that are measured, each behind the same interface."""
+"""The measured systems, each behind the same interface."""

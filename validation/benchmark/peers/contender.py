@@ -1,4 +1,4 @@
-"""What a contender of the benchmark is: a system, its threads and limits, and what it does on one mesh."""
+"""Interface of the benchmark's contenders: a system, its threads and limits, and its queries on one mesh."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -14,7 +14,7 @@ Faces = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Family:
-    """Rays with a name, and where they end: ``origins`` and ``directions`` (n, 3) float64, exact in float32.
+    """Named rays with an end: ``origins`` and ``directions`` (n, 3) float64, exact in float32.
 
     ``t_max`` is in units of |direction|, one for all rays: inf, or 1 for shadow rays, which end at their light.
     """
@@ -38,7 +38,7 @@ class Family:
 class Query(NamedTuple):
     """Rays already in the system's own arrays. Only ``trace`` is timed.
 
-    read : of what ``trace`` returned, t of each ray, float64 (n,), inf on a miss; of any-hit queries bool (n,).
+    read : converts ``trace``'s result to t of each ray, float64 (n,), inf on a miss; for any-hit queries to bool (n,).
     """
 
     trace: Callable[[], Any]
@@ -52,20 +52,20 @@ class Peer(Protocol):
         """Closest hits."""
 
     def any(self, rays: Family) -> Query | None:
-        """Whether anything is hit up to ``rays.t_max``; None where the system does not offer it."""
+        """Whether each ray hits anything up to ``rays.t_max``; None where the system does not offer this query."""
 
     def touch(self) -> None:
-        """Trace one ray: systems that build on the first query then have built."""
+        """Trace one ray, so that systems that build on the first query have built."""
 
 
 @dataclass(frozen=True)
 class System:
     """A contender before it has a mesh.
 
-    load : takes vertices (V, 3) float64 and faces (F, 3) int32 into the system's own arrays, and returns what builds.
+    load : converts vertices (V, 3) float64 and faces (F, 3) int32 to the system's own arrays; returns the build.
     most_rays, most_faces : a slow system gets fewer rays, spread evenly, and no larger meshes; None: no limit.
-    scope : where ``load``'s result must be called; entered off the clock.
-    times_build : whether its build is one of its own, and not another contender's with other threads.
+    scope : the context in which ``load``'s result must be called; entered off the clock.
+    times_build : whether the build is its own, and not another contender's with other threads.
     """
 
     name: str
@@ -87,5 +87,5 @@ class System:
         return peer
 
     def takes(self, faces: int) -> bool:
-        """Whether a mesh of so many faces is not too large."""
+        """Whether the system takes a mesh of so many faces."""
         return self.most_faces is None or faces <= self.most_faces

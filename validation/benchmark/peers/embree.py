@@ -1,7 +1,7 @@
-"""Embree through ``embreex``, as a contender. It traces on one thread: the wrapper's loop allows no more.
+"""Embree through ``embreex``, as a contender. It traces on one thread: the wrapper's loop does not allow more.
 
-``validation.references.embree`` judges hits and converts on every call; here rays and answers stay in embreex's
-float32 arrays.
+``validation.references.embree`` judges hits and converts on every call; here rays and results stay in embreex's float32
+arrays.
 """
 
 from typing import Any
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
 
-# Embree's answer in t where nothing is hit is what went in; the face tells hits from misses.
+# Where nothing is hit, Embree leaves the input value in t; the face distinguishes hits from misses.
 _NO_FACE = -1
 
 
 class EmbreePeer:
-    """A scene of one mesh, robust as ours is; it is built by its first query."""
+    """A scene of one mesh, robust as ours is; its first query builds it."""
 
     def __init__(self, vertices: NDArray[np.float32], faces: Faces) -> None:
         self._scene = EmbreeScene(robust=True)
@@ -26,7 +26,7 @@ class EmbreePeer:
         self._ray = np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32)
 
     def closest(self, rays: Family) -> Query:
-        """t, u, v, normal and face of each ray: embreex has no query for less."""
+        """t, u, v, normal and face of each ray; embreex has no smaller query."""
         o, d, far = _native(rays)
         return Query(lambda: self._scene.run(o, d, dists=far, query="INTERSECT", output=True), _t)
 
@@ -36,12 +36,12 @@ class EmbreePeer:
         return Query(lambda: self._scene.run(o, d, dists=far, query="OCCLUDED"), lambda face: face > _NO_FACE)
 
     def touch(self) -> None:
-        """One ray."""
+        """Trace one ray."""
         self._scene.run(*self._ray, query="OCCLUDED")
 
 
 def systems() -> list[System]:
-    """The one way that embreex has."""
+    """The one contender of embreex."""
     return [System("embree", "Embree (embreex)", 1, "float32", _builder)]
 
 
@@ -51,7 +51,7 @@ def _builder(vertices: Floats, faces: Faces) -> Any:
 
 
 def _native(rays: Family) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    # embreex's own start value where no distance is given.
+    # embreex's own default where no distance is given.
     far = 1e37 if np.isinf(rays.t_max) else rays.t_max
     return rays.origins.astype(np.float32), rays.directions.astype(np.float32), np.full(len(rays), far, np.float32)
 

@@ -1,4 +1,4 @@
-"""Find a libLLVM that Dr.Jit can use. Older ones end the whole process, so each is tried in a process of its own."""
+"""Search for a libLLVM that Dr.Jit can use. Older ones abort the process, so each is tried in a separate one."""
 
 import os
 import re
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from glob import glob
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
-# Dr.Jit 1 aborts with libLLVM 15 and 16; 19 is the oldest that was seen to work with it here.
+# Dr.Jit 1 aborts with libLLVM 15 and 16; 19 is the oldest that was seen to work here.
 OLDEST = 19
 HOW = f"libLLVM >= {OLDEST}: Debian, Ubuntu: apt-get install libllvm19; macOS: brew install llvm; or set {VARIABLE}"
 _PLACES = (
@@ -28,7 +28,7 @@ def usable() -> str | None:
 
 
 def candidates() -> Iterator[str]:
-    """What ``DRJIT_LIBLLVM_PATH`` names, alone if it is set; else what lies in the usual places, newest first."""
+    """Only the path in ``DRJIT_LIBLLVM_PATH`` if it is set; else those in the usual places, newest first."""
     if VARIABLE in os.environ:
         yield os.environ[VARIABLE]
         return
@@ -38,7 +38,7 @@ def candidates() -> Iterator[str]:
 
 
 def version(path: str) -> int:
-    """Major version in a library's name or folder, 0 where there is none.
+    """Major version in a library's name or folder, 0 without one.
 
     >>> version("/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1"), version("/usr/lib/llvm-14/lib/libLLVM.so")
     (19, 14)
@@ -51,6 +51,6 @@ def version(path: str) -> int:
 
 def _works(path: str) -> bool:
     environment = os.environ | {VARIABLE: path}
-    # Loading takes a second; a minute is for a machine that is busy.
+    # Loading takes a second; a minute allows for a busy machine.
     command = [sys.executable, "-P", "-c", _TRIAL]
     return subprocess.run(command, env=environment, capture_output=True, timeout=60, check=False).returncode == 0

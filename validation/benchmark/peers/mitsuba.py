@@ -1,6 +1,6 @@
 """Mitsuba 3 as two contenders: ``scalar_rgb``, ray by ray from Python, and ``llvm_ad_rgb``, whole batches.
 
-Both find hits with Embree in float32. Scenes and rays keep the variant that they were made under, so that none is
+Both find hits with Embree in float32. Scenes and rays keep the variant in which they were made, so that no variant is
 switched while a clock runs.
 """
 
@@ -17,7 +17,7 @@ from validation.benchmark.peers.mitsuba_variant import LLVM, SCALAR, libllvm_pat
 
 
 class ScalarPeer:
-    """One ``Ray3f`` a ray, made beforehand; Python's loop over them is what driving this variant costs."""
+    """One ``Ray3f`` for each ray, made beforehand; the Python loop over them is this variant's cost."""
 
     def __init__(self, scene: Any, ray: Any) -> None:
         self._scene, self._ray = scene, ray[0]
@@ -33,12 +33,12 @@ class ScalarPeer:
         return Query(lambda: [test(ray) for ray in native], lambda found: np.array(found, bool))
 
     def touch(self) -> None:
-        """One ray."""
+        """Trace one ray."""
         self._scene.ray_test(self._ray)
 
 
 class LLVMPeer:
-    """Rays as Dr.Jit arrays; every answer is evaluated and waited for while the clock runs."""
+    """Rays as Dr.Jit arrays; the clock includes the evaluation of every result."""
 
     def __init__(self, scene: Any, ray: Any) -> None:
         self._scene, self._ray = scene, ray
@@ -68,13 +68,13 @@ class LLVMPeer:
         return Query(trace, lambda found: found.numpy())
 
     def touch(self) -> None:
-        """One ray."""
+        """Trace one ray."""
         dr.eval(self._scene.ray_test(self._ray))
         dr.sync_thread()
 
 
 def systems() -> list[System]:
-    """Scalar always; llvm where a libLLVM was found that it works with."""
+    """The scalar variant always; the llvm variant where a working libLLVM was found."""
     scalar = System("mitsuba_scalar", "Mitsuba scalar_rgb", 1, "float32", lambda v, f: _loader(v, f, SCALAR),
                     most_rays=20_000, times_build=False, scope=partial(using, SCALAR))  # fmt: skip
     llvm = System("mitsuba_llvm", "Mitsuba llvm_ad_rgb", available_threads(), "float32",
@@ -83,7 +83,7 @@ def systems() -> list[System]:
 
 
 def _loader(vertices: Floats, faces: Faces, variant: str) -> Any:
-    """Arrays of the variant now; the mesh object, its scene and its BVH when called."""
+    """Convert the arrays to the variant now; the result builds the mesh object, its scene and its BVH."""
     points, corners = vertices.astype(np.float32).ravel(), faces.astype(np.uint32).ravel()
     one = Family("touch", np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
     if variant == SCALAR:

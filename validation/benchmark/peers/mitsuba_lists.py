@@ -1,9 +1,9 @@
-"""Whitted's recursion as lists of rays in Mitsuba's ``llvm_ad_rgb``: the fastest way that it draws our picture.
+"""Whitted's recursion as lists of rays in Mitsuba's ``llvm_ad_rgb``: its fastest way to draw our picture.
 
 All rays of one depth are one list: a Dr.Jit kernel finds their hits, lights them through shadow rays and writes the
 reflected and refracted rays, which are gathered into the next list. Materials are looked up in tables, which is faster
-than Mitsuba's virtual BSDF calls; hits, frames, spawned rays, Fresnel's shares and directions are Mitsuba's. Materials
-without highlights, constant shares and ambient light, which ``checkered.toml`` has none of, are all it knows.
+than Mitsuba's virtual BSDF calls; hits, frames, spawned rays, Fresnel's shares and directions are Mitsuba's. It
+supports no highlights, constant shares or ambient light, which ``checkered.toml`` does not have.
 """
 
 from types import SimpleNamespace
@@ -18,26 +18,26 @@ from renderer.scene.light import PointLight
 from renderer.scene.material import Dielectric, Mirror
 from renderer.scene.scene import Scene
 from validation.benchmark.peers.mitsuba_variant import LLVM, using
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import scene as mitsuba_scene
 
 _DIFFUSE, _MIRROR, _GLASS = 0, 1, 2
-# Kept from the variant, so that none need be chosen while a clock runs.
+# Taken from the variant once, so that none must be selected while a clock runs.
 _NAMES = ("Float", "UInt32", "Point3f", "Color3f", "Ray3f", "Vector3f", "fresnel", "reflect", "refract")
 
 
 class RayLists:
-    """A scene with its rays, ready to be drawn again and again; ``rays`` as origins and unit directions (n, 3).
+    """A scene with its rays, ready to be drawn repeatedly; ``rays`` are origins and unit directions (n, 3).
 
     Raises ``ValueError`` for a scene that has more than diffuse, mirror and glass surfaces under one point light.
     """
 
-    def __init__(self, scene: Scene, rays: source.Rays, max_depth: int) -> None:
+    def __init__(self, scene: Scene, rays: mitsuba_scene.Rays, max_depth: int) -> None:
         _check(scene)
         self._depth, self._count = max_depth, len(rays[0])
         with using(LLVM):
             self._mi = SimpleNamespace(**{name: getattr(mi, name) for name in _NAMES})
-            shapes = source.meshes(scene, [source.diffuse((0.5, 0.5, 0.5))] * len(scene.instances))
-            self._scene = source.assemble(shapes, [source.emitter(light) for light in scene.lights])
+            shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.5, 0.5, 0.5))] * len(scene.instances))
+            self._scene = mitsuba_scene.assemble(shapes, [mitsuba_scene.emitter(light) for light in scene.lights])
             self._tables(scene, shapes)
             o, d = (np.ascontiguousarray(a.T, np.float32) for a in rays)
             self._o, self._d = mi.Point3f(o), mi.Vector3f(d)
@@ -64,7 +64,7 @@ class RayLists:
         dr.eval(self._kind, self._ior, self._color)
 
     def draw(self, counts: dict[str, int] | None = None) -> NDArray[np.float32]:
-        """The picture, (n, 3) linear radiance. ``counts`` is told ``rays`` and ``shadow_rays``, at a price in time."""
+        """The picture, (n, 3) linear radiance. ``counts`` receives ``rays`` and ``shadow_rays``, at a cost in time."""
         film = [dr.zeros(self._mi.Float, self._count) for _ in range(3)]
         pixel = dr.arange(self._mi.UInt32, self._count)
         o, d, weight = self._o, self._d, self._mi.Color3f(1.0)
@@ -87,14 +87,14 @@ class RayLists:
         return picture
 
     def _gathered(self, pixel: Any, wanted: Any, o: Any, d: Any, weight: Any) -> tuple[Any, ...]:
-        """The rays where ``wanted``, one after the other."""
+        """The rays where ``wanted``, gathered without gaps."""
         rows = dr.compress(wanted)
         m = self._mi
         return (dr.gather(m.Point3f, o, rows), dr.gather(m.Vector3f, d, rows), dr.gather(m.Color3f, weight, rows),
                 dr.gather(m.UInt32, pixel, rows))  # fmt: skip
 
     def _trace(self, o: Any, d: Any, weight: Any, pixel: Any, film: Any, more: bool) -> tuple[list[Any], Any]:
-        """Add what these rays see to the film. Gives the reflected and refracted rays, and who cast a shadow ray."""
+        """Add the radiance of these rays to the film; returns the spawned rays, and the mask of shadow rays."""
         si = self._scene.ray_intersect(self._mi.Ray3f(o, d))
         hit = si.is_valid()
         shape = dr.reinterpret_array(self._mi.UInt32, si.shape)
@@ -108,7 +108,7 @@ class RayLists:
             return [], lit
         glass = hit & (kind == _GLASS)
         share, cos_t, _, eta_ti = self._mi.fresnel(si.wi.z, dr.gather(self._mi.Float, self._ior, shape, glass))
-        # A mirror shines on both sides; the share of light that glass reflects is Fresnel's.
+        # A mirror reflects on both sides; glass reflects Fresnel's share of light.
         reflected = si.spawn_ray(si.to_world(self._mi.reflect(si.wi)))
         refracted = si.spawn_ray(si.to_world(self._mi.refract(si.wi, cos_t, eta_ti)))
         mirrored = weight * dr.select(glass, self._mi.Color3f(share), color)
@@ -118,7 +118,7 @@ class RayLists:
         ], lit
 
     def _direct(self, si: Any, color: Any, diffuse: Any) -> tuple[Any, Any]:
-        """k_d N.L I / r^2 where the light is on the eye's side and nothing is between, and where that was asked."""
+        """k_d N.L I / r^2 where the light is on the eye's side and unoccluded, and the mask of shadow rays."""
         way = self._light - si.p
         cosine = si.to_local(dr.normalize(way)).z
         lit = diffuse & (cosine * si.wi.z > 0.0)
@@ -128,7 +128,7 @@ class RayLists:
 
 
 def _joined(first: Any, second: Any) -> Any:
-    """Both lists in one, component by component: Dr.Jit joins only flat arrays."""
+    """Both lists in one, component by component, because Dr.Jit joins only flat arrays."""
     if dr.depth_v(first) == 1:
         return dr.concat((first, second))
     return type(first)(*(dr.concat(both) for both in zip(first, second, strict=True)))

@@ -1,8 +1,8 @@
-"""Mitsuba's own integrators on a scene of ours, in either variant: what its users would call to draw it.
+"""Mitsuba's own integrators on a scene of ours, in either variant, as its users would call them.
 
 ``path`` follows one random branch at glass and adds light between diffuse surfaces, ``direct`` stops at the first
-surface, and the background shines on diffuse surfaces, so their pictures differ from Whitted's. They are here as a
-clock, not as a reference.
+surface, and the background shines on diffuse surfaces, so their pictures differ from Whitted's. Only their time is
+compared; they are no reference.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.material import Dielectric, Material, Mirror
 from renderer.scene.scene import Scene
 from validation.benchmark.peers.mitsuba_variant import using
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import scene as mitsuba_scene
 
 
 def drawing(scene: Scene, variant: str, integrator: str, size: int, max_depth: int) -> Callable[[], None]:
@@ -24,9 +24,11 @@ def drawing(scene: Scene, variant: str, integrator: str, size: int, max_depth: i
     integrator : "path", with as many edges as our rays have, or "direct".
     """
     with using(variant):
-        shapes = source.meshes(scene, [_bsdf(scene.materials[i.material]) for i in scene.instances])
-        emitters = [source.emitter(light) for light in scene.lights] + [source.background(scene.background)]
-        loaded = source.assemble(shapes, emitters)
+        shapes = mitsuba_scene.meshes(scene, [_bsdf(scene.materials[i.material]) for i in scene.instances])
+        emitters = [mitsuba_scene.emitter(light) for light in scene.lights] + [
+            mitsuba_scene.background(scene.background)
+        ]
+        loaded = mitsuba_scene.assemble(shapes, emitters)
         sensor = mi.load_dict(_sensor(scene, size))
         depth = {"max_depth": max_depth + 2, "rr_depth": 1000} if integrator == "path" else {}
         drawer: Any = mi.load_dict({"type": integrator} | depth)
@@ -40,19 +42,17 @@ def drawing(scene: Scene, variant: str, integrator: str, size: int, max_depth: i
 
 def _bsdf(material: Material) -> Any:
     if isinstance(material, Mirror):
-        return source.mirror(material.reflectance)
+        return mitsuba_scene.mirror(material.reflectance)
     if isinstance(material, Dielectric):
-        return source.dielectric(material.ior, material.reflectance, material.transmittance)
-    return source.diffuse(material.diffuse)
+        return mitsuba_scene.dielectric(material.ior, material.reflectance, material.transmittance)
+    return mitsuba_scene.diffuse(material.diffuse)
 
 
 def _sensor(scene: Scene, size: int) -> dict[str, Any]:
     camera = scene.camera
     if not isinstance(camera, PerspectiveCamera):
         raise ValueError(f"scene: expected a perspective camera, got {camera.type}")
-    look = mi.ScalarTransform4f().scene_pointers(
-        origin=list(camera.eye), target=list(camera.target), up=list(camera.up)
-    )
+    look = mi.ScalarTransform4f().look_at(origin=list(camera.eye), target=list(camera.target), up=list(camera.up))
     film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
     return {"type": "perspective", "fov": camera.fov, "fov_axis": "y", "to_world": look, "film": film,
             "sampler": {"type": "independent"}}  # fmt: skip

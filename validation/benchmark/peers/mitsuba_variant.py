@@ -1,4 +1,4 @@
-"""Mitsuba's variants side by side in one process: which ones there are, and code that runs under one of them."""
+"""Mitsuba's variants in one process: which ones exist, and a context that selects one."""
 
 import os
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ SCALAR, LLVM = "scalar_rgb", "llvm_ad_rgb"
 
 @cache
 def libllvm_path() -> str | None:
-    """The libLLVM that ``llvm_ad_rgb`` runs on from now on, or None; found once."""
+    """The libLLVM for ``llvm_ad_rgb`` in this process, or None; searched once."""
     if LLVM not in mi.variants():
         return None
     path = libllvm.usable()
@@ -26,7 +26,7 @@ def libllvm_path() -> str | None:
 
 @contextmanager
 def using(variant: str) -> Iterator[None]:
-    """Run under ``variant``, then under the one before again. Switching takes 0.1 s: keep it off every clock."""
+    """Select ``variant`` for a block, then restore the one before. Switching takes 0.1 s: keep it off every clock."""
     before = mi.variant()
     if variant != before:
         mi.set_variant(variant)

@@ -10,7 +10,7 @@ from validation.benchmark.peers.contender import Faces, Family, Floats, Query, S
 
 
 class Open3DPeer:
-    """A scene of one mesh; it is built by its first query."""
+    """A scene of one mesh; its first query builds it."""
 
     def __init__(self, vertices: Any, faces: Any) -> None:
         self._scene = o3d.t.geometry.RaycastingScene()
@@ -18,7 +18,7 @@ class Open3DPeer:
         self._ray = o3d.core.Tensor(np.array([[0, 0, 0, 0, 0, 1]], np.float32))
 
     def closest(self, rays: Family) -> Query:
-        """t, u, v, normal and face of each ray: Open3D has no query for less."""
+        """t, u, v, normal and face of each ray; Open3D has no smaller query."""
         tensor = _native(rays)
         return Query(lambda: self._scene.cast_rays(tensor), lambda found: found["t_hit"].numpy().astype(np.float64))
 
@@ -28,12 +28,12 @@ class Open3DPeer:
         return Query(lambda: self._scene.test_occlusions(tensor, tfar=far), lambda found: found.numpy())
 
     def touch(self) -> None:
-        """One ray."""
+        """Trace one ray."""
         self._scene.test_occlusions(self._ray)
 
 
 def systems() -> list[System]:
-    """On all threads."""
+    """The one contender of Open3D, on all threads."""
     return [System("open3d", "Open3D", available_threads(), "float32", _builder)]
 
 

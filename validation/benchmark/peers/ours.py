@@ -1,4 +1,4 @@
-"""Our octree as a contender: float64, with all threads and with one, and once for each way to build it."""
+"""Our octree as a contender: float64, with all threads and with one, and once for each split rule."""
 
 import copy
 from typing import Any
@@ -15,14 +15,14 @@ OURS, OURS_ONE = "ours", "ours_one_thread"
 
 
 class Ours:
-    """An octree; ``threads`` None takes all."""
+    """Queries of an octree."""
 
     def __init__(self, octree: Octree) -> None:
         self.octree = octree
         self._origin = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
 
     def closest(self, rays: Family) -> Query:
-        """Through ``Octree.closest_hit``, its checks of the rays included: nobody is spared them."""
+        """Through ``Octree.closest_hit``, which includes its checks of the rays, as for every user."""
         return Query(lambda: self.octree.closest_hit(rays.origins, rays.directions, t_max=rays.t_max), lambda h: h.t)
 
     def any(self, rays: Family) -> Query:
@@ -30,18 +30,18 @@ class Ours:
         return Query(lambda: self.octree.any_hit(rays.origins, rays.directions, t_max=rays.t_max), lambda hit: hit)
 
     def touch(self) -> None:
-        """One ray."""
+        """Trace one ray."""
         self.octree.closest_hit(*self._origin)
 
     def one_thread(self) -> "Ours":
-        """The same octree, not a second one, traced by one thread."""
+        """The same octree, not a copy, traced by one thread."""
         single = copy.copy(self.octree)
         single.threads = 1
         return Ours(single)
 
 
 def systems() -> list[System]:
-    """All threads, and one thread on the same octree."""
+    """Our contenders: all threads, and one thread on the same octree."""
     return [
         System(OURS, "ours", available_threads(), "float64", lambda v, f: _builder(v, f, {})),
         System(OURS_ONE, "ours, 1 thread", 1, "float64", lambda v, f: _builder(v, f, {"threads": 1}),
@@ -50,7 +50,7 @@ def systems() -> list[System]:
 
 
 def builds() -> list[System]:
-    """One contender for each split rule, for the clock of the build alone."""
+    """One contender for each split rule, for timing builds."""
     return [
         System(f"{OURS}_{split}", f"ours, {split}", available_threads(), "float64",
                lambda v, f, split=split: _builder(v, f, {"split": split}))  # type: ignore[misc]

@@ -1,11 +1,11 @@
-"""The contenders that are installed here, and how to get those that are not."""
+"""The installed contenders, and how to install the others."""
 
 from importlib import import_module
 
 from validation.benchmark.peers import libllvm, ours
 from validation.benchmark.peers.contender import System
 
-# By name the module of each, and how to get it.
+# By name: the module, and how to install it.
 _PEERS = {
     "embree": ("embree", "pip install embreex"),
     "open3d": ("open3d", "pip install open3d"),
@@ -15,7 +15,7 @@ _PEERS = {
 
 
 def available() -> tuple[list[System], dict[str, str]]:
-    """Ours and every peer that can be imported; and by name how to get the others."""
+    """Ours and every peer that can be imported; and by name how to install the others."""
     found, missing = ours.systems(), {}
     for name, (module, how) in _PEERS.items():
         try:

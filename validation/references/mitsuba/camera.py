@@ -1,7 +1,7 @@
-"""Our primary rays against those of Mitsuba's own sensors, which know nothing of our film map.
+"""Our primary rays against those of Mitsuba's own sensors, which are independent of our film map.
 
-All picture references are handed our primary rays, so that a silhouette is not judged by float32 film positions. This
-check is what makes that fair: without it a camera that is off would be off in both pictures.
+All picture references get our primary rays, so that float32 film positions do not decide silhouettes. This check makes
+that fair: without it a wrong camera would be wrong in both pictures.
 """
 
 import mitsuba as mi
@@ -16,7 +16,7 @@ Vector = NDArray[np.float64]
 
 
 def largest_distance(camera: Camera, size: int) -> float:
-    """The largest distance between our ray and Mitsuba's through a pixel's centre, in pixels, for size x size.
+    """The largest distance in pixels between our ray and Mitsuba's through a pixel's centre, for size x size pixels.
 
     Measured at the distance of the camera's target, over 33 x 33 pixels that include the corners.
     """
@@ -35,7 +35,7 @@ def largest_distance(camera: Camera, size: int) -> float:
 
 
 def _at(o: Vector, d: Vector, camera: Camera, away: float) -> Vector:
-    """Where a ray crosses the plane through the target that faces the camera."""
+    """The point where a ray crosses the plane through the target that faces the camera."""
     _, _, forward = camera.frame()
     t = (away - float(np.dot(o - np.asarray(camera.eye), forward))) / float(np.dot(d, forward))
     return o + t * d
@@ -49,9 +49,7 @@ def _pixel(camera: Camera, size: int, away: float) -> float:
 
 
 def _sensor(camera: Camera, size: int) -> dict[str, object]:
-    to_world = mi.ScalarTransform4f().scene_pointers(
-        origin=list(camera.eye), target=list(camera.target), up=list(camera.up)
-    )
+    to_world = mi.ScalarTransform4f().look_at(origin=list(camera.eye), target=list(camera.target), up=list(camera.up))
     film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
     if isinstance(camera, PerspectiveCamera):
         return {"type": "perspective", "fov": camera.fov, "fov_axis": "y", "to_world": to_world, "film": film}

@@ -1,7 +1,7 @@
 """Mitsuba's intersections as a reference for hits, ray by ray from Python.
 
-The variant ``scalar_rgb`` works in float32 and asks an Embree of its own, in robust mode: it judges how the answers
-come through Mitsuba, and is no independent judge of distances.
+The variant ``scalar_rgb`` works in float32 and finds hits with its own Embree in robust mode: it judges the answers
+that come through Mitsuba, and is no independent judge of distances.
 """
 
 from typing import Any
@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import validation.references.mitsuba.scene as source  # selects the variant
+import validation.references.mitsuba.scene as mitsuba_scene  # selects the variant
 
 
 def version() -> str:
@@ -29,18 +29,18 @@ class MitsubaHits:
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         points = np.array(vertices, dtype=np.float32).reshape(-1, 3)
         corners = np.array(faces, dtype=np.uint32).reshape(-1, 3)
-        shape = source.fill(mi.Mesh("mesh", len(points), len(corners)), points, corners)
-        self._scene: Any = source.assemble({shape: 0} if len(corners) else {}, [])
+        shape = mitsuba_scene.fill(mi.Mesh("mesh", len(points), len(corners)), points, corners)
+        self._scene: Any = mitsuba_scene.assemble({shape: 0} if len(corners) else {}, [])
 
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest hits of ``origins``, ``directions`` (n, 3): (t, face), t in units of |direction|.
 
-        ``t`` is float64 that holds Mitsuba's float32, inf on a miss; ``face`` is int64, -1 on a miss.
+        ``t`` is Mitsuba's float32 stored as float64, inf on a miss; ``face`` is int64, -1 on a miss.
         """
         o = np.asarray(origins, dtype=np.float64).reshape(-1, 3)
         d = np.asarray(directions, dtype=np.float64).reshape(-1, 3)
         t, face = np.full(len(o), np.inf), np.full(len(o), -1, dtype=np.int64)
-        for row, ray in enumerate(source.mitsuba_rays((o, d))):
+        for row, ray in enumerate(mitsuba_scene.mitsuba_rays((o, d))):
             found = self._scene.ray_intersect_preliminary(ray)
             if found.is_valid():
                 t[row], face[row] = found.t, found.prim_index

@@ -1,16 +1,16 @@
 """Reference A: Mitsuba's own path integrator, on scenes where a path-traced picture is the Whitted picture.
 
-Nothing of the light transport is written here, so it is independent of reference B's recursion too. Four things make
+None of its light transport is written here, so it is also independent of reference B's recursion. Four measures turn
 the global illumination of the path integrator into Whitted's:
 
-1. A surface answers the lights by diffuse + Phong but sends paths on only as a mirror or glass (``mitsuba_phong``),
-   so that no diffuse surface lights another.
+1. A surface scatters the lights by diffuse + Phong but continues paths only as a mirror or glass (``phong``), so that
+   no diffuse surface lights another.
 2. Each light is rendered alone and the pictures are summed: with several, the integrator chooses one at random.
-3. What is seen without being lit, the background and ambient light, has passes in which nothing is lit.
+3. Radiance seen without lighting, the background and ambient light, has passes in which nothing is lit.
 4. Russian roulette is off, and the paths are as long as our rays: D bounces, and one more edge to the light.
 
 Without glass nothing is random. With it each path takes one branch, drawn by Fresnel's share, and the mean over many
-paths tends to the Whitted picture: ``random_paths``, which ``validation.pictures.monte_carlo`` judges.
+paths tends to the Whitted picture: see ``random_paths``, which ``validation.pictures.monte_carlo`` judges.
 """
 
 from itertools import chain
@@ -22,21 +22,20 @@ from numpy.typing import NDArray
 
 from renderer.scene.material import Dielectric
 from renderer.scene.scene import Scene
-from validation.references.mitsuba import ambient as mitsuba_ambient
-from validation.references.mitsuba import phong as mitsuba_phong
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import ambient, phong
+from validation.references.mitsuba import scene as mitsuba_scene
 
-# As reports show it.
+# The name in reports.
 NAME = "Mitsuba's native path integrator (scalar_rgb)"
-# Longer than any path, so that none ends by chance.
+# Longer than any path, so that no path ends by chance.
 _NO_ROULETTE = 1000
 
-# What stands against any scene without them.
+# Why scenes without shadows cannot be judged.
 SHADOWLESS = "Mitsuba's path integrator cannot leave shadows out"
 
 
 class _Pass(NamedTuple):
-    """A part of the light: a Mitsuba scene that holds no other, and the largest number of edges of a path."""
+    """One part of the light: a Mitsuba scene that holds this part only, and the largest number of edges of a path."""
 
     scene: mi.Scene
     edges: int
@@ -48,7 +47,7 @@ def can_judge(scene: Scene) -> str | None:
 
 
 def _first_fault(scene: Scene, glass: str | None) -> str | None:
-    """What stands against ``scene`` or a material of it; ``glass`` against a dielectric."""
+    """Why ``scene`` or one of its materials cannot be judged; ``glass`` is the reason for a dielectric, or None."""
     if not scene.render.shadows:
         return f"render.shadows: {SHADOWLESS}"
     for name in sorted({instance.material for instance in scene.instances}):
@@ -69,27 +68,27 @@ def path(
     *,
     max_depth: int,
     samples: int = 1,
-    rays: source.Rays | None = None,
+    rays: mitsuba_scene.Rays | None = None,
 ) -> NDArray[np.float64]:
     """The picture of ``scene`` by reference A, linear radiance (height, width, 3) float64.
 
-    max_depth, samples, rays : as for ``mitsuba_whitted.whitted``.
+    max_depth, samples, rays : as for ``whitted.whitted``.
 
-    Raises ``ValueError`` if ``can_judge`` says why not.
+    Raises ``ValueError`` if ``can_judge`` gives a reason.
     """
     fault = can_judge(scene)
     if fault is not None:
         raise ValueError(f"scene: expected only Phong surfaces and mirrors, got {fault}")
-    bundles = source.camera_rays(scene, width, height, samples) if rays is None else [rays]
+    bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
     passes = _passes(scene, max_depth)
     result = sum(_paths(passes, bundle, 1)[0] for bundle in bundles)
     return (result / len(bundles)).reshape(height, width, 3)
 
 
-def random_paths(scene: Scene, rays: source.Rays, count: int, *, max_depth: int) -> NDArray[np.float64]:
+def random_paths(scene: Scene, rays: mitsuba_scene.Rays, count: int, *, max_depth: int) -> NDArray[np.float64]:
     """Radiance along ``count`` random paths of each of the n rays, (count, n, 3) float64.
 
-    Their mean tends to the Whitted picture; rows are independent of each other, the same in every run, and a smaller
+    Their mean tends to the Whitted picture. Rows are independent of each other and the same in every run, and a smaller
     ``count`` gives the first of them.
 
     Raises ``ValueError`` for a surface that transmits a constant share of light.
@@ -101,35 +100,37 @@ def random_paths(scene: Scene, rays: source.Rays, count: int, *, max_depth: int)
 
 
 def _passes(scene: Scene, max_depth: int) -> list[_Pass]:
-    """One for each light, and one or two for what is seen without light: their sum is the picture."""
+    """One pass for each light, and one or two for radiance seen without lighting: their sum is the picture."""
     materials = [scene.materials[instance.material] for instance in scene.instances]
     passes = []
     if scene.lights:
-        lit = source.meshes(scene, [mitsuba_phong.bsdf(material) for material in materials])
-        passes = [_Pass(source.assemble(lit, [source.emitter(light)]), max_depth + 2) for light in scene.lights]
-    sky = [source.background(scene.background)] if any(scene.background) else []
-    glows = mitsuba_ambient.has_glow(scene)
+        lit = mitsuba_scene.meshes(scene, [phong.bsdf(material) for material in materials])
+        passes = [
+            _Pass(mitsuba_scene.assemble(lit, [mitsuba_scene.emitter(light)]), max_depth + 2) for light in scene.lights
+        ]
+    sky = [mitsuba_scene.background(scene.background)] if any(scene.background) else []
+    glows = ambient.has_glow(scene)
     if sky or glows:
-        unlit = source.meshes(scene, [mitsuba_phong.unlit(material) for material in materials])
-        front = mitsuba_ambient.glowing(scene, unlit, turned=False)
-        passes.append(_Pass(source.assemble(front, sky), max_depth + 1))
+        unlit = mitsuba_scene.meshes(scene, [phong.unlit(material) for material in materials])
+        front = ambient.glowing(scene, unlit, turned=False)
+        passes.append(_Pass(mitsuba_scene.assemble(front, sky), max_depth + 1))
     if glows:
-        back = mitsuba_ambient.glowing(scene, unlit, turned=True)
-        passes.append(_Pass(source.assemble(back, []), max_depth + 1))
+        back = ambient.glowing(scene, unlit, turned=True)
+        passes.append(_Pass(mitsuba_scene.assemble(back, []), max_depth + 1))
     return passes
 
 
-def _paths(passes: list[_Pass], rays: source.Rays, count: int) -> NDArray[np.float64]:
+def _paths(passes: list[_Pass], rays: mitsuba_scene.Rays, count: int) -> NDArray[np.float64]:
     """The sum of the passes along ``count`` paths of each ray, (count, n, 3) float64."""
-    traced = [mi.RayDifferential3f(ray) for ray in source.mitsuba_rays(rays)]
+    traced = [mi.RayDifferential3f(ray) for ray in mitsuba_scene.mitsuba_rays(rays)]
     result = np.zeros((count, len(traced), 3))
     for number, (scene, edges) in enumerate(passes):
         integrator = mi.load_dict({"type": "path", "max_depth": edges, "rr_depth": _NO_ROULETTE})
         sampler = mi.load_dict({"type": "independent", "sample_count": 1})
-        # From one seed a path would share its numbers with a later path's next pass; rows would not be independent.
+        # With one seed a path would share its numbers with a later path's next pass, and rows would not be independent.
         sampler.seed(number)
         for row in result:
             colors = (integrator.sample(scene, sampler, ray)[0] for ray in traced)
-            # numpy.array asks each colour for its shape first: 2.7 us a ray, as long as the path itself; this 0.1 us.
+            # numpy.array queries each colour's shape first: 2.7 us a ray, as long as the path itself; this 0.1 us.
             row += np.fromiter(chain.from_iterable(colors), np.float64, row.size).reshape(row.shape)
     return result

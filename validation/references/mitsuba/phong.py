@@ -1,16 +1,16 @@
-"""Whitted's surfaces as BSDFs that Mitsuba's own integrators can follow without scattering what Whitted does not.
+"""Whitted's surfaces as BSDFs for Mitsuba's own integrators, without scattering that Whitted's model lacks.
 
-A path integrator asks a BSDF two things: ``eval``, how much of a light's radiance it sends on, and ``sample``, where
-the path goes next. Here ``eval`` is diffuse + Phong, and ``sample`` draws delta lobes only. So direct light is
-complete, mirrors and glass are followed, and no diffuse surface ever lights another: global illumination becomes
-Whitted's. Everything is over pi, because ``mitsuba_scene`` multiplies the lights by it.
+A path integrator uses two functions of a BSDF: ``eval`` gives the share of a light's radiance that is scattered, and
+``sample`` the path's next direction. Here ``eval`` is diffuse + Phong, and ``sample`` draws delta lobes only. So direct
+light is complete, mirrors and glass are followed, and no diffuse surface ever lights another: global illumination
+becomes Whitted's. Everything is divided by pi, because ``scene`` multiplies the lights by it.
 """
 
 from math import pi
 
 import mitsuba as mi
 
-import validation.references.mitsuba.scene as source  # selects the variant before a class below derives from it
+import validation.references.mitsuba.scene as mitsuba_scene  # selects the variant before a class below derives from it
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
 
 _BOTH_SIDES = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
@@ -22,7 +22,7 @@ _SMOOTH, _MIRROR = 0, 1
 class PhongMirror(mi.BSDF):  # type: ignore[misc]  # Mitsuba's classes are Any, see pyproject.toml
     """k_d / pi + k_s (R.V)^n / pi, and a mirror of reflectance k_r, on both sides of the surface.
 
-    Component 0 is what lights are seen by: evaluated, never sampled. Component 1 is the mirror: sampled with
+    Component 0 scatters the lights: it is evaluated, never sampled. Component 1 is the mirror: it is sampled with
     probability 1 and weight k_r, so nothing is random.
     """
 
@@ -34,7 +34,7 @@ class PhongMirror(mi.BSDF):  # type: ignore[misc]  # Mitsuba's classes are Any, 
         self._reflectance = mi.Color3f(*material.reflectance)
         self._shines, self._mirrors = any(material.specular), any(material.reflectance)
         self.m_components = [_LIT, _DELTA]
-        # An integrator looks for lights only where a component is smooth, and that costs a shadow ray.
+        # An integrator samples lights only where a component is smooth, and each sample costs a shadow ray.
         self.m_flags = (_LIT if material.receives_light else 0) | (_DELTA if self._mirrors else 0)
 
     def eval(
@@ -69,22 +69,22 @@ class PhongMirror(mi.BSDF):  # type: ignore[misc]  # Mitsuba's classes are Any, 
         return drawn, self._reflectance
 
     def to_string(self) -> str:
-        """For Mitsuba's messages."""
+        """A description for Mitsuba's messages."""
         return f"PhongMirror[{self._diffuse}, {self._specular}, {self._shininess}, {self._reflectance}]"
 
 
 class Glass(mi.BSDF):  # type: ignore[misc]  # as above
-    """Mitsuba's dielectric, asked for importance: radiance inside it is then not compressed by 1 / eta^2.
+    """Mitsuba's dielectric under importance transport, so that radiance inside it is not compressed by 1 / eta^2.
 
-    On a path that enters and leaves, the factor cancels; on one that ends on a lit surface inside, it would not, and
-    Whitted's model has none.
+    On a path that enters and leaves, the factor cancels. On one that ends on a lit surface inside, it would not, and
+    Whitted's model has no such factor.
     """
 
     _IMPORTANCE = mi.BSDFContext(mi.TransportMode.Importance)
 
     def __init__(self, material: Dielectric) -> None:
         super().__init__(mi.Properties())
-        self._inner = source.dielectric(material.ior, material.reflectance, material.transmittance)
+        self._inner = mitsuba_scene.dielectric(material.ior, material.reflectance, material.transmittance)
         self.m_components = [self._inner.flags(i) for i in range(self._inner.component_count())]
         self.m_flags = self._inner.flags()
 
@@ -101,7 +101,7 @@ class Glass(mi.BSDF):  # type: ignore[misc]  # as above
     def sample(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, sample1: float, sample2: mi.Point2f, active: bool = True
     ) -> tuple[mi.BSDFSample3f, mi.Color3f]:
-        """Reflection or refraction, drawn by Fresnel's share; of ``ctx`` only the component counts."""
+        """Reflection or refraction, drawn by Fresnel's share; only the component of ``ctx`` is used."""
         context = self._IMPORTANCE
         if ctx.component != context.component:
             context = mi.BSDFContext(mi.TransportMode.Importance)
@@ -109,19 +109,19 @@ class Glass(mi.BSDF):  # type: ignore[misc]  # as above
         return self._inner.sample(context, si, sample1, sample2, active)
 
     def to_string(self) -> str:
-        """For Mitsuba's messages."""
+        """A description for Mitsuba's messages."""
         return f"Glass[{self._inner}]"
 
 
 def bsdf(material: Material) -> mi.BSDF:
-    """The BSDF of a material; constant transmission and ambient light are not in it."""
+    """The BSDF of a material; it omits constant transmission and ambient light."""
     if isinstance(material, Mirror):
-        return source.mirror(material.reflectance)
+        return mitsuba_scene.mirror(material.reflectance)
     return Glass(material) if isinstance(material, Dielectric) else PhongMirror(material)
 
 
 def unlit(material: Material) -> mi.BSDF:
-    """The same without what lights are seen by: its mirror or glass alone."""
+    """The material's mirror or glass alone, without the component that scatters the lights."""
     if isinstance(material, Dielectric):
         return Glass(material)
-    return source.mirror(material.reflectance)
+    return mitsuba_scene.mirror(material.reflectance)

@@ -1,9 +1,9 @@
-"""Mitsuba's own film, samplers and path integrator on a scene of diffuse surfaces and mirrors: no ray, no sample and no
-line of light transport is ours.
+"""Mitsuba's own film, samplers and path integrator on a scene of diffuse surfaces and mirrors.
 
-The path integrator's picture is Whitted's where no diffuse surface lights another: every albedo is multiplied by a
-millionth and every light divided by it, so that light loses six digits at each diffuse bounce after the first. Each
-light has a pass of its own, because the integrator would choose one at random, and the background another.
+No ray, no sample and no line of light transport is ours. The path integrator's picture is Whitted's where no diffuse
+surface lights another: every albedo is multiplied by a millionth and every light divided by it, so light loses six
+digits at each diffuse bounce after the first. Each light has its own pass, because the integrator would choose one at
+random, and so has the background.
 """
 
 from typing import Literal
@@ -15,23 +15,23 @@ from numpy.typing import NDArray
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.material import Mirror, Phong
 from renderer.scene.scene import Scene
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import scene as mitsuba_scene
 from validation.references.mitsuba.path import SHADOWLESS
 
-# Interreflection is then this share of direct light: below float32's resolution of a picture, 6e-8 of each radiance
-# times some ten; and 1e-6 times a radiance is far from float32's smallest number.
+# Interreflection is then this share of direct light. That is below float32's resolution of a picture, 6e-8 of each
+# radiance times some ten; and 1e-6 times a radiance is far from float32's smallest number.
 _FADED = 1e-6
-# Longer than any path, so that none ends by chance.
+# Longer than any path, so that no path ends by chance.
 _NO_ROULETTE = 1000
 
 Sampler = Literal["independent", "stratified", "centre"]
 
 
 class Film:
-    """``scene`` on a film of ``size`` x ``size`` pixels with a box filter, each pixel the mean over its square.
+    """``scene`` on a film of ``size`` x ``size`` pixels with a box filter: each pixel is the mean over its square.
 
-    Raises ``ValueError`` for a scene that is not made of diffuse surfaces and mirrors under a perspective camera, or
-    that has ambient light or no shadows.
+    Raises ``ValueError`` unless the scene consists of diffuse surfaces and mirrors under a perspective camera, without
+    ambient light and with shadows.
     """
 
     def __init__(self, scene: Scene, size: int) -> None:
@@ -39,11 +39,12 @@ class Film:
         if fault is not None:
             raise ValueError(f"scene: expected diffuse surfaces and mirrors in perspective, got {fault}")
         self._scene, self._size = scene, size
-        # Each with the edges of its longest path beyond the bounces: to what is seen, and from there to the light.
-        self._passes = [(self._hit_segments(index), 2) for index in range(len(scene.lights))]
+        # Each pass with the edges of its longest path beyond the bounces: one to the first surface, and one from the
+        # last to the light.
+        self._passes = [(self._lit(index), 2) for index in range(len(scene.lights))]
         if any(scene.background):
-            dark = source.meshes(scene, [_bsdf(scene, i.material, lit=False) for i in scene.instances])
-            self._passes.append((source.assemble(dark, [source.background(scene.background)]), 1))
+            dark = mitsuba_scene.meshes(scene, [_bsdf(scene, i.material, lit=False) for i in scene.instances])
+            self._passes.append((mitsuba_scene.assemble(dark, [mitsuba_scene.background(scene.background)]), 1))
 
     def render(self, samples: int, *, max_depth: int, sampler: Sampler, seed: int = 0) -> NDArray[np.float64]:
         """Linear radiance (size, size, 3) float64 by ``samples`` paths a pixel in each pass, ``max_depth`` bounces.
@@ -55,14 +56,16 @@ class Film:
         picture = np.zeros((self._size, self._size, 3))
         for number, (scene, beyond) in enumerate(self._passes):
             integrator = mi.load_dict({"type": "path", "max_depth": max_depth + beyond, "rr_depth": _NO_ROULETTE})
-            # Passes of equal seeds would share their errors.
+            # Passes with equal seeds would share their errors.
             made = mi.render(scene, sensor=film, integrator=integrator, spp=samples, seed=1000 * seed + number)
             picture += np.array(made, dtype=np.float64)[..., :3]
         return picture
 
-    def _hit_segments(self, index: int) -> mi.Scene:
-        shapes = source.meshes(self._scene, [_bsdf(self._scene, i.material, lit=True) for i in self._scene.instances])
-        return source.assemble(shapes, [source.emitter(self._scene.lights[index], 1.0 / _FADED)])
+    def _lit(self, index: int) -> mi.Scene:
+        shapes = mitsuba_scene.meshes(
+            self._scene, [_bsdf(self._scene, i.material, lit=True) for i in self._scene.instances]
+        )
+        return mitsuba_scene.assemble(shapes, [mitsuba_scene.emitter(self._scene.lights[index], 1.0 / _FADED)])
 
     def _sensor(self, samples: int, sampler: Sampler) -> dict[str, object]:
         camera = self._scene.camera
@@ -72,7 +75,7 @@ class Film:
             sampling = {"type": "stratified", "jitter": sampler == "stratified", "sample_count": samples}
         film = {"type": "hdrfilm", "width": self._size, "height": self._size, "rfilter": {"type": "box"}}
         film |= {"pixel_format": "rgb", "component_format": "float32"}
-        to_world = mi.ScalarTransform4f().scene_pointers(
+        to_world = mi.ScalarTransform4f().look_at(
             origin=list(camera.eye), target=list(camera.target), up=list(camera.up)
         )
         return {"type": "perspective", "fov": camera.fov, "fov_axis": "y", "to_world": to_world, "near_clip": 1e-3,
@@ -96,9 +99,9 @@ def can_judge(scene: Scene) -> str | None:
 
 
 def _bsdf(scene: Scene, name: str, lit: bool) -> mi.BSDF:
-    """The background's pass sees diffuse surfaces black; in a light's pass they are a millionth as bright."""
+    """A material's BSDF: diffuse surfaces are black in the background's pass, a millionth as bright in a light's."""
     material = scene.materials[name]
     if isinstance(material, Mirror):
-        return source.mirror(material.reflectance)
+        return mitsuba_scene.mirror(material.reflectance)
     assert isinstance(material, Phong)
-    return source.diffuse([_FADED * channel if lit else 0.0 for channel in material.diffuse])
+    return mitsuba_scene.diffuse([_FADED * channel if lit else 0.0 for channel in material.diffuse])

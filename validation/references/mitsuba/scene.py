@@ -1,8 +1,7 @@
 """A scene of ours as Mitsuba 3 objects: rays, BSDFs, meshes, emitters, and the scene that holds them.
 
-Mitsuba runs in the variant ``scalar_rgb``, which every wheel carries; importing this module selects it for
-the whole process. It computes in float32 and finds its hits with Embree, so it judges pictures, not
-distances.
+Mitsuba runs in the variant ``scalar_rgb``, which every wheel contains; importing this module selects it for the whole
+process. It computes in float32 and finds its hits with Embree, so it judges pictures, not distances.
 
 A diffuse BSDF is k_d / pi in Mitsuba and k_d for us, so every light is multiplied by pi.
 """
@@ -24,9 +23,8 @@ mi.set_variant("scalar_rgb")
 Rays = tuple[NDArray[np.float64], NDArray[np.float64]]
 Rgb = Sequence[float]
 
-# Rounding a vertex to float32 moves it by 2^-24 of its coordinate. Up to 2^-22 of the mesh's size, i.e.
-# within four sizes of the origin, that is the order of what every float32 reader does to a model; beyond,
-# shapes would change.
+# Rounding a vertex to float32 moves it by 2^-24 of its coordinate. Up to 2^-22 of the mesh's size, i.e. within four
+# sizes of the origin, every float32 reader changes a model by as much; beyond, shapes would change.
 VERTEX_ROUNDING = 2.0**-22
 
 
@@ -36,7 +34,7 @@ def camera_rays(scene: Scene, width: int, height: int, samples: int) -> list[Ray
 
 
 def mitsuba_rays(rays: Rays) -> list[mi.Ray3f]:
-    """The same rays for Mitsuba, rounded to float32."""
+    """The rays as Mitsuba's, rounded to float32."""
     origins, directions = rays
     pairs = zip(origins.tolist(), directions.tolist(), strict=True)
     return [mi.Ray3f(mi.Point3f(*origin), mi.Vector3f(*direction)) for origin, direction in pairs]
@@ -98,9 +96,9 @@ def meshes(scene: Scene, bsdfs: Sequence[mi.BSDF]) -> dict[mi.Mesh, int]:
 def assemble(shapes: dict[mi.Mesh, int], emitters: Sequence[mi.Emitter]) -> mi.Scene:
     """The Mitsuba scene of these shapes and emitters.
 
-    A hit's ``si.shape`` is the very object in ``shapes``, so ``shapes[si.shape]`` is the instance's index.
-    Mitsuba may merge shapes when it loads a scene; that is turned off, and ``RuntimeError`` is raised should
-    it happen all the same.
+    A hit's ``si.shape`` is the very object in ``shapes``, so ``shapes[si.shape]`` is the instance's index. Mitsuba may
+    merge shapes when it loads a scene; that is turned off, and ``RuntimeError`` is raised should it happen all the
+    same.
     """
     content: dict[str, Any] = {"type": "scene", "embree_use_robust_intersections": True}
     content |= {f"instance{i}": shape for shape, i in shapes.items()}
@@ -117,7 +115,7 @@ def _two_sided(bsdf: dict[str, Any]) -> mi.BSDF:
 
 
 def _reflectance(color: Rgb) -> dict[str, Any]:
-    """A spectrum of ``color`` that, unlike the usual "rgb", may exceed 1: our materials may."""
+    """A spectrum of ``color`` that may exceed 1, as in our materials; the usual "rgb" may not."""
     return {"type": "srgb", "color": list(color), "unbounded": True}
 
 
@@ -142,7 +140,7 @@ def _mesh(index: int, instance: Instance, bsdf: mi.BSDF) -> mi.Mesh:
 
 
 def fill(mesh: mi.Mesh, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None = None) -> mi.Mesh:
-    """``mesh`` with these arrays, float32 and uint32 there: vertices and their normals (V, 3), faces (F, 3)."""
+    """Set the mesh's arrays, float32 and uint32 in Mitsuba: vertices and their normals (V, 3), faces (F, 3)."""
     arrays = mi.traverse(mesh)
     arrays["vertex_positions"] = np.asarray(vertices, np.float32).ravel()
     arrays["faces"] = np.asarray(faces, np.uint32).ravel()

@@ -1,9 +1,9 @@
 """Reference B: the Whitted recursion over Mitsuba's scene, BSDFs and emitters.
 
-Only the recursion is written here. Hits, shading frames, spawned rays, mirror and refraction directions,
-Fresnel's shares, light falloff and shadows are Mitsuba's; the Phong highlight, for which Mitsuba has no
-plugin, is computed from Mitsuba's frame and its ``reflect``. Each lobe of a BSDF is sampled on its own, so
-nothing is random and a second run gives the same bits.
+Only the recursion is written here. Hits, shading frames, spawned rays, mirror and refraction directions, Fresnel's
+shares, light falloff and shadows are Mitsuba's. Mitsuba has no plugin for the Phong highlight, which is computed from
+Mitsuba's frame and its ``reflect``. Each lobe of a BSDF is sampled on its own, so nothing is random and a second run
+gives the same bits.
 """
 
 from collections.abc import Callable
@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import Scene
-from validation.references.mitsuba import scene as source
+from validation.references.mitsuba import scene as mitsuba_scene
 
-# Delta lobes and delta emitters do not depend on the random numbers that they are sampled with.
+# Delta lobes and delta emitters do not depend on the random numbers.
 _ANY_NUMBER, _ANY_POINT = 0.5, mi.Point2f(0.5, 0.5)
 
 
 def _context(component: int | None = None) -> mi.BSDFContext:
     """A context that samples one component of a BSDF, or all of them.
 
-    Importance transport leaves out the factor 1 / eta^2 by which radiance is compressed in glass: Whitted's
-    model, and ours, has none.
+    Importance transport omits the factor 1 / eta^2 by which radiance is compressed in glass: Whitted's model, and ours,
+    has none.
     """
     context = mi.BSDFContext(mi.TransportMode.Importance)
     if component is not None:
@@ -39,7 +39,7 @@ _ALL, _REFLECTION, _REFRACTION = _context(), _context(0), _context(1)
 
 @dataclass(frozen=True)
 class _Lobe:
-    """A direction in which light is followed; ``weight`` replaces the BSDF's own where it is given."""
+    """A direction in which a ray is followed; a ``weight`` that is given replaces the BSDF's own."""
 
     bsdf: mi.BSDF
     context: mi.BSDFContext
@@ -48,7 +48,7 @@ class _Lobe:
 
 @dataclass(frozen=True)
 class _Surface:
-    """What one material does: its ambient light k_a I_a, what it scatters of the lights, its lobes."""
+    """One material's surface: ambient light k_a I_a, the BSDF and highlight that scatter the lights, and the lobes."""
 
     ambient: mi.Color3f
     diffuse: mi.BSDF | None
@@ -112,17 +112,17 @@ def _scattered(si: mi.SurfaceInteraction3f, surface: _Surface, wo: mi.Vector3f) 
     return result
 
 
-def _surface(material: Material, ambient_light: source.Rgb) -> _Surface:
+def _surface(material: Material, ambient_light: mitsuba_scene.Rgb) -> _Surface:
     black = mi.Color3f(0.0)
     if isinstance(material, Mirror):
-        return _Surface(black, None, None, 0.0, (_Lobe(source.mirror(material.reflectance), _ALL),))
+        return _Surface(black, None, None, 0.0, (_Lobe(mitsuba_scene.mirror(material.reflectance), _ALL),))
     if isinstance(material, Dielectric):
-        glass = source.dielectric(material.ior, material.reflectance, material.transmittance)
+        glass = mitsuba_scene.dielectric(material.ior, material.reflectance, material.transmittance)
         return _Surface(black, None, None, 0.0, (_Lobe(glass, _REFLECTION), _Lobe(glass, _REFRACTION)))
     ambient = material.diffuse if material.ambient is None else material.ambient
     return _Surface(
         mi.Color3f(*ambient) * mi.Color3f(*ambient_light),
-        source.diffuse(material.diffuse) if any(material.diffuse) else None,
+        mitsuba_scene.diffuse(material.diffuse) if any(material.diffuse) else None,
         mi.Color3f(*material.specular) if any(material.specular) else None,
         material.shininess,
         _phong_lobes(material),
@@ -130,25 +130,23 @@ def _surface(material: Material, ambient_light: source.Rgb) -> _Surface:
 
 
 def _phong_lobes(material: Phong) -> tuple[_Lobe, ...]:
-    """The constant shares; clear glass gives the refracted direction, and weight 0 under total internal
-    reflection.
-    """
+    """The constant shares; clear glass gives the refracted direction, and weight 0 under total internal reflection."""
     lobes = []
     if any(material.reflectance):
-        lobes.append(_Lobe(source.mirror(material.reflectance), _ALL))
+        lobes.append(_Lobe(mitsuba_scene.mirror(material.reflectance), _ALL))
     if any(material.transmittance):
-        glass = source.dielectric(material.ior, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+        glass = mitsuba_scene.dielectric(material.ior, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
         lobes.append(_Lobe(glass, _REFRACTION, mi.Color3f(*material.transmittance)))
     return tuple(lobes)
 
 
 def _whitted(scene: Scene, max_depth: int) -> _Whitted:
     surfaces = [_surface(scene.materials[i.material], scene.ambient) for i in scene.instances]
-    # A shape must carry some BSDF; each surface's own are asked instead, so what it is does not matter.
-    shapes = source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
-    lights = tuple(source.emitter(light) for light in scene.lights)
+    # Mitsuba requires a BSDF for each shape, but only the surfaces' own lobes are sampled, so any will do.
+    shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
+    lights = tuple(mitsuba_scene.emitter(light) for light in scene.lights)
     return _Whitted(
-        source.assemble(shapes, lights),
+        mitsuba_scene.assemble(shapes, lights),
         {shape: surfaces[index] for shape, index in shapes.items()},
         lights,
         mi.Color3f(*scene.background),
@@ -160,7 +158,7 @@ def _whitted(scene: Scene, max_depth: int) -> _Whitted:
 def can_judge(scene: Scene) -> str | None:
     """Why Mitsuba cannot hold ``scene``, so that neither reference can judge it; None if it can."""
     try:
-        source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
+        mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
     except ValueError as error:
         return str(error)
     return None
@@ -173,22 +171,21 @@ def whitted(
     *,
     max_depth: int,
     samples: int = 1,
-    rays: source.Rays | None = None,
+    rays: mitsuba_scene.Rays | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> NDArray[np.float64]:
     """The picture of ``scene`` by reference B, linear radiance (height, width, 3) float64.
 
     max_depth : bounces followed, as in ``RenderSettings``; there is no ``min_weight``.
     samples : a square number of rays a pixel, on our regular grid.
-    rays : origins and unit directions, (height * width, 3) each, instead of the camera's; ``samples`` is then
-        not used.
-    progress : called with the rows done and the rows in all.
+    rays : origins and unit directions, (height * width, 3) each, instead of the camera's; ``samples`` is then unused.
+    progress : called with the number of finished rows and of all rows.
     """
     tracer = _whitted(scene, max_depth)
-    bundles = source.camera_rays(scene, width, height, samples) if rays is None else [rays]
+    bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
     result = np.zeros((height, width, 3))
     for number, bundle in enumerate(bundles):
-        traced = source.mitsuba_rays(bundle)
+        traced = mitsuba_scene.mitsuba_rays(bundle)
         for row in range(height):
             line = [tracer.radiance(ray, 0) for ray in traced[row * width : (row + 1) * width]]
             result[row] += np.array(line, dtype=np.float64).reshape(width, 3)
@@ -199,7 +196,7 @@ def whitted(
 
 @dataclass(frozen=True)
 class Aovs:
-    """What the primary rays meet; every array begins with (height, width).
+    """The primary hits; every array begins with (height, width).
 
     depth : float64, distance along the unit ray, inf on a miss.
     position, geometric_normal, shading_normal : (..., 3) float64, NaN on a miss. Normals point to the side
@@ -214,15 +211,15 @@ class Aovs:
     instance: NDArray[np.int64]
 
 
-def aovs(scene: Scene, width: int, height: int, *, rays: source.Rays | None = None) -> Aovs:
-    """Mitsuba's hits, in float32, of our primary rays through the pixels' centres, or of ``rays``."""
-    shapes = source.meshes(scene, [source.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
-    unlit = source.assemble(shapes, [])
+def aovs(scene: Scene, width: int, height: int, *, rays: mitsuba_scene.Rays | None = None) -> Aovs:
+    """Mitsuba's float32 hits of our primary rays through the pixels' centres, or of ``rays``."""
+    shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
+    unlit = mitsuba_scene.assemble(shapes, [])
     table = np.full((height * width, 10), np.nan)
     table[:, 0] = np.inf
     instance = np.full(height * width, -1, dtype=np.int64)
-    bundle = source.camera_rays(scene, width, height, 1)[0] if rays is None else rays
-    for row, ray in enumerate(source.mitsuba_rays(bundle)):
+    bundle = mitsuba_scene.camera_rays(scene, width, height, 1)[0] if rays is None else rays
+    for row, ray in enumerate(mitsuba_scene.mitsuba_rays(bundle)):
         si = unlit.ray_intersect(ray)
         if si.is_valid():
             table[row] = si.t, *si.p, *si.n, *si.sh_frame.n

@@ -1,1 +1,1 @@
-"""Extreme cases: one file a group of them, with their judges and scenes."""
+"""Extreme cases: one file for each group, with shared judges and scenes."""

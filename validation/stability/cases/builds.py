@@ -1,4 +1,4 @@
-"""Rows 18 to 32 of the extreme cases: meshes that are hard to build a tree over, or that are no meshes at all."""
+"""Extreme cases 18 to 32: meshes that are hard to build a tree over, or that are not valid meshes."""
 
 import resource
 import time
@@ -47,13 +47,13 @@ def _separate(corners: ArrayLike) -> Mesh:
 
 
 def _pins(side: float) -> list[Triangle]:
-    """Two small triangles at opposite corners of [0, side]^3, which make it the root's cell."""
+    """Two small triangles at opposite corners of [0, side]^3, so that this cube is the root's cell."""
     end = side - 1 / 64
     return [[(0, 0, 0), (1 / 64, 0, 0), (0, 1 / 64, 0)], [(side, side, side), (end, side, side), (side, end, side)]]
 
 
 def _rays_at(rng: np.random.Generator, mesh: Mesh, count: int) -> RayBatch:
-    """From around the mesh at random points of random faces, half of them at vertices; float32-exact."""
+    """Rays from around the mesh at random points of random faces, half of them at vertices; float32-exact."""
     lower, upper = mesh.bounds
     radius = float(np.linalg.norm(upper - lower))
     weights = rng.dirichlet((1, 1, 1), count)
@@ -64,7 +64,7 @@ def _rays_at(rng: np.random.Generator, mesh: Mesh, count: int) -> RayBatch:
 
 
 def _expected_t(mesh: Mesh, rays: RayBatch, t: float, digits: float) -> Outcome:
-    """The first ray's t by every tree as exact, and as the number that the row gives to ``digits``."""
+    """Check the first ray's t by every tree: it must be exact, and within ``digits`` of the table's number."""
     answers = [closest(tree, rays) for tree in octrees(mesh)]
     holds = all(as_exact(against_exact(mesh, rays, hits)) and abs(float(hits.t[0]) - t) <= digits for hits in answers)
     return Outcome(one_t(answers[0].t, answers[0].face), holds, *embree_says(mesh, rays, one_t))
@@ -81,7 +81,7 @@ def _early_exit(quick: bool) -> Outcome:
     first_seen: Triangle = [(0.5, 0.5, 0.95), (1.95, 0.1, 0.3), (1.95, 0.9, 0.3)]
     nearer: Triangle = [(1.25, 0.3, 0.3), (1.25, 0.7, 0.3), (1.25, 0.5, 0.8)]
     mesh = float32_mesh(_separate([*_pins(2), first_seen, nearer]))
-    # x = 1.25 is exact; the rounding of t is the kernel's alone.
+    # x = 1.25 is exact; only the kernel rounds t.
     return _expected_t(mesh, ray_batch((-1, 0.5, 0.5), (1, 0, 0)), 2.25, 1e-15)
 
 
@@ -153,7 +153,7 @@ def _teapot_in_stadium(quick: bool) -> Outcome:
 
 
 def _seconds(run: Callable[[], object]) -> float:
-    """The shortest of three."""
+    """The shortest of three runs."""
     times = []
     for _ in range(3):
         begin = time.perf_counter()
@@ -173,10 +173,10 @@ def _without_area(quick: bool) -> Outcome:
     wrong = np.zeros(count, dtype=np.bool_)
     trees: list[Accelerator] = [*octrees(mesh), BruteForce.from_mesh(mesh)]
     for tree in trees:
-        for asked in (rays, exact_aim):
-            hits = closest(tree, asked)
-            on_ray = asked.origins + np.where(hits.hit, hits.t, 0.0)[:, None] * asked.directions
-            # Faces 0 to 2 have two corners in one.
+        for batch in (rays, exact_aim):
+            hits = closest(tree, batch)
+            on_ray = batch.origins + np.where(hits.hit, hits.t, 0.0)[:, None] * batch.directions
+            # Faces 0 to 2 have two equal corners.
             near = np.abs(hits.points - on_ray).max(axis=1) <= 1e-9
             wrong |= hits.hit & ~(near & (hits.face >= 3))
         wrong |= tree.any_hit(beside.origins, beside.directions)
@@ -202,7 +202,7 @@ def _not_finite(quick: bool) -> Outcome:
         mesh, repairs = Mesh.repaired(vertices, faces)
         hits = closest(Octree.from_mesh(mesh), rays)
         left.append(hits.t.tolist() == [1, np.inf] and list(repairs.dropped_faces) == [1])
-    # The mesh for Embree is plain arrays: ours would not let it be made.
+    # Embree gets plain arrays, because ``Mesh`` refuses these vertices.
     says = [count_hits(*Embree(vertices, faces, robust=mode).closest_hit(rays.origins, rays.directions))
             for mode in (False, True)]  # fmt: skip
     ours = f"{of(named, 'named')}; repaired: {of(left, 'without the bad face')}"
@@ -246,7 +246,7 @@ def _single(quick: bool) -> Outcome:
         texts.append(embree_says(mesh, rays, lambda t, face: str((face >= 0).sum())))
     rays_in_all = count * len(turns)
     said = [f"{sum(map(int, numbers)):,} of {rays_in_all:,} hits" for numbers in zip(*texts, strict=True)]
-    # Aimed from all around with roundings of 1e-7, all but a few grazing rays hit.
+    # From all around, with roundings of 1e-7, all but a few grazing rays hit.
     holds = wrong == 0 and hits_in_all > 0.99 * rays_in_all
     return Outcome(f"{hits_in_all:,} of {rays_in_all:,} hits, {wrong} otherwise than exact", holds, *said)
 
@@ -257,7 +257,7 @@ def _duplicates(quick: bool) -> Outcome:
     order = rng.permutation(np.repeat(np.arange(len(mesh.faces)), 10))
     shuffled = Mesh(mesh.vertices, mesh.faces[order])
     lowest = np.unique(order, return_index=True)[1]
-    # Aimed at the insides of faces, where only duplicates tie.
+    # Rays at the insides of faces, where only duplicates tie.
     origins = float32_exact(2 * unit_rows(rng, count))
     targets = np.einsum("nk,nkj->nj", rng.dirichlet((2, 2, 2), count),
                         mesh.triangles[rng.integers(0, len(mesh.faces), count)])  # fmt: skip
@@ -292,7 +292,7 @@ def _ten_million(quick: bool) -> Outcome:
     begin = time.perf_counter()
     octree = Octree.from_mesh(mesh)
     seconds = time.perf_counter() - begin
-    # The peak of this process so far, before Embree builds beside us; Linux counts in kB.
+    # The peak of this process so far, before Embree builds; Linux counts in kB.
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     rays = _rays_at(rng, mesh, 10_000)
     hits = closest(octree, rays)
@@ -300,7 +300,7 @@ def _ten_million(quick: bool) -> Outcome:
     for robust in (False, True):
         embree = Embree(mesh.vertices, mesh.faces, robust=robust)
         answers.append(embree.closest_hit(rays.origins, rays.directions))
-        del embree  # two of ten million faces at once need 4 GB
+        del embree  # two scenes of ten million faces need 4 GB
     wrong = sum(_is_wrong(mesh, rays, hits, row, answers[1][1]) for row in _differing(rays, hits, answers[1][0]))
     stats = octree.stats
     holds = wrong == 0 and stats.references == len(mesh.faces) and peak < MEMORY_LIMIT_GB and bool(hits.hit.any())
@@ -321,7 +321,7 @@ def _terrain(side: int) -> Mesh:
 
 
 def _differing(rays: RayBatch, hits: Hits, t: Floats) -> Ints:
-    """Rays where one hits and the other does not, or t differs by more than Embree's float32 explains."""
+    """Rays that only one of the two hits, or whose t differs by more than Embree's float32 explains."""
     differs = hits.hit != np.isfinite(t)
     both = np.flatnonzero(hits.hit & np.isfinite(t))
     directions = rays.directions[both]
@@ -331,7 +331,7 @@ def _differing(rays: RayBatch, hits: Hits, t: Floats) -> Ints:
 
 
 def _is_wrong(mesh: Mesh, rays: RayBatch, hits: Hits, row: int, their_face: Ints) -> bool:
-    """Whether exact arithmetic contradicts ours, on the faces that the two answers name."""
+    """Whether exact arithmetic contradicts our answer, on the faces that the two answers name."""
     named = sorted({int(hits.face[row]), int(their_face[row])} - {-1})
     local = named.index(int(hits.face[row])) if hits.face[row] >= 0 else -1
     ours = HitArrays(hits.t[row : row + 1], np.array([local]))

@@ -1,7 +1,7 @@
-"""Extreme cases: one table that the tests and the report read.
+"""Extreme cases: one table for the tests and the report.
 
-A case constructs something stiff, says what must come out and who says so, runs it, and tells what came out of ours
-and of the references. A reference that fails is shown as it is; only ours decides whether the case holds.
+A case constructs extreme input, states the expected result and its judges, and runs our renderer and the references.
+Failures of a reference are only shown; ours alone decides whether the case holds.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ Judge = Literal["exact", "brute force", "analytic", "Embree", "policy"]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out: one short text each, None for a reference that has no say, and whether ours is as expected."""
+    """One short text for each result, None for a reference that does not apply, and whether ours is as expected."""
 
     ours: str
     holds: bool
@@ -25,7 +25,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class ExtremeCase:
-    """One row of the table. ``tolerance`` says how close ours must come and why; ``run(quick)`` does it."""
+    """One row of the table. ``tolerance`` says how close ours must come and why; ``run(quick)`` runs the case."""
 
     number: int
     construct: str
@@ -35,7 +35,10 @@ class ExtremeCase:
     run: Callable[[bool], Outcome]
 
     def record(self, quick: bool) -> dict[str, object]:
-        """Run the case; everything for JSON. A case that raises does not hold; a missing reference is no such case."""
+        """Run the case and return its row for JSON.
+
+        A case that raises does not hold; only a missing reference (``ImportError``) is passed on.
+        """
         try:
             outcome = self.run(quick)
         except ImportError:

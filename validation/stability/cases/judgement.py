@@ -1,4 +1,4 @@
-"""How the extreme cases about hits are judged and put into words."""
+"""Judges of the extreme cases about hits, and the wording of their results."""
 
 from collections.abc import Callable, Iterable
 from fractions import Fraction
@@ -8,8 +8,7 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
 from renderer import BruteForce, Hits, Mesh, Octree
-from validation.hits import compare as compare_hits
-from validation.hits.compare import ExactErrors, HitArrays
+from validation.hits.compare import ExactErrors, HitArrays, exact_errors
 from validation.hits.rays import RayBatch, float32_exact
 from validation.oracle import exact
 from validation.references.embree import Embree
@@ -35,8 +34,8 @@ def closest(accelerator: Accelerator, rays: RayBatch) -> Hits:
 
 
 def embree_says(mesh: Mesh, rays: RayBatch, say: Callable[[Floats, Ints], str]) -> tuple[str, str]:
-    """What Embree's default and robust mode answer, as ``say(t, face)`` words it."""
-    # Numbers beyond float32 reach Embree as infinities; what it makes of them is the point of showing it.
+    """The answers of Embree's default and robust mode, formatted by ``say(t, face)``."""
+    # Numbers beyond float32 reach Embree as infinities; the table shows its answers.
     with np.errstate(over="ignore"):
         default, robust = (Embree(mesh.vertices, mesh.faces, robust=mode) for mode in (False, True))
         return (
@@ -46,13 +45,13 @@ def embree_says(mesh: Mesh, rays: RayBatch, say: Callable[[Floats, Ints], str]) 
 
 
 def against_exact(mesh: Mesh, rays: RayBatch, hits: Hits | HitArrays) -> ExactErrors:
-    """Every ray judged by exact arithmetic, t within the bound that rounding explains."""
+    """Compare every ray with exact arithmetic, t within the bound that rounding explains."""
     truth = exact.closest_hits(mesh.vertices, mesh.faces, rays.origins, rays.directions)
-    return compare_hits.exact_errors(HitArrays(hits.t, hits.face), truth, mesh.vertices, mesh.faces, rays)
+    return exact_errors(HitArrays(hits.t, hits.face), truth, mesh.vertices, mesh.faces, rays)
 
 
 def as_exact(errors: ExactErrors) -> bool:
-    """Whether no ray is wrong, nor undecided by float64."""
+    """Whether no ray is wrong or undecidable in float64."""
     return errors.wrong == 0 and errors.near_edge == 0
 
 
@@ -65,7 +64,7 @@ def same_bits(first: Hits, second: Hits) -> Bools:
 
 
 def against_brute_force(mesh: Mesh, rays: RayBatch, octrees: Iterable[Octree]) -> tuple[int, str]:
-    """How many rays some octree answers otherwise than brute force, in t, face, u, v or any hit; and in words."""
+    """Number of rays on which some octree differs from brute force, in t, face, u, v or any hit; and a text."""
     brute = closest(BruteForce.from_mesh(mesh), rays)
     differs = np.zeros(len(rays), dtype=np.bool_)
     for octree in octrees:
@@ -89,13 +88,13 @@ def ulp_errors(t: Floats, true: Iterable[Fraction]) -> Floats:
 
 
 def of(good: ArrayLike, what: str = "hits") -> str:
-    """ "3 of 4 hits" of a mask."""
+    """A mask in words: "3 of 4 hits"."""
     mask = np.asarray(good)
     return f"{int(mask.sum()):,} of {mask.size:,} {what}"
 
 
 def one_t(t: Floats, face: Ints) -> str:
-    """The first ray's answer; -0, which Embree gives, is 0."""
+    """The first ray's answer; Embree's -0 is shown as 0."""
     return f"t = {abs(t[0]):.8g}" if face[0] >= 0 else "miss"
 
 
@@ -109,7 +108,7 @@ def unit_rows(rng: Generator, count: int) -> Floats:
 
 
 def rotation(rng: Generator) -> Floats:
-    """A random orthogonal (3, 3)."""
+    """A random orthogonal matrix (3, 3)."""
     return np.asarray(np.linalg.qr(rng.standard_normal((3, 3)))[0])
 
 

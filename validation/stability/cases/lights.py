@@ -1,4 +1,4 @@
-"""Extreme cases 41 to 45: halls of mirrors, branching rays, highlights, lights on and under surfaces."""
+"""Extreme cases 41 to 45: facing mirrors, branching rays, highlights, lights on and under surfaces."""
 
 import math
 
@@ -64,7 +64,7 @@ def _highlights(quick: bool) -> Outcome:
         material = Phong(diffuse=0.0, ambient=0.0, specular=1.0, shininess=shininess)
         for off in (0.0, 1e-6, 1e-3, 2e-3, 0.1, half, math.pi / 2 - 1e-3):
             light = DirectionalLight(direction=(math.sin(half + off), -math.cos(half + off), 0.0))
-            if off > half - 1e-9:  # the light would be below; turned to the other side, R.V = cos(off) all the same
+            if off > half - 1e-9:  # the light would be below; on the other side R.V = cos(off) too
                 light = DirectionalLight(direction=(math.sin(half - off), -math.cos(half - off), 0.0))
             value = pixel(scene_of(eye_at((1, 1, 0), (0, 0, 0)), (level(3, 0, 1), material), lights=(light,)))
             # The angle errs by 2 u, cos^n relatively by n tan(off) times that, and the lobe by 16 u (n + 2).
@@ -100,7 +100,7 @@ def _lights_on_surfaces(quick: bool) -> Outcome:
     return Outcome(f"{pictures - brighter} of {pictures} ambient only", brighter == 0)
 
 
-def _hit_segments(light: Light, *blockers: Mesh) -> bool:
+def _lit(light: Light, *blockers: Mesh) -> bool:
     eye = eye_at((0.3, 0.1, 0.0), (0.0, 0.0, 0.0))
     value = pixel(scene_of(eye, (level(3, 0, 1), WHITE), *((b, WHITE) for b in blockers), lights=(light,)))
     if value not in (0.0, 1.0):
@@ -112,13 +112,13 @@ def _shadow_rays(quick: bool) -> Outcome:
     wrong = []
     sun, lamp = DirectionalLight(direction=(0, -1, 0)), PointLight(position=(0, 2, 0), intensity=4.0)
     for height, half in ((1.0, 0.2), (1e3, 0.2), (1e6, 0.2), (1e9, 10.0), (-1.0, 0.2)):
-        if _hit_segments(sun, level(0, height, 0, half)) != (height < 0):
+        if _lit(sun, level(0, height, 0, half)) != (height < 0):
             wrong.append(f"directional, occluder at {height:g}")
     for gap in (1e-12, 1e-9, 1e-6, 0.5, 1e3):
-        if not _hit_segments(lamp, level(0, 2 + gap, 0, 0.2)):
+        if not _lit(lamp, level(0, 2 + gap, 0, 0.2)):
             wrong.append(f"point light, occluder {gap:g} past it")
     for gap in (1e-9, 1e-6, 1e-3, 1.0):
-        if _hit_segments(lamp, level(0, 2 - gap, 0, 0.2)):
+        if _lit(lamp, level(0, 2 - gap, 0, 0.2)):
             wrong.append(f"point light, occluder {gap:g} before it")
     return Outcome("; ".join(wrong) if wrong else "stops at the light in all 14", not wrong)
 

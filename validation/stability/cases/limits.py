@@ -1,4 +1,4 @@
-"""Extreme cases 47 and 48: eyes as far as rays are traced and beyond, and rays that branch without end."""
+"""Extreme cases 47 and 48: eyes at and beyond the farthest traced distance, and endlessly branching rays."""
 
 import warnings
 
@@ -14,7 +14,7 @@ _DEPTH, _BUDGET = 16, 5000
 
 
 def far_pictures() -> list[str]:
-    """What goes wrong with eyes at the limit, before a ball on the axis, and just beyond it."""
+    """Failures with eyes at the limit, before a ball on the axis, and just beyond it."""
     wrong = []
     for kind in ("orthographic", "perspective"):
         for distance in (1e30, FARTHEST):
@@ -44,7 +44,7 @@ def _far_eyes(quick: bool) -> Outcome:
 
 
 def branching(depth: int, budget: int) -> tuple[int, float]:
-    """Rays and radiance of one pixel whose every ray leaves two of half its weight, counted one by one."""
+    """Rays and radiance of one pixel where each ray spawns two of half its weight, counted one by one."""
     rays, value, waiting = 0, 0.0, [(0, 1.0)]
     while waiting:
         bounces, weight = waiting.pop()

@@ -1,4 +1,4 @@
-"""Row 46 of the extreme cases: rays whose hits err by more than the boxes are wide, asked in every order."""
+"""Extreme case 46: rays whose hits err by more than the boxes' width, in every order."""
 
 from collections.abc import Callable, Iterator
 
@@ -19,12 +19,12 @@ from validation.stability.cases.judgement import (
     same_bits,
 )
 
-# Exact arithmetic takes 20 ms a ray with 2,000 faces that all overlap.
+# Exact arithmetic takes 20 ms a ray, because all 2,000 faces overlap.
 JUDGED = 64
 
 
 def sheets(count: int) -> Mesh:
-    """Triangles in the plane x = 0 that overlap: every float32 box around them is flat."""
+    """Overlapping triangles in the plane x = 0: every float32 box around them is flat."""
     corners = float32_exact(np.random.default_rng(SEED).uniform(-0.5, 0.5, (count, 3, 3)))
     corners[..., 0] = 0.0
     return Mesh(corners.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3))
@@ -43,9 +43,9 @@ def _refitted(mesh: Mesh) -> Octree:
 
 
 def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tuple[str, Hits]]:
-    """The closest hits of the same rays by brute force, trees of all kinds, and batches cut and turned in many ways."""
+    """Closest hits of the same rays by brute force, all kinds of trees, and batches cut and reordered in many ways."""
 
-    def ask(accelerator: Octree | BruteForce, *pieces: np.ndarray) -> Hits:
+    def trace(accelerator: Octree | BruteForce, *pieces: np.ndarray) -> Hits:
         far = np.broadcast_to(t_max, len(rays))
         parts = [accelerator.closest_hit(rays.origins[p], rays.directions[p], t_max=far[p]) for p in pieces]
         back = np.argsort(np.concatenate(pieces), kind="stable")
@@ -63,20 +63,20 @@ def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tu
         "a refit": lambda: _refitted(mesh),
         "one thread": lambda: octree,
     }
-    yield "brute force", ask(BruteForce.from_mesh(mesh), rows)
+    yield "brute force", trace(BruteForce.from_mesh(mesh), rows)
     for name, build in builds.items():
-        yield name, ask(build(), rows)
-    yield "without the first eight", ask(octree, rows[8:], rows[:8])
-    yield "turned", ask(octree, rows[::-1])
-    yield "few at a time", ask(octree, *np.array_split(rows, len(rows) // 7))
+        yield name, trace(build(), rows)
+    yield "without the first eight", trace(octree, rows[8:], rows[:8])
+    yield "turned", trace(octree, rows[::-1])
+    yield "few at a time", trace(octree, *np.array_split(rows, len(rows) // 7))
 
 
 def differing(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray = np.inf) -> tuple[np.ndarray, Hits, list[str]]:
-    """The rays that some order answers otherwise than the first one, its hits, and which orders those are."""
-    asked = orders(mesh, rays, t_max)
-    _, first = next(asked)
+    """Rays that some order answers differently from the first, the first order's hits, and those orders' names."""
+    traced = orders(mesh, rays, t_max)
+    _, first = next(traced)
     differs, names = np.zeros(len(rays), dtype=np.bool_), []
-    for name, hits in asked:
+    for name, hits in traced:
         other = ~same_bits(hits, first)
         differs |= other
         names += [name] * bool(other.any())
@@ -86,7 +86,7 @@ def differing(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray = np.inf) ->
 def _order(quick: bool) -> Outcome:
     mesh, rays = sheets(2000), beside_sheets(80 if quick else 200)
     differs, hits, names = differing(mesh, rays)
-    # Half the limits cut the hit off by less than its error is large, half leave it.
+    # Half of the limits cut the hit off by less than its error, half keep it.
     close = np.where(hits.hit, hits.t, 1.0) * np.where(np.arange(len(rays)) % 2, 1 - 1e-9, 1 + 1e-9)
     differs_close, _, names_close = differing(mesh, rays, close)
     judged = np.linspace(0, len(rays) - 1, JUDGED).astype(int)

@@ -1,4 +1,4 @@
-"""Rows 12 to 17 of the extreme cases: far from the origin, huge, tiny, thin and grazing."""
+"""Extreme cases 12 to 17: far from the origin, huge, tiny, thin and grazing."""
 
 from fractions import Fraction
 
@@ -89,7 +89,7 @@ def _far_scales(quick: bool) -> Outcome:
     for scale in (1e-40, 1e-30, 1e30, 1e300):
         mesh, rays = Mesh(ball.vertices * scale, ball.faces), ray_batch(origins * scale, directions)
         hits = closest(Octree.from_mesh(mesh), rays)
-        # Judge the scene times a power of two, which is the same scene, so that no bound over- or underflows.
+        # Judge the scene times a power of two, which is an equal scene, so that no bound over- or underflows.
         near = -int(np.frexp(scale)[1])
         errors = against_exact(
             Mesh(np.ldexp(mesh.vertices, near), mesh.faces),
@@ -104,7 +104,7 @@ def _far_scales(quick: bool) -> Outcome:
 
 
 def _slivers(quick: bool) -> Outcome:
-    """The base is symmetric about the origin and the apex lies beside it, so float32 holds any height."""
+    """Judge slivers with a base symmetric about the origin and the apex beside it, so that float32 holds any height."""
     rng, count = np.random.default_rng(SEED), 40 if quick else 200
     wrong, true_hits, found = 0, [], []
     for height in 10.0 ** -np.arange(1, 9):
@@ -145,7 +145,7 @@ def _grazing(quick: bool) -> Outcome:
             rays_in_all += count
             for row, hit in enumerate(truth):
                 flips += (hit is not None) != bool(np.isfinite(answers[0][row]))
-                # The angle that the ray really has, after its rounding to float32.
+                # The ray's real angle, after rounding to float32.
                 sine = abs(float(normal @ directions[row])) / np.linalg.norm(directions[row])
                 for kept, t in zip((scaled, *theirs), answers, strict=True):
                     if hit is not None and np.isfinite(t[row]):
@@ -158,12 +158,12 @@ def _grazing(quick: bool) -> Outcome:
 def _far_origin(quick: bool) -> Outcome:
     mesh, rng, count = float32_mesh(icosphere(5)), np.random.default_rng(SEED), 10_000 if quick else 100_000
     origins = float32_exact(1e6 * unit_rows(rng, count))
-    # Float32 moves the direction by at most 2^-25 of 1e6 a component, the target by 0.06: within 0.6 of the centre,
-    # where the sphere of facets, of inner radius 0.998, is always met.
+    # Float32 moves the direction by at most 2^-25 of 1e6 a component, the target by 0.06. Rays pass within 0.6 of the
+    # centre, and the faceted sphere, of inner radius 0.998, is always hit.
     rays = ray_batch(origins, float32_exact(0.5 * unit_rows(rng, count) * rng.random((count, 1)) - origins))
     hits = closest(Octree.from_mesh(mesh), rays)
     radius = np.linalg.norm(origins + hits.t[:, None] * rays.directions, axis=1)
-    # o + t d is off by u 1e6 a component and by as much again from t; 1e-8 is 50 times that.
+    # o + t d errs by u 1e6 a component and by as much again from t; 1e-8 is 50 times that.
     holds = bool(hits.hit.all()) and bool((radius > 0.998 - 1e-8).all() and (radius < 1 + 1e-6).all())
     return Outcome(of(~hits.hit, "missed"), holds, *embree_says(mesh, rays, lambda t, face: of(face < 0, "missed")))
 

@@ -1,4 +1,4 @@
-"""Rows 1 to 11 of the extreme cases: rays that are hard to answer."""
+"""Extreme cases 1 to 11: rays that are hard to trace."""
 
 from collections.abc import Callable
 from itertools import product
@@ -35,7 +35,10 @@ Bools = NDArray[np.bool_]
 
 
 def _leaks(kind: int) -> Callable[[bool], Outcome]:
-    """Aim in full float64: a direction rounded to float32 passes an edge at a distance that float64 resolves."""
+    """Leaks of rays aimed in full float64.
+
+    A direction rounded to float32 would pass an edge at a distance that float64 resolves.
+    """
 
     def run(quick: bool) -> Outcome:
         mesh = float32_mesh(icosphere(5))
@@ -66,7 +69,7 @@ def _integer_box(quick: bool) -> Outcome:
     targets = rng.integers(0, 17, (count, 3)) / 2
     targets[np.arange(count), axis] = rng.choice([0.0, 8.0], count)
     directions = targets - origins
-    # Where the longest component is a power of two nothing in the kernel rounds.
+    # Where the longest component is a power of two, the kernel rounds nothing.
     unrounded = np.frexp(np.abs(directions).max(axis=1))[0] == 0.5
 
     def say(t: Floats, face: Ints) -> str:
@@ -85,7 +88,7 @@ def _integer_box(quick: bool) -> Outcome:
 
 
 def _unit_quad_box(side: int, shift: float) -> Mesh:
-    """The surface of [0, side]^3 + shift in unit quads of two faces, vertices shared."""
+    """The surface of [0, side]^3 + shift in unit quads of two faces with shared vertices."""
     i, j = np.divmod(np.arange((side + 1) ** 2), side + 1)
     points: list[Floats] = []
     faces = []
@@ -137,8 +140,10 @@ def _denormal_direction(quick: bool) -> Outcome:
 
 
 def _in_plane(quick: bool) -> Outcome:
-    """Nothing rounds in a plane x = c, nor where the longest component of d is a power of two. Elsewhere float64 does
-    not tell whether the ray lies in the plane, and a hit must be one that rounding permits.
+    """Rays in a triangle's plane must miss where nothing rounds; elsewhere a hit must be one that rounding permits.
+
+    Nothing rounds in a plane x = c, nor where the longest component of d is a power of two. Elsewhere float64 cannot
+    decide whether the ray lies in the plane.
     """
     rng = np.random.default_rng(SEED)
     unrounded, hit, theirs, sound = [], [], [], True
@@ -173,7 +178,7 @@ def _permitted(mesh: Mesh, rays: RayBatch, row: int, t: float) -> bool:
 
 def _bad_rays(quick: bool) -> Outcome:
     octree, row, caught = Octree.from_mesh(box()), 3, []
-    # Few rays and many go by kernels of their own.
+    # Few rays and many rays use different kernels.
     for argument, value, count in product(("origins", "directions"), (np.nan, np.inf, -np.inf, 0.0), (5, 50)):
         if argument == "origins" and value == 0.0:
             continue

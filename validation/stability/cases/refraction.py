@@ -1,6 +1,6 @@
-"""Extreme cases 35 to 40: refraction at any index and angle, and media in one another.
+"""Extreme cases 35 to 40: refraction at any index and angle, and nested media.
 
-The judges take the refraction that they judge, so that the tests can hand them one that must fail.
+The judges take the refraction function as an argument, so that the tests can pass one that must fail.
 """
 
 import math
@@ -43,7 +43,7 @@ _GLASS = (1.0000002, 1.33, 1.5, 2.417)
 
 
 def _before_squares(*parts: tuple[Mesh, Material], smooth: bool = False) -> Scene:
-    """Parts that stand before a floor of squares and a sky, without lights: dielectrics cast opaque shadows."""
+    """Parts before a checkered floor and a sky, without lights, because dielectrics cast opaque shadows."""
     floor = Floor(min=(-9.0, -9.0), max=(9.1, 9.3), materials=("red", "blue"), squares=(23, 23))
     colors = {"red": Phong(diffuse=0.0, ambient=(1, 0.5, 0)), "blue": Phong(diffuse=0.0, ambient=(0, 0.25, 1))}
     moved = [(Mesh(mesh.vertices + np.array([0.0, 1.2, 0.0]), mesh.faces), m) for mesh, m in parts]
@@ -52,7 +52,7 @@ def _before_squares(*parts: tuple[Mesh, Material], smooth: bool = False) -> Scen
 
 
 def _different(with_it: Scene, without: Scene, side: int, depths: tuple[int, int]) -> tuple[int, int]:
-    """Pixels that differ, and those where the first picture shows another face: a check that it is in view."""
+    """Number of differing pixels, and of pixels whose first hit differs, to prove that the object is in view."""
     a, b = (
         render(s, resolution=(side, side), max_depth=d, threads=1)
         for s, d in zip((with_it, without), depths, strict=True)
@@ -105,7 +105,7 @@ def snell_residual(d: Vector, n: Vector, t: Vector, n1: float, n2: float) -> flo
 
 
 def _beyond_critical(d: Vector, n: Vector, n1: float, n2: float) -> Fraction:
-    """(n1 sin i / n2)^2 - 1 of the very floats, exactly; the vectors need not be of unit length to the last bit."""
+    """(n1 sin i / n2)^2 - 1 of these very floats, exactly; the vectors need not be of unit length to the last bit."""
     dd, nn = ([Fraction(x) for x in v] for v in (d, n))
     c = _cross(dd, nn)
     return Fraction(n1) ** 2 * _dot(c, c) / (Fraction(n2) ** 2 * _dot(dd, dd) * _dot(nn, nn)) - 1
@@ -114,7 +114,7 @@ def _beyond_critical(d: Vector, n: Vector, n1: float, n2: float) -> Fraction:
 def critical_angle(rule: Refract, count: int) -> tuple[int, int, float]:
     """Directions 1e-7 and less about the critical angle to air: (wrong sides, NaN, largest Snell residual).
 
-    Within 4 u of n1 sin i = 1 either side will do. Above the indices of glass that is within 4 u of sin i, the
+    Within 4 u of n1 sin i = 1 either side is accepted. For indices above those of glass the range is 4 u of sin i, the
     rounding of the direction itself, which n1 multiplies.
     """
     wrong = nan = 0
@@ -126,7 +126,7 @@ def critical_angle(rule: Refract, count: int) -> tuple[int, int, float]:
             cos_t, t = rule(d, n, n1, 1.0)
             nan += not all(map(math.isfinite, (cos_t, *t)))
             beyond = _beyond_critical(d, n, n1, 1.0)
-            # The square is twice as far from 1 as n1 sin i.
+            # The square's distance from 1 is twice that of n1 sin i.
             wrong += (cos_t < 0.0) != (beyond > 0) and abs(beyond) > 2 * near
             if cos_t >= 0.0:
                 largest = max(largest, snell_residual(d, n, t, n1, 1.0))
@@ -159,7 +159,7 @@ def _steep_indices(quick: bool) -> Outcome:
 
 
 def _plate(edge: float) -> Scene:
-    """A plate of thickness 1, met at 60 degrees; beyond it a glowing plane that ends at x = ``edge``."""
+    """A plate of thickness 1, hit at 60 degrees; behind it a glowing plane that ends at x = ``edge``."""
     plate = box((-4.0, -1.0, -4.0), (5.0, 0.0, 4.5))
     clear = Phong(diffuse=0.0, ambient=0.0, transmittance=1.0, ior=1.5)
     camera = eye_at((-math.sqrt(3.0), 1.0, 0.0), (0.0, 0.0, 0.0))
@@ -167,7 +167,7 @@ def _plate(edge: float) -> Scene:
 
 
 def _shift(sees: Callable[[Scene], bool], halvings: int) -> float:
-    """How far the plate shifts its ray across itself, by halving the interval in which the plane's edge hides."""
+    """The sideways shift of the plate's ray, by bisection of the x at which the plane's edge disappears."""
     low, high = 0.0, 5.0 * math.tan(math.pi / 3)
     for _ in range(halvings):
         middle = (low + high) / 2
@@ -198,12 +198,12 @@ def _inside_ball(quick: bool) -> Outcome:
 
 
 def _reflectance(n1: float, n2: float) -> float:
-    """Fresnel at normal incidence."""
+    """Fresnel's reflectance at normal incidence."""
     return ((n1 - n2) / (n1 + n2)) ** 2
 
 
 def nested_radiance(outer: float, inner: float, from_inside: bool) -> tuple[float, float]:
-    """A sky of 1 seen straight through two boxes one in the other, or from within both: (rendered, analytic)."""
+    """Radiance of a sky of 1 seen straight through two nested boxes, or from inside both: (rendered, analytic)."""
     glass = [Dielectric(type="dielectric", ior=n, reflectance=0.0) for n in (outer, inner)]
     boxes = [box((-a, -a, -a), (a, a, a)) for a in (2.0, 1.0)]
     camera = eye_at((0.1 if from_inside else -5.0, 0.2, 0.3), (6.0, 0.2, 0.3))
@@ -218,7 +218,7 @@ def _nested(quick: bool) -> Outcome:
 
     side = 64 if quick else 256
     differ = _different(_before_squares(clear(1.0), clear(0.5)), _before_squares(clear(1.0)), side, (4, 2))[0]
-    # Both show the outer ball first, so that it is the empty picture that tells whether it is in view.
+    # Both pictures show the outer ball first, so the empty picture is needed to prove that it is in view.
     seen = _different(_before_squares(clear(1.0)), _before_squares(), side, (2, 2))[1]
     wrong = []
     for outer, inner in ((1.5, 1.0), (1.5, 1.33), (1.33, 1.5), (1.5, 2.4), (1.5, 1.5), (1.5, 1e3), (1e3, 1.5)):

@@ -1,4 +1,4 @@
-"""Small scenes whose radiance is known by hand, as the extreme cases of shading need them."""
+"""Small scenes of known radiance, for the extreme cases of shading."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ MIRROR = Mirror(type="mirror")
 
 
 def scene_of(camera: Camera, *parts: tuple[Mesh, Material], smooth: bool = False, **more: Any) -> Scene:
-    """A scene of meshes with their materials, ambient light 1 unless given."""
+    """A scene of meshes with their materials; ambient light is 1 unless given."""
     normals = "smooth" if smooth else "flat"
     return Scene(
         camera=camera,
@@ -46,17 +46,17 @@ def level(x: float, y: float, z: float, half: float = 50.0) -> Mesh:
 
 
 def eye_at(eye: Vector, target: Vector, up: Vector = (0.0, 1.0, 0.0), fov: float = 20.0) -> PerspectiveCamera:
-    """A camera whose only ray, of a picture of one pixel, goes from ``eye`` to ``target``."""
+    """A camera whose picture of one pixel has one ray, from ``eye`` to ``target``."""
     return PerspectiveCamera(eye=eye, target=target, up=up, fov=fov)
 
 
 def one(scene: Scene, **options: Any) -> Image:
-    """The one ray from the eye to the camera's target."""
+    """The image of one pixel: the ray from the eye to the camera's target."""
     return render(scene, resolution=(1, 1), threads=1, **{"max_rays": UNLIMITED_RAYS, **options})
 
 
 def pixel(scene: Scene, **options: Any) -> float:
-    """The red radiance of ``one``."""
+    """The red radiance of that pixel."""
     return float(one(scene, **options).radiance[0, 0, 0])
 
 
@@ -66,12 +66,12 @@ def close(value: float, expected: float) -> bool:
 
 
 def vector(values: Any) -> Vector:
-    """Three numbers as kernels take them."""
+    """Three numbers as a tuple, which kernels take."""
     return (float(values[0]), float(values[1]), float(values[2]))
 
 
 def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(..., 3) at unit length."""
+    """Vectors (..., 3) scaled to unit length."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 

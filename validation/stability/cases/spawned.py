@@ -1,6 +1,6 @@
-"""Extreme cases 33 and 34: rays that leave a surface neither meet it again nor jump over its neighbour.
+"""Extreme cases 33 and 34: rays that leave a surface neither hit it again nor jump over its neighbour.
 
-The judges take the offset rule that they judge, so that the tests can hand them one that must fail.
+The judges take the offset rule as an argument, so that the tests can pass one that must fail.
 """
 
 from typing import Literal
@@ -50,11 +50,12 @@ def _prism(sides: int = 512, half: float = 500.0) -> Mesh:
 
 
 def self_hits(mesh: Mesh, count: int, offset: OffsetRule = BOUNDED) -> tuple[int, int]:
-    """Rays that ``count`` hits from outside and ``count`` from inside of a convex mesh spawn: (wrong ones, all).
+    """Spawn rays at ``count`` hits from outside and ``count`` from inside of a convex mesh: (wrong ones, all).
 
-    A ray spawned outwards must meet nothing, one spawned inwards must leave through a face that looks its way. Asked
-    once from the starts that pictures have, by the offset rule, and once as ``leaving`` the faces from the hit points.
+    A ray spawned outwards must hit nothing; one spawned inwards must leave through a face that points its way. Each is
+    traced twice: from the offset start of pictures, and as ``leaving`` its face from the hit point.
     """
+    # Trace rays inwards from outside, and outwards from inside.
     rng = np.random.default_rng(33)
     octree = Octree.from_mesh(mesh, threads=1)
     middle, size = (mesh.bounds[0] + mesh.bounds[1]) / 2, mesh.extent
@@ -65,6 +66,8 @@ def self_hits(mesh: Mesh, count: int, offset: OffsetRule = BOUNDED) -> tuple[int
     hits = octree.closest_hit(origins, directions)
     corners = mesh.triangles[hits.face]
     normals, points, lost = hits.normals, hits.points, int((~hits.hit).sum())
+
+    # Spawn a reflected, a shadow and, without total reflection, a refracted ray at each hit.
     starts: list[Vector] = []
     ways: list[Vector] = []
     outwards: list[bool] = []
@@ -83,6 +86,8 @@ def self_hits(mesh: Mesh, count: int, offset: OffsetRule = BOUNDED) -> tuple[int
             ways.append(w)
             rows.append(int(i))
             outwards.append(float(np.dot(n_g, w)) > 0.0)
+
+    # Trace the spawned rays from both starts and count the wrong ones.
     wrong = 0
     for spawned in (octree.closest_hit(starts, ways), octree.closest_hit(points[rows], ways, leaving=hits.face[rows])):
         facing = np.einsum("nk,nk->n", np.nan_to_num(spawned.normals, nan=-1.0), np.array(ways)) > 0.0
@@ -91,13 +96,13 @@ def self_hits(mesh: Mesh, count: int, offset: OffsetRule = BOUNDED) -> tuple[int
 
 
 def ball_pictures(scale: float) -> tuple[Scene, Scene]:
-    """A mirror under a sky of 1, and a clear ball whose front and far side add 1 each: its pixels are 1 and 2."""
+    """A mirror under a sky of 1, and a clear ball whose front and far side add 1 each: the pixels must be 1 and 2."""
     camera = eye_at((3 * scale, scale, 2 * scale), (0, 0, 0), fov=30)
     return scene_of(camera, (ball(scale), MIRROR), background=1.0), scene_of(camera, (ball(scale), _CLEAR))
 
 
 def wrong_pixels(scale: float, side: int, offset: Rule = "bounded") -> int:
-    """Pixels of ``ball_pictures`` that are not what they must be."""
+    """Number of pixels of ``ball_pictures`` with a wrong value."""
     wrong = 0
     for scene, value in zip(ball_pictures(scale), (1.0, 2.0), strict=True):
         image = render(scene, resolution=(side, side), max_depth=1, threads=1, offset=offset)
@@ -124,7 +129,7 @@ def _spawned_rays(quick: bool) -> Outcome:
 
 
 def close_planes() -> dict[str, tuple[Scene, float]]:
-    """Planes 1e-3 apart at 100, the second to be met by a reflected, a refracted and a shadow ray: scene, radiance."""
+    """Two planes 1e-3 apart at 100; a reflected, a refracted and a shadow ray must hit the second: scene, radiance."""
     lower, upper = level(103.0, 100.0, 101.0), level(103.0, 100.001, 101.0)
     between = eye_at((100.001, 100.0005, 100.0), (100.0, 100.0, 100.0), fov=1)
     above = eye_at((101.0, 101.0, 100.0), (100.0, 100.0, 100.0), fov=1)
@@ -138,7 +143,7 @@ def close_planes() -> dict[str, tuple[Scene, float]]:
 
 
 def missed_planes(offset: Rule = "bounded") -> list[str]:
-    """The kinds of ray that jump the gap of ``close_planes``."""
+    """Kinds of ray that miss the second plane of ``close_planes``."""
     found = close_planes().items()
     return [kind for kind, (scene, value) in found if pixel(scene, max_depth=1, offset=offset) != value]
 

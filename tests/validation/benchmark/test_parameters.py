@@ -1,4 +1,4 @@
-"""Error against run time: what the front and the slope are, and that the knobs' errors are those of the knobs."""
+"""Error against run time: what the front and the slope are, and that each parameter has its own error."""
 
 import dataclasses
 import json
@@ -12,14 +12,15 @@ from hypothesis import strategies as st
 
 from renderer import Mesh, Octree, load_scene
 from validation.benchmark.page import pareto
-from validation.benchmark.parameters import hits as knobs_hits
-from validation.benchmark.parameters import pictures as knobs_pictures
+from validation.benchmark.parameters import hits as parameter_hits
+from validation.benchmark.parameters import pictures as parameter_pictures
 from validation.efficiency import hits as tradeoff_hits
+from validation.error_curves import front, slope
 from validation.hits.compare import HitArrays
 from validation.hits.rays import random_rays
 from validation.oracle import exact
 from validation.scenes import CASES
-from validation.tradeoff import front, median_seconds, slope, timed
+from validation.timing import median_seconds, timed
 
 # Few values, so that equal costs and equal errors are common.
 POINTS = st.lists(st.tuples(st.integers(0, 6).map(float), st.integers(0, 6).map(float)), max_size=20)
@@ -92,7 +93,7 @@ def test_the_median_leaves_out_the_first_round_and_all_take_turns():
 
 @pytest.fixture(scope="module")
 def hits():
-    return knobs_hits.run(knobs_hits.Effort(level=2, rays=400, judged=200, runs=1), lambda _: None)
+    return parameter_hits.run(parameter_hits.HitStudyEffort(level=2, rays=400, judged=200, runs=1), lambda _: None)
 
 
 def test_float32_storage_errs_by_its_rounding_and_float64_by_none(hits):
@@ -123,17 +124,17 @@ def test_the_fronts_of_storage_hold_the_most_exact(hits):
 def test_no_option_of_the_tree_changes_a_bit(hits):
     tree = hits["tree"]
     assert tree["differing_rays"] == 0
-    assert {p["leaf_size"] for p in tree["points"]} >= set(knobs_hits.LEAF_SIZES)
-    assert len({p["bytes"] for p in tree["points"]}) > len(knobs_hits.LEAF_SIZES)  # they are different trees
+    assert {p["leaf_size"] for p in tree["points"]} >= set(parameter_hits.LEAF_SIZES)
+    assert len({p["bytes"] for p in tree["points"]}) > len(parameter_hits.LEAF_SIZES)  # they are different trees
 
 
 def test_a_tree_that_answers_otherwise_is_reported(monkeypatch):
     mesh = tradeoff_hits.turned_mesh(2)
     rays = random_rays(mesh.triangles, 300, np.random.default_rng(1))
     moved = Mesh(np.nextafter(mesh.vertices, np.inf), mesh.faces)
-    built = knobs_hits._built
-    monkeypatch.setattr(knobs_hits, "_built", lambda m, t: built(moved if t.leaf_size == 8 else m, t))
-    record = knobs_hits.tree_knobs(mesh, (rays,), 1)
+    built = parameter_hits._built
+    monkeypatch.setattr(parameter_hits, "_built", lambda m, t: built(moved if t.leaf_size == 8 else m, t))
+    record = parameter_hits.tree_parameters(mesh, (rays,), 1)
     differing = {p["name"]: p["differing_rays"] for p in record["points"]}
     assert record["differing_rays"] == sum(differing.values()) > 450
     assert {name for name, count in differing.items() if count} == {
@@ -150,8 +151,8 @@ def test_one_changed_bit_of_any_field_is_counted(field):
     changed = getattr(hits, field).copy()
     row = int(hits.hit.argmax())
     changed.view(np.int64)[row] ^= 1
-    assert knobs_hits.differing_rays(hits, hits) == 0
-    assert knobs_hits.differing_rays(hits, dataclasses.replace(hits, **{field: changed})) == 1
+    assert parameter_hits.differing_rays(hits, hits) == 0
+    assert parameter_hits.differing_rays(hits, dataclasses.replace(hits, **{field: changed})) == 1
 
 
 def test_errors_count_every_kind_of_wrong_answer():
@@ -170,14 +171,16 @@ def test_errors_count_every_kind_of_wrong_answer():
 @pytest.fixture(scope="module")
 def pictures():
     glass = tuple(case for case in CASES if case.name == "glass")
-    return knobs_pictures.run(knobs_pictures.Effort(glass, size=16, samples=256, runs=1), lambda _: None)
+    return parameter_pictures.run(
+        parameter_pictures.PictureStudyEffort(glass, size=16, samples=256, runs=1), lambda _: None
+    )
 
 
-def rows(pictures, knob):
-    return pictures["scenes"][0]["knobs"][knob]["points"]
+def rows(pictures, parameter):
+    return pictures["scenes"][0]["knobs"][parameter]["points"]
 
 
-def test_each_knob_at_its_converged_end_errs_by_little_and_at_the_other_by_much(pictures):
+def test_each_parameter_at_its_converged_end_errs_by_little_and_at_the_other_by_much(pictures):
     samples, depths, weights = (rows(pictures, k) for k in ("samples", "max_depth", "min_weight"))
     assert samples[0]["rmse"] > 2 * samples[-1]["rmse"] > 0.0
     assert depths[0]["rmse"] > 10 * depths[-1]["rmse"]
@@ -185,8 +188,8 @@ def test_each_knob_at_its_converged_end_errs_by_little_and_at_the_other_by_much(
 
 
 def test_rays_rise_with_samples_and_depth_and_fall_with_the_least_weight(pictures):
-    for knob, sign in (("samples", 1), ("max_depth", 1), ("min_weight", -1)):
-        rays = [sign * p["rays"] for p in rows(pictures, knob)]
+    for parameter, sign in (("samples", 1), ("max_depth", 1), ("min_weight", -1)):
+        rays = [sign * p["rays"] for p in rows(pictures, parameter)]
         assert rays == sorted(rays) and rays[0] < rays[-1]
 
 
@@ -203,11 +206,11 @@ def test_sampling_a_regular_grid_converges_at_least_like_monte_carlo(pictures):
 
 def test_a_difference_is_rms_and_largest_over_all_channels():
     scene = load_scene(next(case.path for case in CASES if case.name == "stairs"))
-    image = knobs_pictures.render(scene, resolution=(2, 1))
+    image = parameter_pictures.render(scene, resolution=(2, 1))
     other = dataclasses.replace(image, radiance=image.radiance + np.float32([[[0, 3, 0], [0, 0, -4]]]))
     # Adding to float32 radiances below 1 rounds to within 2^-22.
-    assert knobs_pictures.difference(other, image) == pytest.approx((math.sqrt(25 / 6), 4.0), abs=1e-6)
-    assert knobs_pictures.difference(image, image) == (0.0, 0.0)
+    assert parameter_pictures.difference(other, image) == pytest.approx((math.sqrt(25 / 6), 4.0), abs=1e-6)
+    assert parameter_pictures.difference(image, image) == (0.0, 0.0)
 
 
 def test_the_record_survives_json_and_is_drawn_from_it(hits, pictures):

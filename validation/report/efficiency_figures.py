@@ -5,23 +5,23 @@ from typing import Any
 
 from validation.report.plots import Panel, Series, draw
 
-# The grey, dotted row of the looks: a front is no contender.
+# The grey, dotted look, because a front is not a contender.
 _FRONT = 8
-# Of float32, in which pictures are stored: an error below it has no place beside errors of a percent.
+# Roundoff of float32, in which pictures are stored: a smaller error is meaningless beside errors of a percent.
 _ROUNDOFF = 2.0**-24
 _QUANTITIES = {"rmse": "RMSE, linear", "flip": "FLIP", "dissimilarity": "1 - SSIM"}
-_KNOBS = {"samples": "samples", "max_depth": "depth", "min_weight": "least weight"}
+_PARAMETERS = {"samples": "samples", "max_depth": "depth", "min_weight": "least weight"}
 
 
 def figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
-    """For each figure a title (its caption too) and an ``<svg>`` element."""
+    """For each figure a title (also its caption) and an ``<svg>`` element."""
     hits, pictures = record["tradeoff_hits"], record["tradeoff_pictures"]
     return [_hits_figure(hits), _samples_figure(pictures), _truncation_figure(pictures)]
 
 
 def _hits_figure(hits: Mapping[str, Any]) -> dict[str, str]:
     points = hits["points"]
-    # Half a ray stands for none: the most that this many rays can say.
+    # No leak is drawn as half a ray, the resolution of this many rays.
     leaks = {p["name"]: (p["leaks"] or 0.5) / p["leak_rays"] for p in points}
     errors = {p["name"]: p["errors"]["p99"] for p in points}
     panels = [
@@ -46,7 +46,7 @@ def _hits_figure(hits: Mapping[str, Any]) -> dict[str, str]:
 def _contenders(
     points: Sequence[Mapping[str, Any]], errors: Mapping[str, float | None], names: Sequence[str]
 ) -> list[Series]:
-    """A marker each, and the front as a line through its own."""
+    """A marker for each contender, and the front as a line through its markers."""
     speeds = {p["name"]: p["mrays"] for p in points}
     series = [Series(p["label"], [p["mrays"]], [errors[p["name"]]], look) for look, p in enumerate(points)]
     return [*series, Series("Pareto front", [speeds[n] for n in names], [errors[n] for n in names], _FRONT)]
@@ -80,11 +80,14 @@ def _samples_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
 def _truncation_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
     curves = [c for c in pictures["curves"] if c["knob"] != "samples"]
     panels = [
-        Panel([_curve(f"{c['who']}, {_KNOBS[c['knob']]}", c, quantity, look) for look, c in enumerate(curves)], label)
+        Panel(
+            [_curve(f"{c['who']}, {_PARAMETERS[c['knob']]}", c, quantity, look) for look, c in enumerate(curves)], label
+        )
         for quantity, label in _QUANTITIES.items()
     ]
     values = "; ".join(
-        f"{c['who']}, {_KNOBS[c['knob']]} {c['points'][0]['value']:g} to {c['points'][-1]['value']:g}" for c in curves
+        f"{c['who']}, {_PARAMETERS[c['knob']]} {c['points'][0]['value']:g} to {c['points'][-1]['value']:g}"
+        for c in curves
     )
     title = (
         f"{pictures['scene']}: error against seconds over depth and least weight, 1 sample a pixel ({values}). Each is "

@@ -14,12 +14,12 @@ from validation.efficiency import hits as tradeoff_hits
 from validation.efficiency import pictures as tradeoff_pictures
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba.sampling import Film, can_judge
-from validation.report.tradeoff_figures import figures
+from validation.report.efficiency_figures import figures
 from validation.scenes import SCENES
-from validation.tradeoff import spending
+from validation.timing import spending
 
-HITS = tradeoff_hits.Effort(level=3, rays=2000, judged=400, leaks=5000, runs=1, few=20)
-PICTURES = tradeoff_pictures.Effort(size=32, theirs=(1, 16), truth=36, runs=1)
+HITS = tradeoff_hits.HitTimingEffort(level=3, rays=2000, judged=400, leaks=5000, runs=1, few=20)
+PICTURES = tradeoff_pictures.PictureTimingEffort(size=32, theirs=(1, 16), truth=36, runs=1)
 
 
 @pytest.fixture(scope="module")
