@@ -1,9 +1,12 @@
 """A small package beside the compiler's own modules, for tests that edit kernels' sources and run them anew."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
+import tempfile
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "renderer"
@@ -56,15 +59,72 @@ def bottom_of(folder: Path) -> Path:
     return folder / "below" / "deep" / "bottom.py"
 
 
+# A process that has imported Numba and compiled once, most of a small run's time, and forks for each script: a line
+# of JSON says what to run, and the exit code is the answer. Nothing of ours is imported before the fork.
+_SERVER = """
+import json, os, sys, types
+import numba
+numba.njit(lambda x: x + 1)(1)
+assert not any(name.split(".")[0] == "renderer" for name in sys.modules)
+for line in sys.stdin:
+    asked = json.loads(line)
+    child = os.fork()
+    if child:
+        status = os.waitpid(child, 0)[1]
+        print(os.waitstatus_to_exitcode(status), flush=True)
+        continue
+    for number, name in enumerate((os.devnull, asked["out"], asked["err"])):
+        file = os.open(name, os.O_RDWR | os.O_CREAT)
+        os.dup2(file, number)
+        os.close(file)
+    os.environ.clear()
+    os.environ.update(asked["environment"])
+    os.chdir(asked["folder"])
+    sys.path[:0] = asked["environment"]["PYTHONPATH"].split(os.pathsep)
+    numba.config.reload_config()
+    main = sys.modules["__main__"] = types.ModuleType("__main__")
+    exec(compile(asked["script"], "<string>", "exec"), vars(main))
+    break
+"""
+# What Numba reads before that: a script with other values needs a process that is not forked.
+_EARLY = ("NUMBA_DISABLE_JIT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
+
+
+@cache
+def _server(process: int) -> "subprocess.Popen[str]":
+    """The forking process of the process that runs the tests; it ends with it, at the end of its input."""
+    own = {**os.environ, "PYTHONPATH": ""}
+    command = [sys.executable, "-B", "-P", "-c", _SERVER]
+    return subprocess.Popen(command, env=own, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
 def run(folder: Path, script: str = RUN, **environment: str) -> list[str]:
     """The words that a script prints in a process of its own beside the package."""
     return start(folder, script, **environment).stdout.split()
 
 
-def start(folder: Path, script: str = RUN, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a script in a process of its own, where the package is found, with no cache folder but what is named."""
+def start(folder: Path, script: str = RUN, **environment: str) -> "subprocess.CompletedProcess[str]":
+    """Run a script in a process of its own, where the package is found, with no cache folder but what is named.
+
+    Where there is ``fork``, it is forked from a process that has imported Numba, unless its environment forbids that.
+    """
     own = {**os.environ, "NUMBA_CACHE_DIR": "", "PYTHONPATH": str(folder.parent), **environment}
-    command = [sys.executable, "-B", "-P", "-c", script]
-    done = subprocess.run(command, cwd=folder.parent, env=own, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
+    if hasattr(os, "fork") and not any(name in environment for name in _EARLY):
+        done = _forked(folder.parent, script, own)
+    else:
+        command = [sys.executable, "-B", "-P", "-c", script]
+        done = subprocess.run(command, cwd=folder.parent, env=own, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, f"ended with {done.returncode}: {done.stderr}"
     return done
+
+
+def _forked(folder: Path, script: str, environment: dict[str, str]) -> "subprocess.CompletedProcess[str]":
+    server = _server(os.getpid())
+    assert server.stdin is not None and server.stdout is not None
+    with tempfile.TemporaryDirectory() as place:
+        out, err = Path(place, "out"), Path(place, "err")
+        asked = {"folder": str(folder), "script": script, "environment": environment, "out": str(out), "err": str(err)}
+        server.stdin.write(json.dumps(asked) + "\n")
+        server.stdin.flush()
+        code = int(server.stdout.readline())
+        return subprocess.CompletedProcess(script, code, out.read_text(), err.read_text())

@@ -1,16 +1,15 @@
-"""A short run of tests/fuzz.py, and proof that its checks find what they are there to find."""
+"""A short run of tests/fuzz, and proof that its checks find what they are there to find."""
 
+import subprocess
+import sys
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import fuzz
-import fuzz_faults
-import fuzz_files
-import fuzz_scenes
 import numpy as np
 import pytest
+from fuzz import faults, files, run, scenes
 from numpy.random import default_rng
 
 from renderer import (
@@ -48,28 +47,28 @@ SHORT = {
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    fuzz.prepare(tmp_path)
+    run.prepare(tmp_path)
     return tmp_path
 
 
-@pytest.mark.parametrize("name", fuzz_files.SEEDS)
+@pytest.mark.parametrize("name", files.SEEDS)
 def test_mutated_files_are_refused_or_right(folder: Path, name: str) -> None:
-    outcomes = [fuzz_files.check(folder / name, fuzz_files.mutated(name, 0, index), index) for index in range(INPUTS)]
+    outcomes = [files.check(folder / name, files.mutated(name, 0, index), index) for index in range(INPUTS)]
     # Both ways were gone: mutations that all fail, or that all load, would test one of them only.
     assert 0 < outcomes.count("refused") < INPUTS
 
 
-@pytest.mark.parametrize("name", fuzz_files.SEEDS)
+@pytest.mark.parametrize("name", files.SEEDS)
 def test_the_seed_files_load(folder: Path, name: str) -> None:
-    counted = Path(name).suffix in fuzz_files.COUNTERS
-    assert fuzz_files.check(folder / name, fuzz_files.SEEDS[name], 0) == ("counted" if counted else "loaded")
+    counted = Path(name).suffix in files.COUNTERS
+    assert files.check(folder / name, files.SEEDS[name], 0) == ("counted" if counted else "loaded")
 
 
-@pytest.mark.parametrize("name", fuzz_files.SEEDS)
+@pytest.mark.parametrize("name", files.SEEDS)
 def test_inputs_are_the_same_again_and_differ_from_each_other(name: str) -> None:
-    inputs = [fuzz_files.mutated(name, 3, index) for index in range(40)]
-    assert inputs == [fuzz_files.mutated(name, 3, index) for index in range(40)]
-    assert len(set(inputs)) > 30 and inputs != [fuzz_files.mutated(name, 4, index) for index in range(40)]
+    inputs = [files.mutated(name, 3, index) for index in range(40)]
+    assert inputs == [files.mutated(name, 3, index) for index in range(40)]
+    assert len(set(inputs)) > 30 and inputs != [files.mutated(name, 4, index) for index in range(40)]
 
 
 def test_finds_an_exception_that_is_let_through(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,7 +77,7 @@ def test_finds_an_exception_that_is_let_through(folder: Path, monkeypatch: pytes
 
     monkeypatch.setitem(mesh_io._PARSERS, ".ply", careless)
     with pytest.raises(KeyError):
-        fuzz_files.check(folder / "ascii.ply", fuzz_files.SEEDS["ascii.ply"], 0)
+        files.check(folder / "ascii.ply", files.SEEDS["ascii.ply"], 0)
 
 
 @pytest.mark.parametrize("name", ["ascii.ply", "little.ply", "big.ply"])
@@ -86,24 +85,22 @@ def test_finds_a_face_that_is_dropped_silently(folder: Path, monkeypatch: pytest
     cut = ply._polygons
     monkeypatch.setattr(ply, "_polygons", lambda *given: cut(*given)[:-1])
     with pytest.raises(AssertionError, match="a silent drop"):
-        fuzz_files.check(folder / name, fuzz_files.SEEDS[name], 0)
+        files.check(folder / name, files.SEEDS[name], 0)
 
 
 def test_finds_a_repair_without_its_warning(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = folder / "plain.obj"
-    content = fuzz_files.SEEDS["plain.obj"] + b"f 1 2 99\n"
-    assert fuzz_files.check(path, content, 0) == "repaired"
+    content = files.SEEDS["plain.obj"] + b"f 1 2 99\n"
+    assert files.check(path, content, 0) == "repaired"
     monkeypatch.setattr(mesh_io.warnings, "warn", lambda *_, **__: None)
     with pytest.raises(AssertionError, match="without its warning"):
-        fuzz_files.check(path, content, 0)
+        files.check(path, content, 0)
 
 
 def test_finds_a_line_that_is_dropped_silently(folder: Path) -> None:
-    content = fuzz_files.SEEDS["plain.obj"]
-    assert (
-        fuzz_files.triangles_by_lines(content) == 15 == fuzz_files.triangles_by_lines(content.replace(b"\n", b"\r\n"))
-    )
-    assert fuzz_files.triangles_by_lines(content + b"f 1 2 3 4 5\n") == 18
+    content = files.SEEDS["plain.obj"]
+    assert files.triangles_by_lines(content) == 15 == files.triangles_by_lines(content.replace(b"\n", b"\r\n"))
+    assert files.triangles_by_lines(content + b"f 1 2 3 4 5\n") == 18
 
 
 def test_finds_a_reader_that_does_not_end(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,9 +109,9 @@ def test_finds_a_reader_that_does_not_end(folder: Path, monkeypatch: pytest.Monk
             pass
 
     monkeypatch.setitem(mesh_io._PARSERS, ".ply", endless)
-    monkeypatch.setattr(fuzz_files, "SECONDS", 0.05)
+    monkeypatch.setattr(files, "SECONDS", 0.05)
     with pytest.raises(TimeoutError):
-        fuzz_files.check(folder / "ascii.ply", fuzz_files.SEEDS["ascii.ply"], 0)
+        files.check(folder / "ascii.ply", files.SEEDS["ascii.ply"], 0)
 
 
 def test_finds_a_wrong_hit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,30 +122,30 @@ def test_finds_a_wrong_hit(monkeypatch: pytest.MonkeyPatch) -> None:
         hits.t[hits.hit] = np.nextafter(hits.t[hits.hit], 0.0)
         return hits
 
-    assert fuzz_files.check_mesh(box(), default_rng(0))
+    assert files.check_mesh(box(), default_rng(0))
     monkeypatch.setattr(octree.BruteForce, "closest_hit", wrong)
     with pytest.raises(AssertionError):
-        fuzz_files.check_mesh(box(), default_rng(0))
+        files.check_mesh(box(), default_rng(0))
 
 
 def test_meshes_that_no_octree_holds_are_told_apart() -> None:
     spread = Mesh([[0, 0, 0], [1e-300, 0, 0], [0, 1e300, 0]], [[0, 1, 2]])  # type: ignore[arg-type]
     with pytest.raises(MeshError):
         octree.Octree.from_mesh(spread)
-    assert not fuzz_files.check_mesh(spread, default_rng(0))
+    assert not files.check_mesh(spread, default_rng(0))
 
 
 # --- scenes, rays and faults -----------------------------------------------------------------------------------
 
 
 def judged(folder: Path, name: str, inputs: int) -> Counter[str]:
-    kind = fuzz.KINDS[name]
+    kind = run.KINDS[name]
     return Counter(kind.judge(folder, kind.make(0, index), index) for index in range(inputs))
 
 
 def complaints(folder: Path, name: str, inputs: int) -> str:
     """What the checks of a kind say, all in one text."""
-    kind, told = fuzz.KINDS[name], []
+    kind, told = run.KINDS[name], []
     for index in range(inputs):
         try:
             kind.judge(folder, kind.make(0, index), index)
@@ -158,7 +155,7 @@ def complaints(folder: Path, name: str, inputs: int) -> str:
 
 
 def test_every_kind_is_in_the_short_run() -> None:
-    assert {*fuzz_files.SEEDS, *SHORT} == set(fuzz.KINDS)
+    assert {*files.SEEDS, *SHORT} == set(run.KINDS)
 
 
 @pytest.mark.parametrize("name", SHORT)
@@ -169,21 +166,28 @@ def test_extreme_inputs_are_refused_or_right(folder: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", SHORT)
 def test_extreme_inputs_are_the_same_again(name: str) -> None:
-    make = fuzz.KINDS[name].make
+    make = run.KINDS[name].make
     inputs = [repr(make(3, index)) for index in range(40)]
     assert inputs == [repr(make(3, index)) for index in range(40)]
     assert len(set(inputs)) > 20 and inputs != [repr(make(4, index)) for index in range(40)]
 
 
 def test_the_rare_kind_comes_thirty_times_at_most() -> None:
-    turns = fuzz.Turns(list(fuzz.KINDS))
+    turns = run.Turns(list(run.KINDS))
     counts = Counter(turns[index] for index in range(200_000))
-    assert counts["cache"] == fuzz.MOST_RARE and set(counts) == set(fuzz.KINDS)
-    assert fuzz.Turns(["cache"])[0] == "cache" and fuzz.Turns(["cache", "query"])[fuzz.RARE - 1] == "cache"
+    assert counts["cache"] == run.MOST_RARE and set(counts) == set(run.KINDS)
+    assert run.Turns(["cache"])[0] == "cache" and run.Turns(["cache", "query"])[run.RARE - 1] == "cache"
+
+
+def test_the_folder_runs_as_a_command() -> None:
+    """Modules such as ``files`` stand beside ``__main__.py``; those of the package are found all the same."""
+    command = [sys.executable, str(Path(run.__file__).parent), "--inputs", "1", "--first", "4711", "--kinds", "camera"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and "\n1 inputs in" in done.stdout, done.stdout + done.stderr
 
 
 def test_a_finding_is_kept_and_counted_once(tmp_path: Path, capsys: Any) -> None:
-    log = fuzz.Log(tmp_path)
+    log = run.Log(tmp_path)
     for index, given in ((7, {"eye": float("nan")}), (8, {})):
         try:
             raise AssertionError("wrong")
@@ -199,7 +203,7 @@ def test_a_finding_is_kept_and_counted_once(tmp_path: Path, capsys: Any) -> None
 @pytest.mark.parametrize("plane", ["radiance", "depth", "face", "nan"])
 def test_finds_another_picture(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, plane: str) -> None:
     """Every second picture has one pixel that is another by one bit, or all have one of no light."""
-    right, calls = fuzz_scenes.render, [0]
+    right, calls = scenes.render, [0]
 
     def wrong(*arguments: Any, **options: Any) -> Any:
         image = right(*arguments, **options)
@@ -214,7 +218,7 @@ def test_finds_another_picture(folder: Path, monkeypatch: pytest.MonkeyPatch, na
         changed.view(np.uint8).reshape(-1)[0] ^= 1
         return replace(image, **{plane: changed})
 
-    monkeypatch.setattr(fuzz_scenes, "render", wrong)
+    monkeypatch.setattr(scenes, "render", wrong)
     assert ("no light" if plane == "nan" else f"another {plane}") in complaints(folder, name, 20)
 
 
@@ -223,7 +227,7 @@ def test_finds_an_error_that_is_not_clear(folder: Path, monkeypatch: pytest.Monk
     def unclear(*_: Any, **__: Any) -> None:
         raise ValueError("1 validation error\nhttps://errors.pydantic.dev")
 
-    monkeypatch.setattr(fuzz_scenes, "render", unclear)
+    monkeypatch.setattr(scenes, "render", unclear)
     monkeypatch.setattr(Octree, "closest_hit", unclear)
     assert "says not what is wrong" in complaints(folder, name, 20)
 
@@ -262,12 +266,12 @@ def test_finds_a_file_that_is_left_or_cut_off(folder: Path, monkeypatch: pytest.
 
     def careless(path: Any, write: Any) -> None:
         try:
-            with fuzz_faults.files.open(path, "wb") as file:
+            with faults.files.open(path, "wb") as file:
                 write(file)
         except OSError as error:
             raise OSError("no") from error
 
-    monkeypatch.setattr(fuzz_faults.files, "open", open, raising=False)
+    monkeypatch.setattr(faults.files, "open", open, raising=False)
     for module in ("renderer.picture.image", "renderer.scene.scene", "renderer.mesh.load"):
         monkeypatch.setattr(f"{module}.write_atomically", careless)
     said = complaints(folder, "output", 100)
@@ -278,15 +282,15 @@ def test_finds_another_content(folder: Path, monkeypatch: pytest.MonkeyPatch) ->
     right = mesh_io.format_ply
     monkeypatch.setattr(mesh_io, "format_ply", lambda mesh: right(mesh)[:-1])
     assert "another content" not in complaints(folder, "output", 0)
-    monkeypatch.setattr(fuzz_faults, "_whole", lambda what: b"x")
+    monkeypatch.setattr(faults, "_whole", lambda what: b"x")
     assert "another content than was written" in complaints(folder, "output", 40)
 
 
-@pytest.mark.parametrize("damage", ["a wrong answer", "not noticed", "exit code"])
+@pytest.mark.parametrize("damage", ["a wrong answer", "not noticed", "ended with 3"])
 def test_finds_a_process_that_damage_misleads(folder: Path, monkeypatch: pytest.MonkeyPatch, damage: str) -> None:
     """The small package with a store that does not look what it reads, or a run that answers otherwise."""
     given = {"damage": "a bit", "where": 0.0, "bit": 0}
-    package, _ = fuzz_faults._kept(folder)
+    package, _ = faults._kept(folder)
     if damage == "a wrong answer":
         (package / "below" / "deep" / "bottom.py").write_text("STEP = 11\n")
     elif damage == "not noticed":
@@ -295,12 +299,12 @@ def test_finds_a_process_that_damage_misleads(folder: Path, monkeypatch: pytest.
         assert text.count("if head != _HEADER or ") == 1
         store.write_text(text.replace("if head != _HEADER or ", "if "))
         # Of its own sources, so that the kernels that are kept are those of this store.
-        fuzz_faults.shutil.rmtree(folder / "kernels")
-        fuzz_faults.start(package, NUMBA_CACHE_DIR=str(folder / "kernels"))
+        faults.shutil.rmtree(folder / "kernels")
+        faults.start(package, NUMBA_CACHE_DIR=str(folder / "kernels"))
     else:
         (package / "upper.py").write_text("raise SystemExit(3)\n")
-    with pytest.raises(AssertionError, match=None if damage == "exit code" else damage):
-        fuzz.KINDS["cache"].judge(folder, given, 0)
+    with pytest.raises(AssertionError, match=damage):
+        run.KINDS["cache"].judge(folder, given, 0)
 
 
 # --- what the long run found -----------------------------------------------------------------------------------

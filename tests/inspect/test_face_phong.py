@@ -81,7 +81,7 @@ def test_the_formula(eye: Any) -> None:
     what = scene((torus(), SHINY), shell, (box(), MATTE))
     got, expected = colors_of(what, eye).astype(int), srgb(twin(what, eye)).astype(int)
     assert got.shape == (sum(len(i.mesh.faces) for i in what.instances), 3)
-    assert len(np.unique(got, axis=0)) > 200
+    assert len(np.unique(got, axis=0)) > 1800
     # The twin's rounding differs: a code may be the next one where the radiance is within some 1e-15 of a step.
     assert np.abs(got - expected).max() <= 1
     assert (got != expected).mean() < 1e-3
@@ -142,7 +142,7 @@ class TestStandIns:
         floor = (box((-3, -2, -3), (3, -1, 3)), MATTE)
         got = colors_of(scene((icosphere(2), material), floor))
         np.testing.assert_array_equal(got, colors_of(scene((icosphere(2), Phong(diffuse=grey)), floor)))
-        assert got[:320].max() > 60
+        assert got[:320].max() > 160
 
     def test_the_world_stays_as_it_is(self) -> None:
         _, world = pack(scene((icosphere(1), Mirror(type="mirror")), (box(), MATTE)))

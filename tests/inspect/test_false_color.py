@@ -55,7 +55,7 @@ class TestAll:
     def test_a_miss_shows_the_background(self, aov: str) -> None:
         image = ball()
         missed = false_color(image, aov)[image.face < 0]
-        assert len(missed) > 100
+        assert len(missed) > 900
         # A miss has its cost too: the camera ray.
         expected = VIRIDIS[0] if aov == "cost" else srgb(BACKGROUND)
         np.testing.assert_array_equal(missed, np.broadcast_to(expected, missed.shape))
@@ -84,7 +84,7 @@ class TestDepth:
         hit = image.face >= 0
         order = np.argsort(image.depth[hit])
         assert (np.diff(grey[hit][order]) <= 0).all()
-        assert len(np.unique(grey[hit])) > 50
+        assert len(np.unique(grey[hit])) > 100
 
     def test_limits_hold_still_what_would_change_with_the_view(self) -> None:
         shades = false_color(row(), "depth", (2.5, 3.5))[0, :3, 0].tolist()

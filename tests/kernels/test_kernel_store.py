@@ -242,41 +242,41 @@ def test_a_machine_runs_the_levels_whose_features_it_has(monkeypatch, lacks, tri
     assert runnable_levels.__wrapped__() == levels
 
 
+@pytest.fixture(scope="module")
+def ahead(tmp_path_factory):
+    """The kernels of the package for a level that this machine runs, compiled once where another copy of it is."""
+    level, place = runnable_levels()[-1], tmp_path_factory.mktemp("ahead")
+    processor = {"NUMBA_CPU_NAME": LEVELS[level], "NUMBA_CPU_FEATURES": ""}
+    assert run(write_package(place), NUMBA_CACHE_DIR=str(place / "made"), **processor) == COMPILED
+    (folder,) = (place / "made").iterdir()
+    return folder
+
+
 class TestAhead:
     """Folders of kernels that were compiled for a level of processors, and are only read."""
 
-    def made(self, package, tmp_path, level):
-        """A folder of the package's kernels for a level, which no other folder has."""
-        processor = {"NUMBA_CPU_NAME": LEVELS[level], "NUMBA_CPU_FEATURES": ""}
-        made = tmp_path / "made"
-        assert run(package, NUMBA_CACHE_DIR=str(made), **processor) == COMPILED
-        (folder,) = made.iterdir()
-        return folder
+    @pytest.fixture
+    def folder(self, ahead, tmp_path):
+        """A folder of its own with them, which no other folder has."""
+        return shutil.copytree(ahead, tmp_path / "made" / ahead.name)
 
-    def level(self):
-        return runnable_levels()[-1]
-
-    def test_they_are_found_where_the_environment_names_them(self, package, tmp_path):
-        folder = self.made(package, tmp_path, self.level())
+    def test_they_are_found_where_the_environment_names_them(self, package, folder, tmp_path):
         assert run(package, OCTREE_RENDERER_KERNELS=f"{tmp_path / 'none'}{os.pathsep}{folder}") == LOADED
         assert run(package) == COMPILED
 
-    def test_a_package_may_carry_them(self, package, tmp_path):
-        self.made(package, tmp_path, self.level()).rename(package / "compiled")
+    def test_a_package_may_carry_them(self, package, folder):
+        folder.rename(package / "compiled")
         assert run(package) == LOADED
 
-    def test_they_are_not_used_for_other_sources(self, package, tmp_path):
-        folder = self.made(package, tmp_path, self.level())
+    def test_they_are_not_used_for_other_sources(self, package, folder):
         bottom_of(package).write_text("STEP = 20\n")
         assert run(package, OCTREE_RENDERER_KERNELS=str(folder)) == ["27", "0", "1"]
 
-    def test_they_are_not_used_by_a_machine_that_lacks_the_level(self, package, tmp_path):
-        folder = self.made(package, tmp_path, self.level())
+    def test_they_are_not_used_by_a_machine_that_lacks_the_level(self, package, folder):
         pretend = "import renderer.kernels.store as store\nstore.runnable_levels = tuple\n"
         assert run(package, pretend + RUN, OCTREE_RENDERER_KERNELS=str(folder)) == COMPILED
 
-    def test_they_are_never_written(self, package, tmp_path):
-        folder = self.made(package, tmp_path, self.level())
+    def test_they_are_never_written(self, package, folder):
         before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
         bottom_of(package).write_text("STEP = 20\n")
         assert run(package, OCTREE_RENDERER_KERNELS=str(folder)) == ["27", "0", "1"]

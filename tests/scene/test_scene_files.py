@@ -108,4 +108,4 @@ def test_stairs_have_the_radiance_of_their_slopes() -> None:
         assert matches
         on_stairs += image.face[y, x] < 44
         both += image.face[y, x] < 44 and np.allclose(image.radiance[y, x], sum(terms), rtol=1e-6)
-    assert on_stairs > 500 and both > 0.5 * on_stairs
+    assert on_stairs > 1500 and both > 0.5 * on_stairs

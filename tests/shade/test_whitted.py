@@ -200,7 +200,7 @@ class TestShadows:
                 continue  # the lamp's own surface stands before the plane
             lit += 1
             hidden += image.radiance[0, 0, 0] == 0.0
-        assert hidden == 0 and lit > 90
+        assert hidden == 0 and lit > 95
 
     @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
     def test_a_floor_through_the_origin_does_not_shadow_itself(self, scale: float) -> None:
@@ -217,7 +217,7 @@ class TestShadows:
                 )
                 image = render(lit, resolution=(40, 40), threads=1)
                 on = image.face >= 0
-                assert on.sum() > 500
+                assert on.sum() > 1200
                 cosine = -sun[1] / math.hypot(*sun)
                 np.testing.assert_allclose(image.radiance[on], cosine, rtol=REL)
 
@@ -518,7 +518,7 @@ class TestLaws:
         options: Any = {"resolution": (50, 37), "samples": 4, "offset": offset, "threads": 1}
         brute = render(mixed(), accelerator="brute", **options)
         assert_same_bits(render(mixed(), split=split, **options), brute)
-        assert len(np.unique(brute.face)) > 100
+        assert len(np.unique(brute.face)) > 250
 
     def test_neither_do_threads_or_another_run(self) -> None:
         first = render(mixed(), resolution=(97, 65), threads=1)

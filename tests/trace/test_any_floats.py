@@ -89,7 +89,7 @@ def test_no_ray_leaves_its_stack_or_spoils_another(kind, alike, any_hit):
     rng = np.random.default_rng([1, len(kind), alike])
     mesh = icosphere(3) if kind == "sphere" else Mesh(*make_mesh(kind, 5, 500))
     octree = Octree.from_mesh(mesh, leaf_size=4)
-    assert octree.tree.depth > 1
+    assert octree.tree.depth >= 3
     with np.errstate(all="ignore"):
         rays = any_rays(rng, 6000, alike)
         found, right = answers(octree, rays, any_hit), answers(octree, rays, any_hit, by_blocks=True)
@@ -99,7 +99,7 @@ def test_no_ray_leaves_its_stack_or_spoils_another(kind, alike, any_hit):
         np.testing.assert_array_equal(found[good], right[good])
         return
     faces = found[3].view(np.int64)
-    assert (faces[good] >= 0).sum() > 20
+    assert (faces[good] >= 0).sum() > 450
     np.testing.assert_array_equal(found[:, good], right[:, good])
     assert (faces >= -1).all()
     assert (faces < len(mesh.faces)).all()

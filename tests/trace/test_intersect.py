@@ -310,7 +310,7 @@ def test_no_box_is_missed_that_a_ray_meets_and_no_entry_is_late(seed):
             first = found[0] * Fraction(float(np.abs(d).max()))
             # What enters later than the best hit's padded distance is dropped, so an entry may err by the padding.
             assert Fraction(float(entry[k])) <= first * (1 + 8 * Fraction(2) ** -23)
-    assert met >= 150
+    assert met >= 190
     # The rays are aimed at boxes to the last bit, so some misses within rounding enter; most misses must not.
     assert wrongly_entered < 0.2 * (7 * len(origins) - met)
 
@@ -330,4 +330,4 @@ def test_the_interval_keeps_boxes_at_its_ends_and_drops_those_beyond(seed):
             assert entered(node, o, d, 0.0, np.nextafter(first, np.inf), entry) >> k & 1
             dropped += not entered(node, o, d, 1.001 * last, np.inf, entry) >> k & 1
             dropped += not entered(node, o, d, 0.0, 0.999 * first, entry) >> k & 1
-    assert dropped > 50
+    assert dropped > 350

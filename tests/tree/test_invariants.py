@@ -47,7 +47,7 @@ class Broken:
         self.links = self.tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
         self.boxes = nodes.reshape(-1, NODE_WORDS)[:, :CHILDREN].reshape(-1, 3, 2, 8)
         self.used = self.boxes[:, 0, 0] < np.inf
-        assert self.tree.depth > 2 and (~self.used).any() and (self.tree.faces < 0).any()
+        assert self.tree.depth == 4 and (~self.used).any() and (self.tree.faces < 0).any()
 
     def found(self):
         return faults(self.tree, self.mesh)
@@ -108,18 +108,19 @@ def link_to(target):
     return inject
 
 
+# What is put in, and what is said of it.
 ON_A_CHILD = {
-    "lower shrunk": shrink(0),
-    "upper shrunk": shrink(1),
-    "inverted": invert,
-    "nan": nan_box,
-    "hidden": hide,
-    "to the root": link_to(0),
-    "to no node": link_to(10**6),
-    "to the largest number": link_to(2**31 - 1),
-    "to no block": link_to(~(10**6 << LEAF_BITS)),
-    "to the smallest number": link_to(-(2**31)),
-    "to the first block": link_to(~0),
+    "lower shrunk": (shrink(0), "reaches outside"),
+    "upper shrunk": (shrink(1), "reaches outside"),
+    "inverted": (invert, "octant {place}: inverted box"),
+    "nan": (nan_box, "octant {place}: inverted box"),
+    "hidden": (hide, "reached 0 times"),
+    "to the root": (link_to(0), "node 0: reached 2 times"),
+    "to no node": (link_to(10**6), "a link to node 1000000 of"),
+    "to the largest number": (link_to(2**31 - 1), "a link to node 2147483647 of"),
+    "to no block": (link_to(~(10**6 << LEAF_BITS)), "octant {place}: leaf of blocks 1000000 to"),
+    "to the smallest number": (link_to(-(2**31)), "octant {place}: leaf of blocks 268435455 to"),
+    "to the first block": (link_to(~0), "octant {place}: a face reaches outside the leaf's box"),
 }
 
 
@@ -127,8 +128,10 @@ ON_A_CHILD = {
 @pytest.mark.parametrize("child", ["some_node", "some_leaf"])
 def test_a_fault_in_a_child_is_found(fault, child):
     broken = Broken()
-    ON_A_CHILD[fault](broken, getattr(broken, child)())
-    assert broken.found()
+    inject, said = ON_A_CHILD[fault]
+    node, place = getattr(broken, child)()
+    inject(broken, (node, place))
+    assert any(said.format(place=place) in found for found in broken.found())
 
 
 @pytest.mark.parametrize("inject", [shrink_by_one_ulp, grow])

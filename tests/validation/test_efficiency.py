@@ -39,7 +39,7 @@ def test_each_contender_errs_as_its_numbers_are_stored(record: dict[str, Any]) -
     for name in ("ours_float32", "embree_default", "embree_robust", "igl", "mitsuba"):
         assert 1e-9 < points[name]["errors"]["p99"] < 1e-5
     assert points["ours"]["leaks"] == 0 == points["ours_float32"]["leaks"]
-    assert points["embree_default"]["leaks"] > 100
+    assert points["embree_default"]["leaks"] > 800
     assert points["embree_default"]["leaks"] > points["embree_robust"]["leaks"]
     # Mitsuba asks Embree in robust mode, for the same float32 rays.
     assert points["mitsuba"]["errors"] == points["embree_robust"]["errors"]

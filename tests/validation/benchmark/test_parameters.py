@@ -100,7 +100,7 @@ def test_float32_storage_errs_by_its_rounding_and_float64_by_none(hits):
     assert hits["mesh"]["float32"] is False
     for family in hits["storage"]:
         errors = {p["name"]: p["errors"] for p in family["points"]}
-        assert all(e["both_hit"] > 50 for e in errors.values())
+        assert all(e["both_hit"] > 130 for e in errors.values())
         # Rays are no closer than 0.1 to their origin in this mesh of radius 3.4: float64 keeps twelve digits, while
         # float32 vertices, wrong by up to 2^-24 of that radius, leave a median above 1e-9.
         assert errors["float64"]["max"] < 1e-12
@@ -136,7 +136,7 @@ def test_a_tree_that_answers_otherwise_is_reported(monkeypatch):
     monkeypatch.setattr(parameter_hits, "_built", lambda m, t: built(moved if t.leaf_size == 8 else m, t))
     record = parameter_hits.tree_parameters(mesh, (rays,), 1)
     differing = {p["name"]: p["differing_rays"] for p in record["points"]}
-    assert record["differing_rays"] == sum(differing.values()) > 100
+    assert record["differing_rays"] == sum(differing.values()) > 450
     assert {name for name, count in differing.items() if count} == {
         "midpoint, leaf 8, depth 32",
         "sah, leaf 8, depth 32",

@@ -62,7 +62,7 @@ def test_right_hits_are_right():
     comparison = judged()
     assert comparison.ours_wrong == 0 and comparison.verdicts[NEAR_EDGE] == 0
     assert comparison.both_hit + comparison.both_miss + comparison.only_ours + comparison.only_theirs == len(RAYS)
-    assert comparison.both_hit > 200 and comparison.both_miss > 10
+    assert comparison.both_hit == 353 and comparison.both_miss == 47
     assert 1e-8 < comparison.t_error_p50 < 1e-7
     errors = exact_errors(OURS, EXACT, VERTICES, FACES, RAYS)
     assert errors.wrong == errors.near_edge == 0 and errors.disagreements == ()
@@ -181,7 +181,7 @@ def test_a_tie_may_name_any_face():
     target = VERTICES[3]
     batch = one_ray([0, 0, 0], target)
     hits = exact.closest_hits(VERTICES, FACES, batch.origins, batch.directions)
-    assert len(hits[0].faces_at_t) >= 5
+    assert len(hits[0].faces_at_t) == 5
     for face in hits[0].faces_at_t:
         assert exact_errors(answer(1.0, face), hits, VERTICES, FACES, batch).wrong == 0
         assert judged(answer(1.0, face), answer(np.inf, -1), batch).verdicts[OURS_RIGHT] == 1
@@ -214,7 +214,7 @@ def test_the_neighbour_at_an_edge_is_counted_apart_but_is_no_flip():
 
 def test_faces_are_not_compared_where_t_agrees():
     theirs = replace(THEIRS, face=np.where(THEIRS.hit, (THEIRS.face + 1) % len(FACES), -1))
-    assert np.count_nonzero(theirs.face != THEIRS.face) > 200
+    assert np.count_nonzero(theirs.face != THEIRS.face) > 350
     first, second = compare(OURS, THEIRS, VERTICES, FACES, RAYS), compare(OURS, theirs, VERTICES, FACES, RAYS)
     assert [d.ray for d in first.disagreements] == [d.ray for d in second.disagreements]
 

@@ -78,7 +78,8 @@ def test_bound_holds_for_the_kernel(real, roundoff, height, offset):
         bound = t_bounds(triangle[None], origin[None], direction[None], edges, roundoff)[0]
         assert abs(Fraction(float(t)) - depth / (u + v + w)) <= bound
         checked += np.isfinite(bound)
-    assert checked > 100 or (height < 1e-2 and real is np.float32)
+    # Float32 bounds few of the thinnest triangles.
+    assert checked > (10 if height < 1e-2 and real is np.float32 else 100)
 
 
 def test_bound_is_sharp_enough_to_see_a_fault():

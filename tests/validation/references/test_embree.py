@@ -37,7 +37,7 @@ def test_faces_and_t_are_those_of_exact_arithmetic():
     t, face = embree.Embree(vertices, faces).closest_hit(batch.origins, batch.directions)
     expected = exact.closest_hits(vertices, faces, batch.origins, batch.directions)
     assert [-1 if hit is None else hit.face for hit in expected] == face.tolist()
-    assert np.count_nonzero(face >= 0) > 50
+    assert np.count_nonzero(face >= 0) > 150
     for found, hit in zip(t, expected, strict=True):
         # A thousand float32 roundings: random triangles and rays are seldom flatter than 1e-2.
         assert hit is None or abs(found - float(hit.t)) <= 1000 * 2.0**-24 * float(hit.t)

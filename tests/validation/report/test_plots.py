@@ -27,6 +27,12 @@ def plot(title="Errors"):
     return loglog(SERIES, x_label="offset", y_label="error", title=title)
 
 
+@pytest.fixture(scope="module")
+def svg():
+    """The plot of ``SERIES``, drawn once."""
+    return plot()
+
+
 def texts(svg):
     return [text for element in ElementTree.fromstring(svg).iter() for text in element.itertext()]
 
@@ -35,23 +41,21 @@ def ids(svg):
     return [element.attrib["id"] for element in ElementTree.fromstring(svg).iter() if "id" in element.attrib]
 
 
-def test_a_plot_names_its_series_axes_and_title():
-    shown = texts(plot())
+def test_a_plot_names_its_series_axes_and_title(svg):
+    shown = texts(svg)
     for name in ("ours & theirs", "other", "offset", "error", "Errors"):
         assert name in shown
-    assert ElementTree.fromstring(plot())[0].tag == "{http://www.w3.org/2000/svg}title"
+    assert ElementTree.fromstring(svg)[0].tag == "{http://www.w3.org/2000/svg}title"
 
 
-def test_a_plot_has_no_link_no_date_and_no_header():
-    svg = plot()
+def test_a_plot_has_no_link_no_date_and_no_header(svg):
     assert svg.startswith('<svg xmlns="http://www.w3.org/2000/svg"')
     assert svg.replace('xmlns="http://www.w3.org/2000/svg"', "").count("http") == 0
     for absent in ("<?xml", "<!DOCTYPE", "<metadata", "<style", "xlink", "DejaVu", "#ffffff", "#010203"):
         assert absent not in svg
 
 
-def test_every_reference_within_a_plot_leads_to_one_id():
-    svg = plot()
+def test_every_reference_within_a_plot_leads_to_one_id(svg):
     known = ids(svg)
     assert len(known) == len(set(known))
     used = [e.attrib["href"] for e in ElementTree.fromstring(svg).iter() if "href" in e.attrib]
@@ -60,9 +64,9 @@ def test_every_reference_within_a_plot_leads_to_one_id():
     assert {reference[1:] for reference in used + clips} <= set(known)
 
 
-def test_equal_arguments_give_equal_text_and_others_other_ids():
-    assert plot() == plot()
-    assert not set(ids(plot())) & set(ids(plot("Leaks")))
+def test_equal_arguments_give_equal_text_and_others_other_ids(svg):
+    assert svg == plot()
+    assert not set(ids(svg)) & set(ids(plot("Leaks")))
 
 
 def test_an_x_that_has_no_logarithm_is_refused():

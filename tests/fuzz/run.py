@@ -1,22 +1,7 @@
-"""Inputs at the ends of what there is: each gives one clear error or a sound result.
-
-Kinds, each input the same again by its seed and number:
-
-files       mutated mesh and scene files (ascii.ply ... scene.toml), fuzz_files.py
-camera, light, transform, settings    scenes at the ends of numbers, fuzz_scenes.py
-query       rays at the ends of numbers, of odd shapes and types, fuzz_rays.py
-output      files that cannot be written, fuzz_faults.py
-cache       damaged folders of compiled kernels, each in a process of its own, fuzz_faults.py
-
-The long run, with its findings kept as files, and one input of it again:
-
-    python tests/fuzz.py --inputs 100000 --seed 1 [--kinds ascii.ply camera] [--keep folder]
-    python tests/fuzz.py --inputs 1 --first 4711 --kinds camera
-"""
+"""Run inputs of all kinds, count what came of them, and tell and keep what is wrong."""
 
 import argparse
 import faulthandler
-import sys
 import tempfile
 import time
 import traceback
@@ -24,24 +9,21 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import fuzz_faults
-import fuzz_files
-import fuzz_rays
-import fuzz_scenes
-from fuzz_values import SECONDS, Kind
-
+import fuzz
+from fuzz import faults, files, rays, scenes
+from fuzz.values import SECONDS, Kind
 from renderer.mesh.ply import format_ply
 from renderer.mesh.shapes import box
 
-KINDS: dict[str, Kind] = {**fuzz_files.KINDS, **fuzz_scenes.KINDS, **fuzz_rays.KINDS, **fuzz_faults.KINDS}
+KINDS: dict[str, Kind] = {**files.KINDS, **scenes.KINDS, **rays.KINDS, **faults.KINDS}
 # A kind whose share is 0 comes once in so many inputs, so often at most.
 RARE, MOST_RARE = 3500, 30
 
 
 def prepare(folder: Path) -> None:
     """Put beside the inputs what they refer to, and compile the kernels before a clock starts."""
-    fuzz_files.prepare(folder)
-    for kinds in (fuzz_scenes, fuzz_rays, fuzz_faults):
+    files.prepare(folder)
+    for kinds in (scenes, rays, faults):
         kinds.prepare_kinds()
     (folder / "box.ply").write_bytes(format_ply(box()))
 
@@ -121,7 +103,9 @@ def judge(name: str, folder: Path, seed: int, index: int, log: Log) -> None:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="tests/fuzz", description=fuzz.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--inputs", type=int, default=100_000)
     parser.add_argument("--first", type=int, default=0, help="the number of the first input")
     parser.add_argument("--seed", type=int, default=1)
@@ -146,7 +130,3 @@ def main() -> int:
     faulthandler.cancel_dump_traceback_later()
     log.print(done, time.perf_counter() - began)
     return 1 if log.findings else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -16,8 +16,8 @@ from random import Random
 import numpy as np
 import plyfile
 import trimesh
-from fuzz_values import SECONDS, Kind, time_limit
 
+from fuzz.values import SECONDS, Kind, time_limit
 from renderer import BruteForce, Mesh, MeshError, Octree, Scene, SceneError, load_mesh, load_scene
 from renderer.mesh.mesh import RepairWarning
 from renderer.mesh.ply import format_ply

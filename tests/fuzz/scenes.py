@@ -13,8 +13,8 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from fuzz_values import NOT_FINITE, Kind, expect_clear, extreme, vector
 
+from fuzz.values import NOT_FINITE, Kind, expect_clear, extreme, vector
 from renderer import (
     CutWarning,
     Dielectric,
