@@ -12,26 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect, is_count
-from renderer.kernels.jit import kernel
-from renderer.kernels.vec3 import add, dot, normalized, scale, sub, times
+from renderer.kernels.vec3 import add, dot, normalized, scale, times
 from renderer.picture.pack import media_around
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import checked_vector
-from renderer.shade.direct import SHORT_OF_LIGHT
-from renderer.shade.records import (
-    AMBIENT,
-    DIELECTRIC,
-    DIRECTIONAL,
-    IOR,
-    KIND,
-    LAMBERT,
-    MATERIAL_COLUMNS,
-    PHONG,
-    REFLECTANCE,
-    TRANSMITTANCE,
-)
-from renderer.shade.shading import fresnel, reflect, refract
-from renderer.shade.surface import MAX_MEDIA, SceneArrays, Surface, phong, scene_pointers, surface_at
+from renderer.shade.lights import aim_from
+from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG, REFLECTANCE
+from renderer.shade.shading import reflect
+from renderer.shade.surface import MAX_MEDIA, Surface, phong_of, surface_of
+from renderer.shade.whitted import refract_from
 from renderer.trace.spawn import BOUNDED, spawn_origin
 
 Vector = tuple[float, float, float]
@@ -148,12 +137,6 @@ def _goes_on(weight: Vector, min_weight: float) -> bool:
     return max(weight) > 0.0 and max(weight) >= min_weight
 
 
-@kernel
-def surface_of(arrays: SceneArrays, face: int, u: float, v: float, d: Vector) -> Surface:
-    """``surface_at``, for Python."""
-    return surface_at(scene_pointers(arrays), face, u, v, d)
-
-
 def _meet(prepared: PreparedScene, ray: _Ray) -> _Met | None:
     """The nearest surface on the ray's way."""
     hits = prepared.octree.closest_hit([ray.origin], [ray.direction])
@@ -199,32 +182,18 @@ def _hit_segments(prepared: PreparedScene, ray: _Ray, met: _Met, own: int, shado
 
 
 def _aim(prepared: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
-    """The ways to the lights that the surface faces, by the rules of ``direct``."""
+    """The ways to the lights that the surface faces."""
     if met.material[KIND] not in (PHONG, LAMBERT):
         return []
-    aims, (p, error, n_g, *_) = [], met.surface
-    for light in prepared.arrays.lights:
-        place, arriving = _color(light, 1), _color(light, 4)
-        directional = light[0] == DIRECTIONAL
-        to_light = place if directional else sub(place, p)
-        if dot(met.n, to_light) <= (0.0 if directional else error):
+    aims = []
+    for light in range(len(prepared.arrays.lights)):
+        seen, (o, way, t_max) = aim_from(prepared.arrays, met.surface, met.n, light)
+        if not seen.faces:
             continue
-        o = spawn_origin(p, error, n_g, to_light, BOUNDED)
-        if directional:
-            way, t_max, end = place, np.inf, _beyond(prepared, o, place)
-        else:
-            way, t_max, end = sub(place, o), SHORT_OF_LIGHT, place
-            arriving = scale(arriving, 1.0 / dot(to_light, to_light))
-            to_light = normalized(to_light)
-        seen = times(ray.weight, times(_phong(prepared.arrays, met.row, met.n, ray.direction, to_light), arriving))
-        aims.append(_Aim(o, way, t_max, end, seen))
+        end = _beyond(prepared, o, way) if seen.directional else seen.place
+        share = phong_of(prepared.arrays, met.row, met.n, ray.direction, seen.towards)
+        aims.append(_Aim(o, way, float(t_max), end, times(ray.weight, times(share, seen.arriving))))
     return aims
-
-
-@kernel
-def _phong(arrays: SceneArrays, m: int, n: Vector, d: Vector, towards: Vector) -> Vector:
-    """``phong``, for Python."""
-    return phong(scene_pointers(arrays), m, n, d, towards)
 
 
 def _shadow(prepared: PreparedScene, ray: _Ray, own: int, aim: _Aim) -> Segment:
@@ -238,23 +207,19 @@ def _shadow(prepared: PreparedScene, ray: _Ray, own: int, aim: _Aim) -> Segment:
 
 def _bounce(prepared: PreparedScene, ray: _Ray, met: _Met, own: int) -> list[_Ray]:
     """The rays that leave the surface: the reflected one, then the refracted one where light passes."""
-    d, m = ray.direction, met.material
-    k_r, k_t = _color(m, REFLECTANCE), _color(m, TRANSMITTANCE)
-    children = []
-    if any(k_t) or m[KIND] == DIELECTRIC:
-        limit = MAX_MEDIA if prepared.needs.refraction else 0
-        beyond = _cross(ray.media, met, limit)
-        # From inside, n1 is this material even where no entry was seen: an open mesh.
-        n1 = float(m[IOR]) if met.inside else _innermost_ior(prepared, ray.media)
-        n2 = _innermost_ior(prepared, beyond) if met.inside else float(m[IOR])
-        cos_t, through = refract(d, met.n, n1, n2)
-        if m[KIND] == DIELECTRIC:
-            f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, met.n), cos_t, n1, n2)
-            k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
-        if cos_t >= 0.0:
-            children.append(_child("refracted", ray, met, own, through, times(ray.weight, k_t), beyond))
-    mirrored = reflect(d, met.n)
-    return [_child("reflected", ray, met, own, mirrored, times(ray.weight, k_r), ray.media), *children]
+    limit = MAX_MEDIA if prepared.needs.refraction else 0
+    media, beyond = np.array(ray.media, np.int64), np.zeros(limit + 1, np.int64)
+    passes_light, through, passes, k_r, k_t, left = refract_from(
+        prepared.arrays, met.row, ray.direction, met.n, met.inside, media, beyond
+    )
+    if not passes_light:
+        k_r = _color(met.material, REFLECTANCE)
+    mirrored = reflect(ray.direction, met.n)
+    children = [_child("reflected", ray, met, own, mirrored, times(ray.weight, k_r), ray.media)]
+    if passes_light and passes:
+        inside = tuple(beyond[:left].tolist())
+        children.append(_child("refracted", ray, met, own, through, times(ray.weight, k_t), inside))
+    return children
 
 
 def _child(
@@ -262,17 +227,3 @@ def _child(
 ) -> _Ray:
     w, (p, error, n_g, *_) = normalized(direction), met.surface
     return _Ray(kind, ray.depth + 1, own, spawn_origin(p, error, n_g, w, BOUNDED), w, weight, media)
-
-
-def _cross(media: tuple[int, ...], met: _Met, limit: int) -> tuple[int, ...]:
-    """The media beyond the surface; leaving takes out the innermost entry of its material, wherever it stands."""
-    if not met.inside:
-        return (*media, met.row) if len(media) < limit else media
-    for k in reversed(range(len(media))):
-        if media[k] == met.row:
-            return media[:k] + media[k + 1 :]
-    return media
-
-
-def _innermost_ior(prepared: PreparedScene, media: tuple[int, ...]) -> float:
-    return float(prepared.arrays.materials[media[-1] // MATERIAL_COLUMNS, IOR]) if media else 1.0

@@ -7,12 +7,12 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import add, dot, normalized, row3, scale, sub, three, times
+from renderer.kernels.vec3 import add, row3, three, times
 from renderer.shade.bundle import SIZE
-from renderer.shade.records import DIELECTRIC, DIRECTIONAL, KIND, LIGHT_COLUMNS, MIRROR, UNLIT
+from renderer.shade.lights import aim, see_light
+from renderer.shade.records import DIELECTRIC, KIND, MIRROR, UNLIT
 from renderer.shade.surface import phong
 from renderer.trace.rays import RayPointers
-from renderer.trace.spawn import spawn_origin
 from renderer.trace.traverse import search_blocks, trace
 
 # What a lit ray of a bundle leaves for its light and its children, one column of SURFACE_DOUBLES float64 a ray.
@@ -21,10 +21,6 @@ SURFACE_DOUBLES = 15
 # A shadow ray: where it starts, where it goes, how far, the unit direction to the light and what arrives from there.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 _TOWARDS, _ARRIVING, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE
-
-# A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
-# covers angles down to 2^-12.
-SHORT_OF_LIGHT = 1.0 - 2.0**-36
 
 
 @kernel
@@ -51,45 +47,22 @@ def is_lit(materials, m):
     return kind != MIRROR and kind != DIELECTRIC and kind != UNLIT
 
 
-@inlined
-def _aim(scene, surface, light, offset):
-    """The shadow ray from a surface to a light: (whether the light faces it, origin, direction, t_max, unit direction,
-    the irradiance that arrives facing it).
-
-    A shadow ray to a point light ends at the light: t counts in units of the distance, and a surface at the light
-    itself does not hide it.
-    """
-    row = light * LIGHT_COLUMNS
-    towards, arriving = three(scene.lights, row + 1), three(scene.lights, row + 4)
-    p, n, n_g, error = three(surface, POINT), three(surface, NORMAL), three(surface, GEOMETRIC), get(surface, BOUND)
-    if get(scene.lights, row) == DIRECTIONAL:
-        if dot(n, towards) <= 0.0:
-            return False, p, towards, 0.0, towards, arriving
-        return True, spawn_origin(p, error, n_g, towards, offset), towards, np.inf, towards, arriving
-    to_light = sub(towards, p)
-    squared = dot(to_light, to_light)
-    # A light within rounding of the surface lies on it and does not light it; this also bounds 1 / r^2.
-    if dot(n, to_light) <= error:
-        return False, p, to_light, 0.0, to_light, arriving
-    o = spawn_origin(p, error, n_g, to_light, offset)
-    # Mitsuba stops ten of its epsilons short.
-    t_max = SHORT_OF_LIGHT if offset.bounded else 1.0 - 10.0 * offset.epsilon
-    return True, o, sub(towards, o), t_max, normalized(to_light), scale(arriving, 1.0 / squared)
-
-
 @kernel
 def _aim_all(scene, surfaces, lit, count, light, offset, shadows):
     """Aim the ``count`` rays in ``lit`` at a light. Returns how many face it; they go to ``lit`` from SIZE on."""
     aimed = 0
     for k in range(count):
         i = get(lit, k)
-        faces, o, d, t_max, towards, arriving = _aim(scene, at(surfaces, i * SURFACE_DOUBLES), light, offset)
-        if faces:
-            put3(shadows, _ORIGIN + 3 * aimed, o)
-            put3(shadows, _DIRECTION + 3 * aimed, d)
-            put(shadows, _T_MAX + aimed, t_max)
-            put3(shadows, _TOWARDS + 3 * aimed, towards)
-            put3(shadows, _ARRIVING + 3 * aimed, arriving)
+        surface = at(surfaces, i * SURFACE_DOUBLES)
+        p, n, n_g, error = three(surface, POINT), three(surface, NORMAL), three(surface, GEOMETRIC), get(surface, BOUND)
+        seen = see_light(scene.lights, light, p, n, error)
+        if seen.faces:
+            ray = aim(seen, p, n_g, error, offset)
+            put3(shadows, _ORIGIN + 3 * aimed, ray.origin)
+            put3(shadows, _DIRECTION + 3 * aimed, ray.direction)
+            put(shadows, _T_MAX + aimed, ray.t_max)
+            put3(shadows, _TOWARDS + 3 * aimed, seen.towards)
+            put3(shadows, _ARRIVING + 3 * aimed, seen.arriving)
             put(lit, SIZE + aimed, i)
             aimed += 1
     return aimed

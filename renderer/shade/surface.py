@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined
+from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import get, pointer
 from renderer.kernels.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
@@ -110,3 +110,15 @@ def phong(scene, m, n, d, towards):
         shininess = get(scene.materials, m + SHININESS)
         factor = add(factor, scale(three(scene.materials, m + SPECULAR), specular(d, n, towards, shininess)))
     return factor
+
+
+@kernel
+def surface_of(arrays, face, u, v, d):
+    """``surface_at``, for Python."""
+    return surface_at(scene_pointers(arrays), face, u, v, d)
+
+
+@kernel
+def phong_of(arrays, m, n, d, towards):
+    """``phong``, for Python."""
+    return phong(scene_pointers(arrays), m, n, d, towards)

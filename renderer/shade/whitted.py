@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, put
+from renderer.kernels.simd import at, get, pointer, put
 from renderer.kernels.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
 from renderer.shade.bundle import (
     BUNDLE_DOUBLES,
@@ -40,7 +40,7 @@ from renderer.shade.direct import (
 )
 from renderer.shade.records import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
-from renderer.shade.surface import surface_at
+from renderer.shade.surface import scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
 from renderer.trace.spawn import OffsetRule, spawn_origin
 from renderer.trace.traverse import Scratch
@@ -199,15 +199,17 @@ def _meet_surfaces(scene, bundle, work):
 
 
 @inlined
-def _refract(scene, bundle, surface, i, settings, beyond):
-    """The refracted ray: (its direction, whether there is one, k_r, k_t, the media beyond, in ``beyond``)."""
-    m, materials, count = np.int64(get(surface, MATERIAL)), scene.materials, get(bundle.media_counts, i)
-    d, n, inside = row3(bundle.directions, i), three(surface, NORMAL), get(surface, INSIDE) != 0.0
+def _refract(scene, m, d, n, inside, around, beyond):
+    """The refracted ray of a ray in direction d at a surface of material ``m``, whose normal n faces it.
+
+    ``around`` = (media, count, limit) are the media that the ray is in, how many, and how many it may remember.
+    Returns (its direction, whether there is one, k_r, k_t, the number of media beyond, which go to ``beyond``).
+    """
+    materials, (media, count, limit) = scene.materials, around
     k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
-    media = at(bundle.media, i * bundle.limit)
     for k in range(count):
         put(beyond, k, get(media, k))
-    left = _enter_or_leave(beyond, count, m, inside, bundle.limit)
+    left = _enter_or_leave(beyond, count, m, inside, limit)
     # From inside, n1 is this material even where no entry was seen: an open mesh.
     n1 = get(materials, m + IOR) if inside else _innermost_ior(scene, media, count)
     n2 = _innermost_ior(scene, beyond, left) if inside else get(materials, m + IOR)
@@ -216,6 +218,24 @@ def _refract(scene, bundle, surface, i, settings, beyond):
         f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
         k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
     return through, cos_t >= 0.0, k_r, k_t, left
+
+
+@inlined
+def _passes_light(materials, m):
+    """Whether the material in row ``m`` has refracted rays."""
+    return largest_component(three(materials, m + TRANSMITTANCE)) > 0.0 or get(materials, m + KIND) == DIELECTRIC
+
+
+@kernel
+def refract_from(arrays, m, d, n, inside, media, beyond):
+    """For Python: (whether material ``m`` passes light, then as of ``_refract``) for a ray in ``media``, an array.
+
+    ``beyond`` has a place more than there are media that the ray may remember.
+    """
+    scene = scene_pointers(arrays)
+    around = pointer(media), len(media), len(beyond) - 1
+    through, passes, k_r, k_t, left = _refract(scene, m, d, n, inside, around, pointer(beyond))
+    return _passes_light(scene.materials, m), through, passes, k_r, k_t, left
 
 
 @inlined
@@ -247,14 +267,16 @@ def _bounce(scene, bundle, settings, work, refracted, reflected):
             continue
         surface = at(work.surfaces, i * SURFACE_DOUBLES)
         m, weight, pixel = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i), get(bundle.pixels, i)
-        k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
-        if largest_component(k_t) > 0.0 or get(materials, m + KIND) == DIELECTRIC:
-            w, passes, k_r, k_t, left = _refract(scene, bundle, surface, i, settings, work.beyond)
+        d, n, k_r = row3(bundle.directions, i), three(surface, NORMAL), three(materials, m + REFLECTANCE)
+        if _passes_light(materials, m):
+            around = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i), bundle.limit
+            inside = get(surface, INSIDE) != 0.0
+            w, passes, k_r, k_t, left = _refract(scene, m, d, n, inside, around, work.beyond)
             if passes and _may_leave(work, pixel, times(weight, k_t), settings):
                 _spawn(surface, pixel, w, times(weight, k_t), refracted, work.beyond, left, settings)
         if _may_leave(work, pixel, times(weight, k_r), settings):
             media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
-            w = reflect(row3(bundle.directions, i), three(surface, NORMAL))
+            w = reflect(d, n)
             _spawn(surface, pixel, w, times(weight, k_r), reflected, media, count, settings)
 
 

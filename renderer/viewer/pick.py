@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from renderer.inspect.ray_path import Segment, Vector, ray_path, surface_of
+from renderer.inspect.ray_path import Segment, Vector, ray_path
 from renderer.inspect.tree_boxes import visited
 from renderer.picture.prepare import PreparedScene
 from renderer.shade.records import MATERIAL_COLUMNS
+from renderer.shade.surface import surface_of
 from renderer.trace.query import Hits
 from renderer.viewer.protocol import Pick
 from renderer.viewer.shown import ShownScene, varied

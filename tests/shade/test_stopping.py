@@ -132,7 +132,7 @@ def test_finished_may_stop_a_tile_under_way() -> None:
 
     prepared, chosen = prepare(half_mirrors()), RenderSettings(resolution=(16, 16), max_depth=64, max_rays=2**61)
     with pytest.raises(TimeoutError):
-        prepared.picture(prepared.scene.camera, chosen, -1.0, 2, finished)
+        prepared.picture(prepared.scene.camera, chosen, BOUNDED, 2, finished)
     assert heard == [0, 0, 0]
 
 

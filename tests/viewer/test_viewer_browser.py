@@ -138,11 +138,11 @@ def test_a_change_of_mode_waits_a_moment_for_its_picture_and_draws_once(viewer: 
           const drawn = [], frame = () => new Promise(requestAnimationFrame), sent = viewer.seq;
           const noon = performance.now();
           performance.now = () => noon; // time stands still, so that a slow machine changes nothing
-          model.draw = (...a) => { drawn.push(viewer.prepared.dataset.mode); draw.apply(model, a); };
+          model.draw = (...a) => { drawn.push(viewer.stage.dataset.mode); draw.apply(model, a); };
           if (!answered) viewer.connection.send = () => {};
           viewer.setMode("phong");
           while (viewer.seq === sent) await frame();
-          for (let i = 0; i < 5 || (answered && viewer.prepared.dataset.mode !== "phong"); i++) await frame();
+          for (let i = 0; i < 5 || (answered && viewer.stage.dataset.mode !== "phong"); i++) await frame();
           const inTime = drawn.length;
           delete performance.now;
           for (let i = 0; i < 100 && !drawn.length; i++) await new Promise((r) => setTimeout(r, 50));

@@ -106,9 +106,9 @@ class TestJudgesFindABrokenRefraction:
 FAULTS = [
     ("whitted._innermost_ior", "get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
     ("whitted._goes_on", "largest > 0.0 and largest >= min_weight", "largest > 0.02"),
-    ("direct._aim", "dot(n, to_light) <= error", "dot(n, to_light) < -1e-3"),
+    ("see_light", "dot(n, to_light) <= error", "dot(n, to_light) < -1e-3"),
     ("surface.phong", "dot(n, towards)", "abs(dot(n, towards))"),
-    ("direct._aim", "SHORT_OF_LIGHT", "2.0"),
+    ("lights.aim", "SHORT_OF_LIGHT", "2.0"),
     ("shading.specular", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
 ]
 NOTICED = [40, 41, 42, 43, 44, 45]

@@ -1,0 +1,43 @@
+"""One colour a face: Phong at its centroid, without shadows and without bounces, as codes of sRGB."""
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import get, larger, pointer, smaller
+from renderer.kernels.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
+from renderer.shade.lights import see_light
+from renderer.shade.records import AMBIENT
+from renderer.shade.surface import phong, scene_pointers
+
+# Parts of [0, 1] of which most hold no more than one step of sRGB: the steps are 3e-4 apart and more.
+PLACES = 4096
+
+
+@inlined
+def _encoded(x, table):
+    """The sRGB code of x: how many steps of ``_table`` it reaches, counted from those that its place does."""
+    steps, first = table
+    x = smaller(larger(x, 0.0), 1.0)
+    code = get(first, np.int64(x * PLACES))
+    while get(steps, code) <= x:
+        code += 1
+    return code
+
+
+@kernel
+def shade_faces(arrays, eye, colors, table, begin, end):
+    """Colour the faces from ``begin`` to ``end``."""
+    seen, table = scene_pointers(arrays), (pointer(table[0]), pointer(table[1]))
+    for face in range(begin, end):
+        a, b, c = row3(seen.faces, face)
+        p0, p1, p2 = row3(seen.vertices, a), row3(seen.vertices, b), row3(seen.vertices, c)
+        p, n = scale(add(add(p0, p1), p2), 1.0 / 3.0), normalized(cross(sub(p1, p0), sub(p2, p0)))
+        d, m = normalized(sub(p, eye)), get(seen.material, face)
+        n = scale(n, -1.0) if dot(d, n) > 0.0 else n
+        color = times(three(seen.materials, m + AMBIENT), row3(seen.colors, 0))
+        for light in range(seen.light_count):
+            lamp = see_light(seen.lights, light, p, n, 0.0)
+            if lamp.faces:
+                color = add(color, times(phong(seen, m, n, d, lamp.towards), lamp.arriving))
+        for k in range(3):
+            colors[face, k] = _encoded(color[k], table)

@@ -1,0 +1,75 @@
+"""A light as a surface sees it, and the shadow ray towards it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import get
+from renderer.kernels.vec3 import dot, normalized, scale, sub, three
+from renderer.shade.records import DIRECTIONAL, LIGHT_COLUMNS
+from renderer.shade.surface import scene_pointers
+from renderer.trace.spawn import BOUNDED, spawn_origin
+
+# A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
+# covers angles down to 2^-12.
+SHORT_OF_LIGHT = 1.0 - 2.0**-36
+
+
+class SeenLight(NamedTuple):
+    """A light from a point: whether it lies before the surface there, whether it is directional, its position or the
+    unit vector towards it, the unit vector towards it, and the irradiance of a surface that faces it.
+    """
+
+    faces: bool
+    directional: bool
+    place: tuple
+    towards: tuple
+    arriving: tuple
+
+
+@inlined
+def see_light(lights, light, p, n, error):
+    """The ``SeenLight`` from the surface point p, whose normal is n and whose distance from its plane is bounded by
+    ``error``.
+    """
+    row = light * LIGHT_COLUMNS
+    place, arriving = three(lights, row + 1), three(lights, row + 4)
+    if get(lights, row) == DIRECTIONAL:
+        return SeenLight(dot(n, place) > 0.0, True, place, place, arriving)
+    to_light = sub(place, p)
+    # A light within rounding of the surface lies on it and does not light it; this also bounds 1 / r^2.
+    if dot(n, to_light) <= error:
+        return SeenLight(False, False, place, to_light, arriving)
+    arriving = scale(arriving, 1.0 / dot(to_light, to_light))
+    return SeenLight(True, False, place, normalized(to_light), arriving)
+
+
+class ShadowRay(NamedTuple):
+    """A ray from a surface towards a light that it faces; t counts in units of ``direction``."""
+
+    origin: tuple
+    direction: tuple
+    t_max: float
+
+
+@inlined
+def aim(seen, p, n_g, error, offset):
+    """The ``ShadowRay`` from the surface point p to a light that was seen from there.
+
+    One to a point light ends at the light: t counts in units of the distance, and a surface at the light itself does
+    not hide it.
+    """
+    if seen.directional:
+        return ShadowRay(spawn_origin(p, error, n_g, seen.place, offset), seen.place, np.inf)
+    o = spawn_origin(p, error, n_g, sub(seen.place, p), offset)
+    # Mitsuba stops ten of its epsilons short.
+    t_max = SHORT_OF_LIGHT if offset.bounded else 1.0 - 10.0 * offset.epsilon
+    return ShadowRay(o, sub(seen.place, o), t_max)
+
+
+@kernel
+def aim_from(arrays, surface, n, light):
+    """For Python: how a ``Surface`` with the normal n sees a light, and the shadow ray by the bounded offset."""
+    seen = see_light(scene_pointers(arrays).lights, light, surface.p, n, surface.error)
+    return seen, aim(seen, surface.p, surface.n_g, surface.error, BOUNDED)
