@@ -28,6 +28,7 @@ from renderer import (
 from renderer.cli import main
 from renderer.mesh.shapes import icosphere
 from renderer.picture import prepare as prepared_scene
+from renderer.trace.spawn import BOUNDED
 
 # Four half-mirrors one in another: a ray that meets one leaves two.
 TEXT = """
