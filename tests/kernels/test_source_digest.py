@@ -122,3 +122,23 @@ def test_a_kernel_of_another_package_follows_all_of_ours(tmp_path):
     before = run(folder, script)
     (folder / "below" / "deep" / "aside.py").write_text("STEP = 11\n")
     assert run(folder, script) != before
+
+
+def seen_by(path):
+    """The files of the package that a source imports, directly or not."""
+    seen, pending = set(), [path]
+    while pending:
+        found = pending.pop()
+        if found not in seen:
+            seen.add(found)
+            pending += _imports(found)
+    return seen
+
+
+def test_kernels_see_no_model_of_a_scene():
+    """An edit of a scene's class or of a picture's file format compiles nothing anew."""
+    kernels = [path for path in PACKAGE.rglob("*.py") if "\n@kernel\n" in path.read_text()]
+    assert len(kernels) > 20
+    for path in kernels:
+        rooms = {found.relative_to(PACKAGE).parts[0] for found in seen_by(path)}
+        assert not rooms & {"scene", "picture", "viewer", "cli.py"}, path
