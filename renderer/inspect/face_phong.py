@@ -28,7 +28,7 @@ def face_colors(arrays: SceneArrays, eye: ArrayLike, threads: int | None = None)
     matte surface instead, whose colour is half of what it reflects or lets through, whichever is more: middle grey
     for clear glass, tinted where the glass is.
 
-    A face of no area has no normal and shows its ambient light alone. Only lights in ``arrays`` shine: a arrays packed
+    A face of no area has no normal and shows its ambient light alone. Only lights in ``arrays`` shine: arrays packed
     for a scene on which no light falls (``needs.shadows`` False) has none. The same bits for any number of threads.
     Raises ``ValueError`` naming the argument.
     """

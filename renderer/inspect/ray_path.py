@@ -17,7 +17,7 @@ from renderer.picture.pack import media_around
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import checked_vector
 from renderer.shade.lights import aim_from
-from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG, REFLECTANCE
+from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG
 from renderer.shade.shading import reflect
 from renderer.shade.surface import MAX_MEDIA, Surface, phong_of, surface_of
 from renderer.shade.whitted import refract_from
@@ -212,8 +212,6 @@ def _bounce(prepared: PreparedScene, ray: _Ray, met: _Met, own: int) -> list[_Ra
     passes_light, through, passes, k_r, k_t, left = refract_from(
         prepared.arrays, met.row, ray.direction, met.n, met.inside, media, beyond
     )
-    if not passes_light:
-        k_r = _color(met.material, REFLECTANCE)
     mirrored = reflect(ray.direction, met.n)
     children = [_child("reflected", ray, met, own, mirrored, times(ray.weight, k_r), ray.media)]
     if passes_light and passes:

@@ -50,7 +50,7 @@ from renderer.trace.ray_lanes import (
 _WIDER = np.float32(2.0**-18)
 _LEAST_SLOPE = np.float32(2.0**-140)
 _LOW_WORD = 0xFFFFFFFF
-# A packet gives up after this many octants, and its rays go on singly. Most packets of a dense picture end after 40;
+# A packet gives up after this many octants, and its rays go on as lanes. Most packets of a dense picture end after 40;
 # where faces are smaller than the distance of neighbouring rays, they share the upper levels only. Of 16 to 512, 48 was
 # within 5 % of the best on meshes of 1e5, 1e6 and 5e6 faces.
 BUDGET = 48
@@ -240,7 +240,7 @@ def trace_packet(tree, rays, stack, any_hit):
     """Search for hits of sixteen prepared rays with one dominant axis and sign; the results stay in ``rays``.
 
     With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns how many octants it left waiting on the
-    stack, where it gave up, and the bits of the rays in doubt. ``stack`` is scratch as ``traverse.stack_size`` says.
+    stack, where it gave up, and the bits of the rays in doubt. ``stack`` is scratch as ``singly.stack_size`` says.
     """
     beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes
     limit, doubtful, top, node, left = _most(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET

@@ -200,7 +200,7 @@ def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
 
 @inlined
 def _trace_sixteen(tree, rays, found, first, scratch, any_hit):
-    """Trace the rays from ``first`` on as a packet, and each alone from where it gave up."""
+    """Trace the rays from ``first`` on as a packet, and as lanes from where it gave up."""
     prepared = scratch.prepared
     for r in range(WIDTH):
         ray, t_max = ray_at(rays, first + r)

@@ -60,7 +60,7 @@ def _places(path: Path, module: str) -> Iterator[Place]:
                 yield Place(path, f"{prefix}.{node.name}", node, known)
                 yield from within(node.body, f"{prefix}.{node.name}")
             elif isinstance(node, ast.Assign | ast.AnnAssign):
-                for target in _names(node.targets if isinstance(node, ast.Assign) else [node.target]):
+                for target in _assigned(node):
                     yield Place(path, f"{prefix}.{target}", node, known)
 
     yield from within(tree.body, module)
@@ -74,11 +74,12 @@ def _bound_at_top(tree: ast.Module) -> Iterator[str]:
         elif isinstance(node, ast.FunctionDef | ast.ClassDef):
             yield node.name
         elif isinstance(node, ast.Assign | ast.AnnAssign):
-            yield from _names(node.targets if isinstance(node, ast.Assign) else [node.target])
+            yield from _assigned(node)
 
 
-def _names(nodes: Sequence[ast.AST]) -> list[str]:
-    return [name.id for node in nodes for name in ast.walk(node) if isinstance(name, ast.Name)]
+def _assigned(node: ast.Assign | ast.AnnAssign) -> list[str]:
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+    return [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
 
 
 def replaced(place: Place, rule: str, broken: str) -> str:
