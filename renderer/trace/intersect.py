@@ -7,28 +7,34 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get, larger, load4, load8, magnitude, movemask, select, smaller, splat4, splat8
-from renderer.kernels.vec3 import cross, dot, largest_component, scale, sub
+from renderer.kernels.jit import inlined
+from renderer.kernels.simd import larger, load4, load8, magnitude, movemask, select, smaller, splat4, splat8
 from renderer.trace.layout import NODE_WORDS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).
 FAR_PADDING = np.float32(1.0 + 8.0 * 2.0**-23)
-_LARGEST = np.float32(np.finfo(np.float32).max)
+LARGEST_FLOAT = np.float32(np.finfo(np.float32).max)
 _STEP = np.float32(2.0**-23)
 _TINY = np.float32(2.0**-149)
-# With A = ``across``, Z = ``along``, D = A + Z and u = 2^-53: a sheared coordinate errs by 4 u D, the edge functions
-# together by 9 u A D, their sum by 10 u A D and the numerator of t by 11 u A D Z. Where the numerator exceeds 2^-27 of
-# A D Z, and so the determinant 2^-27 of A D, t errs by 21 * 2^-26 = 2^-21.6 of itself, less than FAR_PADDING leaves
-# after a slab's own roundings (2^-20.4). The ray passes its plane beside the face by 9 * 2^-26 of the barycentrics at
-# most, 2^-21.8 of the width of the face's box: less than ``face_range`` adds. So such a hit lies at or behind the entry
-# of every box around its face, and a hit in doubt is moved there by ``settled``: the answer is the least t over all
-# faces, whatever the tree, the packet or the order.
-_DOUBT = 2.0**-27
-# Of a face thinner than this share of its longest side every determinant is in doubt: A is at least the side as the ray
-# sees it, and D at least half the side.
-_THIN = 2.0**-30
+# Of a triangle let A be ``across``, Z ``along``, D = A + Z, S how far its z spread and u = 2^-53. A sheared coordinate
+# errs by 4 u D, the edge functions together by 9 u A D, their sum, the determinant, by 10 u A D, and the numerator of t
+# by 11 u A D Z. Three things are in doubt:
+# - a determinant of no more than 2^-27 of A D. Any other errs by 2^-23 of itself, and the ray passes its plane beside the
+#   face by 9 * 2^-26 of the barycentrics at most, 2^-21.8 of the width of the face's box: less than ``face_range`` adds.
+# - a numerator of no more than 2^-27 of A D Z. With any other, t errs by 21 * 2^-26 = 2^-21.6 of itself, less than
+#   FAR_PADDING leaves after a slab's own roundings (2^-20.4). So a hit in no doubt lies at or behind the entry of every
+#   box around its face, and ``doubt.settled`` moves the others there: the answer is the least t over all faces, whatever
+#   the tree, the packet or the order.
+DOUBT = 2.0**-27
+# - a determinant of no more than 2^-16 of A D S / Z, of thin faces and of those met at small angles. A hit is a mean of
+#   the corners, so it lies from the plane by 9 u A D S over the face's double area: by 9 sqrt(3) u Z / SLANT for any
+#   other determinant, which is at most sqrt(3) double areas. Z is at most three times the largest component L of a corner
+#   relative to the origin: 47 u L / SLANT, 2^-31 of L.
+SLANT = 2.0**-16
+# What a numerator in doubt errs by, of A D Z: its 11 u, and the determinant's share of 2^-27. A hit in doubt that is
+# settled has moved by no more, since the ray meets the plane itself within the face's box.
+_ERROR = 2.0**-48
 ROOM = 2.0**-21
 
 
@@ -36,7 +42,7 @@ ROOM = 2.0**-21
 def round_up(x):
     """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN; of a NaN the least."""
     # No branch, here and below: whether a random ray takes it cannot be predicted.
-    y = larger(-_LARGEST, np.float32(x))
+    y = larger(-LARGEST_FLOAT, np.float32(x))
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) < x else np.float32(0.0)
     return np.float32(y + step)
 
@@ -44,7 +50,7 @@ def round_up(x):
 @inlined
 def round_down(x):
     """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN; of a NaN the largest."""
-    y = smaller(_LARGEST, np.float32(x))
+    y = smaller(LARGEST_FLOAT, np.float32(x))
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) > x else np.float32(0.0)
     return np.float32(y - step)
 
@@ -112,7 +118,7 @@ class Slabs(NamedTuple):
 
 
 @inlined
-def _slab(axis, o, d, largest):
+def make_slab(axis, o, d, largest):
     """Near row, far row, origins and reciprocals for one axis, each rounded so that the slab only grows.
 
     The sign bit chooses the rows, so -0.0 is a direction like any other. The near reciprocal is finite and never
@@ -122,7 +128,7 @@ def _slab(axis, o, d, largest):
     back = np.signbit(d)
     flip = 8 if back else 0
     down, up = round_down(o), round_up(o)
-    near_inverse = smaller(larger(inverse, -_LARGEST), _LARGEST)
+    near_inverse = smaller(larger(inverse, -LARGEST_FLOAT), LARGEST_FLOAT)
     near_origin, far_origin = (down if back else up), (up if back else down)
     return 16 * axis + flip, 16 * axis + 8 - flip, near_origin, far_origin, near_inverse, inverse
 
@@ -130,9 +136,9 @@ def _slab(axis, o, d, largest):
 @inlined
 def make_slabs(ray, largest):
     """Prepare a ray; ``largest`` is ``largest_of(ray)`` > 0."""
-    nx, fx, nox, fox, nix, fix = _slab(0, ray.ox, ray.dx, largest)
-    ny, fy, noy, foy, niy, fiy = _slab(1, ray.oy, ray.dy, largest)
-    nz, fz, noz, foz, niz, fiz = _slab(2, ray.oz, ray.dz, largest)
+    nx, fx, nox, fox, nix, fix = make_slab(0, ray.ox, ray.dx, largest)
+    ny, fy, noy, foy, niy, fiy = make_slab(1, ray.oy, ray.dy, largest)
+    nz, fz, noz, foz, niz, fiz = make_slab(2, ray.oz, ray.dz, largest)
     return Slabs(
         nx, ny, nz, fx, fy, fz, nox, noy, noz, fox, foy, foz, nix, niy, niz, fix, fiy, fiz
     )  # fmt: skip
@@ -185,15 +191,15 @@ class Shear(NamedTuple):
 @inlined
 def make_shear(ray):
     """Turn the axes so that z is the largest component of the direction, then shear the direction onto it."""
-    axis = _longest_axis(ray)
-    row_x, row_y, row_z = _turned(axis, 0, 4, 8)
-    ox, oy, oz = _turned(axis, ray.ox, ray.oy, ray.oz)
-    dx, dy, dz = _turned(axis, ray.dx, ray.dy, ray.dz)
+    axis = longest_axis(ray)
+    row_x, row_y, row_z = turned(axis, 0, 4, 8)
+    ox, oy, oz = turned(axis, ray.ox, ray.oy, ray.oz)
+    dx, dy, dz = turned(axis, ray.dx, ray.dy, ray.dz)
     return Shear(row_x, row_y, row_z, ox, oy, oz, dx / dz, dy / dz, dz)
 
 
 @inlined
-def _longest_axis(ray):
+def longest_axis(ray):
     """Whether the largest component of the direction is z, and else whether it is y."""
     ax, ay, az = abs(ray.dx), abs(ray.dy), abs(ray.dz)
     on_z = az >= ax and az >= ay
@@ -201,8 +207,8 @@ def _longest_axis(ray):
 
 
 @inlined
-def _turned(axis, x, y, z):
-    """Three values in the order of the ray's axes, the one of ``_longest_axis`` last."""
+def turned(axis, x, y, z):
+    """Three values in the order of the ray's axes, the one of ``longest_axis`` last."""
     on_z, on_y = axis
     return _chosen(on_z, on_y, y, z, x), _chosen(on_z, on_y, z, x, y), _chosen(on_z, on_y, x, y, z)
 
@@ -270,115 +276,33 @@ def see_triangles(tree, base, ray):
 
 
 @inlined
-def meet_planes(edges, ray):
-    """t of four triangles, and the masks of those in doubt, where rounding may have made t, and of those whose
-    determinant it may have made.
+def meet_planes(edges, ray, t_min, t_max):
+    """t of four triangles; masks of those in doubt, where rounding may have made t, of those that are blurred, where it
+    may have made the determinant, and of those in doubt that may count from t_min to t_max when they are settled.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant = edges
     across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
-    numerator = e0 * z0 + e1 * z1 + e2 * z2
-    limit = across * (across + along) * splat4(_DOUBT)
-    doubt, blurred = magnitude(numerator) <= limit * along, magnitude(determinant) <= limit
-    return numerator / (determinant * splat4(ray.direction_z)), doubt, blurred
+    numerator, product = e0 * z0 + e1 * z1 + e2 * z2, across * (across + along)
+    denominator = determinant * splat4(ray.direction_z)
+    t, height, base = numerator / denominator, magnitude(numerator), magnitude(denominator)
+    limit, error = product * along * splat4(DOUBT), product * along * splat4(_ERROR)
+    slant = product * (magnitude(z1 - z0) + magnitude(z2 - z0)) * splat4(SLANT)
+    blurred = magnitude(determinant) * along <= select(slant > limit, slant, limit)
+    doubt = blurred | (height <= limit)
+    within = (height + error >= splat4(t_min) * base) & (height - error <= splat4(t_max) * base)
+    return t, doubt, blurred, blurred | (doubt & (t >= splat4(0.0)) & within)
 
 
 @inlined
-def hit_triangles(tree, base, ray):
-    """Watertight test of one ray and the four triangles of a block: bits of those hit, of those in doubt and of those
-    whose determinant is, t, the numerators of u and v, and their denominator. Of a hit in doubt ``settled`` decides.
+def hit_triangles(tree, base, ray, t_min, t_max):
+    """Watertight test of one ray and the four triangles of a block: bits of those hit and of the three masks of
+    ``meet_planes``, t, the numerators of u and v, and their denominator. Of a hit in doubt ``settled`` decides.
     """
     edges, seen = see_triangles(tree, base, ray)
     bits, zero = movemask(seen), splat4(0.0)
     if bits == 0:
-        return bits, bits, bits, zero, zero, zero, zero
-    t, doubt, blurred = meet_planes(edges, ray)
-    return bits, bits & movemask(doubt), bits & movemask(blurred), t, edges.e1, edges.e2, edges.determinant
-
-
-@kernel
-def settled(tree, at, ray, hit):
-    """What counts of a hit in doubt, (t, u, v, w), of the face at ``at``: t no less than where the ray enters its box.
-
-    NaN for t, which is no hit, where the ray misses that box or t lies before ``t_min``. The arithmetic is that of
-    ``enter_boxes``, and monotone: boxes around this one are entered no later. It starts from the ray, because keeping
-    ``Slabs`` for it costs every ray. It depends on the ray and the face alone, so whoever asks gets the same answer.
-    """
-    largest = largest_of(ray)
-    t0, t1 = round_down(ray.t_min * largest), np.float32(np.inf)
-    t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
-    t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
-    t0, t1 = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
-    t, u, v, w = _passed(tree, at, ray, largest, hit)
-    if not (t0 <= np.float32(t1 * FAR_PADDING) and t0 <= _LARGEST and t >= ray.t_min):
-        return np.nan, u, v, w
-    return (t if t0 <= box_limit(t, largest) else np.float64(t0) / largest), u, v, w
-
-
-@kernel
-def _passed(tree, at, ray, largest, hit):
-    """The hit (t, u, v, w) of a face that is a line but for a 2^30th of it: where the ray passes its longest side.
-
-    t and barycentrics from the edge functions would be noise there. Other faces keep their hit.
-    """
-    # In the order of the ray's axes, so that the bits do not depend on the names of the axes.
-    axis = _longest_axis(ray)
-    p0, p1, p2 = _corner(tree, at, axis), _corner(tree, at + 12, axis), _corner(tree, at + 24, axis)
-    o, d = _turned(axis, ray.ox, ray.oy, ray.oz), scale(_turned(axis, ray.dx, ray.dy, ray.dz), 1.0 / largest)
-    side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
-    l0, l1, l2 = largest_component(side0), largest_component(side1), largest_component(side2)
-    longest = larger(l0, larger(l1, l2))
-    # In units of the longest side, so that no product vanishes.
-    unit = 1.0 / longest
-    if largest_component(cross(scale(side1, unit), scale(side2, unit))) > _THIN:
-        return hit
-    if longest == l2:
-        s, t = _approach(scale(sub(p0, o), unit), d, scale(side2, unit))
-        u, v = s, 0.0
-    elif longest == l1:
-        s, t = _approach(scale(sub(p2, o), unit), d, scale(side1, unit))
-        u, v = 0.0, 1.0 - s
-    else:
-        s, t = _approach(scale(sub(p1, o), unit), d, scale(side0, unit))
-        u, v = 1.0 - s, s
-    return t * longest / largest, u, v, 1.0
-
-
-@kernel
-def _approach(start, d, side):
-    """Where a ray from the origin in direction d is nearest to a side: the share of the side before it, and t.
-
-    NaN for a ray that passes the line beyond the side by more than a face of no area is wide. A ray along the side is
-    nowhere nearer than elsewhere, and meets its start.
-    """
-    dd, ss, ds, dp, sp = dot(d, d), dot(side, side), dot(d, side), dot(d, start), dot(side, start)
-    apart = dd * ss - ds * ds
-    share, room = ds * dp - dd * sp, dd * ss * _THIN
-    if share < -room or share > apart + room:
-        return np.nan, np.nan
-    s = smaller(larger(share / apart, 0.0), 1.0) if apart > 0.0 else 0.0
-    return s, (dp + s * ds) / dd
-
-
-@inlined
-def _corner(tree, at, axis):
-    return _turned(axis, _coordinate(tree, at), _coordinate(tree, at + 4), _coordinate(tree, at + 8))
-
-
-@inlined
-def _coordinate(tree, at):
-    """One coordinate of a block, exactly."""
-    return get(tree.wide_blocks, at) if tree.wide != 0 else np.float64(get(tree.blocks, at))
-
-
-@kernel
-def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
-    """Narrow [t0, t1] to one axis of a face's own box."""
-    row = at + 4 * axis
-    near, far = face_range(_coordinate(tree, row), _coordinate(tree, row + 12), _coordinate(tree, row + 24))
-    near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = _slab(axis, o, d, largest)
-    if near_row > far_row:
-        near, far = far, near
-    n = np.float32(np.float32(near - near_origin) * near_inverse)
-    f = np.float32(np.float32(far - far_origin) * far_inverse)
-    return (n if n > t0 else t0), (f if f < t1 else t1)
+        return bits, bits, bits, bits, zero, zero, zero, zero
+    t, doubt, blurred, due = meet_planes(edges, ray, t_min, t_max)
+    doubts, blurs, dues = bits & movemask(doubt), bits & movemask(blurred), bits & movemask(due)
+    return bits, doubts, blurs, dues, t, edges.e1, edges.e2, edges.determinant

@@ -13,12 +13,11 @@ from renderer.kernels.simd import (
     int32_pointer,
     lane,
     lowest_bit,
-    movemask,
     pointer,
     smaller,
-    splat4,
 )
-from renderer.trace.intersect import hit_triangles, make_shear, settled
+from renderer.trace.doubt import settled
+from renderer.trace.intersect import hit_triangles, make_shear
 from renderer.trace.layout import BLOCK_COUNT, BLOCK_WORDS, BLOCKS, DEPTH, FACES, LANES, NODES, SCALE, WIDE
 
 
@@ -73,11 +72,9 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
     t, face, u, v, w = best
     doubtful = np.int64(0)
     for block in range(first, first + count):
-        bits, doubts, blurred, t4, u4, v4, w4 = hit_triangles(tree, block * BLOCK_WORDS, shear)
-        if doubts != 0:
-            # What surely lies beyond the best hit matters no more.
-            doubtful |= blurred | (doubts & movemask((t4 >= splat4(t_min)) & (t4 <= splat4(t))))
-            bits &= ~doubts
+        bits, doubts, _, due, t4, u4, v4, w4 = hit_triangles(tree, block * BLOCK_WORDS, shear, t_min, t)
+        doubtful |= due
+        bits &= ~doubts
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
@@ -94,14 +91,14 @@ def nearest_carefully(tree, first, count, ray, shear, best):
     t, face, u, v, w = best
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
-        bits, doubts, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear)
+        bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, t)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
             fi = get(tree.faces, block * LANES + i)
             hit = lane(t4, i), lane(u4, i), lane(v4, i), lane(w4, i)
             if (doubts >> i) & 1 != 0:
-                hit = settled(tree, base + i, ray, hit)
+                hit = settled(tree, base + i, ray, hit, (blurred >> i) & 1 != 0)
             if hit[0] >= ray.t_min and (hit[0] < t or (hit[0] == t and fi < face)):
                 t, u, v, w = hit
                 face = fi

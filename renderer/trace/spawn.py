@@ -9,8 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, larger, pointer, put
+from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, power_below, scaled_difference
+from renderer.kernels.simd import at, larger, pointer, put, smaller
 from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, row3, scale, sub, three
+from renderer.trace.doubt import ROUNDING
+from renderer.trace.intersect import DOUBT, SLANT
 
 _ROUNDOFF = 2.0**-53
 # gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).
@@ -23,6 +26,17 @@ _GAMMA264 = 264.0 * _ROUNDOFF / (1.0 - 264.0 * _ROUNDOFF)
 # The same for the distance of a point from a face's plane as ``leave_faces`` finds it: the cross product's components
 # err by 32 u L^2, its product with the point by 192 u L^3, and dividing by its length adds 6 u of at most 24 L^3.
 _GAMMA336 = 336.0 * _ROUNDOFF / (1.0 - 336.0 * _ROUNDOFF)
+# And never more than 47 u / SLANT of L, where a hit lies whose determinant is not in doubt (see ``intersect``).
+_MOST = 50.0 * _ROUNDOFF / SLANT
+# Of a face thinner than this share of its longest side every determinant is in doubt: it is at most 3 |cross| / side^2
+# of A D, because A is at least the side as the ray sees it, and D at least side / sqrt(3).
+_THIN = DOUBT / 4.0
+# A hit whose determinant is in doubt counts within ROUNDING of the face: twice that is off it.
+_LEAST = 2.0 * ROUNDING
+# A face so thin that float64 does not tell the direction of its normal: it is taken for a line.
+_LINE = 2.0**-46
+# Of a face thinner than this the distance from the plane errs by more than matters, so it takes twice the digits.
+_SHARP = 2.0**-10
 _SMALLEST = 2.0**-1074
 # Mitsuba 3's RayEpsilon: 1500 times the unit roundoff of float32.
 MITSUBA_EPSILON = 1500.0 * 2.0**-24
@@ -42,16 +56,28 @@ BOUNDED = OffsetRule(True, 0.0)
 def normal_of(p0, p1, p2, d):
     """The unit normal of a face by its winding.
 
-    A face whose corners lie on a line has none. It fills a slit between its neighbours, so it is taken for one that
-    looks back along d as far as its longest side allows.
+    A face whose corners lie on a line, as rounded, has none. It fills a slit between its neighbours, so it is taken for
+    one that looks back along d as far as its longest side allows.
     """
     side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
     n = cross(side2, sub(p2, p0))
-    if largest_component(n) > 0.0:
-        return normalized(n)
     l0, l1, l2 = largest_component(side0), largest_component(side1), largest_component(side2)
+    if largest_component(n) > larger(l0, larger(l1, l2)) * _LINE * larger(l0, larger(l1, l2)):
+        return normalized(n)
     longest = normalized(side2 if l2 >= l0 and l2 >= l1 else (side1 if l1 >= l0 else side0))
     return normalized(sub(scale(longest, dot(d, longest)), d))
+
+
+@inlined
+def _clearance(p0, p1, p2, double_area, reach):
+    """How far a point ``reach`` from the corners must be from a face's plane, so that no ray meets the face that leads
+    away from it.
+    """
+    side = larger(largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2))))
+    if not double_area / side > _THIN * side:
+        return _LEAST * reach
+    # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
+    return reach * larger(_LEAST, smaller(_GAMMA264 * (reach / double_area * reach), _MOST))
 
 
 @inlined
@@ -65,12 +91,7 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
     for k in range(3):
         distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
         reach = larger(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
-    # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
-    double_area = length(cross(sub(p1, p0), sub(p2, p0)))
-    if double_area == 0.0:
-        # Off its line a ray does not meet it again.
-        return _GAMMA7 * distance + _GAMMA264 * reach
-    return _GAMMA7 * distance + _GAMMA264 * reach * (reach / double_area * reach)
+    return _GAMMA7 * distance + _clearance(p0, p1, p2, length(cross(sub(p1, p0), sub(p2, p0))), reach)
 
 
 @inlined
@@ -101,22 +122,36 @@ def spawn_origin(p, error, n_g, w, offset):
     return (_away(p[0], step[0]), _away(p[1], step[1]), _away(p[2], step[2]))
 
 
+@kernel
+def _exact_plane(p0, p1, p2, o):
+    """The unit normal of a thin face, and how far o is above its plane, by twice the digits."""
+    side = power_below(larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0))))
+    point = power_below(larger(largest_component(sub(o, p0)), side))
+    n = cross_pairs(scaled_difference(p1, p0, 1.0 / side), scaled_difference(p2, p0, 1.0 / side))
+    normal = heads(n)
+    return normalized(normal), dot_pairs(n, scaled_difference(o, p0, 1.0 / point))[0] / length(normal) * point
+
+
 @inlined
 def _leave(p0, p1, p2, o, w):
     """The point o near the plane of a face, moved along the normal to the side of w until it is off for certain."""
-    double_area = length(cross(sub(p1, p0), sub(p2, p0)))
-    n_g, reach = normal_of(p0, p1, p2, scale(w, -1.0)), 0.0
+    double_area, reach, side = length(cross(sub(p1, p0), sub(p2, p0))), 0.0, 0.0
     for p in (p0, p1, p2):
         reach = larger(reach, largest_component(sub(p, o)))
-    side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
-    # A 1024th more, because the next test measures from where the point is moved to. Off its line a ray does not meet a
-    # face of no area again.
-    blown = reach / double_area * reach if double_area > 0.0 else 1.0
-    needed = (_GAMMA264 + _GAMMA336) * (1.0 + 2.0**-10) * reach * blown
-    missing = needed - side * dot(n_g, sub(o, p0))
+        side = larger(side, largest_component(sub(p, p0)))
+    n_g = normal_of(p0, p1, p2, scale(w, -1.0))
+    height = dot(n_g, sub(o, p0))
+    # A 1024th more, because the next test measures from where the point is moved to.
+    needed = _clearance(p0, p1, p2, double_area, reach) * (1.0 + 2.0**-10)
+    if double_area / side > _SHARP * side:
+        needed += _GAMMA336 * (reach / double_area * reach) * reach
+    elif double_area / side > _LINE * side:
+        n_g, height = _exact_plane(p0, p1, p2, o)
+    away = 1.0 if dot(n_g, w) >= 0.0 else -1.0
+    missing = needed - away * height
     if missing <= 0.0:
         return o
-    step = scale(n_g, side * missing)
+    step = scale(n_g, away * missing)
     return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
 
 

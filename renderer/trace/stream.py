@@ -184,11 +184,10 @@ def meet_leaves(tree, rays, lanes, count):
         block = (~child >> LEAF_BITS) if child != END else 0
         shear = shear_of(rays, r)
         edges, seen = see_triangles(tree, block * BLOCK_WORDS, shear)
-        t, doubt, blurred = meet_planes(edges, shear)
-        within = (t >= splat4(get(rays.doubles, T_MIN + r))) & (t <= splat4(get(rays.doubles, T + r)))
-        # What surely lies beyond the best hit matters no more.
-        put(lanes.bits, r, movemask(seen & within) & ~movemask(doubt))
-        put(lanes.doubts, r, movemask(seen & (blurred | (doubt & within))))
+        t_min, t_max = get(rays.doubles, T_MIN + r), get(rays.doubles, T + r)
+        t, doubt, _, due = meet_planes(edges, shear, t_min, t_max)
+        put(lanes.bits, r, movemask(seen & (t >= splat4(t_min)) & (t <= splat4(t_max))) & ~movemask(doubt))
+        put(lanes.doubts, r, movemask(seen & due))
         hits = 4 * LANES * r
         store(lanes.hits, hits, t)
         store(lanes.hits, hits + LANES, edges.e1)

@@ -15,7 +15,8 @@ from numpy.random import Generator
 
 from renderer.kernels.simd import lane
 from renderer.octree import BruteForce, Octree
-from renderer.trace.intersect import Ray, hit_triangles, make_shear, settled
+from renderer.trace.doubt import settled
+from renderer.trace.intersect import Ray, hit_triangles, make_shear
 from renderer.trace.layout import BLOCK_WORDS, LANES
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.query import Hits
@@ -177,11 +178,11 @@ def judged(words, origins, directions, out):
         o, d = origins[i], directions[i]
         ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
         base, place = (i // LANES) * BLOCK_WORDS, i % LANES
-        bits, doubts, _, t4 = hit_triangles(tree, base, make_shear(ray))[:4]
+        bits, doubts, blurred, _, t4 = hit_triangles(tree, base, make_shear(ray), 0.0, np.inf)[:5]
         t = lane(t4, place)
         if (bits >> place) & 1 == 1 and t >= 0.0:
             out[i, 0], out[i, 1] = 1 + ((doubts >> place) & 1), t
-            out[i, 2] = settled(tree, base + place, ray, (t, 0.0, 0.0, 1.0))[0]
+            out[i, 2] = settled(tree, base + place, ray, (t, 0.0, 0.0, 1.0), (blurred >> place) & 1 != 0)[0]
 
 
 def rays_close_to_planes(rng, count):
@@ -201,7 +202,7 @@ def rays_close_to_planes(rng, count):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_hit_beyond_doubt_lies_within_its_own_box_and_so_within_all(seed):
-    """The law of the order: see ``_DOUBT``. Sure hits satisfy it by the bound of their error, others are moved."""
+    """The law of the order: see ``DOUBT``. Sure hits satisfy it by the bound of their error, others are moved."""
     corners, origins, directions = rays_close_to_planes(np.random.default_rng(seed), 100_000)
     brute = BruteForce(*separate(corners))
     assert brute.tree.scale == 1.0
