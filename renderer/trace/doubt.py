@@ -1,0 +1,235 @@
+"""Hits in doubt: what counts of a hit whose t, or whose very sign, rounding may have made.
+
+Two bounds decide. No t lies outside the stretch in which the ray is within its face's own box, so that no box on the
+way to the face is left out. And where the determinant is in doubt, everything is computed anew with twice the digits:
+the hit counts where the ray comes within ROUNDING of the face.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import (
+    as_pairs,
+    cross_pairs,
+    dot_pairs,
+    heads,
+    minus,
+    power_below,
+    product,
+    scaled_difference,
+)
+from renderer.kernels.simd import get, larger, smaller
+from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, scale, sub
+from renderer.trace.intersect import (
+    FAR_PADDING,
+    LARGEST_FLOAT,
+    box_limit,
+    face_range,
+    largest_of,
+    longest_axis,
+    make_slab,
+    round_down,
+    turned,
+)
+
+# A sheared coordinate errs by 5 u L, L the largest component of a corner relative to the origin (``spawn`` derives it),
+# so a ray that passes a face on the same side of all its edges, as rounded, passes within 7.1 u L < 2^-50 L of it. This
+# bound, in units of the power of two below L, is at least 16 times that, so no closed mesh opens; and what float64 adds
+# below, 2^-50 L at most, does not matter.
+ROUNDING = 2.0**-45
+# How far before the entry of a box a hit may lie, by ``box_limit``, and a rounding less.
+_BEFORE = (1.0 + 2.0**-30) / np.float64(FAR_PADDING)
+# A face thinner than this share of its length is a line: its normal errs by 2^-100, its product with a corner by 2^-97,
+# and so the distance from the plane of any other face by 2^-49, a sixteenth of ROUNDING.
+_LINE = 2.0**-48
+
+
+@kernel
+def settled(tree, at, ray, hit, blurred):
+    """What counts of a hit in doubt, (t, u, v, w), of the face at ``at``; NaN for t, which is no hit, if nothing does.
+
+    ``blurred`` says that the determinant is in doubt, not t alone. t lies where the ray is within the face's own box, in
+    the arithmetic of ``enter_boxes``: that is monotone, so boxes around this one are entered no later and left no
+    earlier. The result depends on the ray and the face alone, not on t_min, so whoever asks gets the same answer. It
+    starts from the ray, because keeping ``Slabs`` for it costs every ray.
+    """
+    largest = largest_of(ray)
+    t0, t1 = np.float32(0.0), np.float32(np.inf)
+    t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
+    t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
+    t0, t1 = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
+    first, last = np.float64(t0) * _BEFORE, np.float32(t1 * FAR_PADDING)
+    t, u, v, w = _meet_face(tree, at, ray, first / largest, np.float64(last) / largest) if blurred else hit
+    if not (t0 <= last and t0 <= LARGEST_FLOAT and t >= 0.0):
+        return np.nan, u, v, w
+    if round_down(t * largest) > last:
+        t = np.float64(last) / largest
+    if t0 > box_limit(t, largest):
+        t = first / largest
+    return t, u, v, w
+
+
+@kernel
+def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
+    """Narrow [t0, t1] to one axis of a face's own box."""
+    row = at + 4 * axis
+    near, far = face_range(_coordinate(tree, row), _coordinate(tree, row + 12), _coordinate(tree, row + 24))
+    near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = make_slab(axis, o, d, largest)
+    if near_row > far_row:
+        near, far = far, near
+    n = np.float32(np.float32(near - near_origin) * near_inverse)
+    f = np.float32(np.float32(far - far_origin) * far_inverse)
+    return (n if n > t0 else t0), (f if f < t1 else t1)
+
+
+@inlined
+def _coordinate(tree, at):
+    """One coordinate of a block, exactly."""
+    return get(tree.wide_blocks, at) if tree.wide != 0 else np.float64(get(tree.blocks, at))
+
+
+@inlined
+def _corner(tree, at, axis):
+    return turned(axis, _coordinate(tree, at), _coordinate(tree, at + 4), _coordinate(tree, at + 8))
+
+
+class _Face(NamedTuple):
+    """A face as a ray sees it, its longest side from the first corner to the second, all scaled by powers of two.
+
+    first, second        the corners of the longest side relative to the origin, as pairs, in units of about the farthest
+    along, other         the sides from the first corner to the second and to the apex, as pairs, in units of ``along``
+    back                 the side from the second corner to the apex, in the same units, rounded
+    direction            the ray's, its largest component from 1 to 2
+    t_unit               what one t in these units is of the ray's own
+    ratio                the unit of the corners over that of the sides
+    """
+
+    first: Any
+    second: Any
+    along: Any
+    other: Any
+    back: Any
+    direction: Any
+    t_unit: float
+    ratio: float
+
+
+@kernel
+def _meet_face(tree, at, ray, least, most):
+    """The hit (t, u, v, w) of a face, with twice the digits; NaN for t where the ray passes it by.
+
+    From least to most the ray is within the face's box.
+    """
+    # In the order of the ray's axes, so that the bits do not depend on the names of the axes.
+    axis = longest_axis(ray)
+    p0, p1, p2 = _corner(tree, at, axis), _corner(tree, at + 12, axis), _corner(tree, at + 24, axis)
+    o, d = turned(axis, ray.ox, ray.oy, ray.oz), turned(axis, ray.dx, ray.dy, ray.dz)
+    l0, l1, l2 = length(sub(p2, p1)), length(sub(p0, p2)), length(sub(p1, p0))
+    bounds = least, most
+    if l2 >= l0 and l2 >= l1:
+        t, second, apex = _meet_side(p0, p1, p2, o, d, bounds)
+        return t, second, apex, 1.0
+    if l1 >= l0:
+        t, second, apex = _meet_side(p2, p0, p1, o, d, bounds)
+        return t, apex, 1.0 - second - apex, 1.0
+    t, second, apex = _meet_side(p1, p2, p0, o, d, bounds)
+    return t, 1.0 - second - apex, second, 1.0
+
+
+@kernel
+def _meet_side(a, b, c, o, d, bounds):
+    """t, within bounds, and the weights of b and c of a face whose longest side is from a to b."""
+    qa, qb, qc = sub(a, o), sub(b, o), sub(c, o)
+    reach = larger(largest_component(qa), larger(largest_component(qb), largest_component(qc)))
+    far, d_unit, side = power_below(reach), power_below(largest_component(d)), power_below(largest_component(sub(b, a)))
+    face = _Face(
+        scaled_difference(a, o, 1.0 / far),
+        scaled_difference(b, o, 1.0 / far),
+        scaled_difference(b, a, 1.0 / side),
+        scaled_difference(c, a, 1.0 / side),
+        scale(sub(c, b), 1.0 / side),
+        scale(d, 1.0 / d_unit),
+        far / d_unit,
+        far / side,
+    )
+    normal = cross_pairs(face.along, face.other)
+    if largest_component(heads(normal)) <= _LINE:
+        t, second, apex = _meet_line(face, bounds[0] / face.t_unit, bounds[1] / face.t_unit)
+    else:
+        t, second, apex = _meet_plane(face, normal, bounds[0] / face.t_unit, bounds[1] / face.t_unit)
+    return t * face.t_unit, second, apex
+
+
+@kernel
+def _meet_plane(face, normal, low, high):
+    """t and weights of a face that is no line: where the ray meets its plane, as near as the face's outline allows."""
+    d, n = face.direction, heads(normal)
+    numerator, determinant = dot_pairs(normal, face.first), dot_pairs(normal, as_pairs(d))
+    low, high = _within_outline(face, normalized(n), low, high)
+    t = numerator[0] / determinant[0]
+    t += minus(numerator, product(determinant, (t, 0.0)))[0] / determinant[0]
+    # A ray in the plane meets the face where it comes to its outline.
+    t = smaller(t, high) if t > low else low
+    passed = minus(numerator, product(determinant, (t, 0.0)))[0]
+    if not (low <= high and abs(passed) <= ROUNDING * length(n)):
+        return np.nan, 0.0, 0.0
+    second, apex = _weights(face, n, t)
+    return t, second, apex
+
+
+@kernel
+def _within_outline(face, normal, low, high):
+    """The part of low to high in which a ray is over the outline of a face, as widened by ROUNDING."""
+    d, first, second = face.direction, heads(face.first), heads(face.second)
+    along, back, other = normalized(heads(face.along)), normalized(face.back), normalized(heads(face.other))
+    low, high = _beyond(cross(normal, along), first, d, low, high)
+    low, high = _beyond(cross(normal, back), second, d, low, high)
+    low, high = _beyond(cross(other, normal), first, d, low, high)
+    # Where two sides meet at a small angle, both widened reach far beyond the corner.
+    low, high = _beyond(along, first, d, low, high)
+    return _beyond(scale(along, -1.0), second, d, low, high)
+
+
+@inlined
+def _beyond(inward, corner, d, low, high):
+    """Narrow low to high to where a ray is beyond a line through a corner, or ROUNDING before it."""
+    least, rate = dot(inward, corner) - ROUNDING, dot(inward, d)
+    if rate > 0.0:
+        return larger(low, least / rate), high
+    if rate < 0.0:
+        return low, smaller(high, least / rate)
+    return low, (high if least <= 0.0 else -1.0)
+
+
+@kernel
+def _weights(face, normal, t):
+    """The weights of the second corner and the apex at t, from its place along the longest side and above it.
+
+    The height errs most, of thin faces, so it keeps to what the face has at that place.
+    """
+    along, other = heads(face.along), heads(face.other)
+    point = scale(sub(scale(face.direction, t), heads(face.first)), face.ratio)
+    square = dot(along, along)
+    place, foot = smaller(larger(dot(along, point) / square, 0.0), 1.0), dot(along, other) / square
+    most = smaller(place / foot if place < foot else 1.0, (1.0 - place) / (1.0 - foot) if place > foot else 1.0)
+    apex = smaller(larger(dot(cross(normal, along), point) / dot(normal, normal), 0.0), most)
+    return smaller(larger(place - apex * foot, 0.0), 1.0 - apex), apex
+
+
+@kernel
+def _meet_line(face, low, high):
+    """t and weights of a face whose corners lie on a line: where the ray passes its longest side."""
+    d, along, first = face.direction, heads(face.along), heads(face.first)
+    across = cross_pairs(as_pairs(d), face.along)
+    # Of a ray along the side every place is as near as another.
+    square = larger(dot(heads(across), heads(across)), np.finfo(np.float64).tiny)
+    t = dot_pairs(cross_pairs(face.first, face.along), across)[0] / square
+    t = smaller(larger(t, low), high)
+    second = dot(sub(scale(d, t), first), along) / dot(along, along) * face.ratio
+    second = smaller(larger(second, 0.0), 1.0)
+    place = add(first, scale(along, second / face.ratio))
+    if not length(sub(place, scale(d, t))) <= ROUNDING:
+        return np.nan, 0.0, 0.0
+    return t, second, 0.0
