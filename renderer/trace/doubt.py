@@ -36,9 +36,9 @@ from renderer.trace.intersect import (
 
 # A sheared coordinate errs by 5 u L, L the largest component of a corner relative to the origin (``spawn`` derives it),
 # so a ray that passes a face on the same side of all its edges, as rounded, passes within 7.1 u L < 2^-50 L of it. This
-# bound, in units of the power of two below L, is at least 16 times that, so no closed mesh opens; and what float64 adds
+# bound, in units of the power of two below L, is at least 8 times that, so no closed mesh opens; and what float64 adds
 # below, 2^-50 L at most, does not matter.
-ROUNDING = 2.0**-45
+ROUNDING = 2.0**-46
 # How far before the entry of a box a hit may lie, by ``box_limit``, and a rounding less.
 _BEFORE = (1.0 + 2.0**-30) / np.float64(FAR_PADDING)
 # A face thinner than this share of its length is a line: its normal errs by 2^-100, its product with a corner by 2^-97,
@@ -127,15 +127,14 @@ def _meet_face(tree, at, ray, least, most):
     p0, p1, p2 = _corner(tree, at, axis), _corner(tree, at + 12, axis), _corner(tree, at + 24, axis)
     o, d = turned(axis, ray.ox, ray.oy, ray.oz), turned(axis, ray.dx, ray.dy, ray.dz)
     l0, l1, l2 = length(sub(p2, p1)), length(sub(p0, p2)), length(sub(p1, p0))
-    bounds = least, most
     if l2 >= l0 and l2 >= l1:
-        t, second, apex = _meet_side(p0, p1, p2, o, d, bounds)
+        t, second, apex = _meet_side(p0, p1, p2, o, d, (least, most))
         return t, second, apex, 1.0
     if l1 >= l0:
-        t, second, apex = _meet_side(p2, p0, p1, o, d, bounds)
-        return t, apex, 1.0 - second - apex, 1.0
-    t, second, apex = _meet_side(p1, p2, p0, o, d, bounds)
-    return t, 1.0 - second - apex, second, 1.0
+        t, second, apex = _meet_side(p2, p0, p1, o, d, (least, most))
+        return t, apex, larger(1.0 - second - apex, 0.0), 1.0
+    t, second, apex = _meet_side(p1, p2, p0, o, d, (least, most))
+    return t, larger(1.0 - second - apex, 0.0), second, 1.0
 
 
 @kernel

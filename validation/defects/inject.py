@@ -26,7 +26,7 @@ _LOADED = "renderer.kernels.loaded"
 class Replacement:
     """Replace the code ``rule`` in ``place`` by ``broken``.
 
-    place   the end of the dotted name of one function, method or module-level constant: "Mesh.normals", "_DOUBT";
+    place   the end of the dotted name of one function, method or module-level constant: "Mesh.normals", "DOUBT";
             with its module where the name alone is not unique: "spawn._leave"
     rule    one expression, or one or more statements, that occur there once. They are compared as syntax: layout and
             comments do not count, and local variables may have other names

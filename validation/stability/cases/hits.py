@@ -1,6 +1,6 @@
-"""Extreme cases 1 to 32, 46 and 49: hits."""
+"""Extreme cases 1 to 32, 46, 49 and 50: hits."""
 
-from validation.stability.cases import builds, order, precision, rays, thin
+from validation.stability.cases import builds, edge_on, order, precision, rays, thin
 from validation.stability.cases.case import ExtremeCase
 
 CASES: tuple[ExtremeCase, ...] = (
@@ -9,4 +9,5 @@ CASES: tuple[ExtremeCase, ...] = (
     *builds.CASES,
     *order.CASES,
     *thin.CASES,
+    *edge_on.CASES,
 )

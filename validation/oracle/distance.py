@@ -1,0 +1,49 @@
+"""Distances of points from triangles in exact rational arithmetic: squared, so that no root rounds them."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+Vector = Sequence[Fraction]
+
+
+def rational(rows: Sequence[Sequence[float]]) -> list[list[Fraction]]:
+    """Rows of finite numbers as fractions."""
+    return [[Fraction(float(x)) for x in row] for row in rows]
+
+
+def squared_distance(point: Vector, triangle: Sequence[Vector]) -> Fraction:
+    """The squared distance of a point from a closed triangle, which may be a side or a point.
+
+    >>> squared_distance(*rational([[0.25, 0.25, 2.0]]), rational([[0, 0, 0], [1, 0, 0], [0, 1, 0]]))
+    Fraction(4, 1)
+    """
+    a, b, c = triangle
+    normal = cross(difference(b, a), difference(c, a))
+    sides = ((a, b), (b, c), (c, a))
+    if any(normal) and all(dot(cross(normal, difference(q, p)), difference(point, p)) >= 0 for p, q in sides):
+        return dot(normal, difference(point, a)) ** 2 / dot(normal, normal)
+    return min(_from_side(point, p, q) for p, q in sides)
+
+
+def _from_side(point: Vector, start: Vector, end: Vector) -> Fraction:
+    """The squared distance from a side, which may be a point."""
+    side, offset = difference(end, start), difference(point, start)
+    square = dot(side, side)
+    share = max(Fraction(0), min(Fraction(1), dot(side, offset) / square)) if square else Fraction(0)
+    rest = [x - share * s for x, s in zip(offset, side, strict=True)]
+    return dot(rest, rest)
+
+
+def dot(a: Vector, b: Vector) -> Fraction:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> list[Fraction]:
+    """Vector product."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def difference(a: Vector, b: Vector) -> list[Fraction]:
+    """a - b."""
+    return [x - y for x, y in zip(a, b, strict=True)]
