@@ -1,8 +1,8 @@
-"""Hits in doubt: what counts of a hit whose t, or whose very sign, rounding may have made.
+"""Settles hits in doubt: those whose t, or whose determinant, rounding may have made.
 
-Two bounds decide. No t lies outside the stretch in which the ray is within its face's own box, so that no box on the
-way to the face is left out. And where the determinant is in doubt, everything is computed anew with twice the digits:
-the hit counts where the ray comes within ROUNDING of the face.
+Two rules hold afterwards. No t lies outside the stretch in which the ray is within its face's own box, so the search
+for it leaves out no box on its way. And a hit whose determinant was in doubt is computed anew with twice the digits: it
+counts where the ray comes within ROUNDING of the face.
 """
 
 from typing import Any, NamedTuple
@@ -34,12 +34,12 @@ from renderer.trace.intersect import (
     turned,
 )
 
-# A sheared coordinate errs by 5 u L, L the largest component of a corner relative to the origin (``spawn`` derives it),
-# so a ray that passes a face on the same side of all its edges, as rounded, passes within 7.1 u L < 2^-50 L of it. This
-# bound, in units of the power of two below L, is at least 8 times that, so no closed mesh opens; and what float64 adds
-# below, 2^-50 L at most, does not matter.
+# How near a ray must come to a face to hit it, in units of the power of two below L, the largest component of a corner
+# relative to the origin. A sheared coordinate errs by 5 u L (``spawn`` derives it), so a ray that passes a face on the
+# same side of all its edges, as rounded, passes within 7.1 u L of it, less than 2^-50 L. This is at least eight times
+# as much, so no closed mesh opens. What float64 adds below, 2^-50 L at most, does not matter.
 ROUNDING = 2.0**-46
-# How far before the entry of a box a hit may lie, by ``box_limit``, and a rounding less.
+# The least t that ``box_limit`` allows, as a share of the entry of a box, and a rounding more.
 _BEFORE = (1.0 + 2.0**-30) / np.float64(FAR_PADDING)
 # A face thinner than this share of its length is a line: its normal errs by 2^-100, its product with a corner by 2^-97,
 # and so the distance from the plane of any other face by 2^-49, a sixteenth of ROUNDING.
@@ -48,13 +48,13 @@ _LINE = 2.0**-48
 
 @kernel
 def settled(tree, at, ray, hit, blurred):
-    """What counts of a hit in doubt, (t, u, v, w), of the face at ``at``; NaN for t, which is no hit, if nothing does.
+    """The hit (t, u, v, w) that a hit in doubt of the face at ``at`` counts as. t is NaN where it counts as none.
 
-    ``blurred`` says that the determinant is in doubt, not t alone. t lies where the ray is within the face's own box, in
-    the arithmetic of ``enter_boxes``: that is monotone, so boxes around this one are entered no later and left no
-    earlier. The result depends on the ray and the face alone, not on t_min, so whoever asks gets the same answer. It
-    starts from the ray, because keeping ``Slabs`` for it costs every ray.
+    ``blurred`` says that the determinant is in doubt, not t alone. t lies where the ray is within the face's own box,
+    in the arithmetic of ``enter_boxes``. That is monotone: the ray enters no box around this one later, and leaves none
+    earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
     """
+    # From the ray itself: to keep its ``Slabs`` for this would cost every ray.
     largest = largest_of(ray)
     t0, t1 = np.float32(0.0), np.float32(np.inf)
     t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
@@ -98,12 +98,12 @@ def _corner(tree, at, axis):
 class _Face(NamedTuple):
     """A face as a ray sees it, its longest side from the first corner to the second, all scaled by powers of two.
 
-    first, second        the corners of the longest side relative to the origin, as pairs, in units of about the farthest
-    along, other         the sides from the first corner to the second and to the apex, as pairs, in units of ``along``
-    back                 the side from the second corner to the apex, in the same units, rounded
-    direction            the ray's, its largest component from 1 to 2
-    t_unit               what one t in these units is of the ray's own
-    ratio                the unit of the corners over that of the sides
+    first, second  the corners of the longest side relative to the origin, as pairs
+    along, other   the sides from the first corner to the second and to the apex, as pairs
+    back           the side from the second corner to the apex, rounded
+    direction      the ray's direction, its largest component from 1 to 2
+    t_unit         one t in these units, in the ray's own
+    ratio          the unit of the corners over that of the sides
     """
 
     first: Any

@@ -17,30 +17,37 @@ FAR_PADDING = np.float32(1.0 + 8.0 * 2.0**-23)
 LARGEST_FLOAT = np.float32(np.finfo(np.float32).max)
 _STEP = np.float32(2.0**-23)
 _TINY = np.float32(2.0**-149)
-# Of a triangle let A be ``across``, Z ``along``, D = A + Z, S how far its z spread and u = 2^-53. A sheared coordinate
-# errs by 4 u D, the edge functions together by 9 u A D, their sum, the determinant, by 10 u A D, and the numerator of t
-# by 11 u A D Z. Three things are in doubt:
-# - a determinant of no more than 2^-27 of A D. Any other errs by 2^-23 of itself, and the ray passes its plane beside the
-#   face by 9 * 2^-26 of the barycentrics at most, 2^-21.8 of the width of the face's box: less than ``face_range`` adds.
-# - a numerator of no more than 2^-27 of A D Z. With any other, t errs by 21 * 2^-26 = 2^-21.6 of itself, less than
-#   FAR_PADDING leaves after a slab's own roundings (2^-20.4). So a hit in no doubt lies at or behind the entry of every
-#   box around its face, and ``doubt.settled`` moves the others there: the answer is the least t over all faces, whatever
-#   the tree, the packet or the order.
+# The errors of the triangle test. Let u = 2^-53, A = ``across``, Z = ``along``, D = A + Z and S the spread of z. Then a
+# sheared coordinate errs by 4 u D, the edge functions together by 9 u A D, the determinant by 10 u A D and the
+# numerator of t by 11 u A D Z. Three limits say when a hit is in doubt.
+#
+# DOUBT for the determinant, as a share of A D. Above it the determinant errs by 2^-23 of itself, and the ray passes its
+# plane beside the face by 9 * 2^-26 of the barycentrics at most: by 2^-21.8 of the width of the face's box, which is
+# less than ``face_range`` adds.
+#
+# DOUBT for the numerator, as a share of A D Z. Above it t errs by 21 * 2^-26 = 2^-21.6 of itself, which is less than
+# FAR_PADDING leaves after a slab's own roundings (2^-20.4). So a hit in no doubt lies at or behind the entry of every
+# box around its face, and ``doubt.settled`` moves the others there: the answer is the least t over all faces, whatever
+# the tree, the packet or the order.
 DOUBT = 2.0**-27
-# - a determinant of no more than 2^-16 of A D S / Z, of thin faces and of those met at small angles. A hit is a mean of
-#   the corners, so it lies from the plane by 9 u A D S over the face's double area: by 9 sqrt(3) u Z / SLANT for any
-#   other determinant, which is at most sqrt(3) double areas. Z is at most three times the largest component L of a corner
-#   relative to the origin: 47 u L / SLANT, 2^-31 of L.
+# SLANT for the determinant, as a share of A D S / Z: thin faces, and faces met at small angles, are below it. A hit is
+# a mean of the corners, so its distance from the plane is 9 u A D S over twice the face's area. Above the limit that is
+# 9 sqrt(3) u Z / SLANT, because no determinant exceeds sqrt(3) times twice the area. Let L be the largest component of
+# a corner relative to the origin. Z is at most 3 L, so the distance is at most 47 u L / SLANT, less than 2^-31 L.
 SLANT = 2.0**-16
-# What a numerator in doubt errs by, of A D Z: its 11 u, and the determinant's share of 2^-27. A hit in doubt that is
-# settled has moved by no more, since the ray meets the plane itself within the face's box.
+# The error of a numerator in doubt, as a share of A D Z: its own 11 u, and the determinant's share of 2^-27. Settling
+# moves t by no more, because the ray meets the plane itself within the face's box.
 _ERROR = 2.0**-48
+# The share of its width by which a face's box is wider than the face, on each side.
 ROOM = 2.0**-21
 
 
 @inlined
 def round_up(x):
-    """A float32 >= x, within two ulp; finite or +inf, so that differences with it are no NaN; of a NaN the least."""
+    """A float32 >= x, within two ulp of it, or +inf. It is never -inf, so no difference with it is NaN.
+
+    Of NaN it is the least float32.
+    """
     # No branch, here and below: whether a random ray takes it cannot be predicted.
     y = larger(-LARGEST_FLOAT, np.float32(x))
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) < x else np.float32(0.0)
@@ -49,7 +56,10 @@ def round_up(x):
 
 @inlined
 def round_down(x):
-    """A float32 <= x, within two ulp; finite or -inf, so that differences with it are no NaN; of a NaN the largest."""
+    """A float32 <= x, within two ulp of it, or -inf. It is never +inf, so no difference with it is NaN.
+
+    Of NaN it is the largest float32.
+    """
     y = smaller(LARGEST_FLOAT, np.float32(x))
     step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) > x else np.float32(0.0)
     return np.float32(y - step)
@@ -57,10 +67,10 @@ def round_down(x):
 
 @inlined
 def face_range(a, b, c):
-    """The interval that the box of a face has on one axis, from its corners' coordinates: float32, rounded outwards.
+    """The interval of a face's box on one axis, from its corners' coordinates: float32, rounded outwards.
 
-    Every box that claims to hold the face holds this one, which is wider than the corners by what a ray that hits the
-    face in float64 may pass beside it.
+    Every box around the face contains this one. It is wider than the corners by ROOM on each side, because a ray that
+    hits the face in float64 may pass it by that much.
     """
     low, high = smaller(a, smaller(b, c)), larger(a, larger(b, c))
     room = (high - low) * ROOM
@@ -69,7 +79,7 @@ def face_range(a, b, c):
 
 @inlined
 def box_limit(t, largest):
-    """The float32 distance beyond which the entry of a box says that it holds no hit at t or nearer."""
+    """The float32 distance that bounds a search for hits up to t: a box that is entered later holds none."""
     return round_up(t * largest) * FAR_PADDING
 
 
@@ -119,10 +129,10 @@ class Slabs(NamedTuple):
 
 @inlined
 def make_slab(axis, o, d, largest):
-    """Near row, far row, origins and reciprocals for one axis, each rounded so that the slab only grows.
+    """Near row, far row, origins and reciprocals of one axis, each rounded so that the slab only grows.
 
-    The sign bit chooses the rows, so -0.0 is a direction like any other. The near reciprocal is finite and never
-    above the true one; the far one may be infinite: with lower - o = 0 that makes a NaN, which drops out.
+    The sign bit chooses the rows, so -0.0 is a direction like any other. The near reciprocal is finite and never above
+    the true one. The far one may be infinite; times a difference of 0 it makes NaN, which ``enter_boxes`` ignores.
     """
     inverse = np.float32(largest / d)
     back = np.signbit(d)
@@ -146,10 +156,10 @@ def make_slabs(ray, largest):
 
 @inlined
 def enter_boxes(nodes, node, slabs, lower, upper):
-    """Entry distances (8 x float32) and the bits of the octants that the ray meets within [lower, upper].
+    """Entry distances (8 x float32), and the bits of the octants that the ray meets within [lower, upper].
 
-    ``n > t`` picks n only when it is a number, so a NaN (an origin in a slab's plane, a zero direction) leaves
-    the interval as it was.
+    A distance is NaN where the direction is 0 and the origin lies in a slab's plane. Each comparison is false for NaN,
+    so the interval stays as it was.
     """
     base = node * NODE_WORDS
     n = _distances(nodes, base + slabs.near_x, slabs.near_origin_x, slabs.near_inverse_x)
@@ -173,8 +183,12 @@ def _distances(nodes, row, origin, inverse):
 
 
 class Shear(NamedTuple):
-    """A ray prepared for ``hit_triangles``: the rows of its axes, its origin along them, Woop's shear, and the largest
-    component of its direction.
+    """A ray prepared for ``hit_triangles``: its axes turned so that z is the largest component of its direction.
+
+    row_x, row_y, row_z       where a block has the coordinates of each axis
+    origin_x to origin_z      the origin
+    shear_x, shear_y          Woop's shear: the direction's x and y over its z
+    direction_z               the direction's z
     """
 
     row_x: Any
@@ -200,7 +214,7 @@ def make_shear(ray):
 
 @inlined
 def longest_axis(ray):
-    """Whether the largest component of the direction is z, and else whether it is y."""
+    """Two bools: the largest component of the direction is z; it is y. Neither means x."""
     ax, ay, az = abs(ray.dx), abs(ray.dy), abs(ray.dz)
     on_z = az >= ax and az >= ay
     return on_z, not on_z and ay >= ax
@@ -251,10 +265,10 @@ def _load_rows(blocks, base, ray):
 def see_triangles(tree, base, ray):
     """The ``Edges`` of a block's four triangles, and the mask of those whose edges a ray passes on the same side.
 
-    Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
-    ab - cd or is 0, and is antisymmetric, so two triangles never both miss on their shared edge; 0 counts as inside.
-    When all three edge functions are 0 (the ray lies in the plane, or two corners are one) it is a miss. A triangle
-    whose corners lie on a line may be hit: where its neighbours' rounded edges leave a slit, it fills it.
+    Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
+    ab - cd or is 0, and it is antisymmetric. 0 counts as inside. So of two triangles that share an edge one is hit
+    there. A triangle is missed when all three edge functions are 0: the ray lies in its plane, or two corners are one.
+    A triangle whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded edges leave.
     """
     if tree.wide != 0:
         x0, x1, x2, y0, y1, y2, z0, z1, z2 = _load_rows(tree.wide_blocks, base, ray)
@@ -277,8 +291,10 @@ def see_triangles(tree, base, ray):
 
 @inlined
 def meet_planes(edges, ray, t_min, t_max):
-    """t of four triangles; masks of those in doubt, where rounding may have made t, of those that are blurred, where it
-    may have made the determinant, and of those in doubt that may count from t_min to t_max when they are settled.
+    """t of four triangles, and three masks: doubt, blurred and due.
+
+    In doubt is a triangle whose t rounding may have made; blurred, one of those whose determinant it may have made. Due
+    is one in doubt whose hit may lie from t_min to t_max once it is settled.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant = edges
     across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
@@ -296,8 +312,10 @@ def meet_planes(edges, ray, t_min, t_max):
 
 @inlined
 def hit_triangles(tree, base, ray, t_min, t_max):
-    """Watertight test of one ray and the four triangles of a block: bits of those hit and of the three masks of
-    ``meet_planes``, t, the numerators of u and v, and their denominator. Of a hit in doubt ``settled`` decides.
+    """Watertight test of one ray and the four triangles of a block.
+
+    Returns the bits of those hit, those of the three masks of ``meet_planes``, t, the numerators of u and v, and their
+    denominator. ``doubt.settled`` decides about a hit in doubt.
     """
     edges, seen = see_triangles(tree, base, ray)
     bits, zero = movemask(seen), splat4(0.0)

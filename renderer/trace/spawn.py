@@ -73,7 +73,9 @@ def _clearance(p0, p1, p2, double_area, reach):
     """How far a point ``reach`` from the corners must be from a face's plane, so that no ray meets the face that leads
     away from it.
     """
-    side = larger(largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2))))
+    side = larger(
+        largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2)))
+    )
     if not double_area / side > _THIN * side:
         return _LEAST * reach
     # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.

@@ -11,9 +11,7 @@ from numba import njit
 from renderer.kernels import pairs
 
 # Products and their roundings must be normal numbers: users scale first.
-NUMBERS = st.one_of(
-    st.floats(-(2.0**60), 2.0**60).filter(lambda x: x == 0.0 or abs(x) > 2.0**-60), st.sampled_from([0.0, 1.0, 1 + 2.0**-52])
-)
+NUMBERS = st.floats(-(2.0**60), 2.0**60).filter(lambda x: x == 0.0 or abs(x) > 2.0**-60)
 
 
 @njit

@@ -172,9 +172,7 @@ def test_every_way_to_ask_has_the_same_answer(kind, seed, count, chosen):
 
 @njit(error_model="numpy")
 def judged(words, origins, directions, out):
-    """Of the ray i at the face i: 0 for a miss, 1 for a hit, 2 for one whose t is in doubt and 3 for one whose determinant
-    is; its t, and the t that counts.
-    """
+    """Of ray i at face i: 0 for a miss, 1 for a hit, 2 where t is in doubt, 3 where the determinant is; then both t."""
     tree = tree_pointers(words)
     for i in range(len(origins)):
         o, d = origins[i], directions[i]

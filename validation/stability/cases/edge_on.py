@@ -10,8 +10,8 @@ from validation.oracle.distance import cross, difference, dot, rational, squared
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import SEED, Floats
 
-# Of the largest component of a corner relative to the origin. A determinant in no doubt is more than 2^-16 of its terms,
-# so it blows a rounding of 2^-53 up to 2^-37 at most.
+# Of the largest component of a corner relative to the origin. A determinant in no doubt is more than 2^-16 of its
+# terms, so it blows a rounding of 2^-53 up to 2^-37 at most.
 NEAR = Fraction(1, 2**37)
 # A ray that passes all sides by more than this is no matter of rounding: 2^-53 for each of about 500 roundings.
 SURE = Fraction(1, 2**44)
@@ -29,7 +29,7 @@ def thin_face(rng: Generator) -> Floats:
 
 
 def ray_at(rng: Generator, corners: Floats) -> tuple[Floats, Floats]:
-    """Origin and direction (3,) of a ray at a face: from anywhere, in its plane, nearly so, along a side, or beside it."""
+    """Origin and direction (3,) of a ray at a face: from anywhere, near its plane, along a side, or beside it."""
     first, second = corners[1] - corners[0], corners[2] - corners[0]
     target, weights, way = rng.dirichlet([0.4] * 3) @ corners, rng.normal(size=2), rng.integers(5)
     direction = rng.normal(size=3)
