@@ -22,14 +22,14 @@ from renderer.process.terminal import on_terminal, one_line, spell_everything
 @interruptible("octree-render: interrupted")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``octree-render``; returns the exit code: 0, 2 for bad input, 130 after Ctrl-C."""
-    options = _parser().parse_args(arguments)
+    options = make_parser().parse_args(arguments)
     try:
         if getattr(options, "level", None):
             _choose_processor(options.level, options.output)
         if arguments is None:
             spell_everything()
             _hide_scipy_from_numba()
-        with _compile_notices(getattr(options, "quiet", False)):
+        with compile_notices(getattr(options, "quiet", False)):
             options.command(options)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -52,7 +52,7 @@ def _hide_scipy_from_numba() -> None:
 
 
 @contextmanager
-def _compile_notices(silent: bool) -> Iterator[None]:
+def compile_notices(silent: bool) -> Iterator[None]:
     """Say on standard error that kernels are compiled, so that nobody takes the first run for the usual one."""
     log, notices = logging.getLogger("renderer.jit"), _Notices()
     level, propagate = log.level, log.propagate
@@ -94,7 +94,7 @@ def _scene_to_write(options: argparse.Namespace) -> None:
         write_scene(options.scene, options.write_scene)
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="octree-render", description="Octree ray tracer for triangle meshes.")
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @interruptible("validation: interrupted, no report written")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    parser = _parser()
+    parser = make_parser()
     options = parser.parse_args(arguments)
     _check(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
@@ -47,7 +47,7 @@ def _program() -> str:
     return "octree-validate" if Path(sys.argv[0]).stem == "octree-validate" else "python -m validation"
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=_program(),
         description="Judge hits and pictures by references that nobody here wrote; write a report.",

@@ -32,7 +32,7 @@ def source_digest(path: Path) -> str | None:
         found = pending.pop()
         if found not in seen and found.exists():
             seen.add(found)
-            pending += _imports(found)
+            pending += imported_files(found)
     newer = sorted(found for found in seen if found.stat().st_mtime > loaded.AT)
     if path not in seen or newer:
         why = f"{newer[0]} was written after this process began" if newer else f"{path} cannot be read"
@@ -56,7 +56,7 @@ def _source(path: Path) -> bytes:
 
 
 @cache
-def _imports(path: Path) -> list[Path]:
+def imported_files(path: Path) -> list[Path]:
     """The files of the package that a source imports by ``from renderer.a.b import c``, c a module or a name in b."""
     found = []
     for module, names in _IMPORT.findall(_source(path).decode(errors="replace")):

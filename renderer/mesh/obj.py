@@ -64,7 +64,7 @@ def _mesh(content: _Content, repairs: list[Repairs] | None) -> Mesh:
         corners = corners.reshape(-1, 9)[repairs[-1].kept_faces].reshape(-1, 3)
     if (corners[:, 1:] == -1).all():
         return by_position
-    distinct, faces = _distinct(corners, len(positions))
+    distinct, faces = distinct_rows(corners, len(positions))
     position, texcoord, normal = distinct.T
     normals, texcoords = None, None
     if (normal >= 0).all():
@@ -81,7 +81,7 @@ def _mesh(content: _Content, repairs: list[Repairs] | None) -> Mesh:
     )
 
 
-def _distinct(corners: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def distinct_rows(corners: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The distinct rows in rising order, and each corner's row among them, for positions below ``count``."""
     position = corners[:, 0]
     row_of = np.full(count, -1)

@@ -45,7 +45,7 @@ def build_tree(
     """Build the tree over all faces of vertices that were multiplied by ``scale``; without faces it has no nodes."""
     if not len(faces):
         return build_blocks(vertices, faces, scale, threads)
-    top, subtrees = _build_parts(vertices, faces, rule, threads)
+    top, subtrees = build_parts(vertices, faces, rule, threads)
     if len(subtrees) == 1:
         built = next(iter(subtrees.values()))
         nodes, block_faces, depth = cache_aligned(len(built.nodes), np.float32), built.block_faces, built.depth
@@ -62,7 +62,7 @@ def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], scale:
     return Tree(np.empty(0, np.float32), fill_blocks(vertices, faces, block_faces, threads), block_faces, 0, scale)
 
 
-def _build_parts(
+def build_parts(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, threads: int
 ) -> tuple[Hierarchy, dict[int, _Subtree]]:
     """The top of the hierarchy and the subtree of each whole part of it."""

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from renderer.cli import _parser
-from validation.__main__ import _parser as _validation_parser
-from validation.benchmark.__main__ import _parser as _benchmark_parser
+from renderer.cli import make_parser
+from validation.__main__ import make_parser as validation_parser
+from validation.benchmark.__main__ import make_parser as benchmark_parser
 from validation.stability.section import CASES
 from validation.thresholds import HitLimits
 
@@ -33,10 +33,10 @@ HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
 # What commands write, and so may be absent.
 WRITTEN = {"reports/index.html", "reports/benchmark.html", "renderer/__pycache__", "renderer/compiled"}
 PARSERS = {
-    "octree-render": _parser,
-    "octree-validate": _validation_parser,
-    "python -m validation": _validation_parser,
-    "python -m validation.benchmark": _benchmark_parser,
+    "octree-render": make_parser,
+    "octree-validate": validation_parser,
+    "python -m validation": validation_parser,
+    "python -m validation.benchmark": benchmark_parser,
 }
 MOST_LINES = 110
 
@@ -87,7 +87,7 @@ def test_the_readme_has_python_to_run():
     ("page", "line"), [(p, line) for p in PAGES for line in typed(p) if line.startswith("octree-render ")], ids=shown
 )
 def test_commands_in_a_page_are_ones_that_there_are(page, line):
-    options = _parser().parse_args(shlex.split(line)[1:])
+    options = make_parser().parse_args(shlex.split(line)[1:])
     assert not hasattr(options, "scene") or (ROOT / options.scene).is_file()
 
 
@@ -129,7 +129,7 @@ def test_what_a_page_lets_make_make_is_a_target(page, line):
     assert {word.partition("=")[0] for word in given} <= variables, f"{page}: {line}"
     options = [word for text in given if text.startswith("ARGS=") for word in shlex.split(text[len("ARGS=") :])]
     if target in ("validate", "bench") and options:
-        parser = _validation_parser() if target == "validate" else _benchmark_parser()
+        parser = validation_parser() if target == "validate" else benchmark_parser()
         assert isinstance(parser.parse_args(options), argparse.Namespace)
 
 

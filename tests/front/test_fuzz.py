@@ -290,7 +290,7 @@ def test_finds_another_content(folder: Path, monkeypatch: pytest.MonkeyPatch) ->
 def test_finds_a_process_that_damage_misleads(folder: Path, monkeypatch: pytest.MonkeyPatch, damage: str) -> None:
     """The small package with a store that does not look what it reads, or a run that answers otherwise."""
     given = {"damage": "a bit", "where": 0.0, "bit": 0}
-    package, _ = faults._kept(folder)
+    package, _ = faults.kept_package(folder)
     if damage == "a wrong answer":
         (package / "below" / "deep" / "bottom.py").write_text("STEP = 11\n")
     elif damage == "not noticed":

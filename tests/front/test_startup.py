@@ -163,9 +163,9 @@ def test_a_notice_stands_on_a_line_of_its_own_beside_a_progress_bar():
     script = """
 import io, logging, sys
 from tqdm import tqdm
-from renderer.cli import _compile_notices
+from renderer.cli import compile_notices
 sys.stderr = io.StringIO()
-with _compile_notices(silent=False), tqdm(total=3, file=sys.stderr, ncols=40):
+with compile_notices(silent=False), tqdm(total=3, file=sys.stderr, ncols=40):
     logging.getLogger("renderer.jit").warning("renderer: compiling it")
 print("\\roctree-render: compiling it\\n" in sys.stderr.getvalue().replace(" " * 2, ""))
 print(repr(sys.stderr.getvalue()))

@@ -289,7 +289,7 @@ def _damage(kernels: Path, given: Values) -> None:
             folder.symlink_to("nowhere/at/all")
 
 
-def _kept(folder: Path) -> tuple[Path, Path]:
+def kept_package(folder: Path) -> tuple[Path, Path]:
     """The small package of tests/kernel_package.py, and the folder of its kernels as they were compiled."""
     parent, kernels = folder / "small", folder / "kernels"
     if not parent.exists():
@@ -299,7 +299,7 @@ def _kept(folder: Path) -> tuple[Path, Path]:
 
 
 def check_cache(folder: Path, given: Values, index: int) -> str:
-    package, sound = _kept(folder)
+    package, sound = kept_package(folder)
     kernels = Path(tempfile.mkdtemp(dir=folder))
     try:
         shutil.copytree(sound, kernels, dirs_exist_ok=True)

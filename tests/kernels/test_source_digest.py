@@ -6,7 +6,7 @@ import shutil
 import pytest
 from kernel_package import MIDDLE, PACKAGE, bottom_of, run, write_package
 
-from renderer.kernels.digest import _imports, source_digest
+from renderer.kernels.digest import imported_files, source_digest
 
 TELL = """
 from pathlib import Path
@@ -91,7 +91,7 @@ def package_imports(path, package=PACKAGE):
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.relative_to(PACKAGE).as_posix())
 def test_every_import_in_the_package_has_the_form_that_the_digest_follows(path):
-    assert set(_imports(path)) == package_imports(path)
+    assert set(imported_files(path)) == package_imports(path)
 
 
 @pytest.mark.parametrize("line", ["from . import jit", "from .jit import kernel", "import renderer.kernels.jit as j",
@@ -131,7 +131,7 @@ def seen_by(path):
         found = pending.pop()
         if found not in seen:
             seen.add(found)
-            pending += _imports(found)
+            pending += imported_files(found)
     return seen
 
 

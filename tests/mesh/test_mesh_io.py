@@ -645,7 +645,7 @@ def test_obj_corners_are_split_as_sorted_rows(tmp_path: Path) -> None:
         corners = rng.integers(0, 50, (300, 3))
         if same:
             corners = np.stack([corners[:, 0], (corners[:, 0] * 7) % 50, corners[:, 0]], axis=1)
-        distinct, inverse = obj._distinct(corners, 50)
+        distinct, inverse = obj.distinct_rows(corners, 50)
         expected, places = np.unique(corners, axis=0, return_inverse=True)
         assert np.array_equal(distinct, expected) and np.array_equal(inverse, places.ravel())
 

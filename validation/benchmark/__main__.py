@@ -25,7 +25,7 @@ RAYS, QUICK_RAYS = 1_000_000, 200_000
 @interruptible("benchmark: interrupted, nothing written")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    parser = _parser()
+    parser = make_parser()
     options = parser.parse_args(arguments)
     check_output(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m validation.benchmark", description="Measure speed beside others.")
     parser.add_argument("--quick", action="store_true", help="200,000 rays, at most 100,000 faces, small pictures")
     parser.add_argument("--huge", action="store_true", help="a mesh of 10 million faces too")

@@ -133,12 +133,12 @@ def scatter_of(ours: NDArray[np.float64], paths: NDArray[np.float64], counts: tu
         slope=slope(counts, rmse),
         bias=math.sqrt(max(0.0, float(np.mean(error**2 - variance)))),
         z_max=z_max,
-        p_value=_sidak(z_max, 3 * len(starts)),
+        p_value=sidak(z_max, 3 * len(starts)),
         groups=len(starts),
     )
 
 
-def _sidak(z: float, tests: int) -> float:
+def sidak(z: float, tests: int) -> float:
     """Probability that the largest of ``tests`` normal deviates exceeds z in size: 1 - (1 - p)^tests (Sidak 1967).
 
     Exact for independent tests; for channels, which are correlated, it errs towards no alarm.

@@ -90,18 +90,18 @@ class _Plan(NamedTuple):
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step`` in ``run``: one for the main scene, the others by the scenes' plans."""
-    return job.own + sum(_plan(load_scene(path), effort).steps for _, _, path, effort in _scenes(job))
+    return job.own + sum(plan_pictures(load_scene(path), effort).steps for _, _, path, effort in scenes_of(job))
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Check every scene; writes PNGs into ``job.folder`` and returns a record for JSON and the gates."""
     records: list[dict[str, Any]] = []
     found: list[Gate] = []
-    for name, shows, path, effort in _scenes(job):
+    for name, shows, path, effort in scenes_of(job):
         record, passed = check_scene(name, shows, load_scene(path), effort, job)
         records.append(record)
         found += passed
-    result: dict[str, Any] = {"scenes": records, "costs": _costs(records)}
+    result: dict[str, Any] = {"scenes": records, "costs": costs_of(records)}
     if job.own:
         job.step("pictures: the main scene, 9 samples a pixel")
         result["hero"] = _hero(job)
@@ -116,7 +116,7 @@ def check_scene(
     A rung that no reference can judge fails a gate; the record lists each rung or reference that is left out with its
     reason. Pictures have one ray a pixel and no smallest weight, which no reference has.
     """
-    plan = _plan(scene, effort)
+    plan = plan_pictures(scene, effort)
     record: dict[str, Any] = {
         "name": name,
         "shows": shows,
@@ -141,7 +141,7 @@ def check_scene(
     return record, found
 
 
-def _scenes(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
+def scenes_of(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
     """Names, descriptions, files and efforts of a user's scenes, or else of the suite's own."""
     size, lower = (256, 128) if job.quick else (512, 256)
     if not job.own:
@@ -155,7 +155,8 @@ def _scenes(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
     ]
 
 
-def _plan(scene: Scene, effort: PictureEffort) -> _Plan:
+def plan_pictures(scene: Scene, effort: PictureEffort) -> _Plan:
+    """The rungs and comparisons of a scene, and those that it does not need, with reasons."""
     rungs, left_out = ladder.rungs(scene)
     if effort.lower is None:
         left_out = {rung.name: "climbed on another scene" for rung in rungs[:-1]} | left_out
@@ -238,7 +239,7 @@ def _ours(scene: Scene, resolution: tuple[int, int], offset: _Offset) -> Image:
     return render(scene, resolution=resolution, samples=1, min_weight=0.0, max_rays=UNLIMITED_RAYS, offset=offset)
 
 
-def _costs(scenes: list[dict[str, Any]]) -> dict[str, float]:
+def costs_of(scenes: list[dict[str, Any]]) -> dict[str, float]:
     """Seconds spent in each reference; both rules share one picture of it."""
     spent: dict[str, float] = {}
     for scene in scenes:

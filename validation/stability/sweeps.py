@@ -196,13 +196,13 @@ def moved(offset: float, count: int, rng: Generator) -> list[Sample]:
     """A sphere and its rays moved by ``offset`` along each axis."""
     origins, targets = _around_sphere(count, rng)
     place = np.array([1.0, -0.75, 0.375]) * offset
-    return [Sample(_SPHERE.vertices + place, _SPHERE.faces, _towards(origins + place, targets + place))]
+    return [Sample(_SPHERE.vertices + place, _SPHERE.faces, rays_towards(origins + place, targets + place))]
 
 
 def scaled(scale: float, count: int, rng: Generator) -> list[Sample]:
     """A sphere and its rays, directions too, times ``scale``."""
     origins, targets = _around_sphere(count, rng)
-    return [Sample(_SPHERE.vertices * scale, _SPHERE.faces, _towards(origins * scale, targets * scale))]
+    return [Sample(_SPHERE.vertices * scale, _SPHERE.faces, rays_towards(origins * scale, targets * scale))]
 
 
 def grazing(angle: float, count: int, rng: Generator) -> list[Sample]:
@@ -252,7 +252,7 @@ def _turned(flat: Floats, count: int, rng: Generator, angles: Callable[[int], Fl
         around, above = rng.uniform(0.0, 2.0 * np.pi, count), angles(count)
         up = np.sin(above) * np.where(rng.random(count) < 0.5, 1.0, -1.0)
         back = np.stack([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), up], axis=1) @ turn
-        yield Sample(vertices, np.array([[0, 1, 2]], np.int32), _towards(targets + 2.0 * back, targets))
+        yield Sample(vertices, np.array([[0, 1, 2]], np.int32), rays_towards(targets + 2.0 * back, targets))
 
 
 def _within(corners: Floats, rng: Generator) -> Floats:
@@ -261,7 +261,7 @@ def _within(corners: Floats, rng: Generator) -> Floats:
     return np.einsum("nk,nkj->nj", weights, corners)
 
 
-def _towards(origins: Floats, targets: Floats) -> RayBatch:
+def rays_towards(origins: Floats, targets: Floats) -> RayBatch:
     return RayBatch("stability", origins, targets - origins)
 
 

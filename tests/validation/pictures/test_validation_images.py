@@ -74,7 +74,7 @@ def check(folder: Path, scene: Scene, effort: PictureEffort = SMALL) -> tuple[di
     said: list[str] = []
     job = Job(True, Thresholds(), folder, said.append)
     result = images.check_scene("small", "a test", scene, effort, job)
-    assert len(said) == images._plan(scene, effort).steps
+    assert len(said) == images.plan_pictures(scene, effort).steps
     json.dumps(result[0], allow_nan=False)
     return result
 
@@ -96,7 +96,7 @@ def test_the_whole_ladder_passes_and_leaves_what_the_report_shows(tmp_path: Path
     with Pillow.open(tmp_path / shown[0]["difference"]) as difference:
         assert difference.mode == "L"
     assert record["paths"]["paths"] and any("random paths" in gate.subject for gate in gates)
-    costs = images._costs([record])
+    costs = images.costs_of([record])
     assert costs[images.WHITTED] > 0.0 and costs[monte_carlo.PATHS] == record["paths"]["seconds"]
 
 
@@ -224,5 +224,5 @@ def test_a_users_scene_keeps_its_shape_and_climbs_the_ladder(tmp_path: Path) -> 
     assert sizes == {"diffuse": [32, 16], "everything": [64, 32]}
     files = tuple(SCENES / f"{name}.toml" for name in ("stairs", "mirrors"))
     job = Job(True, Thresholds(), tmp_path, lambda _: None, files)
-    assert [scene[0] for scene in images._scenes(job)] == ["stairs", "mirrors"]
+    assert [scene[0] for scene in images.scenes_of(job)] == ["stairs", "mirrors"]
     assert images.steps(job) > 0

@@ -59,7 +59,7 @@ def test_a_wrong_face_fails(monkeypatch):
 
 def test_a_false_hit_is_counted():
     vertices, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]], np.int32)
-    rays = stability._towards(np.array([[2.0, 2, 1], [0.25, 0.25, 1]]), np.array([[2.0, 2, 0], [0.25, 0.25, 0]]))
+    rays = stability.rays_towards(np.array([[2.0, 2, 1], [0.25, 0.25, 1]]), np.array([[2.0, 2, 0], [0.25, 0.25, 0]]))
     truth = exact.closest_hits(vertices, faces, rays.origins, rays.directions)
     found = HitArrays(np.array([1.0, 1.0]), np.array([0, 0]))
     errors = stability.errors_of(found, stability.Sample(vertices, faces, rays), truth)
@@ -69,7 +69,7 @@ def test_a_false_hit_is_counted():
 
 def test_errors_are_counted_in_ulp_and_relative():
     vertices, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]], np.int32)
-    rays = stability._towards(np.array([[0.25, 0.25, 1]]), np.array([[0.25, 0.25, 0.5]]))
+    rays = stability.rays_towards(np.array([[0.25, 0.25, 1]]), np.array([[0.25, 0.25, 0.5]]))
     truth = exact.closest_hits(vertices, faces, rays.origins, rays.directions)
     found = HitArrays(np.array([2.0 + 3 * 2.0**-51]), np.array([0]))
     errors = stability.errors_of(found, stability.Sample(vertices, faces, rays), truth)
