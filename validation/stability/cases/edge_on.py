@@ -44,6 +44,19 @@ def ray_at(rng: Generator, corners: Floats) -> tuple[Floats, Floats]:
     return target - direction * away * rng.uniform(0.5, 1.0), direction
 
 
+def rays_beside(rng: Generator, corners: Floats, count: int) -> tuple[Floats, Floats]:
+    """Origins and directions (count, 3) in a face's plane, as rounded, that pass it at up to its size."""
+    first, second = corners[1] - corners[0], corners[2] - corners[0]
+    along = first / np.linalg.norm(first)
+    across = second - (second @ along) * along
+    across /= max(float(np.linalg.norm(across)), np.finfo(float).tiny)
+    angle, size = rng.uniform(0, 2 * np.pi, (count, 1)), np.linalg.norm(first) + np.linalg.norm(second)
+    directions = np.cos(angle) * along + np.sin(angle) * across
+    sideways = -np.sin(angle) * along + np.cos(angle) * across
+    origins = corners[0] + size * (sideways * rng.uniform(1.01, 2.0, (count, 1)) - 2.0 * directions)
+    return origins, directions * rng.uniform(0.5, 2.0, (count, 1))
+
+
 def judged(corners: Floats, origin: Floats, direction: Floats, t: float) -> tuple[bool, bool]:
     """Whether a ray with t finite is too far from its face there, and whether one without a hit surely has one."""
     face, (o, d) = rational(corners.tolist()), rational([origin.tolist(), direction.tolist()])
@@ -73,6 +86,11 @@ def _edge_on(quick: bool) -> Outcome:
         off, missing = judged(corners, origin, direction, float(t))
         beside, lost, hit = beside + off, lost + missing, hit + bool(np.isfinite(t))
         again += bool(np.isfinite(t) and octree.closest_hit(origin, direction, t, t).t[0] != t)
+    for _ in range(50):
+        corners = rng.normal(size=(3, 3))
+        octree, rays = Octree(corners, [[0, 1, 2]]), rays_beside(rng, corners, 2000)
+        found = zip(*rays, octree.closest_hit(*rays).t, strict=True)
+        beside += sum(judged(corners, o, d, float(t))[0] for o, d, t in found if np.isfinite(t))
     said = f"{beside} beside, {lost} lost, {again} not met again from their t, {hit:,} of {count:,} hit"
     # Half of the rays pass beside their faces, or in their planes.
     return Outcome(said, not (beside or lost or again) and hit > count // 3)
@@ -80,7 +98,7 @@ def _edge_on(quick: bool) -> Outcome:
 
 CASES: tuple[ExtremeCase, ...] = (
     ExtremeCase(
-        50, "rays within rounding of a face's plane, and at faces 1e-17 to 1e-3 of their length wide",
+        50, "rays within rounding of a face's plane, at it and beside it, and at faces 1e-17 to 1e-3 of their length wide",
         "no hit beside its face, none lost; with t_min = t_max = t the same hit", ("exact",),
         "2^-37 of the distance: a rounding, times the 2^16 that a determinant in no doubt may blow it up", _edge_on,
     ),
