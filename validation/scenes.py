@@ -20,7 +20,7 @@ class Case:
         return SCENES / f"{self.name}.toml"
 
 
-CASES = (
+SCENE_CASES = (
     Case("three_models", "three PLY models on a bounded floor: Phong, shadows, reflections"),
     Case("mirrors", "diffuse objects between mirrors: what a path integrator can judge without any recursion of ours"),
     Case("glass", "dielectrics: refraction, total internal reflection, tinted glass, highlights", every_rung=True),

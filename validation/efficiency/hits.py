@@ -22,7 +22,7 @@ from renderer.process.parallel import available_threads
 from renderer.trace.query import Hits
 from validation.error_curves import front
 from validation.hits.compare import HitArrays
-from validation.hits.rays import RayBatch, camera_rays, float32_exact, leak_rays
+from validation.hits.rays import RayFamily, camera_rays, float32_exact, leak_rays
 from validation.oracle import exact
 from validation.references.table import REFERENCES
 from validation.timing import median_seconds, spending, timed
@@ -178,14 +178,14 @@ def _rows(rays: int, most: int) -> NDArray[np.int64]:
     return np.sort(np.random.default_rng(SEED).choice(rays, most, replace=False))
 
 
-def _judged(contender: Contender, rays: RayBatch, truth: list[exact.ExactHit | None]) -> dict[str, object]:
+def _judged(contender: Contender, rays: RayFamily, truth: list[exact.ExactHit | None]) -> dict[str, object]:
     """Errors of a contender on as many of the rays as it takes."""
     rows = _rows(len(rays), contender.most)
     given = rays.select(rows)
     return errors(answer(contender.closest_hit(given.origins, given.directions)), [truth[row] for row in rows.tolist()])
 
 
-def _leaks(contender: Contender, inside: Sequence[RayBatch]) -> dict[str, int]:
+def _leaks(contender: Contender, inside: Sequence[RayFamily]) -> dict[str, int]:
     """Rays from inside the closed mesh that a contender misses, and the number of these rays."""
     given = [rays.select(_rows(len(rays), contender.most)) for rays in inside]
     missed = sum(int((~answer(contender.closest_hit(r.origins, r.directions)).hit).sum()) for r in given)

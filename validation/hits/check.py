@@ -15,7 +15,7 @@ from validation.gates import Gate
 from validation.hits import compare
 from validation.hits.compare import ExactErrors, HitArrays, HitComparison
 from validation.hits.errors import ErrorSizes, error_sizes, truth
-from validation.hits.rays import RayBatch, face_rays, families, float32_exact
+from validation.hits.rays import RayFamily, face_rays, families, float32_exact
 from validation.hits.verdicts import NEAR_EDGE
 from validation.job import Job
 from validation.oracle import exact
@@ -69,7 +69,7 @@ class LoadedReference(NamedTuple):
     tree: Any
     seconds: dict[str, float]
 
-    def closest_hit(self, rays: RayBatch) -> HitArrays:
+    def closest_hit(self, rays: RayFamily) -> HitArrays:
         """Closest hits of the reference, timed."""
         answer = spending(self.seconds, "query", self.tree.closest_hit)
         return HitArrays(*answer(rays.origins, rays.directions))
@@ -149,7 +149,7 @@ def describe(loaded: LoadedReference) -> dict[str, Any]:
     return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in loaded.seconds.items()}}
 
 
-def _check(target: _Target, rays: RayBatch, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
+def _check(target: _Target, rays: RayFamily, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
     # Trace the rays and compare with every reference.
     hits = target.octree.closest_hit(rays.origins, rays.directions)
     ours = HitArrays(hits.t, hits.face)
@@ -193,7 +193,7 @@ def _check(target: _Target, rays: RayBatch, effort: HitEffort, limits: HitLimits
     return record, [Gate("hits", subject, q, float(v), "at most", most, why) for q, v, most, why in quantities]
 
 
-def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: HitEffort) -> _Findings:
+def _find(target: _Target, rays: RayFamily, ours: HitArrays, effort: HitEffort) -> _Findings:
     """Compare with exact arithmetic and every reference.
 
     A slow reference gets the first rays of one seeded order, so that every smaller sample is part of every larger one.
@@ -221,7 +221,7 @@ def _find(target: _Target, rays: RayBatch, ours: HitArrays, effort: HitEffort) -
     return _Findings(errors, comparisons, sizes, any_differs, _few_differ(target.octree, picked, ours.select(sample)))
 
 
-def _few_differ(octree: Octree, rays: RayBatch, ours: HitArrays) -> int:
+def _few_differ(octree: Octree, rays: RayFamily, ours: HitArrays) -> int:
     """Number of rays with another hit in calls of one ray, two, and so on up to a packet less one, and then again."""
     differ, begin, count = 0, 0, 1
     while begin < len(rays):

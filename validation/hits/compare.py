@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from validation.hits.errors import ErrorSizes, error_sizes, percentiles, truth
-from validation.hits.rays import RayBatch
+from validation.hits.rays import RayFamily
 from validation.hits.verdicts import (
     NEAR_EDGE,
     OURS_WRONG,
@@ -138,7 +138,7 @@ def compare(
     theirs: HitArrays,
     vertices: ArrayLike,
     faces: ArrayLike,
-    rays: RayBatch,
+    rays: RayFamily,
     roundoff: float = FLOAT32_ROUNDOFF,
     numbers: Ints | None = None,
 ) -> HitComparison:
@@ -203,7 +203,7 @@ def judge_all(
     if not unique:
         return list(comparisons)
     origins, directions, t, face = (list(column) for column in zip(*unique, strict=True))
-    rays = RayBatch("disagreements", np.array(origins), np.array(directions))
+    rays = RayFamily("disagreements", np.array(origins), np.array(directions))
     misses = [one is None for one in face]
     ours = HitArrays(np.where(misses, np.inf, t).astype(np.float64), np.where(misses, -1, face).astype(np.int64))
     exactly = exact.closest_hits(points, triangles, rays.origins, rays.directions)
@@ -225,7 +225,7 @@ def exact_errors(
     exact_hits: list[ExactHit | None],
     vertices: ArrayLike,
     faces: ArrayLike,
-    rays: RayBatch,
+    rays: RayFamily,
     most: int = 2000,
     numbers: Ints | None = None,
 ) -> ExactErrors:
@@ -270,7 +270,7 @@ def _relative_tolerance(corners: Floats, directions: Floats) -> Floats:
 
 
 def _disagreement(
-    row: int, kind: str, ours: HitArrays, theirs: HitArrays | None, rays: RayBatch, numbers: Ints | None
+    row: int, kind: str, ours: HitArrays, theirs: HitArrays | None, rays: RayFamily, numbers: Ints | None
 ) -> Disagreement:
     ray = row if numbers is None else int(numbers[row])
     theirs_t, theirs_face = (None, None) if theirs is None else _answer(theirs, row)

@@ -10,11 +10,11 @@ from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits import watertight
 from validation.hits.check import SEED, HitEffort, LoadedReference, load_reference
-from validation.hits.rays import RayBatch, leak_rays
+from validation.hits.rays import RayFamily, leak_rays
 from validation.job import Job
 
 
-def closed_meshes() -> dict[str, Mesh]:
+def leak_meshes() -> dict[str, Mesh]:
     """Closed meshes; for each ``check_leaks`` has a place inside from which every ray must hit."""
     return {"icosphere 6": icosphere(6), "torus": torus(1.0, 0.4, 400, 125)}
 
@@ -27,7 +27,7 @@ def check_leaks(effort: HitEffort, job: Job) -> tuple[dict[str, Any], list[Gate]
     sets: list[dict[str, Any]] = []
     gates: list[Gate] = []
     costs: dict[str, float] = {}
-    for name, mesh in closed_meshes().items():
+    for name, mesh in leak_meshes().items():
         subject, octree = f"{name} ({len(mesh.faces):,} faces)", Octree.from_mesh(mesh)
         loaded = [load_reference(one, mesh) for one in effort.references if len(mesh.faces) <= one.most_faces]
         for rays in leak_rays(mesh.vertices, mesh.faces, effort.leaks, SEED):
@@ -43,16 +43,16 @@ def check_leaks(effort: HitEffort, job: Job) -> tuple[dict[str, Any], list[Gate]
     return {"sets": sets, "costs": costs}, gates
 
 
-def _leaks(loaded: LoadedReference, inside: RayBatch) -> dict[str, Any]:
+def _leaks(loaded: LoadedReference, inside: RayFamily) -> dict[str, Any]:
     """Leaks of a reference among as many of the rays as it takes."""
     some = inside.select(np.arange(min(len(inside), loaded.reference.most_rays)))
     leaks = int(np.count_nonzero(~loaded.closest_hit(some).hit))
     return {"key": loaded.reference.key, "name": loaded.reference.name, "rays": len(some), "leaks": leaks}
 
 
-def _from_ring_core(rays: RayBatch) -> RayBatch:
+def _from_ring_core(rays: RayFamily) -> RayFamily:
     """Rays at the same targets from the circle in the middle of the tube of ``torus(1, ...)``."""
     targets = rays.origins + rays.directions
     along = np.hypot(targets[:, 0], targets[:, 2])
     origins = np.stack([targets[:, 0] / along, np.zeros(len(along)), targets[:, 2] / along], axis=1)
-    return RayBatch(rays.name, origins, targets - origins)
+    return RayFamily(rays.name, origins, targets - origins)

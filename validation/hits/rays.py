@@ -16,7 +16,7 @@ Ints = NDArray[np.int64] | NDArray[np.int32]
 
 
 @dataclass(frozen=True)
-class RayBatch:
+class RayFamily:
     """Rays of one family: ``origins`` and ``directions`` are float64 (n, 3); no direction is zero."""
 
     name: str
@@ -26,10 +26,10 @@ class RayBatch:
     def __len__(self) -> int:
         return len(self.origins)
 
-    def select(self, rows: ArrayLike) -> "RayBatch":
+    def select(self, rows: ArrayLike) -> "RayFamily":
         """The rays at ``rows`` (indices or a mask), under the same name."""
         index = np.asarray(rows)
-        return RayBatch(self.name, self.origins[index], self.directions[index])
+        return RayFamily(self.name, self.origins[index], self.directions[index])
 
 
 def float32_exact(values: ArrayLike) -> Floats:
@@ -37,12 +37,12 @@ def float32_exact(values: ArrayLike) -> Floats:
     return np.asarray(values).astype(np.float32).astype(np.float64)
 
 
-def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayBatch, ...]:
+def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayFamily, ...]:
     """All ten families with ``count`` rays each, "on_surface" with a quarter.
 
     Equal arguments give equal rays; each family has its own seed.
     """
-    makers: tuple[Callable[[Floats, int, Generator], RayBatch], ...] = (
+    makers: tuple[Callable[[Floats, int, Generator], RayFamily], ...] = (
         random_rays,
         axis_parallel_rays,
         edge_rays,
@@ -61,14 +61,14 @@ def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayB
     return (camera_rays(points, count), camera_square_rays(points, count), *seeded)
 
 
-def camera_rays(vertices: Floats, count: int) -> RayBatch:
+def camera_rays(vertices: Floats, count: int) -> RayFamily:
     """Rays of a pinhole camera that just sees all of ``vertices`` (V, 3), scanline by scanline; unit directions."""
     side = max(int(np.ceil(np.sqrt(count))), 1)
     row, column = np.divmod(np.arange(count), side)
     return _pinhole("camera", vertices, row, column, side)
 
 
-def camera_square_rays(vertices: Floats, count: int) -> RayBatch:
+def camera_square_rays(vertices: Floats, count: int) -> RayFamily:
     """The camera's rays in squares of 4 x 4 pixels: each 16 consecutive rays are close together in both directions."""
     squares = max(int(np.ceil(np.sqrt(count) / 4)), 1)  # along one side of the picture
     square, pixel = np.divmod(np.arange(count), 16)
@@ -76,7 +76,7 @@ def camera_square_rays(vertices: Floats, count: int) -> RayBatch:
     return _pinhole("camera_squares", vertices, row, column, 4 * squares)
 
 
-def random_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def random_rays(corners: Floats, count: int, rng: Generator) -> RayFamily:
     """Half between two points on a sphere around the mesh's ``corners`` (F, 3, 3), half between points in its box."""
     centre, radius = _sphere(corners.reshape(-1, 3))
     from_sphere = centre + 1.1 * radius * _sphere_points(count, rng)
@@ -88,7 +88,7 @@ def random_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
     return _batch("random", start, end - start)
 
 
-def axis_parallel_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def axis_parallel_rays(corners: Floats, count: int, rng: Generator) -> RayFamily:
     """Along +-x, +-y, +-z with exact zeros of both signs; half share two or three coordinates with a vertex."""
     lower, upper = _bounds(corners)
     margin = 0.25 * (upper - lower)
@@ -108,17 +108,17 @@ def axis_parallel_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
     return _batch("axis_parallel", origins, directions)
 
 
-def edge_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def edge_rays(corners: Floats, count: int, rng: Generator) -> RayFamily:
     """At random points of random edges, alternately from outside and from near the mesh's centre; t is about 1."""
     return _aimed("edge", corners, _edge_points(corners, count, rng), rng)
 
 
-def vertex_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def vertex_rays(corners: Floats, count: int, rng: Generator) -> RayFamily:
     """At random vertices, alternately from outside and from near the mesh's centre; t is about 1."""
     return _aimed("vertex", corners, _pick(corners.reshape(-1, 3), count, rng), rng)
 
 
-def leak_rays(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayBatch, RayBatch]:
+def leak_rays(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayFamily, RayFamily]:
     """From near the centre at points of edges and at vertices, ``count`` rays each, aimed in full float64.
 
     They are not float32-exact, and not for a float32 reference: a direction rounded to float32 passes its edge at a
@@ -132,11 +132,11 @@ def leak_rays(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[Ray
         ("vertex_leak", _pick(corners.reshape(-1, 3), count, rng)),
     ):
         origins = _near_centre(corners, count, rng)
-        batches.append(RayBatch(name, origins, targets - origins))
+        batches.append(RayFamily(name, origins, targets - origins))
     return batches[0], batches[1]
 
 
-def grazing_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def grazing_rays(corners: Floats, count: int, rng: Generator) -> RayFamily:
     """From outside at random points of random faces, 1e-4 to 1e-1 radians (log-uniform) above their planes."""
     triangle = _pick(corners, count, rng)
     weights = rng.dirichlet((1.0, 1.0, 1.0), count)
@@ -148,12 +148,12 @@ def grazing_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
     return _batch("grazing", target - 2 * _sphere(corners.reshape(-1, 3))[1] * directions, directions)
 
 
-def from_inside_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def from_inside_rays(corners: Floats, count: int, rng: Generator) -> RayFamily:
     """From near the middle of the mesh's box in all directions: every ray hits a closed, star-shaped mesh."""
     return _batch("from_inside", _near_centre(corners, count, rng), _sphere_points(count, rng))
 
 
-def on_surface_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def on_surface_rays(corners: Floats, count: int, rng: Generator) -> RayFamily:
     """From random points of random faces, alternately in any direction and along the face; unit directions.
 
     A third begin at a vertex, where t = 0 is exact and counts; the others begin as near their face as float32 allows,
@@ -170,13 +170,13 @@ def on_surface_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
     return _batch("on_surface", np.einsum("nk,nkj->nj", weights, triangle), directions)
 
 
-def _quarter_on_surface(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def _quarter_on_surface(corners: Floats, count: int, rng: Generator) -> RayFamily:
     # Every fourth ray gets another answer from a float32 reference than from us, and each of them takes an exact
     # verdict.
     return on_surface_rays(corners, -(-count // 4), rng)
 
 
-def far_away_rays(corners: Floats, count: int, rng: Generator) -> RayBatch:
+def far_away_rays(corners: Floats, count: int, rng: Generator) -> RayFamily:
     """From 1e3 to 1e5 radii (log-uniform) away, alternately at points of the mesh's faces and its box; t is about 1."""
     centre, radius = _sphere(corners.reshape(-1, 3))
     distance = radius * 10.0 ** rng.uniform(3, 5, (count, 1))
@@ -197,7 +197,7 @@ def _edge_points(corners: Floats, count: int, rng: Generator) -> Floats:
     return points
 
 
-def face_rays(vertices: Floats, faces: Ints) -> RayBatch:
+def face_rays(vertices: Floats, faces: Ints) -> RayFamily:
     """One ray at the centre of every face, from the face's own size above or below it, so that each must be found."""
     corners = np.asarray(vertices, dtype=np.float64)[np.asarray(faces, dtype=np.int64)]
     centre = corners.mean(axis=1)
@@ -208,7 +208,7 @@ def face_rays(vertices: Floats, faces: Ints) -> RayBatch:
     return _batch("face", origins, centre - origins)
 
 
-def _pinhole(name: str, vertices: Floats, row: Ints, column: Ints, side: int) -> RayBatch:
+def _pinhole(name: str, vertices: Floats, row: Ints, column: Ints, side: int) -> RayFamily:
     """Rays through the pixels (``row``, ``column``) of a picture of all ``vertices``, ``side`` pixels wide and high."""
     centre, radius = _sphere(vertices)
     forward = _unit(np.array([[-0.6, -0.45, -0.66]]))[0]
@@ -223,7 +223,7 @@ def _pinhole(name: str, vertices: Floats, row: Ints, column: Ints, side: int) ->
     return _batch(name, np.broadcast_to(centre - 3 * radius * forward, directions.shape), directions)
 
 
-def _aimed(name: str, corners: Floats, targets: Floats, rng: Generator) -> RayBatch:
+def _aimed(name: str, corners: Floats, targets: Floats, rng: Generator) -> RayFamily:
     count = len(targets)
     centre, radius = _sphere(corners.reshape(-1, 3))
     outside = centre + 2 * radius * _sphere_points(count, rng)
@@ -233,11 +233,11 @@ def _aimed(name: str, corners: Floats, targets: Floats, rng: Generator) -> RayBa
     return _batch(name, origins, targets - origins)
 
 
-def _batch(name: str, origins: Floats, directions: Floats) -> RayBatch:
+def _batch(name: str, origins: Floats, directions: Floats) -> RayFamily:
     """Rays rounded to float32; a direction that is or rounds to zero (a target at its origin) becomes +z."""
     exact = float32_exact(directions)
     exact[~exact.any(axis=1)] = (0.0, 0.0, 1.0)
-    return RayBatch(name, float32_exact(origins), exact)
+    return RayFamily(name, float32_exact(origins), exact)
 
 
 def _near_centre(corners: Floats, count: int, rng: Generator) -> Floats:

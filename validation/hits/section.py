@@ -11,7 +11,7 @@ from renderer.mesh.shapes import icosphere
 from validation.gates import Gate
 from validation.hits.check import SEED, HitEffort, check_mesh
 from validation.hits.errors import EXPONENTS
-from validation.hits.leaks import check_leaks, closed_meshes
+from validation.hits.leaks import check_leaks, leak_meshes
 from validation.hits.rays import families, float32_exact
 from validation.hits.refit import check_refit
 from validation.hits.verdicts import LISTED
@@ -44,7 +44,7 @@ def steps(job: Job) -> int:
     """Number of calls of ``job.step``: one a family and mesh, two a closed mesh of the leaks, one for refits."""
     triangle = np.eye(3), np.array([[0, 1, 2]])
     a_mesh = len(families(*triangle, 1, SEED)) + 1
-    return len(meshes()) * a_mesh + 2 * len(closed_meshes()) + 1 if job.own else len(job.meshes) * a_mesh
+    return len(meshes()) * a_mesh + 2 * len(leak_meshes()) + 1 if job.own else len(job.meshes) * a_mesh
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.hits.rays import RayBatch
+from validation.hits.rays import RayFamily
 from validation.oracle import exact
 from validation.oracle.exact import ExactHit
 from validation.oracle.rounding import FLOAT64_ROUNDOFF, RayView, t_bounds
@@ -84,7 +84,7 @@ def judgements(
     exact_hits: Sequence[ExactHit | None],
     vertices: Floats,
     faces: Ints,
-    rays: RayBatch,
+    rays: RayFamily,
     most: int,
 ) -> dict[int, Judgement]:
     """Judgements of our answers ``t``, ``face`` (n,), by row, where they are not plainly right.
@@ -157,7 +157,7 @@ def with_truth(d: Disagreement, hit: ExactHit | None) -> Disagreement:
 
 
 def _rows_to_judge(
-    t: Floats, face: Ints, exact_hits: Sequence[ExactHit | None], corners: Floats, rays: RayBatch
+    t: Floats, face: Ints, exact_hits: Sequence[ExactHit | None], corners: Floats, rays: RayFamily
 ) -> list[int]:
     """Rows that are not plainly right, where right is a common miss, or a closest face with t in bounds."""
     rows, named, errors = [], [], []

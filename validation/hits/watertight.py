@@ -20,7 +20,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere, lattice_faces, torus
 from renderer.octree import Octree
 from validation.gates import Gate
-from validation.hits.rays import RayBatch, float32_exact
+from validation.hits.rays import RayFamily, float32_exact
 from validation.references.embree import Embree
 from validation.scenes import SCENES
 
@@ -104,7 +104,7 @@ class Placement:
         """The placed vertices, rounded to float64; with the same faces the mesh is still closed."""
         return self.place(self.closed.mesh.vertices)
 
-    def rays(self, kind: str, count: int, rng: Generator) -> RayBatch:
+    def rays(self, kind: str, count: int, rng: Generator) -> RayFamily:
         """``count`` rays from inside, aimed at the placed vertices or at the edges between them."""
         return aimed(kind, self.vertices(), self.closed.mesh.faces, self.place(self.closed.inside(rng, count)), rng)
 
@@ -127,7 +127,7 @@ class Placement:
         return points @ _TURN.T if self.turned else points
 
 
-def aimed(kind: str, vertices: Floats, faces: NDArray[np.int32], origins: Floats, rng: Generator) -> RayBatch:
+def aimed(kind: str, vertices: Floats, faces: NDArray[np.int32], origins: Floats, rng: Generator) -> RayFamily:
     """One ray from each of ``origins`` (n, 3) at a random vertex, or at a random point of a random edge.
 
     Subtract the origin from the corners before a point between them is taken: far from zero that keeps the ray within
@@ -138,19 +138,19 @@ def aimed(kind: str, vertices: Floats, faces: NDArray[np.int32], origins: Floats
     first = rng.integers(0, 3, count)
     start, end = corners[np.arange(count), first], corners[np.arange(count), (first + 1) % 3]
     if kind == "vertex":
-        return RayBatch(kind, origins, start)
+        return RayFamily(kind, origins, start)
     along = rng.random((count, 1))
-    return RayBatch(kind, origins, (1 - along) * start + along * end)
+    return RayFamily(kind, origins, (1 - along) * start + along * end)
 
 
-def leaks(octree: Octree, rays: RayBatch) -> int:
+def leaks(octree: Octree, rays: RayFamily) -> int:
     """Number of rays that closest hit or any hit misses."""
     missed = ~octree.closest_hit(rays.origins, rays.directions).hit
     missed |= ~octree.any_hit(rays.origins, rays.directions)
     return int(np.count_nonzero(missed))
 
 
-def embree_leaks(embree: Embree, rays: RayBatch) -> int:
+def embree_leaks(embree: Embree, rays: RayFamily) -> int:
     """Number of rays that Embree's closest hit misses."""
     return int(np.count_nonzero(embree.closest_hit(rays.origins, rays.directions)[1] < 0))
 

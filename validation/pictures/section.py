@@ -25,7 +25,7 @@ from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import camera as mitsuba_camera
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba import whitted as mitsuba_whitted
-from validation.scenes import CASES
+from validation.scenes import SCENE_CASES
 
 WHITTED = "Whitted recursion over Mitsuba's scene, BSDFs and rays (scalar_rgb)"
 AOVS = "Mitsuba's primary hits (scalar_rgb)"
@@ -151,7 +151,7 @@ def scenes_of(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
             (name, str(path), path, PictureEffort(size, lower)) for name, path in zip(names, job.scenes, strict=True)
         ]
     return [
-        (case.name, case.shows, case.path, PictureEffort(size, lower if case.every_rung else None)) for case in CASES
+        (case.name, case.shows, case.path, PictureEffort(size, lower if case.every_rung else None)) for case in SCENE_CASES
     ]
 
 
@@ -256,6 +256,6 @@ def costs_of(scenes: list[dict[str, Any]]) -> dict[str, float]:
 
 def _hero(job: Job) -> dict[str, Any]:
     """Render the main scene for the head of the report."""
-    image = render(load_scene(CASES[0].path), resolution=(960, 540), samples=9)
+    image = render(load_scene(SCENE_CASES[0].path), resolution=(960, 540), samples=9)
     write_png(job.folder / "hero.png", srgb(image.radiance))
     return {"file": "hero.png", "seconds": image.render_seconds, "rays": int(image.rays.sum()), "samples": 9}

@@ -18,7 +18,7 @@ from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits import watertight
 from validation.hits.compare import HitArrays
-from validation.hits.rays import RayBatch
+from validation.hits.rays import RayFamily
 from validation.oracle import exact
 from validation.oracle.exact import ExactHit
 from validation.oracle.rounding import t_bounds
@@ -38,7 +38,7 @@ class Sample:
 
     vertices: Floats
     faces: NDArray[np.int32]
-    rays: RayBatch
+    rays: RayFamily
 
 
 @dataclass(frozen=True)
@@ -261,8 +261,8 @@ def _within(corners: Floats, rng: Generator) -> Floats:
     return np.einsum("nk,nkj->nj", weights, corners)
 
 
-def rays_towards(origins: Floats, targets: Floats) -> RayBatch:
-    return RayBatch("stability", origins, targets - origins)
+def rays_towards(origins: Floats, targets: Floats) -> RayFamily:
+    return RayFamily("stability", origins, targets - origins)
 
 
 def _bounds(sample: Sample, faces: NDArray[np.int64], rows: NDArray[np.int64]) -> list[float]:

@@ -19,7 +19,7 @@ from validation.error_curves import front, slope
 from validation.hits.compare import HitArrays
 from validation.hits.rays import random_rays
 from validation.oracle import exact
-from validation.scenes import CASES
+from validation.scenes import SCENE_CASES
 from validation.timing import median_seconds, timed
 
 # Few values, so that equal costs and equal errors are common.
@@ -170,7 +170,7 @@ def test_errors_count_every_kind_of_wrong_answer():
 
 @pytest.fixture(scope="module")
 def pictures():
-    glass = tuple(case for case in CASES if case.name == "glass")
+    glass = tuple(case for case in SCENE_CASES if case.name == "glass")
     return parameter_pictures.run(
         parameter_pictures.PictureStudyEffort(glass, size=16, samples=256, runs=1), lambda _: None
     )
@@ -205,7 +205,7 @@ def test_sampling_a_regular_grid_converges_at_least_like_monte_carlo(pictures):
 
 
 def test_a_difference_is_rms_and_largest_over_all_channels():
-    scene = load_scene(next(case.path for case in CASES if case.name == "stairs"))
+    scene = load_scene(next(case.path for case in SCENE_CASES if case.name == "stairs"))
     image = parameter_pictures.render(scene, resolution=(2, 1))
     other = dataclasses.replace(image, radiance=image.radiance + np.float32([[[0, 3, 0], [0, 0, -4]]]))
     # Adding to float32 radiances below 1 rounds to within 2^-22.

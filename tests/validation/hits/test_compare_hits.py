@@ -170,7 +170,7 @@ def test_two_wrong_answers():
 
 
 def one_ray(origin, direction):
-    return rays.RayBatch("one", np.array([origin], dtype=float), np.array([direction], dtype=float))
+    return rays.RayFamily("one", np.array([origin], dtype=float), np.array([direction], dtype=float))
 
 
 def answer(t, face):

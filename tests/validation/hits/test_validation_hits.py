@@ -168,7 +168,7 @@ def test_references_get_no_more_than_they_take(monkeypatch: pytest.MonkeyPatch) 
     for one in record["families"][0]["references"][0]["listed"]:
         assert one["origin"] == tuple(batch.origins[one["ray"]])
         assert one["direction"] == tuple(batch.directions[one["ray"]])
-    monkeypatch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": icosphere(2)})
+    monkeypatch.setattr(hit_leaks, "leak_meshes", lambda: {"icosphere": icosphere(2)})
     leaks, _ = hits.check_leaks(effort, job())
     assert {one["references"][0]["rays"] for one in leaks["sets"]} == {7}
     record, _ = checked(ball(), dataclasses.replace(EFFORT, references=(small,)))
@@ -216,7 +216,7 @@ def test_thresholds_decide() -> None:
     _, gates = hits.check_mesh("ball", ball(), EFFORT, asked)
     assert {gate.threshold for gate in gates} == {3, 4, 5, 7}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": icosphere(2)})
+        patch.setattr(hit_leaks, "leak_meshes", lambda: {"icosphere": icosphere(2)})
         assert {gate.threshold for gate in hits.check_leaks(EFFORT, asked)[1]} == {6}
 
 
@@ -224,9 +224,9 @@ def test_a_hole_is_a_leak(monkeypatch: pytest.MonkeyPatch) -> None:
     sphere = icosphere(2)
     around = (sphere.faces == 0).any(axis=1)
     whole, holed = partial(dict, icosphere=sphere), dataclasses.replace(sphere, faces=sphere.faces[~around])
-    monkeypatch.setattr(hit_leaks, "closed_meshes", whole)
+    monkeypatch.setattr(hit_leaks, "leak_meshes", whole)
     assert all(g.passed for g in hits.check_leaks(EFFORT, job())[1])
-    monkeypatch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": holed})
+    monkeypatch.setattr(hit_leaks, "leak_meshes", lambda: {"icosphere": holed})
     record, found = hits.check_leaks(EFFORT, job())
     assert not any(g.passed for g in found)
     assert all(one["ours"] > 0 for one in record["sets"])
@@ -239,7 +239,7 @@ def test_a_leak_of_any_hit_alone_is_a_leak(monkeypatch: pytest.MonkeyPatch) -> N
         _blind(octree)
         return octree
 
-    monkeypatch.setattr(hit_leaks, "closed_meshes", lambda: {"icosphere": icosphere(2)})
+    monkeypatch.setattr(hit_leaks, "leak_meshes", lambda: {"icosphere": icosphere(2)})
     monkeypatch.setattr(hit_leaks, "Octree", type("Broken", (), {"from_mesh": staticmethod(build)}))
     assert not any(g.passed for g in hits.check_leaks(dataclasses.replace(EFFORT, references=()), job())[1])
 
@@ -248,7 +248,7 @@ def test_steps_count_the_suites_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hits, "meshes", lambda: {"ball": ball()})
     monkeypatch.setattr(hits, "QUICK", EFFORT)
     for module in (hits, hit_leaks):
-        monkeypatch.setattr(module, "closed_meshes", lambda: {"icosphere": icosphere(2)})
+        monkeypatch.setattr(module, "leak_meshes", lambda: {"icosphere": icosphere(2)})
     seen: list[str] = []
     asked = dataclasses.replace(job(), step=seen.append)
     record, _ = hits.run(asked)

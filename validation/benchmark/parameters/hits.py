@@ -19,7 +19,7 @@ from renderer.octree import Octree
 from renderer.trace.query import Hits
 from validation.efficiency.hits import answer, errors, turned_mesh
 from validation.error_curves import front
-from validation.hits.rays import RayBatch, camera_rays, float32_exact, random_rays
+from validation.hits.rays import RayFamily, camera_rays, float32_exact, random_rays
 from validation.oracle import exact
 from validation.references.embree import Embree
 from validation.timing import median_seconds, timed
@@ -91,7 +91,7 @@ def differing_rays(a: Hits, b: Hits) -> int:
     return int(changed.sum())
 
 
-def tree_parameters(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dict[str, object]:
+def tree_parameters(mesh: Mesh, batches: tuple[RayFamily, ...], runs: int) -> dict[str, object]:
     """Seconds, bytes and nanoseconds a ray of every tree, and the number of rays with other bits than the default tree.
 
     That number must be 0, else the option trades more than time.
@@ -124,7 +124,7 @@ def tree_parameters(mesh: Mesh, batches: tuple[RayBatch, ...], runs: int) -> dic
     }
 
 
-def _differing(octrees: dict[str, Octree], batches: tuple[RayBatch, ...]) -> dict[str, int]:
+def _differing(octrees: dict[str, Octree], batches: tuple[RayFamily, ...]) -> dict[str, int]:
     """Number of rays of all families for which each tree gives other bits than the default tree."""
     counts = dict.fromkeys(octrees, 0)
     for batch in batches:
@@ -134,7 +134,7 @@ def _differing(octrees: dict[str, Octree], batches: tuple[RayBatch, ...]) -> dic
     return counts
 
 
-def _storage(mesh: Mesh, batches: tuple[RayBatch, ...], effort: HitStudyEffort) -> list[dict[str, object]]:
+def _storage(mesh: Mesh, batches: tuple[RayFamily, ...], effort: HitStudyEffort) -> list[dict[str, object]]:
     """One record for each family of rays."""
     contenders = _contenders(mesh, effort.runs)
     records: list[dict[str, object]] = []
@@ -182,6 +182,6 @@ def _ready(build: Callable[[], Any]) -> None:
     build().closest_hit(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
 
 
-def _nanoseconds(queries: dict[str, Any], batch: RayBatch, runs: int) -> dict[str, float]:
+def _nanoseconds(queries: dict[str, Any], batch: RayFamily, runs: int) -> dict[str, float]:
     calls = {name: timed(query, batch.origins, batch.directions) for name, query in queries.items()}
     return {name: 1e9 * seconds / len(batch) for name, seconds in median_seconds(calls, runs).items()}

@@ -31,16 +31,16 @@ The record, ready for JSON; ``front`` always lists the names of points that no o
 from collections.abc import Callable
 
 from validation.benchmark.parameters import hits, pictures
-from validation.scenes import CASES
+from validation.scenes import SCENE_CASES
 
 
 def run(quick: bool, step: Callable[[str], None]) -> dict[str, object]:
     """Measure all parameters: under 20 s when ``quick``, under 2 minutes else, once the kernels are compiled."""
     if quick:
         hit_effort = hits.HitStudyEffort(level=4, rays=10_000, judged=500, runs=5)
-        branching = tuple(case for case in CASES if case.name == "glass")
+        branching = tuple(case for case in SCENE_CASES if case.name == "glass")
         picture_effort = pictures.PictureStudyEffort(branching, size=48, samples=256, runs=5)
     else:
         hit_effort = hits.HitStudyEffort(level=6, rays=50_000, judged=2_000, runs=5)
-        picture_effort = pictures.PictureStudyEffort(CASES, size=128, samples=1024, runs=5)
+        picture_effort = pictures.PictureStudyEffort(SCENE_CASES, size=128, samples=1024, runs=5)
     return {"hits": hits.run(hit_effort, step), "pictures": pictures.run(picture_effort, step)}

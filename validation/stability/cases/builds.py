@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer import BruteForce, Hits, Mesh, Octree, load_mesh
 from renderer.mesh.shapes import grid, icosphere, torus
 from validation.hits.compare import RTOL, RTOL_GRAZING, HitArrays
-from validation.hits.rays import RayBatch, float32_exact
+from validation.hits.rays import RayFamily, float32_exact
 from validation.references.embree import Embree
 from validation.scenes import SCENES
 from validation.stability.cases.case import ExtremeCase, Outcome
@@ -21,9 +21,9 @@ from validation.stability.cases.judgement import (
     against_exact,
     as_exact,
     closest,
-    count_hits,
     embree_says,
     float32_mesh,
+    hits_in_words,
     octrees,
     of,
     one_t,
@@ -52,7 +52,7 @@ def _pins(side: float) -> list[Triangle]:
     return [[(0, 0, 0), (1 / 64, 0, 0), (0, 1 / 64, 0)], [(side, side, side), (end, side, side), (side, end, side)]]
 
 
-def _rays_at(rng: np.random.Generator, mesh: Mesh, count: int) -> RayBatch:
+def _rays_at(rng: np.random.Generator, mesh: Mesh, count: int) -> RayFamily:
     """Rays from around the mesh at random points of random faces, half of them at vertices; float32-exact."""
     lower, upper = mesh.bounds
     radius = float(np.linalg.norm(upper - lower))
@@ -63,7 +63,7 @@ def _rays_at(rng: np.random.Generator, mesh: Mesh, count: int) -> RayBatch:
     return ray_batch(origins, float32_exact(targets - origins))
 
 
-def _expected_t(mesh: Mesh, rays: RayBatch, t: float, digits: float) -> Outcome:
+def _expected_t(mesh: Mesh, rays: RayFamily, t: float, digits: float) -> Outcome:
     """Check the first ray's t by every tree: it must be exact, and within ``digits`` of the table's number."""
     answers = [closest(tree, rays) for tree in octrees(mesh)]
     holds = all(as_exact(against_exact(mesh, rays, hits)) and abs(float(hits.t[0]) - t) <= digits for hits in answers)
@@ -93,7 +93,7 @@ def _on_split_planes(quick: bool) -> Outcome:
     directions[~directions.any(axis=1)] = (0, 0, 1)
     rays = ray_batch(origins, directions)
     differing, ours = against_brute_force(mesh, rays, octrees(mesh))
-    return Outcome(ours, differing == 0, *embree_says(mesh, rays, count_hits))
+    return Outcome(ours, differing == 0, *embree_says(mesh, rays, hits_in_words))
 
 
 def _coincident(quick: bool) -> Outcome:
@@ -121,7 +121,7 @@ def _fan(quick: bool) -> Outcome:
     # A node has at least two children, and a leaf at least one face.
     bounded = stats.references == count and stats.nodes < stats.leaves <= count
     ours = f"{stats.references:,} references, {stats.nodes:,} nodes, depth {stats.depth}; {compared}"
-    return Outcome(ours, bounded and differing == 0, *embree_says(mesh, rays, count_hits))
+    return Outcome(ours, bounded and differing == 0, *embree_says(mesh, rays, hits_in_words))
 
 
 def _tiny_bounds(quick: bool) -> Outcome:
@@ -132,7 +132,7 @@ def _tiny_bounds(quick: bool) -> Outcome:
     differing, compared = against_brute_force(mesh, rays, trees)
     ended = [tree.stats.references == 1000 for tree in trees]
     ours = f"{of(ended, 'builds end')}, depth {trees[0].stats.depth}; {compared}"
-    return Outcome(ours, all(ended) and differing == 0, *embree_says(mesh, rays, count_hits))
+    return Outcome(ours, all(ended) and differing == 0, *embree_says(mesh, rays, hits_in_words))
 
 
 def _teapot_in_stadium(quick: bool) -> Outcome:
@@ -149,7 +149,7 @@ def _teapot_in_stadium(quick: bool) -> Outcome:
     inside, alone = _seconds(lambda: closest(octree, many)), Octree.from_mesh(teapot)
     slowdown = inside / _seconds(lambda: closest(alone, many))
     ours = f"{compared}; takes {slowdown:.1f} times as long as the teapot alone"
-    return Outcome(ours, differing == 0, *embree_says(mesh, few, count_hits))
+    return Outcome(ours, differing == 0, *embree_says(mesh, few, hits_in_words))
 
 
 def _seconds(run: Callable[[], object]) -> float:
@@ -180,7 +180,7 @@ def _without_area(quick: bool) -> Outcome:
             near = np.abs(hits.points - on_ray).max(axis=1) <= 1e-9
             wrong |= hits.hit & ~(near & (hits.face >= 3))
         wrong |= tree.any_hit(beside.origins, beside.directions)
-    return Outcome(f"{of(wrong)} where none is", not wrong.any(), *embree_says(mesh, rays, count_hits))
+    return Outcome(f"{of(wrong)} where none is", not wrong.any(), *embree_says(mesh, rays, hits_in_words))
 
 
 def _refused(call: Callable[[], object], *words: str) -> bool:
@@ -203,7 +203,7 @@ def _not_finite(quick: bool) -> Outcome:
         hits = closest(Octree.from_mesh(mesh), rays)
         left.append(hits.t.tolist() == [1, np.inf] and list(repairs.dropped_faces) == [1])
     # Embree gets plain arrays, because ``Mesh`` refuses these vertices.
-    says = [count_hits(*Embree(vertices, faces, robust=mode).closest_hit(rays.origins, rays.directions))
+    says = [hits_in_words(*Embree(vertices, faces, robust=mode).closest_hit(rays.origins, rays.directions))
             for mode in (False, True)]  # fmt: skip
     ours = f"{of(named, 'named')}; repaired: {of(left, 'without the bad face')}"
     return Outcome(ours, all(named) and all(left), *says)
@@ -227,7 +227,7 @@ def _empty(quick: bool) -> Outcome:
     for mesh in meshes:
         for tree in octrees(mesh):
             hit |= closest(tree, rays).hit | tree.any_hit(rays.origins, rays.directions)
-    return Outcome(of(~hit, "missed"), not hit.any(), *embree_says(meshes[0], rays, count_hits))
+    return Outcome(of(~hit, "missed"), not hit.any(), *embree_says(meshes[0], rays, hits_in_words))
 
 
 def _single(quick: bool) -> Outcome:
@@ -283,7 +283,7 @@ def _not_manifold(quick: bool) -> Outcome:
     some = [_rays_at(rng, part, count) for part in (mesh, float32_mesh(book))]
     rays = ray_batch(*(np.concatenate([getattr(r, name) for r in some]) for name in ("origins", "directions")))
     differing, ours = against_brute_force(mesh, rays, octrees(mesh))
-    return Outcome(ours, differing == 0, *embree_says(mesh, rays, count_hits))
+    return Outcome(ours, differing == 0, *embree_says(mesh, rays, hits_in_words))
 
 
 def _ten_million(quick: bool) -> Outcome:
@@ -320,7 +320,7 @@ def _terrain(side: int) -> Mesh:
     return Mesh(float32_exact(points), flat.faces)
 
 
-def _differing(rays: RayBatch, hits: Hits, t: Floats) -> Ints:
+def _differing(rays: RayFamily, hits: Hits, t: Floats) -> Ints:
     """Rays that only one of the two hits, or whose t differs by more than Embree's float32 explains."""
     differs = hits.hit != np.isfinite(t)
     both = np.flatnonzero(hits.hit & np.isfinite(t))
@@ -330,7 +330,7 @@ def _differing(rays: RayBatch, hits: Hits, t: Floats) -> Ints:
     return np.flatnonzero(differs)
 
 
-def _is_wrong(mesh: Mesh, rays: RayBatch, hits: Hits, row: int, their_face: Ints) -> bool:
+def _is_wrong(mesh: Mesh, rays: RayFamily, hits: Hits, row: int, their_face: Ints) -> bool:
     """Whether exact arithmetic contradicts our answer, on the faces that the two answers name."""
     named = sorted({int(hits.face[row]), int(their_face[row])} - {-1})
     local = named.index(int(hits.face[row])) if hits.face[row] >= 0 else -1

@@ -98,7 +98,7 @@ def _edge_on(quick: bool) -> Outcome:
 
 CASES: tuple[ExtremeCase, ...] = (
     ExtremeCase(
-        50, "rays within rounding of a face's plane, at it and beside it, and at faces 1e-17 to 1e-3 of their length wide",
+        50, "rays along a face's plane, at and beside it; rays at slivers 1e-17 to 1e-3 of their length wide",
         "no hit beside its face, none lost; with t_min = t_max = t the same hit", ("exact",),
         "2^-37 of the distance: a rounding, times the 2^16 that a determinant in no doubt may blow it up", _edge_on,
     ),

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer import BruteForce, Hits, Mesh, Octree
 from validation.hits.compare import ExactErrors, HitArrays, exact_errors
-from validation.hits.rays import RayBatch, float32_exact
+from validation.hits.rays import RayFamily, float32_exact
 from validation.oracle import exact
 from validation.references.embree import Embree
 
@@ -23,17 +23,17 @@ SEED = 2026
 FIRST_FACE = np.array([[0, 1, 2]], dtype=np.int32)
 
 
-def ray_batch(origins: ArrayLike, directions: ArrayLike) -> RayBatch:
+def ray_batch(origins: ArrayLike, directions: ArrayLike) -> RayFamily:
     """Rays from rows that broadcast against each other, (n, 3) or (3,)."""
     o, d = np.broadcast_arrays(np.atleast_2d(np.asarray(origins, float)), np.atleast_2d(np.asarray(directions, float)))
-    return RayBatch("extreme", np.ascontiguousarray(o), np.ascontiguousarray(d))
+    return RayFamily("extreme", np.ascontiguousarray(o), np.ascontiguousarray(d))
 
 
-def closest(accelerator: Accelerator, rays: RayBatch) -> Hits:
+def closest(accelerator: Accelerator, rays: RayFamily) -> Hits:
     return accelerator.closest_hit(rays.origins, rays.directions)
 
 
-def embree_says(mesh: Mesh, rays: RayBatch, say: Callable[[Floats, Ints], str]) -> tuple[str, str]:
+def embree_says(mesh: Mesh, rays: RayFamily, say: Callable[[Floats, Ints], str]) -> tuple[str, str]:
     """The answers of Embree's default and robust mode, formatted by ``say(t, face)``."""
     # Numbers beyond float32 reach Embree as infinities; the table shows its answers.
     with np.errstate(over="ignore"):
@@ -44,7 +44,7 @@ def embree_says(mesh: Mesh, rays: RayBatch, say: Callable[[Floats, Ints], str]) 
         )
 
 
-def against_exact(mesh: Mesh, rays: RayBatch, hits: Hits | HitArrays) -> ExactErrors:
+def against_exact(mesh: Mesh, rays: RayFamily, hits: Hits | HitArrays) -> ExactErrors:
     """Compare every ray with exact arithmetic, t within the bound that rounding explains."""
     truth = exact.closest_hits(mesh.vertices, mesh.faces, rays.origins, rays.directions)
     return exact_errors(HitArrays(hits.t, hits.face), truth, mesh.vertices, mesh.faces, rays)
@@ -63,7 +63,7 @@ def same_bits(first: Hits, second: Hits) -> Bools:
     return same
 
 
-def against_brute_force(mesh: Mesh, rays: RayBatch, octrees: Iterable[Octree]) -> tuple[int, str]:
+def against_brute_force(mesh: Mesh, rays: RayFamily, octrees: Iterable[Octree]) -> tuple[int, str]:
     """Number of rays on which some octree differs from brute force, in t, face, u, v or any hit; and a text."""
     brute = closest(BruteForce.from_mesh(mesh), rays)
     differs = np.zeros(len(rays), dtype=np.bool_)
@@ -98,7 +98,7 @@ def one_t(t: Floats, face: Ints) -> str:
     return f"t = {abs(t[0]):.8g}" if face[0] >= 0 else "miss"
 
 
-def count_hits(t: Floats, face: Ints) -> str:
+def hits_in_words(t: Floats, face: Ints) -> str:
     return of(face >= 0)
 
 

@@ -6,14 +6,14 @@ import numpy as np
 
 from renderer import BruteForce, Hits, Mesh, Octree
 from validation.hits.compare import HitArrays
-from validation.hits.rays import RayBatch, float32_exact
+from validation.hits.rays import RayFamily, float32_exact
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import (
     SEED,
     against_exact,
     as_exact,
-    count_hits,
     embree_says,
+    hits_in_words,
     of,
     ray_batch,
     same_bits,
@@ -30,7 +30,7 @@ def sheets(count: int) -> Mesh:
     return Mesh(corners.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3))
 
 
-def beside_sheets(side: int) -> RayBatch:
+def beside_sheets(side: int) -> RayFamily:
     """Rays from a square grid 1e-12 beside that plane, nearly along it."""
     y, z = np.meshgrid(np.linspace(-0.5, 0.5, side), np.linspace(-0.5, 0.5, side))
     return ray_batch(np.stack([np.full(y.size, 1e-12), y.ravel(), z.ravel()], axis=1), (-0.1, 1.0, 0.3))
@@ -42,7 +42,7 @@ def _refitted(mesh: Mesh) -> Octree:
     return octree
 
 
-def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tuple[str, Hits]]:
+def orders(mesh: Mesh, rays: RayFamily, t_max: float | np.ndarray) -> Iterator[tuple[str, Hits]]:
     """Closest hits of the same rays by brute force, all kinds of trees, and batches cut and reordered in many ways."""
 
     def trace(accelerator: Octree | BruteForce, *pieces: np.ndarray) -> Hits:
@@ -71,7 +71,7 @@ def orders(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray) -> Iterator[tu
     yield "few at a time", trace(octree, *np.array_split(rows, len(rows) // 7))
 
 
-def differing(mesh: Mesh, rays: RayBatch, t_max: float | np.ndarray = np.inf) -> tuple[np.ndarray, Hits, list[str]]:
+def differing(mesh: Mesh, rays: RayFamily, t_max: float | np.ndarray = np.inf) -> tuple[np.ndarray, Hits, list[str]]:
     """Rays that some order answers differently from the first, the first order's hits, and those orders' names."""
     traced = orders(mesh, rays, t_max)
     _, first = next(traced)
@@ -94,7 +94,7 @@ def _order(quick: bool) -> Outcome:
     right = as_exact(against_exact(mesh, rays.select(judged), HitArrays(*few)))
     both = differs | differs_close
     said = f"{of(both, 'rays')} differ" + (f": {', '.join(sorted({*names, *names_close}))}" if both.any() else "")
-    return Outcome(f"{said}; {of(hits.hit)}", right and not both.any(), *embree_says(mesh, rays, count_hits))
+    return Outcome(f"{said}; {of(hits.hit)}", right and not both.any(), *embree_says(mesh, rays, hits_in_words))
 
 
 CASES: tuple[ExtremeCase, ...] = (

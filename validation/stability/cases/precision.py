@@ -18,9 +18,9 @@ from validation.stability.cases.judgement import (
     as_exact,
     both_modes,
     closest,
-    count_hits,
     embree_says,
     float32_mesh,
+    hits_in_words,
     of,
     ray_batch,
     rotation,
@@ -98,7 +98,7 @@ def _far_scales(quick: bool) -> Outcome:
         )
         holds &= as_exact(errors) and errors.hits == count
         ulp = max(ulp, errors.ulp_max)
-        texts.append([f"{scale:.0e} {said}" for said in embree_says(mesh, rays, count_hits)])
+        texts.append([f"{scale:.0e} {said}" for said in embree_says(mesh, rays, hits_in_words)])
     ours = f"all hit at 1e-40, 1e-30, 1e30, 1e300, at most {ulp:.1f} ulp off" if holds else "wrong or missing hits"
     return Outcome(ours, holds, *("; ".join(words) for words in zip(*texts, strict=True)))
 

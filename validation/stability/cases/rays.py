@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from renderer import Mesh, Octree
 from renderer.mesh.shapes import box, grid, icosphere, lattice_faces
-from validation.hits.rays import RayBatch, float32_exact, leak_rays
+from validation.hits.rays import RayFamily, float32_exact, leak_rays
 from validation.oracle.exact import FLOAT64_ROUNDOFF
 from validation.oracle.rounding import RayView
 from validation.stability.cases.case import ExtremeCase, Outcome
@@ -19,9 +19,9 @@ from validation.stability.cases.judgement import (
     as_exact,
     both_modes,
     closest,
-    count_hits,
     embree_says,
     float32_mesh,
+    hits_in_words,
     octrees,
     of,
     one_t,
@@ -107,7 +107,7 @@ def _grid_vertices(quick: bool) -> Outcome:
     rays = ray_batch(mesh.vertices + np.array([0, 0, 5]), (0, 0, -1))
     hits = closest(Octree.from_mesh(mesh), rays)
     holds = len(rays) == 1089 and bool((hits.t == 5).all())
-    return Outcome(f"{of(hits.hit)}, t == 5 on {(hits.t == 5).sum():,}", holds, *embree_says(mesh, rays, count_hits))
+    return Outcome(f"{of(hits.hit)}, t == 5 on {(hits.t == 5).sum():,}", holds, *embree_says(mesh, rays, hits_in_words))
 
 
 def _box_edge(quick: bool) -> Outcome:
@@ -171,7 +171,7 @@ def _in_plane(quick: bool) -> Outcome:
     return Outcome(ours, sound and not hits_in_all[strict].any(), of(default), of(robust))
 
 
-def _permitted(mesh: Mesh, rays: RayBatch, row: int, t: float) -> bool:
+def _permitted(mesh: Mesh, rays: RayFamily, row: int, t: float) -> bool:
     origin, direction = tuple(rays.origins[row].tolist()), tuple(rays.directions[row].tolist())
     return RayView(mesh.vertices, mesh.faces.astype(np.int64), origin, direction, FLOAT64_ROUNDOFF).is_permitted(t, 0)
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from renderer import BruteForce, Mesh, Octree
-from validation.hits.rays import RayBatch
+from validation.hits.rays import RayFamily
 from validation.stability.cases.case import ExtremeCase, Outcome
-from validation.stability.cases.judgement import SEED, count_hits, embree_says, of, ray_batch, same_bits
+from validation.stability.cases.judgement import SEED, embree_says, hits_in_words, of, ray_batch, same_bits
 
 # How far the corner on the split side lies beside it: on it, less and more than rounding.
 BESIDE = (0.0, 1e-300, 1e-17, 2.3e-16, -1e-16, 1e-14, 1e-9)
@@ -20,7 +20,7 @@ def split_side(beside: float) -> Mesh:
     return Mesh(corners, [[0, 2, 1], [0, 3, 2], [1, 2, 3], [0, 1, 4], [0, 4, 3], [1, 3, 4]])
 
 
-def at_the_side(count: int) -> RayBatch:
+def at_the_side(count: int) -> RayFamily:
     """Rays from within, aimed along the whole split side."""
     rng = np.random.default_rng(SEED)
     origins, share = [0.7, 0.61, 0.53] + 0.1 * rng.random((count, 3)), rng.random((count, 1))
@@ -39,7 +39,7 @@ def _thin(quick: bool) -> Outcome:
         differ += int((~same_bits(hits, brute)).sum())
     total = np.zeros(len(BESIDE) * len(rays), np.bool_)
     said = f"{lost} lost, {off} off, {differ} unlike brute force, {of(~total, 'rays')}"
-    return Outcome(said, not (lost or off or differ), *embree_says(split_side(0.0), rays, count_hits))
+    return Outcome(said, not (lost or off or differ), *embree_says(split_side(0.0), rays, hits_in_words))
 
 
 CASES: tuple[ExtremeCase, ...] = (
