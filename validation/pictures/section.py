@@ -151,7 +151,8 @@ def scenes_of(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
             (name, str(path), path, PictureEffort(size, lower)) for name, path in zip(names, job.scenes, strict=True)
         ]
     return [
-        (case.name, case.shows, case.path, PictureEffort(size, lower if case.every_rung else None)) for case in SCENE_CASES
+        (case.name, case.shows, case.path, PictureEffort(size, lower if case.every_rung else None))
+        for case in SCENE_CASES
     ]
 
 
