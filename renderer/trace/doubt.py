@@ -43,7 +43,7 @@ ROUNDING = 2.0**-46
 _BEFORE = (1.0 + 2.0**-30) / np.float64(FAR_PADDING)
 # A face thinner than this share of its length is a line: its normal errs by 2^-100, its product with a corner by 2^-97,
 # and so the distance from the plane of any other face by 2^-49, a sixteenth of ROUNDING.
-_LINE = 2.0**-48
+LINE = 2.0**-48
 
 
 @kernel
@@ -154,7 +154,7 @@ def _meet_side(a, b, c, o, d, bounds):
         far / side,
     )
     normal = cross_pairs(face.along, face.other)
-    if largest_component(heads(normal)) <= _LINE:
+    if largest_component(heads(normal)) <= LINE:
         t, second, apex = _meet_line(face, bounds[0] / face.t_unit, bounds[1] / face.t_unit)
     else:
         t, second, apex = _meet_plane(face, normal, bounds[0] / face.t_unit, bounds[1] / face.t_unit)

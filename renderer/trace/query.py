@@ -174,14 +174,14 @@ def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: 
     if not good.all():
         row = int((~good).argmax())
         expect(False, "leaving", f"faces from 0 to {len(mesh.faces) - 1}, or -1", f"{faces[row]} in row {row}")
-    near = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1)
-    if not near.all():
-        # As it was given: moved, it would be told by numbers that nobody knows.
-        _reject(rays, int((~near).argmax()), scale)
+    whole = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(rays.directions).all(axis=1)
+    if not whole.all():
+        # Before it moves, so that the error tells the numbers that were given.
+        _reject(rays, int((~whole).argmax()), scale)
     starts = np.empty((count, 3))
 
     def leave(begin: int, end: int) -> None:
-        leave_faces(mesh.vertices, mesh.faces, rays.origins, rays.directions, faces, starts, begin, end)
+        leave_faces(mesh.vertices, mesh.faces, rays.origins, rays.directions, faces, starts, (begin, end, scale))
 
     for_chunks(leave, count, CHUNK, threads)
     return rays._replace(origins=starts)

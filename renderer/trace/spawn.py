@@ -12,7 +12,7 @@ from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, power_below, scaled_difference
 from renderer.kernels.simd import at, larger, pointer, put, smaller
 from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, row3, scale, sub, three
-from renderer.trace.doubt import ROUNDING
+from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import DOUBT, SLANT
 
 _ROUNDOFF = 2.0**-53
@@ -31,10 +31,9 @@ _MOST = 50.0 * _ROUNDOFF / SLANT
 # Of a face thinner than this share of its longest side every determinant is in doubt: it is at most 3 |cross| / side^2
 # of A D, because A is at least the side as the ray sees it, and D at least side / sqrt(3).
 _THIN = DOUBT / 4.0
-# A hit whose determinant is in doubt counts within ROUNDING of the face: twice that is off it.
+# A hit whose determinant is in doubt counts within ROUNDING of the face: twice that from its plane is off it, and four
+# times that from a line, which the face may be LINE wide.
 _LEAST = 2.0 * ROUNDING
-# A face so thin that float64 does not tell the direction of its normal: it is taken for a line.
-_LINE = 2.0**-46
 # Of a face thinner than this the distance from the plane errs by more than matters, so it takes twice the digits.
 _SHARP = 2.0**-10
 _SMALLEST = 2.0**-1074
@@ -62,10 +61,12 @@ def normal_of(p0, p1, p2, d):
     side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
     n = cross(side2, sub(p2, p0))
     l0, l1, l2 = largest_component(side0), largest_component(side1), largest_component(side2)
-    if largest_component(n) > larger(l0, larger(l1, l2)) * _LINE * larger(l0, larger(l1, l2)):
+    if largest_component(n) > larger(l0, larger(l1, l2)) * LINE * larger(l0, larger(l1, l2)):
         return normalized(n)
     longest = normalized(side2 if l2 >= l0 and l2 >= l1 else (side1 if l1 >= l0 else side0))
-    return normalized(sub(scale(longest, dot(d, longest)), d))
+    across = normalized(sub(scale(longest, dot(d, longest)), d))
+    # Once more, because of a d nearly along the side rounding leaves much of what points along it.
+    return normalized(sub(across, scale(longest, dot(across, longest))))
 
 
 @inlined
@@ -77,7 +78,7 @@ def _clearance(p0, p1, p2, double_area, reach):
         largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2)))
     )
     if not double_area / side > _THIN * side:
-        return _LEAST * reach
+        return 2.0 * _LEAST * reach
     # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
     return reach * larger(_LEAST, smaller(_GAMMA264 * (reach / double_area * reach), _MOST))
 
@@ -147,7 +148,7 @@ def _leave(p0, p1, p2, o, w):
     needed = _clearance(p0, p1, p2, double_area, reach) * (1.0 + 2.0**-10)
     if double_area / side > _SHARP * side:
         needed += _GAMMA336 * (reach / double_area * reach) * reach
-    elif double_area / side > _LINE * side:
+    elif double_area / side > LINE * side:
         n_g, height = _exact_plane(p0, p1, p2, o)
     away = 1.0 if dot(n_g, w) >= 0.0 else -1.0
     missing = needed - away * height
@@ -158,18 +159,23 @@ def _leave(p0, p1, p2, o, w):
 
 
 @kernel
-def leave_faces(vertices, faces, origins, directions, leaving, starts, begin, end):
+def leave_faces(vertices, faces, origins, directions, leaving, starts, bounds):
     """Write to ``starts`` (n, 3) where the rays begin:end start that leave the faces ``leaving``, -1 for none.
+
+    ``bounds`` are begin, end, and the tree's scale, in whose units no product overflows or vanishes.
 
     A start moves along its face's normal only, by no more than its distance from the plane and some roundings, so that
     the ray meets neither that face nor another in its plane. Origins have one row a ray or one for all.
     """
     corners, points, step = pointer(vertices), pointer(origins), 3 * np.int64(len(origins) > 1)
+    begin, end, unit = bounds
     for i in range(begin, end):
         face, o, w = leaving[i], three(points, i * step), row3(pointer(directions), i)
         if face >= 0:
             a, b, c = row3(pointer(faces), face)
-            o = _leave(row3(corners, a), row3(corners, b), row3(corners, c), o, w)
+            p0, p1, p2 = row3(corners, a), row3(corners, b), row3(corners, c)
+            o = _leave(scale(p0, unit), scale(p1, unit), scale(p2, unit), scale(o, unit), w)
+            o = scale(o, 1.0 / unit)
         row = at(pointer(starts), 3 * i)
         for k in range(3):
             put(row, k, o[k])
