@@ -10,7 +10,7 @@ def on_terminal() -> bool:
 
 
 def spell_everything() -> None:
-    """Let standard output write characters that its encoding lacks, as in a path, by escapes: an error otherwise."""
+    """Let standard output escape characters that its encoding lacks, as an accent in a path, where it would raise."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
 

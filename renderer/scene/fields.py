@@ -1,5 +1,4 @@
-"""The base of the scene classes: types of fields, checks that refuse unknown or wrong values, and one line per fault.
-"""
+"""The base of the scene classes: types of fields, checks for unknown and wrong values, and one line per fault."""
 
 import re
 from collections.abc import Callable

@@ -70,7 +70,7 @@ def cut_part(faces, tree, part, rule, level, count, room):
 
 @kernel
 def _cut_in_half(faces, tree, part, count):
-    """Cut a part whose faces do not separate into equal halves, so that the build ends."""
+    """Cut a part into equal halves where no rule separates its faces, so that the build ends."""
     begin, end = tree.ranges[part]
     middle = (begin + end) // 2
     tree.halves[part] = count

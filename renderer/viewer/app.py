@@ -111,7 +111,7 @@ async def _receive_all(socket: WebSocket, session: Session) -> None:
 
 
 def make_app(shown: ShownScene, host: str, port: int, token: str | None, ancestors: str) -> Starlette:
-    """The application that shows ``shown`` on ``host`` and ``port``; without ``token``, to every client that reaches it.
+    """The application that shows ``shown`` on ``host`` and ``port``; without ``token``, to every client.
 
     ``ancestors`` is the content security policy's rule about frames around the page.
     """

@@ -19,7 +19,7 @@ from renderer.viewer.viewpoint import camera_of
 
 # Longest sides of the first passes: a sixteenth and a quarter of the pixels of a picture of 512 x 512.
 COARSE = (128, 256)
-# On Pillow's scale; above it files grow, but no difference can be seen.
+# On Pillow's scale; above it files grow faster than the quality that can be seen.
 _JPEG_QUALITY = 90
 
 

@@ -12,7 +12,7 @@ from renderer.scene.fields import FiniteVector
 MAX_SIDE = 1024
 # A page's largest message is a pick of under 1 kB; this leaves room for numbers of any length.
 MAX_MESSAGE_BYTES = 16384
-# An 8 x 8 grid per pixel: with 1024 x 1024 pixels, 67 million camera rays, which take long enough.
+# An 8 x 8 grid per pixel: with 1024 x 1024 pixels, 67 million camera rays, the most that are worth the wait.
 MAX_SAMPLES = 64
 # Below a thousandth of a radian neighbouring rays differ by less than a page's float32 matrices resolve; above 3.1
 # almost all of the picture is its rim.
@@ -145,7 +145,7 @@ def parse(text: str) -> Message:
 def packed(
     kind: int, view: CameraMessage, step: int, last: bool, size: tuple[int, int], pace: tuple[float, float]
 ) -> bytes:
-    """The header of a picture or of face colours; ``size`` is (w, h), ``pace`` milliseconds and million rays per second.
+    """The header of a picture or of face colours; ``size`` is (w, h), ``pace`` ms and million rays per second.
 
     32 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 bytes per face.
     """

@@ -214,7 +214,7 @@ class Session:
                 await self.complain(error)
 
     def _camera(self, message: SaveCamera) -> str:
-        """The camera as TOML. Its target is the point of its axis beside the middle of the scene, if that lies ahead."""
+        """The camera as TOML. Its target is the point of its axis nearest the scene's middle, if that lies ahead."""
         camera = camera_of(message.m, message.fovy)
         if not message.walk:
             middle = np.mean(self.host.shown.prepared.mesh.bounds, axis=0)
