@@ -167,7 +167,7 @@ def _render(options: argparse.Namespace) -> None:
     _check_output_is_no_input(options, scene)
     _scene_to_write(options)
     compile_in_two()
-    warnings.simplefilter("ignore", CutWarning)  # said below, in a line of ours
+    warnings.simplefilter("ignore", CutWarning)  # reported below, on one line
     image = render(
         scene,
         resolution=options.resolution,

@@ -283,7 +283,7 @@ def _moved(mesh: Mesh, vertices: ArrayLike) -> Mesh:
     """The mesh with other positions of its vertices."""
     try:
         shape = np.shape(vertices)
-    except ValueError:  # a ragged list, of which Mesh tells more
+    except ValueError:  # a ragged list, which Mesh rejects in more detail
         shape = mesh.vertices.shape
     if shape != mesh.vertices.shape:
         raise MeshError(f"vertices: expected shape {mesh.vertices.shape} as built, got {shape}")

@@ -36,7 +36,7 @@ from renderer.kernels.notice import compiling
 from renderer.kernels.store import KernelStore
 
 # No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
-# Every option is set, because Numba would take others from the kernel whose compiling asked for this one.
+# Every option is set, because Numba would take an unset one from the kernel whose compiling asked for this one.
 OPTIONS = {
     "nopython": True,
     "nogil": True,

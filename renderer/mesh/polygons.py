@@ -172,7 +172,7 @@ def _cut_ears(outline: list[_Point], flat: float) -> list[tuple[int, int, int]] 
     def turns_left(k: int) -> bool:
         return _turn(outline[before[k]], outline[k], outline[after[k]]) > flat
 
-    # Of what is left, only a corner that does not turn left can be the first to lie in an ear.
+    # Of the remaining corners, only one that does not turn left can be the first to lie in an ear.
     blockers = sorted((*outline[k], k) for k in range(count) if not turns_left(k))
     triangles: list[tuple[int, int, int]] = []
     at, missed = 1, 0

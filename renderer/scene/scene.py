@@ -186,9 +186,9 @@ class Scene(Fields):
     def altered(self, **changes: object) -> "Scene":
         """A copy with other values of fields, by name, that shares the meshes: none is loaded or placed again.
 
-        So a change of ``objects`` or ``floor`` shows nowhere. Values are not checked as those of a scene file are.
+        So a change of ``objects`` or ``floor`` has no effect. Values are not checked as those of a scene file are.
         """
-        _ = self.instances  # what is cached goes along
+        _ = self.instances  # cached, so that the copy has it too
         return self.model_copy(update=changes)
 
 

@@ -189,8 +189,8 @@ def _middle_entry(nodes, base, beam, rays, t0):
 def _push_sorted(node, bits, t0, key, stack, top):
     """Push the octants in ``bits`` of a node, the one with the least key last. An entry is t0 over the octant's number.
 
-    The place of an octant is the number of those behind it, so no branch depends on the keys. A NaN counts as -inf:
-    every comparison with NaN is false, and places of the stack would stay unwritten.
+    The place of an octant is the number of those behind it, so no branch depends on the keys. A NaN counts as -inf,
+    because comparisons with NaN are false and would leave places of the stack unwritten.
     """
     key = select(key > splat8(np.float32(-np.inf)), key, splat8(np.float32(-np.inf)))
     for i in range(8):

@@ -11,7 +11,7 @@ from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointer
 
 
 def stack_size(depth: int) -> int:
-    """Entries of one stack: each level leaves at most seven octants waiting, and some entries are beyond the top."""
+    """Entries of one stack: each level leaves at most seven octants waiting, and some are written beyond the top."""
     return 7 * depth + 24
 
 

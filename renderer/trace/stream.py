@@ -1,8 +1,8 @@
 """Incoherent rays through the tree, sixteen at a time; the next ray takes the place of one that ends.
 
-The processor cannot predict whether a ray goes on to a node, to a leaf or ends, and a mispredicted branch discards all
-work begun after it. So each round first computes what every ray meets, without a branch, and then decides: the results
-are there by then, and a misprediction costs little. Meanwhile the records for the next round come from memory.
+The processor cannot predict whether a ray goes to a node, goes to a leaf, or ends, and a mispredicted branch discards
+all work begun after it. So each round first computes what every ray meets, without a branch, and then decides: the
+results are there by then, and a misprediction costs little. Meanwhile the records for the next round come from memory.
 """
 
 from typing import Any, NamedTuple
@@ -177,7 +177,10 @@ def _go_on(tree, rays, lanes, r, stack, entry, top):
 
 @inlined
 def meet_leaves(tree, rays, lanes, count):
-    """Compute what each of ``count`` rays hits in the first block of its leaf; for END it is block 0, to no effect."""
+    """Compute what each of ``count`` rays hits in the first block of its leaf.
+
+    A ray at END is tested against block 0, and the result is ignored.
+    """
     for k in range(count):
         r = get(lanes.at_leaf, k)
         child = get(lanes.child, r)

@@ -34,6 +34,7 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
     ``ends`` (n, 2) int32 holds the link and the levels below it for each whole part; when it is empty, whole parts and
     those that ``collapse`` chose are written as leaves. ``nodes`` and ``links`` are the same memory.
     """
+    # Begin with part 0, which has no parent.
     waiting, shares = room
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 1, -1
     top, used, blocks, depth = 1, np.int64(0), np.int64(0), np.int64(0)

@@ -37,7 +37,7 @@ def new_token() -> str:
 
 
 class ResponseHeaders:
-    """Tell the browser what the page may do: load from here alone, be framed by ``ancestors``, and leave no trace."""
+    """Headers that let the page load from here alone and be framed by ``ancestors``, and keep it out of caches."""
 
     def __init__(self, app: ASGIApp, ancestors: str) -> None:
         self.app = app
@@ -121,5 +121,5 @@ class TokenRequired:
 
 
 def _equal(given: str, token: str) -> bool:
-    """Whether they are equal, compared in a time that does not depend on how much of them is."""
+    """Whether both are equal, compared in a time that does not depend on how much of them is."""
     return hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())

@@ -17,7 +17,7 @@ from renderer.viewer.shown import ShownScene
 
 # Seconds for connections to end; their pictures stop between tiles.
 _LAST_WORDS = 1
-# Seconds after which a wait is interrupted: on Windows Ctrl-C has no effect before.
+# Seconds per turn of ``wait``: on Windows Ctrl-C has no effect before a turn ends.
 _PATIENCE = 0.5
 
 
