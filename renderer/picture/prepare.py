@@ -36,7 +36,7 @@ class PreparedScene:
     scene          the scene that it was made of
     mesh           all instances' triangles, in their order
     octree         the tree over ``mesh``, or its ``BruteForce``
-    needs          the features that are ready: at least those of ``needs_of`` the scene
+    needs          the features that are ready: at least those of ``needs_of(scene)``
     build_seconds  the time that it took, without compiling
     """
 
