@@ -1,15 +1,15 @@
 """An octree ray tracer for triangle meshes: ray queries, and Whitted pictures of scenes.
 
-The names below are imported when they are first used, so that ``import renderer`` costs nothing and whoever only
-reads meshes needs no compiler. Kernels are compiled by their first call, which one line on standard error says, and
-kept on disk; ``octree-render compile`` compiles them ahead. The line comes from the logger ``renderer.jit``:
+The names below are imported when they are first used, so that ``import renderer`` costs nothing, and reading meshes
+needs no compiler. Kernels are compiled by their first call, which one line on standard error reports, and kept on disk;
+``octree-render compile`` compiles them ahead. The line comes from the logger ``renderer.jit``:
 ``logging.getLogger("renderer").setLevel("ERROR")`` or OCTREE_RENDERER_QUIET=1 in the environment turns it off.
 """
 
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
 
-from renderer.kernels import loaded as _loaded  # noqa: F401  # before all others, to look at the clock
+from renderer.kernels import loaded as _loaded  # noqa: F401  # before all others, to note the time
 
 if TYPE_CHECKING:
     from typing import Any

@@ -1,4 +1,4 @@
-"""What users hand over as arrays: lists, NumPy's, those of tables; as NumPy arrays of real numbers, or an error."""
+"""Arguments that stand for arrays, such as lists or columns of tables, as NumPy arrays of real numbers."""
 
 from numbers import Real
 from typing import Any
@@ -15,7 +15,7 @@ def real_array(values: Any) -> NDArray[Any]:
     """``values`` as an array of real numbers of any type that float64 holds.
 
     Columns of tables that may lack values come as Python objects: they are numbers if each one is. Raises
-    ``ValueError`` that tells what was expected, and what was got.
+    ``ValueError`` that says what was expected and what was given.
     """
     array = plain_array(values)
     if array.dtype.kind == "O" and array.ndim and all(_is_number(x) for x in array.flat):

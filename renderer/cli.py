@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:
-        # Whoever read our words, as ``| head`` does, has had enough of them. The picture is written.
+        # The reader of standard output, such as ``| head``, has closed it. The picture is written.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (ValueError, OSError, ImportError) as error:
         print(f"octree-render: {one_line(error)}", file=sys.stderr)
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _hide_scipy_from_numba() -> None:
-    """Spare a process of our own the time in which Numba imports SciPy, of which no kernel calls anything."""
+    """Spare the command's own process the time in which Numba imports SciPy, which no kernel calls."""
     if "scipy" not in sys.modules:
         sys.modules["scipy"] = None  # type: ignore[assignment]  # so the import statement finds none
         import numba  # noqa: F401
@@ -53,7 +53,7 @@ def _hide_scipy_from_numba() -> None:
 
 @contextmanager
 def compile_notices(silent: bool) -> Iterator[None]:
-    """Say on standard error that kernels are compiled, so that nobody takes the first run for the usual one."""
+    """Say on standard error that kernels are compiled, so that the first run is not taken for a usual one."""
     log, notices = logging.getLogger("renderer.jit"), _Notices()
     level, propagate = log.level, log.propagate
     log.addHandler(notices)
@@ -167,7 +167,7 @@ def _render(options: argparse.Namespace) -> None:
     _check_output_is_no_input(options, scene)
     _scene_to_write(options)
     compile_in_two()
-    warnings.simplefilter("ignore", CutWarning)  # said below, in a line of ours
+    warnings.simplefilter("ignore", CutWarning)  # reported below, on one line
     image = render(
         scene,
         resolution=options.resolution,
@@ -195,7 +195,7 @@ def _render(options: argparse.Namespace) -> None:
 
 
 def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
-    """Refuse a picture in the place of what it is made of, whatever links lead there."""
+    """Refuse to write the picture over a file that it is made of, whatever links lead there."""
     read = [options.scene, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
     written = [options.write_scene] if options.write_scene else []
     output = os.path.realpath(options.output)
@@ -204,7 +204,7 @@ def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
 
 
 def _save(image: Any, path: Path) -> None:
-    """Save a picture; where that fails after all its work, keep it elsewhere and say where."""
+    """Save a picture; where that fails after all its work, keep it elsewhere and raise an error that says where."""
     try:
         image.save(path)
     except OSError as error:

@@ -1,7 +1,7 @@
 """The ranges of rays for which the arithmetic of boxes and triangles holds."""
 
-# Origins as far as float32 boxes can tell from infinity.
+# The largest coordinate of an origin: as far as float32 boxes can tell from infinity.
 FARTHEST = 2.0**126
-# Directions, by their largest component, whose product with a determinant, at most 2^254 there, stays a normal float64
-# number, as does one of 2^-300 with the shortest.
+# The range of a direction's largest component. Its product with a determinant stays a normal float64 number: with
+# LONGEST for determinants up to 2^254, the most that FARTHEST allows, and with SHORTEST for those down to 2^-300.
 SHORTEST, LONGEST = 2.0**-600, 2.0**700

@@ -17,23 +17,24 @@ from renderer.tree.refit import refit_tree
 
 MAX_LEAF_SIZE = LANES * MAX_LEAF_BLOCKS
 MAX_DEPTH = 64
-# Boxes are float32, whose products of two extents must neither overflow nor vanish. Meshes beyond these sizes are
-# scaled by a power of two, which is exact.
+# Boxes are float32, and the products of two of their extents must neither overflow nor vanish. Meshes beyond these
+# sizes are scaled by a power of two, which is exact.
 _SMALLEST, _LARGEST = 2.0**-60, 2.0**60
-# t comes from products of two sides of a face and a third length, the ray's way to it. Where that is a side too,
+# t comes from products of two sides of a face and the ray's distance from it. Where the distance is as small as a side,
 # 2^-330 cubed is 2^-990: 2^32 above the least normal number, so that t and barycentrics keep their digits.
 _LEAST_SIDE = 2.0**-330
-# Vertices or faces looked at together: so few that they stay in the cache.
+# Vertices or faces checked together: so few that they stay in the cache.
 _ROWS = 1 << 16
 
 
 @dataclass(frozen=True)
 class Stats:
-    """What was built. ``references`` counts the faces in all leaves; each face is in exactly one.
+    """Counts of a built tree. ``references`` counts the faces in all leaves; each face is in exactly one.
 
     ``cost`` is what the surface area heuristic expects of a line that crosses the mesh's bounds and is stopped by
-    nothing: how many nodes it enters plus how many blocks it tests (the shares of the root's area that their boxes
-    have). It compares trees of one mesh, such as before and after a refit: rays slow down about as it grows.
+    nothing: the number of nodes that it enters plus the number of blocks that it tests, each counted as its box's share
+    of the root's area. It compares trees of one mesh, such as before and after a refit: the time per ray grows about as
+    it does.
     """
 
     faces: int
@@ -47,15 +48,15 @@ class Stats:
 
     @property
     def fill(self) -> float:
-        """Share of the blocks' places that hold a face; 1 for none at all."""
+        """The share of the blocks' places that hold a face; 1 where there is no block."""
         return self.references / (self.blocks * LANES) if self.blocks else 1.0
 
 
 class _Accelerator:
     """Ray queries on one mesh; safe to call from many threads at once.
 
-    ``mesh`` is what was built, and what a hit's ``face`` refers to. ``repairs`` says what ``repair=True`` left out of
-    the given arrays, and is None without it.
+    ``mesh`` is the mesh that was built over, to which a hit's ``face`` refers. ``repairs`` says what ``repair=True``
+    left out of the given arrays, and is None without it.
     """
 
     def __init__(self, mesh: Mesh, tree: Tree, threads: int | None) -> None:
@@ -70,7 +71,7 @@ class _Accelerator:
 
     @property
     def tree(self) -> Tree:
-        """The arrays that rays are shot at."""
+        """The arrays that rays are traced against."""
         return self._built[1]
 
     @tree.setter
@@ -91,7 +92,7 @@ class _Accelerator:
         t_min, t_max         >= 0, one number or (n,), in units of |direction|
         leaving              faces that the rays start on, one or (n,), -1 for none: each start is moved off its face by
                              more than rounding errors, to the side that the direction points to, so that the ray
-                             meets neither that face nor another in its plane. Nobody needs an epsilon
+                             meets neither that face nor another in its plane. No epsilon is needed
 
         No face is culled. A ray in a face's plane misses it, unless the rounding of its slopes lifts it out of the
         plane. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.
@@ -133,12 +134,12 @@ class _Accelerator:
         """Move the vertices and keep the faces: ``vertices`` is (V, 3), finite, V as built.
 
         Hits are from then on, bit for bit, those of a new build over the moved mesh. Only boxes and blocks are made
-        anew, which takes a fraction of a build; which faces share a leaf stays, so rays slow down when neighbours move
-        apart. ``stats.cost`` before and after tells how much: build anew where it has grown by more than rays may slow
-        down. Normals, colours and texture coordinates of ``mesh`` stay as they are.
+        anew, which takes a fraction of a build. Faces that share a leaf still do, so rays slow down when neighbours
+        move apart, about as ``stats.cost`` grows: build anew where that is too much. Normals, colours and texture
+        coordinates of ``mesh`` stay as they are.
 
         A query that runs meanwhile sees the mesh before or after, never a mixture; ``Hits`` keep the mesh that they
-        hit. Raises ``MeshError``, and changes nothing, where ``vertices`` are no new positions of the same vertices.
+        hit. Raises ``MeshError``, and changes nothing, where ``vertices`` cannot replace those of the mesh.
 
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> octree.refit([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
@@ -230,7 +231,7 @@ class Octree(_Accelerator):
 
 
 class BruteForce(_Accelerator):
-    """Every ray against every face, through the octree's own triangle test: its honest baseline.
+    """Every ray against every face, through the octree's own triangle test: the octree's baseline.
 
     ``threads`` and ``repair`` as for ``Octree``.
     """
@@ -282,7 +283,7 @@ def _moved(mesh: Mesh, vertices: ArrayLike) -> Mesh:
     """The mesh with other positions of its vertices."""
     try:
         shape = np.shape(vertices)
-    except ValueError:  # a ragged list, of which Mesh tells more
+    except ValueError:  # a ragged list, which Mesh rejects in more detail
         shape = mesh.vertices.shape
     if shape != mesh.vertices.shape:
         raise MeshError(f"vertices: expected shape {mesh.vertices.shape} as built, got {shape}")
@@ -320,7 +321,7 @@ def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
     largest = float(np.abs(mesh.vertices[mesh.faces]).max(initial=0.0)) if _is_extreme(mesh) else 1.0
     if largest == 0.0 or _SMALLEST <= largest <= _LARGEST:
         return mesh.vertices, 1.0
-    # Limited to what a float64 can be, for meshes of denormals.
+    # Limited so that 2^exponent is a float64, for meshes of denormals.
     exponent = min(-int(np.frexp(largest)[1]), 1000)
     with np.errstate(over="ignore"):  # of a vertex that no face names; it comes back as inf
         scaled = np.ldexp(mesh.vertices, exponent)
@@ -329,14 +330,14 @@ def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
         row = int((~exact).argmax())
         got = mesh.vertices[row].tolist()
         raise MeshError(f"vertices: expected coordinates within 2^900 of each other, got {got} in row {row}")
-    # As the mesh's own, or kernels would be compiled again for arrays that may be written.
+    # Read-only as the mesh's own, or kernels would be compiled again for writable arrays.
     scaled.setflags(write=False)
     return scaled, 2.0**exponent
 
 
 def _check_sides(mesh: Mesh, vertices: NDArray[np.float64], tree: Tree) -> None:
     """Raise ``MeshError`` for a face so small, beside the largest coordinate, that its products vanish."""
-    # Differences of float32 are 0 or no less than 2^-149, and those of larger float64 numbers no less than 2^-53 times.
+    # Differences of float32 numbers are 0 or at least 2^-149; those of float64 numbers at least 2^-53 of the smaller.
     if tree.blocks.dtype == np.float32 or _least_of(vertices) >= 2.0**53 * _LEAST_SIDE:
         return
     for begin in range(0, len(mesh.faces), _ROWS):
@@ -363,7 +364,7 @@ def _least_of(vertices: NDArray[np.float64]) -> float:
 
 
 def _is_extreme(mesh: Mesh) -> bool:
-    """Whether any vertex, used or not, lies outside the comfortable sizes."""
+    """Whether the largest coordinate of any vertex, used or not, is not from _SMALLEST to _LARGEST."""
     # Not from mesh.bounds: the least of each column takes thirty times as long as the least of all.
     largest = float(max(mesh.vertices.max(), -mesh.vertices.min())) if len(mesh.vertices) else 1.0
     return not _SMALLEST <= largest <= _LARGEST

@@ -1,4 +1,4 @@
-"""Kernels compiled ahead, for CI, container images and folders that travel; and, for a first picture, in two processes.
+"""Kernels compiled ahead, for CI, container images and copied folders; and, for a first picture, in two processes.
 
 Numba compiles in one thread of a process only, so a second process halves the wait.
 """
@@ -42,7 +42,7 @@ _GLASS = Dielectric(type="dielectric", ior=1.5)
 
 
 class Part(NamedTuple):
-    """Kernels that are called together: what for, and a function that calls them."""
+    """Kernels that are called together: the name of their purpose, and a function that calls them."""
 
     name: str
     call: Callable[[], object]
@@ -67,7 +67,7 @@ def _search() -> None:
 
 
 def _render() -> None:
-    # No tree is built for it.
+    # Brute force, so that no tree is built.
     render(_scene(_GLASS), resolution=(1, 1), accelerator="brute")
 
 
@@ -111,7 +111,7 @@ def compile_into(folder: Path) -> None:
 
 
 def touch_viewing(prepared: PreparedScene) -> None:
-    """Compile or load what the viewer calls beside pictures; takes milliseconds where that was done before."""
+    """Compile or load the kernels that the viewer calls beside pictures; takes milliseconds if that was done before."""
     eye, forward = prepared.scene.camera.eye, prepared.scene.camera.frame()[2]
     face_colors(prepared.arrays, eye)
     ray_path(prepared, eye, forward, 1)
@@ -119,10 +119,10 @@ def touch_viewing(prepared: PreparedScene) -> None:
 
 
 def compile_in_two() -> None:
-    """Before a first picture: compile what builds trees here and what renders in another process.
+    """Before a first picture: compile the kernels that build trees here and those that render in another process.
 
-    Does nothing where that was done before. Should the other process fail, that is said with its own last words, and
-    its kernels are compiled here when needed.
+    Does nothing where that was done before. Should the other process fail, its last line of output is logged, and its
+    kernels are compiled here when needed.
     """
     if is_on_disk(render_tile) or available_threads() < 2:
         return
@@ -149,9 +149,9 @@ def compile_in_two() -> None:
 
 
 def compile_picture() -> None:
-    """Compile what renders; no tree is built for it.
+    """Compile the kernels that render; no tree is built for it.
 
-    Of use in a process of its own only, which it ends when standard input does, as it does when the parent is gone.
+    To be called in a process of its own only: it ends the process when standard input ends, as when the parent is gone.
     """
     Thread(target=_end_with_input, daemon=True).start()
     _render()

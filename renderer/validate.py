@@ -1,7 +1,7 @@
 """The command ``octree-validate``: the validation suite that was installed beside this package, and no other.
 
-The suite is a package called ``validation``, as a folder of the user's may well be. This command finds it by its place,
-whatever the current folder or the path holds, and says so where the name is taken.
+The suite is a package called ``validation``, and a folder of the user's may have the same name. This command finds the
+suite by its place, whatever the current folder or the path holds, and reports an error where the name is taken.
 """
 
 import sys
@@ -27,7 +27,7 @@ def main() -> int:
 
 
 def _fault() -> str:
-    """Why the suite cannot be loaded, or nothing."""
+    """The reason why the suite cannot be loaded, or an empty string."""
     if not (_SUITE / "suite.py").is_file():
         hint = extra_hint("validate")
         return f"expected the validation suite in {_SUITE}, got another package of that name or none; {hint}"

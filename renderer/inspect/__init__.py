@@ -1,1 +1,1 @@
-"""Looking into a picture: one ray's path, the tree's boxes, one colour a face, false colours."""
+"""Looking into a picture: one ray's path, the tree's boxes, one colour per face, false colours."""

@@ -1,4 +1,4 @@
-"""One colour a face, as seen from an eye: Phong at the face's centroid, without shadows and without bounces.
+"""One colour per face, as seen from an eye: Phong at the face's centroid, without shadows and without bounces.
 
 k_a I_a + sum over lights [k_d (N.L)+ + k_s (R.V)+^n] I_light, with N the geometric normal that faces the eye.
 """
@@ -15,9 +15,9 @@ from renderer.shade.face_colors import PLACES, shade_faces
 from renderer.shade.records import AMBIENT, DIFFUSE, KIND, LAMBERT, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
 
-# 1 to 2 ms of work: little beside a frame, much beside taking a chunk.
+# Faces per chunk, 1 to 2 ms of work: little beside a frame, much beside taking a chunk.
 _CHUNK = 8192
-# How much of the light around it a matte stand-in for a mirror or glass sends back: a middle grey for clear glass.
+# The share of light that a matte stand-in for a mirror or glass sends back: a middle grey for clear glass.
 _STAND_IN = 0.5
 
 
@@ -45,8 +45,8 @@ def face_colors(arrays: SceneArrays, eye: ArrayLike, threads: int | None = None)
 
 @cache
 def _table() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Where the sRGB code changes: the least radiance of codes 1 to 255 and an infinity, (256,); and the code at the
-    beginning of each of PLACES equal parts of [0, 1], and at 1.
+    """The steps of sRGB: the least radiance of codes 1 to 255 and an infinity, (256,); and the code at the beginning of
+    each of PLACES equal parts of [0, 1], and at 1.
 
     A power for each value, as in the formula of sRGB, would take three times as long as all the rest here.
     """

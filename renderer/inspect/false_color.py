@@ -1,4 +1,4 @@
-"""What a picture knows beside its radiance, drawn as colours: depth, normal, face, and the cost of each pixel."""
+"""The AOVs of a picture drawn as colours: depth, normal, face, and the cost of each pixel."""
 
 from typing import Any
 
@@ -57,7 +57,7 @@ def false_color(image: Image, aov: str, limits: Limits | None = None) -> NDArray
 
 
 def limits_of(image: Image, aov: str) -> Limits:
-    """Least and greatest depth of a surface, or least and greatest cost: what a legend says at the ends of the scale.
+    """Least and greatest depth of a surface, or least and greatest cost: the ends of a legend's scale.
 
     (0, 0) for other AOVs and where there is nothing.
     """
@@ -67,7 +67,7 @@ def limits_of(image: Image, aov: str) -> Limits:
 
 
 def _steps(values: NDArray[Any], low: float, high: float) -> NDArray[np.intp]:
-    """Where on a scale of _STEPS each value stands; the first where the scale has no length."""
+    """The step of each value on a scale of _STEPS; the first step where the scale has no length."""
     share = (values - low) / (high - low) if high > low else np.zeros(values.shape)
     return ((_STEPS - 1) * np.clip(share, 0.0, 1.0) + 0.5).astype(np.intp)
 
@@ -85,7 +85,7 @@ def _normal_colors(normals: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def _face_colors(faces: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """(n, 3) colours of face numbers, by a hash that leaves nothing alike of neighbouring numbers.
+    """(n, 3) colours of face numbers, by a hash, so that neighbouring numbers get unlike colours.
 
     lowbias32 of Chris Wellons, Prospecting for Hash Functions, 2018 (public domain).
     """

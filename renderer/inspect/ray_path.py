@@ -1,7 +1,7 @@
 """The tree of rays that one camera ray spawns, as the Whitted kernel traces it: for looking at, not for speed.
 
-Surfaces are met and left by the kernel's own functions, so the rays are the same to the bit, and what they bring home
-adds up to the pixel.
+Surfaces are met and left by the kernel's own functions, so the rays are the same to the bit, and their light adds up to
+the pixel's.
 """
 
 from collections import deque
@@ -26,8 +26,8 @@ from renderer.trace.spawn import BOUNDED, spawn_origin
 Vector = tuple[float, float, float]
 Kind = Literal["camera", "reflected", "refracted", "shadow"]
 
-# A ray of depth d in glass has up to 2^d of its kind, which no one can look at and no click should wait for. This many
-# are all of them to depth 8, the shadow rays not counted, and take about a tenth of a second.
+# In glass there are up to 2^d rays of depth d: too many to look at, and to wait for after a click. This many are all of
+# them to depth 8, the shadow rays not counted, and take about a tenth of a second.
 MAX_RAYS = 511
 
 
@@ -71,7 +71,7 @@ class _Ray(NamedTuple):
 
 
 class _Met(NamedTuple):
-    """What a ray met: the face, its surface, the normal that faces the ray, and the material's row with its columns."""
+    """The face that a ray met, its surface, the normal that faces the ray, and the material's row with its columns."""
 
     face: int
     surface: Surface
@@ -82,7 +82,7 @@ class _Met(NamedTuple):
 
 
 class _Aim(NamedTuple):
-    """A shadow ray, where it ends if nothing hides the light, and what it then adds to the pixel."""
+    """A shadow ray, its end if nothing hides the light, and the radiance that it then adds to the pixel."""
 
     origin: Vector
     direction: Vector
@@ -100,14 +100,14 @@ def ray_path(
     min_weight: float = 0.0,
     shadows: bool = True,
 ) -> tuple[Segment, ...]:
-    """The rays that the camera ray from ``origin`` in ``direction`` (3,) becomes: by depth, each followed by the shadow
-    rays that leave its end.
+    """The camera ray from ``origin`` in ``direction`` (3,) and all rays that it spawns: by depth, each followed by the
+    shadow rays that leave its end.
 
     ``max_depth``, ``min_weight`` and ``shadows`` as in ``RenderSettings``; spawned rays leave by the bounded offset. At
-    most MAX_RAYS rays, and for each as many shadow rays as ``prepared.arrays`` has lights; of more the deepest are left
-    out. Otherwise the segments are as many as the pixel's ``Image.rays``, and their ``radiance`` sums to its colour.
-    Without ``shadows`` the ray that met a surface brings home the light that falls there. Raises ``ValueError`` naming
-    the argument.
+    most MAX_RAYS rays, and for each as many shadow rays as ``prepared.arrays`` has lights; of more rays the deepest are
+    left out. Otherwise the segments are as many as the pixel's ``Image.rays``, and their ``radiance`` sums to its
+    colour. Without ``shadows`` the radiance of a ray that met a surface includes the direct light there. Raises
+    ``ValueError`` naming the argument.
     """
     expect(is_count(max_depth), "max_depth", "an integer >= 0", repr(max_depth))
     o, d = checked_vector("origin", origin), checked_vector("direction", direction)
@@ -138,7 +138,7 @@ def _goes_on(weight: Vector, min_weight: float) -> bool:
 
 
 def _meet(prepared: PreparedScene, ray: _Ray) -> _Met | None:
-    """The nearest surface on the ray's way."""
+    """The nearest surface that the ray meets."""
     hits = prepared.octree.closest_hit([ray.origin], [ray.direction])
     if not hits.hit[0]:
         return None
@@ -182,7 +182,7 @@ def _hit_segments(prepared: PreparedScene, ray: _Ray, met: _Met, own: int, shado
 
 
 def _aim(prepared: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
-    """The ways to the lights that the surface faces."""
+    """The shadow rays to the lights that the surface faces."""
     if met.material[KIND] not in (PHONG, LAMBERT):
         return []
     aims = []

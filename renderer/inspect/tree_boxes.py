@@ -32,7 +32,7 @@ class Visit(NamedTuple):
 
 
 def levels(octree: Octree | BruteForce) -> int:
-    """How many levels have boxes; 0 where there are no nodes, as of ``BruteForce``, or no faces."""
+    """The number of levels that have boxes; 0 where there are no nodes, as of ``BruteForce``, or no faces."""
     return octree.tree.depth + 1 if len(_root_box(octree.tree)) else 0
 
 
@@ -94,7 +94,7 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
 
 
 class _Waiting(NamedTuple):
-    """An octant that waits to be opened: where the ray enters it, its child, level and box."""
+    """An octant that waits to be opened: the distance at which the ray enters it, its child, level and box."""
 
     distance: float
     child: int
@@ -103,7 +103,7 @@ class _Waiting(NamedTuple):
 
 
 def _above(tree: Tree, box: NDArray[np.float64]) -> Tree:
-    """A node above the root, whose one octant is the root in its ``box``: so that a ray meets it as any other."""
+    """A node above the root, whose only octant is the root in its ``box``, so that a ray meets it as any other."""
     words = np.full(NODE_WORDS, np.inf, np.float32)
     words[:CHILDREN].reshape(3, 2, 8)[:, 1] = -np.inf
     words[:CHILDREN].reshape(3, 2, 8)[:, :, 0] = box.reshape(2, 3).T

@@ -1,12 +1,12 @@
 """Kernels through Numba at a third of its usual cost: only what Python calls is optimised and compiled.
 
 Numba takes each function, however small, through its whole pipeline: LLVM optimises and compiles it alone, again within
-each of its callers, and a wrapper lets Python call it. Here a function that kernels call stays a *piece*: typed,
-lowered, and left as LLVM wrote it down. What Python calls is an *entry*: its piece and all below it linked into one
-module, which LLVM optimises once.
+each of its callers, and a wrapper lets Python call it. Here a function that kernels call stays a *piece*: typed and
+lowered to LLVM's code, but not optimised. A function that Python calls is an *entry*: its piece and all below it linked
+into one module, which LLVM optimises once.
 
-This relies on Numba's insides. ``probe`` tries them; ``jit`` asks it where the version of Numba is not one that was
-tested, and does without this module where it fails.
+This relies on Numba's internals, which ``probe`` tests. ``jit`` calls it for versions of Numba that were not tested,
+and does without this module where it fails.
 """
 
 import pickle
@@ -36,7 +36,7 @@ from renderer.kernels.notice import compiling
 from renderer.kernels.store import KernelStore
 
 # No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
-# Each is said, because what is not said Numba inherits from the kernel whose compiling asked for this one.
+# Every option is set, because Numba would take an unset one from the kernel whose compiling asked for this one.
 OPTIONS = {
     "nopython": True,
     "nogil": True,
@@ -59,7 +59,7 @@ class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._finalized = True
 
     def _get_module_for_linking(self) -> Any:
-        """This module with all below it, for kernels that are not ours."""
+        """This module with all below it, for kernels that Numba compiles by itself."""
         if self._merged is None:
             module = self._final_module.clone()
             _link_all(module, self._linking_libraries)
@@ -83,8 +83,9 @@ class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
         _link_all(module, self._linking_libraries)
         for function in module.functions:
             if not function.is_declaration and function.name not in outer:
-                # Dropped where it is inlined everywhere. And without a symbol: an internal function has one, by which
-                # another kernel's call of the same piece would find this one, with arguments as it was optimised.
+                # Private, so that it is dropped where it is inlined everywhere, and has no symbol. An internal function
+                # has one, by which another kernel's call of the same piece would find this function, whose arguments
+                # the optimiser may have changed.
                 function.linkage = "private"
         # Each function alone first, as Numba does: what is inlined then is small. Worth 2 % of tracing.
         for function in module.functions:
@@ -181,7 +182,7 @@ def _set_environments(library: Any) -> None:
             library.codegen.set_env(variable.name, environment)
 
 
-# What kernels need of Numba's passes: they have no closures, no ``with``, no array expressions, no object mode.
+# The passes of Numba that kernels need: they have no closures, no ``with``, no array expressions, no object mode.
 _PIECE_PASSES = (
     TranslateByteCode,
     FixupArgs,
@@ -218,11 +219,11 @@ class _Piece(CPUDispatcher):  # type: ignore[misc]
     """A function as kernels call it."""
 
     def add_overload(self, compiled: Any) -> None:
-        # Not for the dispatcher's table of what Python may call.
+        # Left out of the dispatcher's table of functions that Python may call.
         self.overloads[tuple(compiled.signature.args)] = compiled
 
     def compiled(self, arguments: Any) -> Any:
-        """What was compiled for arguments of these types, now if not before."""
+        """The compiled piece for arguments of these types; compiles it if it was not compiled before."""
         self.compile(tuple(arguments))
         return self.overloads[tuple(arguments)]
 
@@ -233,7 +234,7 @@ class _Piece(CPUDispatcher):  # type: ignore[misc]
 
 
 class Kernel:
-    """A function that Python and kernels call; each way is made when it is first gone.
+    """A function that Python and kernels call; its dispatcher for each is made at the first use.
 
     Numba's dispatchers take a third of a millisecond to make, and most kernels are never called by Python, nor by
     kernels that are compiled now.
@@ -264,16 +265,16 @@ class Kernel:
 
     @cached_property
     def store(self) -> KernelStore:
-        """Where its machine code is kept."""
+        """The files of its machine code."""
         return KernelStore(self.py_func)
 
     @property
     def _numba_type_(self) -> Any:
-        """How Numba sees it in a kernel that calls it."""
+        """Its type in a kernel that calls it, which Numba asks for."""
         return types.Dispatcher(self.piece)
 
     def notice(self) -> AbstractContextManager[None]:
-        """What surrounds its compiling."""
+        """The context in which it is compiled."""
         return compiling(self.py_func.__qualname__, self.store.cache_path) if self.kept else nullcontext()
 
 
@@ -281,7 +282,7 @@ _kernels: dict[Callable[..., Any], Kernel] = {}
 
 
 def probe() -> None:
-    """Compile, call, store and load a kernel that calls another; raises whatever does not fit this Numba."""
+    """Compile, call, store and load a kernel that calls another; raises an error where this Numba does not fit."""
 
     def doubled(x):  # type: ignore[no-untyped-def]
         return x + x

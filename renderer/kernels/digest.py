@@ -21,9 +21,9 @@ def is_ours(path: Path) -> bool:
 def source_digest(path: Path) -> str | None:
     """Hex digest of a source file and of everything it imports from this package, directly or not, at any depth.
 
-    For a file outside the package: of that file and of the whole package. None, which is said once, where the file
-    cannot be read, as in a zip, or where one has been written since this process loaded the package: what runs is then
-    not known to be what stands there.
+    For a file outside the package: of that file and of the whole package. None, which is logged once, where the file
+    cannot be read, as in a zip, or where one has been written since this process loaded the package: the code that runs
+    may then differ from the file.
     """
     path = path.resolve()
     seen: set[Path] = set()

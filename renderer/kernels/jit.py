@@ -1,8 +1,8 @@
 """The decorators that make a kernel: no GIL, no fastmath, C's rules for division, machine code kept on disk.
 
-A kernel is called by Python and by other kernels alike. It allocates nothing and raises nothing; whoever calls it keeps
-its arrays alive. It may be decorated in another package too: its machine code then follows the edits of its own file
-and of all of ours, but not those of other files that it imports.
+A kernel is called by Python and by other kernels alike. It allocates nothing and raises nothing; the caller keeps its
+arrays alive. A kernel may stand in another package too: its machine code then follows the edits of its own file and of
+all files of this package, but not those of other files that it imports.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """A kernel that LLVM must inline: for the tests of the innermost loop, whose vectors would go through memory."""
+    """A kernel that LLVM must inline: for the innermost loops, whose vectors a call would pass through memory."""
     return _decorated(function, forceinline=True)
 
 
@@ -44,7 +44,7 @@ def _decorated(function: Callable[..., Any], forceinline: bool) -> Any:
 
 @cache
 def _compiler() -> Any:
-    """The module ``compiler``, or None where it does not fit this version of Numba; that is said once."""
+    """The module ``compiler``, or None where it does not fit this version of Numba, which is logged once."""
     if numba.config.DISABLE_JIT:
         raise ImportError("renderer: NUMBA_DISABLE_JIT is set, but kernels run only compiled: unset it")
     try:

@@ -6,7 +6,7 @@ AHEAD_VARIABLE = "OCTREE_RENDERER_KERNELS"
 # LLVM's name of each level, best first.
 LEVELS = {"x86-64-v4": "x86-64-v4", "x86-64-v3": "x86-64-v3", "x86-64-v2": "x86-64-v2", "aarch64": "generic"}
 
-# What a machine must have to run a level, as LLVM calls it: for x86-64 what the psABI says of the level.
+# The features that a machine must have to run a level, by LLVM's names: for x86-64 those of the psABI.
 _V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 _V4 = (*_V3, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")

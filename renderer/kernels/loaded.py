@@ -1,4 +1,4 @@
-"""When this process loaded the package: what is newer on disk is not what it runs."""
+"""The time at which this process loaded the package; a source that is newer on disk is not the one that runs."""
 
 import time
 

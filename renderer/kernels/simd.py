@@ -1,9 +1,10 @@
 """Short vectors as values in Numba kernels: 8 x float32, 4 x float64 and their masks.
 
 This is the one file that touches llvmlite. A vector lives in a register; it is made by ``load*`` or ``splat*`` and
-leaves through ``store``, ``lane`` or ``movemask``. ``+ - * /`` and the comparisons work lane by lane, the latter giving
-a mask that is unset where either is NaN, for ``!=`` too; masks know ``&`` and ``|``. No operation carries fast-math
-flags, so nothing becomes a fused multiply-add: the signs of the edge functions in ``intersect`` depend on that.
+leaves through ``store``, ``lane`` or ``movemask``. ``+ - * /`` and the comparisons work lane by lane. A comparison
+gives a mask that is unset where either value is NaN, for ``!=`` too; masks have ``&`` and ``|``. No operation carries
+fast-math flags, so nothing becomes a fused multiply-add: the signs of the edge functions in ``intersect`` depend on
+that.
 """
 
 import operator
@@ -117,7 +118,7 @@ def pointer(typingctx, array):
 
 @intrinsic
 def address(typingctx, array):
-    """The same as an int64, for memory whose values are of more than one type."""
+    """The address of an array's first element as an int64, for memory with values of more than one type."""
 
     def codegen(context, builder, sig, args):
         data = cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0]).data
@@ -224,7 +225,7 @@ def prefetch(typingctx, base, index):
         kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
         function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
         address = builder.bitcast(builder.gep(args[0], [args[1]]), byte)
-        # To be read, into all levels of cache, data.
+        # The numbers stand for: to be read, into all levels of the cache, data.
         builder.call(function, [address, word(0), word(3), word(1)])
         return context.get_dummy_value()
 

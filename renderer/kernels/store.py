@@ -1,8 +1,8 @@
 """Compiled kernels on disk: one file for each kernel, argument types, sources, Python, Numba and processor.
 
-Files are found by their names, so there is no index to keep in step. What cannot be read counts as absent, what cannot
-be written is compiled in each process; neither stops a run. A folder made ahead of time (``octree-render compile
--o FOLDER``) is only read, after the user's own.
+Files are found by their names, so there is no index to keep in step. A file that cannot be read counts as absent, and a
+kernel that cannot be written is compiled in each process; neither stops a run. A folder made ahead of time
+(``octree-render compile -o FOLDER``) is only read, after the user's own.
 """
 
 import hashlib
@@ -31,18 +31,18 @@ from renderer.kernels.digest import PACKAGE, is_ours, source_digest
 from renderer.kernels.levels import AHEAD_VARIABLE, FEATURES, LEVELS
 from renderer.process.files import write_atomically
 
-# Where a wheel for one platform carries its own.
+# The kernels that a wheel for one platform contains.
 _CARRIED = PACKAGE / "compiled"
 _SUFFIX = ".kernel"
 _HEADER = b"octree-renderer kernel 1\n"
-# Changes where older machine code will not do, for a reason that no digest of kernels' sources shows.
+# To be changed when older machine code is no longer right, for a reason that no digest of kernels' sources shows.
 _FORM = "private pieces"
 _LOG = getLogger("renderer.jit")
 
 
 @dataclass(frozen=True)
 class Folders:
-    """Where kernels of one source folder are kept: ``written`` (None where nothing can be) and all that are read."""
+    """The folders for kernels of one source folder: ``written`` (None where nothing can be), and all that are read."""
 
     written: Path | None
     read: tuple[Path, ...]
@@ -54,7 +54,7 @@ class KernelStore:
     def __init__(self, function: Any) -> None:
         self._function = function
         self._source = Path(function.__code__.co_filename)
-        # Ours share a folder wherever they stand in the package, so the name tells their packages too.
+        # All kernels of this package share a folder, so their names begin with the whole name of the module.
         ours = is_ours(self._source)
         self._home = PACKAGE if ours else self._source.parent
         module = function.__module__ if ours else self._source.stem
@@ -68,10 +68,10 @@ class KernelStore:
 
     @cached_property
     def _digest(self) -> str | None:
-        """Of all that the kernel's code depends on; None where that is not known.
+        """The digest of all that the kernel's code depends on; None where that is not known.
 
-        Of our own files the text is enough. Elsewhere one name may stand for many functions: what a function is made
-        of, and the values that it finds around it, count too.
+        For files of this package their text is enough. Elsewhere one name may stand for many functions, so the
+        function's code and the values that it finds around it count too.
         """
         digest = source_digest(self._source)
         if digest is None or is_ours(self._source):
@@ -105,7 +105,7 @@ class KernelStore:
         return None
 
     def save_overload(self, signature: Any, compiled: CompileResult) -> None:
-        """Keep a kernel for later processes, and remove what was compiled of other sources."""
+        """Keep a kernel for later processes, and remove those that were compiled from other sources."""
         folder = _folders(self._home).written
         if folder is None or self._digest is None or compiled.library.has_dynamic_globals:
             _Count.lost += 1
@@ -157,12 +157,12 @@ def ahead_folders() -> tuple[Path, ...]:
 
 
 def lost() -> int:
-    """How many kernels this process compiled and could not keep."""
+    """The number of kernels that this process compiled and could not keep."""
     return _Count.lost
 
 
 class _Count:
-    """Kernels that could not be kept."""
+    """The number of kernels that could not be kept."""
 
     lost = 0
 
@@ -190,12 +190,15 @@ def runnable_levels() -> tuple[str, ...]:
 
 
 def stored_in(folder: Path) -> int:
-    """How many kernels a folder holds."""
+    """The number of kernels in a folder."""
     return len(_names(folder))
 
 
 def _fingerprint(function: Any) -> str:
-    """What tells a function from others of its name: its code, what it encloses, and the values of globals it names."""
+    """A digest of a function's code, enclosed values and the values of globals that it names.
+
+    It differs between functions of one name.
+    """
     code = function.__code__
     enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
     named = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
@@ -204,7 +207,7 @@ def _fingerprint(function: Any) -> str:
 
 
 def _shape(code: CodeType) -> tuple[object, ...]:
-    """A function's code less what an edit elsewhere in its file changes."""
+    """A function's code without what an edit elsewhere in its file changes."""
     constants = tuple(_shape(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts)
     return code.co_code, constants, code.co_names, code.co_varnames, code.co_freevars
 
@@ -217,7 +220,7 @@ def _versions() -> str:
 
 
 def _of_sources(digest: str) -> str:
-    """The part of a file's name by which the files of other sources are told."""
+    """The part of a file's name that differs between sources."""
     return digest[:8]
 
 
@@ -230,7 +233,7 @@ def _hash(key: tuple[str, ...]) -> str:
 
 
 def _folders(sources: Path) -> Folders:
-    """Where kernels of the sources in one folder are kept and looked for."""
+    """The folders in which kernels of the sources in one folder are kept and looked for."""
     return _Chosen.folders or _usual_folders(sources)
 
 
@@ -259,7 +262,7 @@ def _user_cache() -> Path:
 
 
 def _is_folder(path: Path) -> bool:
-    """``path.is_dir()``, and False for what this user may not even look at."""
+    """``path.is_dir()``, and False where this user has no access."""
     try:
         return path.is_dir()
     except OSError:
@@ -283,9 +286,9 @@ def _names(folder: Path) -> list[str]:
 
 
 def _read(path: Path, key: tuple[str, ...]) -> Any:
-    """What a file holds, or None where it is absent, damaged or of another key."""
+    """The content of a file, or None where it is absent, damaged or of another key."""
     try:
-        if not S_ISREG(path.stat().st_mode):  # a pipe would be waited for
+        if not S_ISREG(path.stat().st_mode):  # reading a pipe would wait
             return None
         content = path.read_bytes()
     except FileNotFoundError:
@@ -305,7 +308,7 @@ def _read(path: Path, key: tuple[str, ...]) -> Any:
 
 @contextmanager
 def _tolerant(path: Path) -> Iterator[None]:
-    """Within, an error means that a stored kernel is of no use; it is said once and the kernel is compiled."""
+    """A context in which an error means that a stored kernel is of no use: it is logged once."""
     try:
         yield
     except Exception as error:
@@ -324,7 +327,7 @@ _said: set[str] = set()
 
 
 def _warn_once(kind: str, message: str) -> None:
-    """Log the first message of each kind: what is wrong with one kernel's file is mostly wrong with all."""
+    """Log the first message of each kind: a fault of one kernel's file is mostly a fault of all."""
     if kind not in _said:
         _said.add(kind)
         _LOG.warning(message)

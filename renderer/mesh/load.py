@@ -29,14 +29,14 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
     repair : leave out the triangles that name a vertex that is not finite or an index out of range, keep the rest
         as ``Mesh.repaired`` does, and issue one ``RepairWarning`` that names the file and the counts.
 
-    Polygons are cut into triangles: by a fan from the first corner, concave ones by their ears. The fan stays, wrong as
-    it may be, where a polygon touches or crosses itself, repeats a corner, has a hole by a bridge, more than 4096
+    Polygons are cut into triangles: by a fan from the first corner, concave ones by their ears. The fan stays, though
+    it may be wrong, where a polygon touches or crosses itself, repeats a corner, has a hole by a bridge, more than 4096
     corners, or strays from its plane. Normals, colours and texture coordinates of vertices are kept. Positions are
     float64 whatever the file holds. An STL file shares no vertices between its faces.
 
     Raises ``MeshError`` that names the file and the fault: not there, not a file, unknown suffix, malformed
     or truncated, no faces, a face index out of range, a face of fewer than three vertices, values that are
-    not finite. With ``repair`` it is raised where no face is right, and for every other fault all the same.
+    not finite. With ``repair`` it is raised where no good face is left, and for faults that no repair mends.
     """
     try:
         path = Path(path)
@@ -63,7 +63,7 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
 def parse_mesh(content: bytes, suffix: str, repairs: list[Repairs] | None = None) -> Mesh:
     """The mesh in a file's content; ``suffix`` is one of '.ply', '.obj', '.stl', '.glb'.
 
-    repairs : a list to which the repairs are added that ``load_mesh`` makes with ``repair``, one a mesh of the file.
+    repairs : a list to which the repairs are added that ``load_mesh`` makes with ``repair``, one per mesh of the file.
 
     Raises ``MeshError`` as ``load_mesh`` does, without the file's name.
     """
@@ -134,7 +134,7 @@ def _check_glb_frame(content: bytes) -> None:
 
 
 def _refuse_unread(document: Any) -> None:
-    """Raise ``MeshError`` for what trimesh drops or reads wrongly without a word. Malformed entries it refuses."""
+    """Raise ``MeshError`` for contents that trimesh drops or reads wrongly in silence. It refuses malformed entries."""
 
     def dicts(owner: Any, key: str) -> list[dict[str, Any]]:
         entries = owner.get(key) if isinstance(owner, dict) else None
@@ -157,7 +157,7 @@ def _refuse_unread(document: Any) -> None:
 
 
 def _refuse_deep(nodes: list[dict[str, Any]]) -> None:
-    """Raise ``MeshError`` for nodes within each other to such a depth that trimesh takes minutes, or for ever."""
+    """Raise ``MeshError`` for nodes in circles, or so deep within each other that trimesh takes minutes."""
     lists = [node.get("children") for node in nodes]
     children = [[c for c in row if isinstance(c, int)] if isinstance(row, list) else [] for row in lists]
     level, seen = set(range(len(nodes))) - {child for row in children for child in row}, 0
@@ -185,5 +185,5 @@ _PARSERS: dict[str, Callable[[bytes, list[Repairs] | None], Mesh]] = {
     ".glb": _parse_glb,
 }
 
-# What ``load_mesh`` reads.
+# The suffixes of files that ``load_mesh`` reads.
 MESH_SUFFIXES = tuple(_PARSERS)

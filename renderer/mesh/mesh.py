@@ -22,18 +22,18 @@ MAX_VERTICES = 2**31 - 1
 
 
 class RepairWarning(UserWarning):
-    """A mesh file was loaded without what is bad in it; names the file and counts what was left out."""
+    """A mesh file was loaded without its bad parts; names the file and counts them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Repairs:
-    """What ``Mesh.repaired`` left out; true where that is anything at all.
+    """The rows that ``Mesh.repaired`` left out or replaced; true where there are any.
 
     dropped_faces : rows of the given faces that name a vertex that is not finite or that is not there, (n,) int64.
     bad_vertices : rows of the given vertices that are not finite, named by a face or not, (n,) int64.
     kept_faces : the given row of each face that was kept, (F,) int64; it takes a hit's ``face`` to the given faces.
-    bad_normals : rows of the given normals that are not finite at a vertex that is, (n,) int64; the faces around it
-        say what they are instead.
+    bad_normals : rows of the given normals that are not finite at a vertex that is, (n,) int64; the mean of the faces
+        around the vertex replaces them.
 
     >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 9], [0, 1, 2]])
     >>> print(repairs)
@@ -71,7 +71,7 @@ class Mesh:
     texcoords : (V, 2) float64, origin at the lower left of the texture, or None.
     name : used to begin error messages.
 
-    Raises ``MeshError`` that names the array, what was expected, what stood there and in which row.
+    Raises ``MeshError`` that names the array, the value that was expected, the one given and its row.
 
     >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 2, 0]], [[0, 1, 2]])
     >>> mesh.face_normals().tolist()
@@ -118,7 +118,7 @@ class Mesh:
             self._reject_rows("colors", self.colors, outside, "values in [0, 1]")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How it is copied and pickled: by the constructor, which checks, and makes arrays that cannot be written."""
+        """Copies and pickles are made by the constructor, which checks the arrays and makes them read-only."""
         return Mesh, (self.vertices, self.faces, self.normals, self.colors, self.texcoords, self.name)
 
     def _error(self, message: str) -> MeshError:
@@ -275,13 +275,13 @@ class Mesh:
         texcoords: ArrayLike | None = None,
         name: str = "",
     ) -> tuple[Mesh, Repairs]:
-        """The mesh of the faces that are right, in their order, and what was left out.
+        """The mesh of the good faces, in their order, and the ``Repairs``.
 
         A face is dropped where it names a vertex with a NaN or infinite coordinate, or an index out of range. Such
         a vertex stays in its row, so that indices keep their meaning, but at 0 with all its attributes. A normal that
-        is not finite becomes the mean of the faces around its vertex. Arguments as for the class. Whatever else is
-        wrong is a ``MeshError`` as there: shapes, dtypes, colours and texture coordinates that are not finite at a
-        vertex that is. Right input gives the same mesh as the class does.
+        is not finite becomes the mean of the faces around its vertex. Arguments as for the class. Any other fault is a
+        ``MeshError`` as there: shapes, dtypes, colours and texture coordinates that are not finite at a vertex that is.
+        Input without faults gives the same mesh as the class does.
 
         >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, np.nan, 0]], [[0, 1, 3], [0, 1, 2]])
         >>> mesh.faces.tolist(), mesh.vertices[3].tolist(), repairs.bad_vertices.tolist()
@@ -328,7 +328,7 @@ def face_normals(corners: Float64Array) -> Float64Array:
 
 
 def build_mesh(repairs: list[Repairs] | None, vertices: Any, faces: Any, **attributes: Any) -> Mesh:
-    """``Mesh(...)``, or, where a list of repairs is given, ``Mesh.repaired(...)`` with what it left out added there."""
+    """``Mesh(...)``, or, where a list of repairs is given, ``Mesh.repaired(...)`` with its ``Repairs`` added there."""
     if repairs is None:
         return Mesh(vertices, faces, **attributes)
     mesh, made = Mesh.repaired(vertices, faces, **attributes)
@@ -360,7 +360,7 @@ def _rows(name: str, argument: str, values: Any, width: int) -> NDArray[Any]:
 
 
 def _real_rows(name: str, argument: str, values: Any, width: int, dtype: type[np.floating]) -> NDArray[Any]:
-    """A new (n, width) array of ``dtype``; what it cannot hold is inf."""
+    """A new (n, width) array of ``dtype``; numbers that it cannot hold are inf."""
     array = _rows(name, argument, values, width)
     if not array.size:
         return np.empty((0, width), dtype)
@@ -405,7 +405,7 @@ def _scaled(*vectors: _Columns) -> list[_Columns]:
     """Vectors over a power of two near each row's largest component: products neither overflow nor vanish."""
     largest = np.maximum.reduce([np.abs(column) for vector in vectors for column in vector])
     exponent = -np.frexp(largest)[1]
-    if np.abs(exponent).max(initial=0) > 1000:  # beyond what a factor can be
+    if np.abs(exponent).max(initial=0) > 1000:  # beyond the powers of two in float64
         return [(np.ldexp(x, exponent), np.ldexp(y, exponent), np.ldexp(z, exponent)) for x, y, z in vectors]
     factor = np.ldexp(1.0, exponent)
     return [(x * factor, y * factor, z * factor) for x, y, z in vectors]

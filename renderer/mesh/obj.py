@@ -27,14 +27,14 @@ _IGNORED = {
 
 @dataclass(frozen=True)
 class _Content:
-    """What a file says, whichever reader read it."""
+    """The content of a file, from either reader."""
 
     positions: Float64Array  # (V, 3)
     colors: Float64Array | None  # (V, 3)
     texcoords: Float64Array  # (T, 2)
     normals: Float64Array  # (N, 3)
-    # (C, 3): a position, texcoord and normal a corner; -1 where a corner has none, or, for positions, where an index
-    # is out of range and bad faces are to be dropped.
+    # (C, 3): position, texcoord and normal of each corner; -1 where a corner has none, or, for positions, where an
+    # index is out of range and bad faces are to be dropped.
     corners: NDArray[np.int64]
     starts: NDArray[np.int64]  # polygon p has corners[starts[p] : starts[p + 1]]
 
@@ -97,11 +97,11 @@ def distinct_rows(corners: NDArray[np.int64], count: int) -> tuple[NDArray[np.in
 
 
 def _read_common(content: bytes) -> _Content | None:
-    """What a right file of the common shape says, as ``_read_any`` would; None for any other.
+    """The content of a file of the common shape without faults, equal to that of ``_read_any``; None for any other.
 
-    Left to the other are: faults of any kind, lines that end in a backslash or a bare carriage return, that begin with
-    a blank or differ in how many numbers follow ``v``, ``vt`` or ``vn``; corners that are negative, or not of one form
-    throughout.
+    Left to ``_read_any`` are faults of any kind; lines that end in a backslash or a bare carriage return, that begin
+    with a blank, or that differ in the number of values after ``v``, ``vt`` or ``vn``; and corners that are negative,
+    or not of one form throughout.
     """
     if content.count(b"\r") != content.count(b"\r\n") or re.search(rb"\\(\r|\n|\Z)", content):
         return None
@@ -123,7 +123,7 @@ def _read_common(content: bytes) -> _Content | None:
 
 
 def _blocks(content: bytes) -> dict[str, bytes] | None:
-    """All lines of each keyword that matters, one after the other; None if any line is not plainly to be ignored."""
+    """All lines of each keyword that matters, end to end; None if any other line is not certain to be ignored."""
     letters = np.frombuffer(content, np.uint8)
     ends = np.flatnonzero(letters == ord("\n")) + 1
     starts = np.concatenate([[0], ends[:-1]])
@@ -151,12 +151,12 @@ def _blocks(content: bytes) -> dict[str, bytes] | None:
 
 
 def _table(block: bytes, keyword: bytes, least: int) -> Float64Array:
-    """The numbers after the keyword, a row a line. Raises ``ValueError`` unless lines have equally many."""
+    """The numbers after the keyword, one row per line. Raises ``ValueError`` unless lines have equally many."""
     lines, words = block.count(b"\n"), block.split()
     if not lines:
         return np.empty((0, least))
     width = len(words) // lines
-    # Where each of these is a keyword, none is elsewhere, or float() would not take it.
+    # If each of these is the keyword, it stands nowhere else: float() would refuse it there.
     if width * lines != len(words) or width <= least or set(words[::width]) != {keyword} or b"_" in block:
         raise ValueError
     del words[::width]
@@ -186,7 +186,7 @@ def _faces(block: bytes, counts: list[int]) -> tuple[NDArray[np.int64], NDArray[
             return None
         if each == 2 and (of_word[:, 1] == of_word[:, 0] + 1).all():
             columns = [0, 2]
-    # As there are as many numbers as could be, none is missing anywhere.
+    # With as many numbers as places, none is missing anywhere.
     numbers = np.fromstring(block.translate(bytes.maketrans(b"f/", b"  ")), np.int64, sep=" ")
     if len(numbers) != len(words) * len(columns):
         return None

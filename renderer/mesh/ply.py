@@ -128,7 +128,7 @@ def format_ply(mesh: Mesh) -> bytes:
 
 
 def _parse_header(content: bytes) -> tuple[_ByteOrder, list[_Element], int]:
-    """Byte order, elements, and where the body starts."""
+    """Byte order, elements, and the start of the body."""
     if re.match(rb"ply[ \t]*(\r\n|\r|\n)", content) is None:
         raise MeshError(f"expected a first line 'ply', got {content[:16]!r}")
     end = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n|\Z)").search(content, 0, _MAX_HEADER_BYTES)
@@ -205,7 +205,7 @@ def _read_elements(
 
 
 def _read_rows(content: bytes, position: int, element: _Element, byte_order: _ByteOrder) -> tuple[_Columns, int]:
-    """The element's columns and where it ends.
+    """The element's columns and its end.
 
     Rows that all look like the first (triangles only, say) are strided views of ``content``. Otherwise
     Python walks from list length to list length, about half a second for a million faces.
@@ -237,7 +237,7 @@ def _read_rows(content: bytes, position: int, element: _Element, byte_order: _By
 def _walk(
     content: bytes, position: int, element: _Element, byte_order: _ByteOrder, rows: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
-    """Where each property's values start and how many there are, (rows, properties), and where the rows end."""
+    """The start and the number of each property's values, (rows, properties), and the end of the rows."""
     steps = [
         (p.count_stored and struct.Struct(byte_order + p.count_stored.char), p.stored.itemsize)
         for p in element.properties
@@ -336,7 +336,7 @@ def _strips(strips: _Column) -> NDArray[np.int64]:
     places = np.arange(len(values))
     begins = restarts.copy()
     begins[strips.starts[:-1][strips.starts[:-1] < len(values)]] = True
-    # Each place's strip is named by where it begins: a row's first place, or a restart's own.
+    # The strip of each place is named by its beginning: a row's first place, or that of a restart.
     strip = np.maximum.accumulate(np.where(begins, places, 0))
     sizes = np.bincount(strip[~restarts])
     if ((sizes == 1) | (sizes == 2)).any():

@@ -21,7 +21,7 @@ _Point = tuple[float, float]
 # A fan's triangle is turned over where the sine of its angle at the first corner is below this; corners on one line,
 # rounded to float32, stay above.
 _TURNED_OVER = -1e-6
-# How far a polygon may stray from its plane, over its extent, within a factor of two, to have notches at all.
+# A polygon keeps its fan where it strays from its plane by more than this share of its extent, within a factor of two.
 _OUT_OF_PLANE = 0.05
 # Corners on one line, rounded to float64, make a triangle of less than this over the square of the extent.
 _FLAT = 1e-12
@@ -37,8 +37,8 @@ def triangulate(positions: _Floats, corners: _Ints, starts: _Ints) -> _Ints:
     corners : rows of ``positions``; polygon p has corners[starts[p] : starts[p + 1]], at least three.
 
     Polygon a b c d ... becomes abc, acd, ... where those triangles do not overlap, else as many others that do not
-    either and are wound as the polygon is. Where nothing is right the fan stays: polygons without area, that cross
-    or touch themselves, stray from a plane, have more than 4096 corners, name a vertex that is not there or not finite.
+    overlap and are wound as the polygon is. The fan stays for polygons that have no area, cross or touch themselves,
+    stray from a plane, have more than 4096 corners, or name a vertex that is not there or not finite.
     """
     places = _fans(starts)
     lengths = np.diff(starts)
@@ -95,7 +95,10 @@ def _fan_may_be_wrong(positions: _Floats, polygons: _Ints) -> NDArray[np.bool_]:
 
 
 def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _Ints]]:
-    """Of polygons (s, n), each whose fan is wrong and whose ears can be cut, with its triangles as (n - 2, 3) of n."""
+    """For each of the polygons (s, n) whose fan is wrong and whose ears can be cut, its row and its triangles.
+
+    The triangles are (n - 2, 3) numbers of the polygon's corners.
+    """
     step = max(1, (1 << 22) // polygons.shape[1] ** 2)
     for begin in range(0, len(polygons), step):
         points = positions[polygons[begin : begin + step]]
@@ -111,7 +114,7 @@ def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _In
         flat = _projected(points, normals[:, 0])
         for k in np.flatnonzero(notched & planar & _is_simple(flat)):
             outline = [(float(x), float(y)) for x, y in flat[k]]
-            # Finer steps than _FLAT tells apart are rare, and are cut as they are.
+            # Outlines with steps finer than _FLAT are rare, and are cut without a tolerance.
             triangles = _cut_ears(outline, _FLAT) or _cut_ears(outline, 0.0)
             if triangles:
                 yield begin + int(k), np.array(triangles, np.int64)
@@ -120,7 +123,7 @@ def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _In
 def _projected(points: _Floats, normals: _Floats) -> _Floats:
     """(s, n, 2): the points without the axis along which the normal is longest, wound counter-clockwise.
 
-    Unlike axes within the plane, it rounds nothing: what is in line stays in line.
+    Unlike a projection onto axes within the plane, this rounds nothing: points on a line stay on it.
     """
     longest = np.abs(normals).argmax(axis=1)
     turned = np.take_along_axis(normals, longest[:, None], axis=1)[:, 0] < 0
@@ -169,7 +172,7 @@ def _cut_ears(outline: list[_Point], flat: float) -> list[tuple[int, int, int]] 
     def turns_left(k: int) -> bool:
         return _turn(outline[before[k]], outline[k], outline[after[k]]) > flat
 
-    # Of what is left, only a corner that does not turn left can be the first to lie in an ear.
+    # Of the remaining corners, only one that does not turn left can be the first to lie in an ear.
     blockers = sorted((*outline[k], k) for k in range(count) if not turns_left(k))
     triangles: list[tuple[int, int, int]] = []
     at, missed = 1, 0

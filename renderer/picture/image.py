@@ -52,10 +52,11 @@ def srgb_steps() -> NDArray[np.float64]:
 
 @cache
 def _table() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """The code of the float32 with each upper half and a lower half of zeros, (65536,); and where the code after each
-    begins, (256,), which is nowhere for the last.
+    """The code of the float32 with each upper half and a lower half of zeros, (65536,); and the least float32 of the
+    code after each, (256,), NaN for the last.
 
-    No two steps are in float32 numbers of one upper half: they are 0.9 % apart at 1 and further below, these 0.8 %.
+    float32 numbers of one upper half span no two steps: they are within 0.8 %, and steps are 0.9 % apart at 1, more
+    below.
     """
     zeros = (np.arange(1 << 16, dtype=np.uint32) << 16).view(np.float32)
     exact = srgb_steps()
@@ -65,7 +66,7 @@ def _table() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
 
 
 class CutWarning(UserWarning):
-    """A picture has pixels that miss rays for ``max_rays``; says how many."""
+    """A picture has pixels that miss rays because of ``max_rays``; the message says how many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +80,8 @@ class Image:
     rays      (h, w) int32, rays traced for the pixel, shadow rays included
 
     Of those that ``render`` was not asked to keep, h and w are 0.
-    cut       (pixels) how many miss rays for ``max_rays``, 0 in most pictures
-    build_seconds, render_seconds  what it took, without compiling; the first is the prepared scene's
+    cut       the number of pixels that miss rays because of ``max_rays``, 0 in most pictures
+    build_seconds, render_seconds  the time that it took, without compiling; the first is the prepared scene's
     """
 
     radiance: NDArray[np.float32]
@@ -93,7 +94,7 @@ class Image:
     cut: int = 0
 
     def cut_message(self, max_rays: int) -> str:
-        """What ``CutWarning`` says."""
+        """The message of ``CutWarning``."""
         return (
             f"{self.cut:,} of {self.radiance.size // 3:,} pixels miss rays: they took max_rays = {max_rays:,} a "
             "sample. More max_rays trace all; a min_weight, such as 0.001, ends those that hardly show"
@@ -145,7 +146,7 @@ class Image:
 
 
 def check_picture_path(path: str | Path) -> None:
-    """Raise ``ValueError`` or ``OSError`` unless ``save`` can write there; worth asking before a long render."""
+    """Raise ``ValueError`` or ``OSError`` unless ``save`` can write there; to be called before a long render."""
     path = Path(path)
     expect(path.suffix.lower() in (".png", ".exr", ".npy"), "output", "a .png, .exr or .npy file", repr(str(path)))
     expect(path.parent.is_dir(), "output", "a path in an existing folder", repr(str(path)))

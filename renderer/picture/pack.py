@@ -14,7 +14,7 @@ from renderer.shade.surface import MAX_MEDIA, SceneArrays
 def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
     """The merged mesh of all instances in their order, and everything else that the kernel reads.
 
-    Only what ``needs`` names is there, and for None only what the scene needs.
+    Arrays that ``needs`` does not name are left empty; for None, those that the scene does not need.
     """
     needs = needs_of(scene) if needs is None else needs
     instances = scene.instances
@@ -42,7 +42,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
 
 
 def _materials(scene: Scene, needs: Needs) -> NDArray[np.float64]:
-    """The materials' rows. Asked for what the scene does not need, they are worked out all the same."""
+    """The rows of the materials, of kinds that have all that ``needs`` names, whether the scene needs it or not."""
     rows = np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)
     own, kinds = needs_of(scene), rows[:, KIND]
     if needs.shadows and not own.shadows:
@@ -63,7 +63,7 @@ def light_rows(scene: Scene, needs: Needs) -> NDArray[np.float64]:
 
 
 def _material_rows(scene: Scene) -> dict[str, int]:
-    """Where each material begins in the array of materials."""
+    """The place of each material's row in the flat array of materials, by name."""
     return {name: i * MATERIAL_COLUMNS for i, name in enumerate(scene.materials)}
 
 
@@ -79,7 +79,7 @@ def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
 
 
 def _winding(mesh: Mesh, point: tuple[float, float, float]) -> float:
-    """How often ``mesh`` winds around ``point``: the solid angle of its faces over 4 pi, 1 inside a closed mesh.
+    """The winding number of ``mesh`` around ``point``: the solid angle of its faces over 4 pi, 1 inside a closed mesh.
 
     van Oosterom and Strackee, The Solid Angle of a Plane Triangle, IEEE Trans. Biomed. Eng. 30:2, 1983.
     """

@@ -1,4 +1,4 @@
-"""A scene made ready: what its pictures share is worked out once, and each camera then costs its rays alone."""
+"""A prepared scene: the data that its pictures share is computed once, and a picture then costs its rays alone."""
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
@@ -24,19 +24,20 @@ from renderer.trace.layout import Tree, cache_aligned
 from renderer.trace.query import rays_against_blocks
 from renderer.trace.spawn import OffsetRule
 
-# Pixels a side: 256 tiles share a 512 x 512 picture evenly, and neighbouring rays find their nodes in the cache.
+# The side of a tile in pixels: 256 tiles share a 512 x 512 picture, and neighbouring rays find their nodes in the
+# cache.
 TILE = 32
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedScene:
-    """What the pictures of a scene share; make one with ``prepare`` and render it with ``render``.
+    """The data that the pictures of a scene share; make one with ``prepare`` and render it with ``render``.
 
-    scene          what it was made of
+    scene          the scene that it was made of
     mesh           all instances' triangles, in their order
     octree         the tree over ``mesh``, or its ``BruteForce``
-    needs          what is ready: at least what ``needs_of`` says of the scene
-    build_seconds  what it took, without compiling
+    needs          the features that are ready: at least those of ``needs_of(scene)``
+    build_seconds  the time that it took, without compiling
     """
 
     scene: Scene
@@ -48,7 +49,7 @@ class PreparedScene:
     build_seconds: float
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How it is copied and pickled: what kernels read is made anew, of the kinds that they were compiled for."""
+        """Copies and pickles make the kernels' arrays anew, so that they are of the types that kernels know."""
         return _restored, (self.scene, self.octree, self.needs, self.build_seconds)
 
     def picture(
@@ -102,7 +103,7 @@ def prepare_scene(
 
 
 def _bundles_in_a_row(tree: Tree) -> int:
-    """After how many bundles a kernel returns, so that Ctrl-C and others are heard: some 10 ms of tracing."""
+    """The number of bundles that a kernel traces per call: some 10 ms, so that Ctrl-C need not wait for longer."""
     return 256 if tree.has_nodes else max(1, rays_against_blocks(tree) // SIZE)
 
 
@@ -112,7 +113,7 @@ def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_sec
 
 
 def tiles(resolution: tuple[int, int]) -> int:
-    """How many tiles a picture of (width, height) has."""
+    """The number of tiles of a picture of (width, height)."""
     width, height = resolution
     return -(-width // TILE) * -(-height // TILE)
 
@@ -131,7 +132,7 @@ def build_octree(
 
 
 def tree_for(octree: Octree | BruteForce, needs: Needs) -> Tree:
-    """What the kernel shoots rays at."""
+    """The tree that the kernel traces rays against."""
     return _widened(octree.tree) if needs.float64_vertices else octree.tree
 
 

@@ -34,17 +34,17 @@ def render(
     """Render ``scene``; ``resolution``, ``samples``, ``max_depth``, ``min_weight``, ``max_rays`` and ``shadows``
     override the scene's own, see ``RenderSettings``.
 
-    scene        a ``Scene``, or what ``prepare`` made of one: its pictures then share the tree and all else that does
-                 not depend on the camera or these settings
+    scene        a ``Scene``, or what ``prepare`` returned for one: its pictures then share the tree and all else that
+                 does not depend on the camera or these settings
     camera       another camera than the scene's
     accelerator  "octree", "brute" to test every ray against every face, or "auto": the octree unless the faces are so
                  few that it does not pay. This and the next two are for a ``Scene`` that is not prepared
-    split        how the octree is cut, "midpoint" or "sah"
-    needs        what to have ready: at least what ``needs_of`` says, which None stands for. More changes no bit of
-                 radiance, depth, normal or face, and costs time and memory
-    offset       how spawned rays leave a surface: "bounded" by their rounding error, or Mitsuba's rule with its
-                 epsilon or another one
-    planes       which arrays of the ``Image`` to keep, of "depth", "normal", "face" and "rays": 28 of 40 bytes a pixel;
+    split        the rule that cuts the octree, "midpoint" or "sah"
+    needs        the features to have ready: at least those of ``needs_of``, which None stands for. More of them change
+                 no bit of radiance, depth, normal or face, and cost time and memory
+    offset       the rule by which spawned rays leave a surface: "bounded" by their rounding error, or Mitsuba's with
+                 its epsilon ("mitsuba") or with the one given
+    planes       the arrays of the ``Image`` to keep, of "depth", "normal", "face" and "rays": 28 of 40 bytes per pixel;
                  "radiance" is always kept
     threads      None takes all processors
     progress     a bar on standard error when that is a terminal
@@ -88,7 +88,7 @@ def prepare(
     needs: Needs | None = None,
     threads: int | None = None,
 ) -> PreparedScene:
-    """Work out once what all pictures of ``scene`` share, its tree above all: for animations and several cameras.
+    """Compute once what all pictures of ``scene`` share, its tree above all: for animations and several cameras.
 
     Arguments as of ``render``. The result renders at any ``max_depth``. Its pictures have the same bits as those of the
     scene itself. Raises ``ValueError`` naming the argument.
@@ -102,7 +102,7 @@ def prepare(
     [0, -1]
     """
     expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
-    # One bounce stands for any number of them.
+    # The needs are the same for any number of bounces above 0.
     depth = max(1, scene.render.max_depth)
     return _prepared(scene, depth, accelerator, split, needs, checked_threads(threads))
 
@@ -138,9 +138,9 @@ def _offset(offset: str | float) -> OffsetRule:
 
 @contextmanager
 def _bar(count: int, progress: bool) -> Iterator[Callable[[int], object] | None]:
-    """What to tell of tiles that are done: a bar, or None where nobody watches.
+    """The function to call with the number of tiles done: that of a bar, or None where no terminal shows it.
 
-    None, because a bar takes a lock that all of them share, and that Ctrl-C may leave taken for good.
+    There is no hidden bar in place of None, because all bars share a lock, which Ctrl-C may leave taken for good.
     """
     if not (progress and on_terminal()):
         yield None

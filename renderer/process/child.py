@@ -1,4 +1,4 @@
-"""Python processes of our own that import from nowhere but where this one did.
+"""Child Python processes that import packages from the same places as this one.
 
 ``python -c`` and ``python -m`` put the current folder first on the path: a file ``renderer.py`` or ``numpy.py`` beside
 a downloaded scene would be executed. A child runs this file by its path, without that folder, and loads the very
@@ -15,12 +15,12 @@ _OUR_PACKAGES = ("renderer", "validation")
 
 
 def command(target: str, *arguments: str) -> list[str]:
-    """The command of a process that calls ``target``, as "renderer.cli:main", with strings."""
+    """The command of a process that calls ``target``, such as "renderer.cli:main", with strings."""
     return [sys.executable, "-P", str(Path(__file__).resolve()), target, *arguments]
 
 
 def environment(**more: str) -> dict[str, str]:
-    """This process's environment for a child: no import from a folder that depends on where it stands."""
+    """This process's environment for a child, without relative paths to import from."""
     own = {**os.environ, **more}
     if "PYTHONPATH" in own:
         absolute = [entry for entry in own["PYTHONPATH"].split(os.pathsep) if os.path.isabs(entry)]
@@ -29,7 +29,7 @@ def environment(**more: str) -> dict[str, str]:
 
 
 def _call(target: str, *arguments: str) -> object:
-    """What the child does: load our packages from where this file lies, and call the target."""
+    """In the child: load our packages from the folder of this file's package, and call the target."""
     home = Path(__file__).resolve().parents[2]
     for name in _OUR_PACKAGES:
         if name not in sys.modules and (home / name).is_dir():

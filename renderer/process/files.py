@@ -21,7 +21,7 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], o
                 write(file)
             return
         with open(temporary, "xb") as file:
-            # Before anything is in it: a private file stays one.
+            # Before anything is in it, so that a private file stays private.
             with suppress(FileNotFoundError):
                 temporary.chmod(S_IMODE(target.stat().st_mode))
             write(file)
@@ -29,7 +29,7 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], o
 
 
 def read_whole(path: Path) -> bytes:
-    """The bytes of a file. Raises ``OSError`` for a device too, which need not end."""
+    """The bytes of a file. Raises ``OSError`` for a device too, which may have no end."""
     mode = path.stat().st_mode
     if S_ISCHR(mode) or S_ISBLK(mode):
         raise OSError(errno.EINVAL, "expected a file, got a device", str(path))
@@ -45,7 +45,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def _is_special(target: Path) -> bool:
-    """Whether it is there and no file, nor a folder, which is an error in any case."""
+    """Whether it exists and is neither a file nor a folder; a folder is an error in any case."""
     return target.exists() and not (target.is_file() or target.is_dir())
 
 

@@ -1,4 +1,4 @@
-"""How a command ends by Ctrl-C, with one line and an exit code, also in the compiler; and by other signals."""
+"""The end of a command by Ctrl-C, with one line and an exit code, also in the compiler; and by other signals."""
 
 import os
 import signal
@@ -12,7 +12,7 @@ from typing import Protocol
 
 # The usual code of a shell for a process that SIGINT ended.
 INTERRUPTED = 130
-# What a job's time limit and a terminal that is closed send. Unheard they would leave temporary files.
+# The signals of a job's time limit and of a terminal that is closed. Unhandled, they would leave temporary files.
 _ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -36,7 +36,7 @@ def interruptible(message: str) -> Callable[[Command], Command]:
                 if not ended_by:
                     print(message, file=sys.stderr)
                     return INTERRUPTED
-            # As it would have ended at once, so that whoever sent the signal sees what became of it.
+            # The process ends by the signal itself, as without a handler, so that its sender sees that it took effect.
             signal.raise_signal(ended_by[0])
             return 128 + ended_by[0]
 
@@ -47,7 +47,7 @@ def interruptible(message: str) -> Callable[[Command], Command]:
 
 @contextmanager
 def _ends_clean(ended_by: list[int], own_process: bool) -> Iterator[None]:
-    """Within, a signal that would end the process raises KeyboardInterrupt, so that temporary files are removed.
+    """A context in which a signal that would end the process raises KeyboardInterrupt, to remove temporary files.
 
     Its number goes to ``ended_by``. In the compiler it ends the process at once, see ``ends_while_compiling``. Does
     nothing where the process is not the command's own, or something else handles or ignores the signal.
@@ -73,7 +73,7 @@ def _ends_clean(ended_by: list[int], own_process: bool) -> Iterator[None]:
 
 @contextmanager
 def ends_while_compiling(message: str, own_process: bool) -> Iterator[None]:
-    """Within, Ctrl-C that meets the compiler prints ``message`` and ends the process; elsewhere it raises as always.
+    """A context in which Ctrl-C in the compiler prints ``message`` and ends the process; elsewhere it raises as always.
 
     A KeyboardInterrupt raised in Numba may be swallowed by a destructor or callback, come out as another error, or
     leave LLVM in a state that crashes the process at its end. No file of ours is being written then, so nothing is
@@ -86,7 +86,7 @@ def ends_while_compiling(message: str, own_process: bool) -> Iterator[None]:
 
     def stop(number: int, frame: FrameType | None) -> None:
         if _in_compiler(frame):
-            # Not by print, which may be what was interrupted; and below a progress bar and the terminal's ^C.
+            # Not by print, which may itself be interrupted; and below a progress bar and the terminal's ^C.
             start = "\n" if os.isatty(2) else ""
             os.write(2, f"{start}{message}\n".encode())
             os._exit(INTERRUPTED)

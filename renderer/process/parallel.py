@@ -15,9 +15,9 @@ from threading import Lock, current_thread
 
 from renderer.errors import expect
 
-# The pool's threads at least, and as many times the processors: whoever asks for more gets the same result from these.
+# The pool's threads: at least so many, and so many per processor. More would not change results.
 _LEAST_POOL, _PER_PROCESSOR = 16, 4
-# Seconds between looks at helpers that have been told to stop, which take milliseconds.
+# Seconds between checks of helpers that have been told to stop, which take milliseconds to do so.
 _MOMENT = 0.0005
 
 
@@ -37,7 +37,7 @@ def checked_threads(threads: int | None) -> int:
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    """The one pool. It starts a thread only where none is idle, so it has no more than were ever busy at once."""
+    """The only pool. It starts a thread only where none is idle, so it has no more than were ever busy at once."""
     return ThreadPoolExecutor(max(_LEAST_POOL, _PER_PROCESSOR * available_threads()), thread_name_prefix="renderer")
 
 
@@ -55,10 +55,10 @@ def for_chunks(
 ) -> None:
     """Call ``work(begin, end)`` for every chunk of ``range(count)``, on up to ``threads`` threads.
 
-    Chunks must write to places of their own; then the result does not depend on who ran what. Long work is a generator
-    that yields where it can be stopped. ``finished(items)`` is called after each chunk, and with 0 where one yields, by
-    one thread at a time. On an exception, Ctrl-C included, no further chunk starts, the running ones end or stop, and
-    it is raised here. ``work`` must not call ``for_chunks``: it might wait for itself.
+    Chunks must write to places of their own; then the result does not depend on the threads that run them. Long work is
+    a generator that yields where it can be stopped. ``finished(items)`` is called after each chunk, and with 0 where
+    one yields, by one thread at a time. On an exception, Ctrl-C included, no further chunk starts, the running ones end
+    or stop, and it is raised here. ``work`` must not call ``for_chunks``: it might wait for itself.
     """
     begins = iter(range(0, count, size))
     taking, shared = Lock(), _Shared()
@@ -99,11 +99,11 @@ def for_chunks(
 
     running: list[Future[None]] = []
     try:
-        # The caller's own thread is one of them, so the work starts without waiting for another to wake up.
+        # The caller's own thread takes chunks too, so the work starts without waiting for another to wake up.
         _start(help_out, min(threads, -(-count // size)) - 1, running)
         take_chunks()
         for future in running:
-            # One that has not begun, in a pool that others keep busy, has nothing left to take.
+            # A helper that has not begun, because other calls keep the pool busy, has nothing left to take.
             if not future.cancel():
                 future.result()
     finally:
@@ -111,10 +111,10 @@ def for_chunks(
 
 
 class _Shared:
-    """What the threads of one call tell each other: that all shall stop, and an entry for each helper at work.
+    """The state that the threads of one call share: whether all shall stop, and an entry for each helper at work.
 
-    A daemon's helpers leave it when the interpreter ends, which waits for all threads of pools. What they had begun is
-    an error then; a daemon that lives on, beside other threads, works alone.
+    A daemon's helpers leave it when the interpreter ends, which waits for all threads of pools. A chunk that they had
+    begun is an error then; a daemon that lives on, beside other threads, works alone.
     """
 
     def __init__(self) -> None:
@@ -129,17 +129,17 @@ class _Shared:
 
 
 def _stop_helpers(shared: _Shared, taking: Lock) -> None:
-    """Return when no helper is at work any more, whatever Ctrl-C interrupts: they write to memory of the caller's.
+    """Return when no helper is at work any more, even on Ctrl-C: they write to memory of the caller's.
 
     By plain flags: interrupted at the wrong moment, an ``Event`` keeps its lock for good, and a future just submitted
-    is one that nobody knows.
+    is lost.
     """
     interrupted = False
     while True:
         try:
             shared.stopped = True
             with taking:
-                pass  # from here on whoever begins sees it
+                pass  # a helper that begins from here on sees it
             while shared.helpers:
                 time.sleep(_MOMENT)
             break
@@ -150,9 +150,9 @@ def _stop_helpers(shared: _Shared, taking: Lock) -> None:
 
 
 def _start(work: Callable[[], None], count: int, running: list[Future[None]]) -> None:
-    """Begin ``work`` on ``count`` threads of the pool, or on fewer: the caller does what nobody else does.
+    """Begin ``work`` on ``count`` threads of the pool, or on fewer: the caller does what is left.
 
-    Adds to ``running`` one by one, so that Ctrl-C in the midst of it leaves none that nobody knows.
+    Adds to ``running`` one by one, so that Ctrl-C between two of them loses none.
     """
     # Raised where the main thread has ended, or the system gives no more threads.
     with suppress(RuntimeError):

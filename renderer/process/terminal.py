@@ -1,4 +1,4 @@
-"""The streams of a command's own process: whether anybody watches, and words that they cannot spell or should not."""
+"""The standard streams of a command's own process: terminals, and characters that they cannot or should not print."""
 
 import sys
 from io import TextIOWrapper
@@ -10,12 +10,12 @@ def on_terminal() -> bool:
 
 
 def spell_everything() -> None:
-    """Let standard output write what its encoding lacks, as an accent in a path, by escapes: an error otherwise."""
+    """Let standard output escape characters that its encoding lacks, as an accent in a path, where it would raise."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def one_line(error: Exception) -> str:
-    """An error's words without what a terminal obeys: they may quote a file."""
+    """An error's message on one line, control characters escaped: it may quote a file."""
     words = " ".join(str(error).split())
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)

@@ -20,7 +20,7 @@ from renderer.scene.fields import Fields, FiniteVector
 
 
 def unit(vector: ArrayLike) -> NDArray[np.float64]:
-    """At unit length, scaled first so that no square overflows or vanishes; zero gives nan."""
+    """The vector at unit length, scaled first so that no square overflows or vanishes; zero gives nan."""
     scaled = np.asarray(vector, np.float64) / np.abs(vector).max()
     return scaled / np.linalg.norm(scaled)
 

@@ -1,4 +1,4 @@
-"""What scene classes share: kinds of fields, what is unknown or wrong refused, and one line for what is wrong."""
+"""The base of the scene classes: types of fields, checks for unknown and wrong values, and one line per fault."""
 
 import re
 from collections.abc import Callable
@@ -13,7 +13,7 @@ _Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 FiniteVector = tuple[_Number, _Number, _Number]
 
 
-# Where a fault stands: names of fields and places in lists.
+# The place of a fault: names of fields and places in lists.
 Keys = tuple[int | str, ...]
 
 
@@ -46,12 +46,12 @@ class Fields(BaseModel):
         """NumPy's numbers and arrays as Python's own, which the fields' types know."""
         return {key: _unpacked(value) for key, value in values.items()} if isinstance(values, dict) else values
 
-    # Without it pydantic would call __init__ for each record within another, and lose where that stands.
+    # Without it pydantic would call __init__ for each record within another, and lose the place of a fault.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @staticmethod
     def _union_member(keys: Keys) -> int | None:
-        """Where ``keys`` hold the name of a union's member; see ``first_fault``."""
+        """The place in ``keys`` of the name of a union's member; see ``first_fault``."""
         return None
 
 
@@ -64,16 +64,16 @@ def _unpacked(value: object) -> object:
 
 
 def first_fault(error: ValidationError, member: Callable[[Keys], int | None] = lambda keys: None) -> str:
-    """One line for the first thing that is wrong, with the number of others.
+    """One line for the first fault, with the number of others.
 
-    Of a union pydantic puts the name of a member, which is ours, among the keys; ``member`` tells where.
+    For a union pydantic puts the name of a member among the keys, which no file has; ``member`` gives its place.
     """
-    # An unknown key is likely what the missing one was meant to be.
+    # Unknown keys first: one is likely a misspelling of a missing one.
     faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     first = faults[0]
     keys = first["loc"]
     where = ".".join(shown(k) for i, k in enumerate(keys) if i != member(keys))
-    # It may quote what was given, line breaks and all.
+    # It may quote the given value with its line breaks.
     message = _in_our_words(" ".join(first["msg"].split()))
     says_it = (first["type"] == "value_error" and ", got" in message) or isinstance(first["input"], dict)
     got = "" if says_it else f", got {_value(first['input'])}"
@@ -85,7 +85,7 @@ def first_fault(error: ValidationError, member: Callable[[Keys], int | None] = l
     return f"{where}: {message}{got}{others}" if where else f"{message}{got}{others}"
 
 
-# What pydantic says, and what every other error of this package does.
+# Pydantic's words, and those of every other error of this package.
 _WORDS = (
     (r"^Value error, ", ""),
     (r"^Input should (be|have) (a valid )?", "expected "),
@@ -103,7 +103,7 @@ def _in_our_words(message: str) -> str:
 
 
 def _type_message(told: dict[str, Any]) -> str:
-    """What is wrong with the key by which the members of a union are told."""
+    """The fault of the key by which the members of a union are told apart."""
     key, known = told["discriminator"], told.get("expected_tags", "")
     got = f", got {told['tag']!r}" if "tag" in told else ", got none"
     return f"expected {key} to be one of {known}{got}" if known else f"expected the key {key}{got}"

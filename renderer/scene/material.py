@@ -36,12 +36,12 @@ class Phong(Fields):
 
     @property
     def receives_light(self) -> bool:
-        """Whether direct light changes what is seen of the surface."""
+        """Whether direct light changes the look of the surface."""
         return any(self.diffuse) or any(self.specular)
 
     @property
     def kind(self) -> int:
-        """What the kernels need to work out of it."""
+        """The kind for the kernels, PHONG, LAMBERT or UNLIT, by the colours that are not black."""
         return PHONG if any(self.specular) else LAMBERT if any(self.diffuse) else UNLIT
 
     def row(self) -> NDArray[np.float64]:

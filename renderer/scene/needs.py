@@ -1,4 +1,4 @@
-"""What a picture needs of the renderer, read off its scene; what it does not need is left out and costs nothing.
+"""The needs of a picture, read off its scene; features that it does not need are left out and cost nothing.
 
 Left out are rays (reflected, refracted, shadow), memory (vertex normals, the media of a ray, lights that are dark) and
 building (the tree over a handful of triangles). Kernel code is not: a kernel compiled without bounces, highlights and
@@ -14,21 +14,22 @@ from renderer.errors import expect, is_count
 from renderer.scene.material import Phong
 from renderer.scene.scene import Instance, Scene
 
-# Whole frames of boxes and spheres on a floor, one thread, all blocks tested against the tree: 0.72 of its time with 2
-# faces, 0.88 with 14, 0.89 with 22, 0.96 with 26, 1.06 to 1.10 with 38, 1.28 with 50.
+# The most faces for which no tree is built. Whole frames of boxes and spheres on a floor, one thread: to test all
+# blocks took 0.72 of the time with a tree for 2 faces, 0.88 for 14, 0.89 for 22, 0.96 for 26, 1.06 to 1.10 for 38, 1.28
+# for 50.
 FEW_FACES = 24
 
 
 @dataclass(frozen=True)
 class Needs:
-    """What a picture needs; ``dataclasses.replace`` switches more on, which changes no bit of it.
+    """The features that a picture needs; ``dataclasses.replace`` switches more on, which changes no bit of it.
 
     reflection        reflected rays
     refraction        refracted rays, and the media that each ray is in
-    shadows           shadow rays, and direct light at all
+    shadows           direct light, and shadow rays for it
     specular          highlights
     smooth_normals    interpolated normals
-    lights            how many lights: those that shine on something
+    lights            the number of lights: those that shine on something
     float64_vertices  vertices that float32 does not hold exactly
     octree            a tree; without it every ray is tested against every face
     """
@@ -44,7 +45,7 @@ class Needs:
 
 
 class Finding(NamedTuple):
-    """One feature of ``Needs``: its name, its value, and why."""
+    """One feature of ``Needs``: its name, its value, and the reason."""
 
     feature: str
     value: bool | int
@@ -52,8 +53,8 @@ class Finding(NamedTuple):
 
 
 def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
-    """What a picture of ``scene`` with ``max_depth`` bounces (the scene's own by default) needs, and why, in the order
-    of the fields of ``Needs``.
+    """The features that a picture of ``scene`` with ``max_depth`` bounces (the scene's own by default) needs, each with
+    its reason, in the order of the fields of ``Needs``.
 
     Only the materials of faces count: one that no face has is not needed.
     """

@@ -1,7 +1,7 @@
-"""Scenes: what a TOML file may say, and the world-space triangles that it means.
+"""Scenes: the contents of a TOML file, and the world-space triangles that it describes.
 
-Units are scene units and degrees, y is up. Paths are relative to the scene file. An unknown key, a missing
-file or a bad value is one ``SceneError`` that names the file, the key's path, what was expected and what stood there.
+Units are scene units and degrees, y is up. Paths are relative to the scene file. An unknown key, a missing file or a
+bad value is one ``SceneError`` that names the file, the key's path, the value that was expected and the one given.
 """
 
 import os
@@ -55,7 +55,7 @@ def _uniform(value: Any) -> Any:
     return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
-# As many as a count can hold, for ``max_rays``.
+# The most that a count can hold, for ``max_rays``.
 UNLIMITED_RAYS = 2**62 - 1
 
 
@@ -186,9 +186,9 @@ class Scene(Fields):
     def altered(self, **changes: object) -> "Scene":
         """A copy with other values of fields, by name, that shares the meshes: none is loaded or placed again.
 
-        So a change of ``objects`` or ``floor`` shows nowhere. Values are not checked as those of a scene file are.
+        So a change of ``objects`` or ``floor`` has no effect. Values are not checked as those of a scene file are.
         """
-        _ = self.instances  # what is cached goes along
+        _ = self.instances  # cached, so that the copy has it too
         return self.model_copy(update=changes)
 
 
@@ -282,7 +282,7 @@ def _rotation(axis: int, degrees: float) -> NDArray[np.float64]:
 
 
 def _floor_meshes(floor: Floor) -> list[tuple[Mesh, str]]:
-    """The floor's squares as one mesh a material, facing up, with the squares' edges shared exactly."""
+    """The floor's squares as one mesh per material, facing up, with the squares' edges shared exactly."""
     nx, nz = floor.squares
     x = np.linspace(floor.min[0], floor.max[0], nx + 1).astype(np.float32).astype(np.float64)
     z = np.linspace(floor.min[1], floor.max[1], nz + 1).astype(np.float32).astype(np.float64)

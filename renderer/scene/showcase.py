@@ -10,12 +10,12 @@ from renderer.mesh.mesh import Mesh
 
 # The ball around the mesh, seen from a little above and to the right, fills the picture's height less a tenth.
 _TOWARDS_EYE, _FOV, _MARGIN = (0.5, 0.4, 1.0), 40.0, 1.1
-# Half sides of the floor, in radii, and its squares a side.
+# Half the side of the floor, in radii, and the number of its squares along a side.
 _FLOOR, _SQUARES = 4.0, 16
 
 
 def showcase_text(mesh: Mesh, path: str) -> str:
-    """The scene file, as TOML, that shows ``mesh``; ``path`` is its file's, as the scene file says it.
+    """The scene file, as TOML, that shows ``mesh``; ``path`` is that of its file, as the scene file names it.
 
     The mesh is moved so that it stands in the middle of the floor, y up. It is smooth where its file has normals.
     """

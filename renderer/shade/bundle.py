@@ -7,17 +7,18 @@ import numpy as np
 from renderer.kernels.jit import inlined
 from renderer.kernels.simd import at, get, put
 
-# Pixels a side of a block that one bundle begins with, and rays of a bundle.
+# The side in pixels of the block that a bundle of camera rays covers, and the most rays of a bundle.
 SIDE = 8
 SIZE = SIDE * SIDE
-# Columns of float64: origin, direction and weight of each ray. Columns of int64: how many rays and their depth; the
-# pixel of each and the media that it is in: how many, then SIZE times their limit materials' rows, outermost first.
+# Columns of float64: origin, direction and weight of each ray. Columns of int64: the number of rays and their depth;
+# for each ray its pixel, the number of media that it is in, and room for ``limit`` of them, as the rows of their
+# materials, outermost first.
 _ORIGIN, _DIRECTION, _WEIGHT, BUNDLE_DOUBLES = 0, 3 * SIZE, 6 * SIZE, 9 * SIZE
 _PIXEL, _COUNT, BUNDLE_INTEGERS = 2, 2 + SIZE, 2 + 2 * SIZE
 
 
 class Bundle(NamedTuple):
-    """Pointers to one bundle's columns, and how many media a ray remembers."""
+    """Pointers to one bundle's columns, and the most media that a ray remembers."""
 
     origins: Any
     directions: Any
@@ -48,13 +49,13 @@ def clear(bundle, depth):
 
 @inlined
 def count_of(bundle):
-    """How many rays a bundle holds."""
+    """The number of rays in a bundle."""
     return get(bundle.header, 0)
 
 
 @inlined
 def depth_of(bundle):
-    """How often its rays have bounced."""
+    """The number of bounces before its rays."""
     return get(bundle.header, 1)
 
 

@@ -15,17 +15,17 @@ from renderer.shade.surface import phong
 from renderer.trace.rays import RayPointers
 from renderer.trace.traverse import search_blocks, trace
 
-# What a lit ray of a bundle leaves for its light and its children, one column of SURFACE_DOUBLES float64 a ray.
+# The surface that a ray of a bundle met, for its light and the rays that it spawns: SURFACE_DOUBLES float64 per ray.
 POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT = 0, 3, 6, 9, 10, 11, 12
 SURFACE_DOUBLES = 15
-# A shadow ray: where it starts, where it goes, how far, the unit direction to the light and what arrives from there.
+# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, and the light from there.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 _TOWARDS, _ARRIVING, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE
 
 
 @kernel
 def trace_any(tree, rays, found, count, scratch, any_hit):
-    """``trace`` of the first ``count`` rays, or every block where the tree has no nodes."""
+    """``trace`` of the first ``count`` rays, or ``search_blocks`` where the tree has no nodes."""
     if tree.has_nodes:
         trace(tree, rays, found, 0, count, scratch, any_hit)
     else:
@@ -42,14 +42,17 @@ def put3(base, first, a):
 
 @inlined
 def is_lit(materials, m):
-    """Whether the material in row ``m`` shows light that comes straight from lights."""
+    """Whether the material in row ``m`` shows direct light."""
     kind = get(materials, m + KIND)
     return kind != MIRROR and kind != DIELECTRIC and kind != UNLIT
 
 
 @kernel
 def _aim_all(scene, surfaces, lit, count, light, offset, shadows):
-    """Aim the ``count`` rays in ``lit`` at a light. Returns how many face it; they go to ``lit`` from SIZE on."""
+    """Aim shadow rays from the surfaces of the ``count`` rays in ``lit`` at a light.
+
+    Returns the number of surfaces that face it; their rays go to ``lit`` from SIZE on.
+    """
     aimed = 0
     for k in range(count):
         i = get(lit, k)
@@ -70,7 +73,7 @@ def _aim_all(scene, surfaces, lit, count, light, offset, shadows):
 
 @inlined
 def _add_light(scene, bundle, surface, i, towards, arriving):
-    """Add what ray ``i`` sees of a light that reaches its surface."""
+    """Add the share of a light that reaches the surface of ray ``i`` and is sent back along the ray."""
     m, n, d = np.int64(get(surface, MATERIAL)), three(surface, NORMAL), row3(bundle.directions, i)
     factor = phong(scene, m, n, d, towards)
     put3(surface, LIGHT, add(three(surface, LIGHT), times(factor, arriving)))
@@ -78,7 +81,7 @@ def _add_light(scene, bundle, surface, i, towards, arriving):
 
 @inlined
 def _trace_shadows(tree, bundle, lit, aimed, work):
-    """Find which of the ``aimed`` shadow rays meet something, and count them in their pixels."""
+    """Find which of the ``aimed`` shadow rays hit anything, and count all of them in their pixels."""
     shadows = work.shadows
     rays = RayPointers(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0)
     trace_any(tree, rays, work.found, aimed, work.trace, np.bool_(True))
@@ -91,8 +94,8 @@ def _trace_shadows(tree, bundle, lit, aimed, work):
 def light_surfaces(tree, scene, bundle, surfaces, lit, settings, work):
     """Direct light of the surfaces that a bundle met, into their LIGHT.
 
-    ``lit`` lists, after their number, the rays whose material shows it, with room for as many again. Shadow rays are
-    counted in ``work.traced`` of their pixels; without ``settings.shadows`` there are none.
+    ``lit`` holds the number of rays whose material shows direct light, then these rays, and room for as many again.
+    Shadow rays are counted in ``work.traced`` of their pixels; without ``settings.shadows`` there are none.
     """
     count, lit = get(lit, 0), at(lit, 1)
     shadows = work.shadows

@@ -1,4 +1,4 @@
-"""One colour a face: Phong at its centroid, without shadows and without bounces, as codes of sRGB."""
+"""One colour per face: Phong at its centroid, without shadows and without bounces, as codes of sRGB."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from renderer.shade.lights import see_light
 from renderer.shade.records import AMBIENT
 from renderer.shade.surface import phong, scene_pointers
 
-# Parts of [0, 1] of which most hold no more than one step of sRGB: the steps are 3e-4 apart and more.
+# Equal parts of [0, 1], so narrow that a code is found within a step or two: steps of sRGB are 3e-4 apart and more.
 PLACES = 4096
 
 
 @inlined
 def _encoded(x, table):
-    """The sRGB code of x: how many steps of ``_table`` it reaches, counted from those that its place does."""
+    """The sRGB code of x, found from the code at the beginning of its part of [0, 1]; see ``face_phong._table``."""
     steps, first = table
     x = smaller(larger(x, 0.0), 1.0)
     code = get(first, np.int64(x * PLACES))

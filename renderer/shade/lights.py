@@ -17,8 +17,13 @@ SHORT_OF_LIGHT = 1.0 - 2.0**-36
 
 
 class SeenLight(NamedTuple):
-    """A light from a point: whether it lies before the surface there, whether it is directional, its position or the
-    unit vector towards it, the unit vector towards it, and the irradiance of a surface that faces it.
+    """A light as seen from a surface point.
+
+    faces        whether the light lies before the surface
+    directional  whether the light is directional
+    place        the position of a point light; the unit vector towards a directional one
+    towards      the unit vector towards the light, of any length where ``faces`` is False
+    arriving     the irradiance of a surface that faces the light
     """
 
     faces: bool
@@ -57,8 +62,8 @@ class ShadowRay(NamedTuple):
 def aim(seen, p, n_g, error, offset):
     """The ``ShadowRay`` from the surface point p to a light that was seen from there.
 
-    One to a point light ends at the light: t counts in units of the distance, and a surface at the light itself does
-    not hide it.
+    A shadow ray to a point light ends just before the light, so that a surface at the light does not hide it. Its t
+    counts in units of the distance.
     """
     if seen.directional:
         return ShadowRay(spawn_origin(p, error, n_g, seen.place, offset), seen.place, np.inf)
@@ -70,6 +75,6 @@ def aim(seen, p, n_g, error, offset):
 
 @kernel
 def aim_from(arrays, surface, n, light):
-    """For Python: how a ``Surface`` with the normal n sees a light, and the shadow ray by the bounded offset."""
+    """For Python: a light as a ``Surface`` with the normal n sees it, and the shadow ray by the bounded offset."""
     seen = see_light(scene_pointers(arrays).lights, light, surface.p, n, surface.error)
     return seen, aim(seen, surface.p, surface.n_g, surface.error, BOUNDED)

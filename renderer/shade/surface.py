@@ -1,4 +1,4 @@
-"""What kernels see of a scene: its arrays, the surface where a ray met it, and what that sends on of a light."""
+"""A scene as kernels read it: its arrays, the surface where a ray met it, and the share of light that this sends on."""
 
 from typing import Any, NamedTuple
 
@@ -12,17 +12,22 @@ from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
 from renderer.shade.shading import specular
 from renderer.trace.spawn import normal_of, offset_distance
 
-# Media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
+# The most media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8
 
 
 class SceneArrays(NamedTuple):
-    """What the kernel reads of a scene; rows of materials and lights as in ``material`` and ``light``.
+    """The arrays that kernels read of a scene; the columns of materials and lights are those of ``records``.
 
-    vertices (V, 3), normals (V, 3), faces (F, 3) int32, material (F,) int32, smooth (F,) bool (normals and smooth
-    without rows where no face is smooth), materials (M, MATERIAL_COLUMNS), lights (L, LIGHT_COLUMNS), colors (2, 3):
-    ambient and background, media (m,) int64, m <= MAX_MEDIA: where in ``materials`` the rows begin of those that the
-    eye is in, outermost first; ``material`` says the same of each face.
+    vertices   (V, 3)
+    normals    (V, 3), without rows where no face is smooth
+    faces      (F, 3) int32
+    material   (F,) int32, for each face the place in ``materials``, as a flat array, at which its material's row begins
+    smooth     (F,) bool, without rows where no face is smooth
+    materials  (M, MATERIAL_COLUMNS)
+    lights     (L, LIGHT_COLUMNS)
+    colors     (2, 3), ambient and background
+    media      (m,) int64, m <= MAX_MEDIA, the same place for each medium that the eye is in, outermost first
     """
 
     vertices: NDArray[np.float64]
@@ -75,7 +80,9 @@ def scene_pointers(scene):
 
 
 class Surface(NamedTuple):
-    """Where a ray met the scene: point, its distance bound, normals n_g and n_s, where its material's row begins."""
+    """The surface where a ray met the scene: its point p, the ``offset_distance`` of p, the geometric and the shading
+    normal, and the place at which its material's row begins.
+    """
 
     p: tuple
     error: float

@@ -1,4 +1,4 @@
-"""A tile of the picture: camera rays in blocks of 8 x 8 pixels, one bundle a sample, and what they bring home."""
+"""A tile of the picture: camera rays in blocks of 8 x 8 pixels, one bundle per sample, and the sums of their light."""
 
 from typing import Any, NamedTuple
 
@@ -17,13 +17,13 @@ from renderer.trace.leaf import tree_pointers
 from renderer.trace.traverse import Memory, make_memory, make_scratch
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
-# Pixels a side of the squares that become packets.
+# The side in pixels of the squares whose rays become packets.
 _SQUARE = 4
 
 
 class Film(NamedTuple):
-    """What a tile writes: radiance and normal (h, w, 3), depth, face and rays (h, w). Of those that are not kept, which
-    radiance always is, h and w are 0.
+    """The arrays that tiles are written to: radiance and normal (h, w, 3), depth, face and rays (h, w). Radiance is
+    always kept; of an array that is not kept, h and w are 0.
     """
 
     radiance: NDArray[np.float32]
@@ -43,7 +43,7 @@ class CameraMap(NamedTuple):
 
 @inlined
 def _place(k):
-    """Column and row in a block of its k-th pixel: square by square, so that sixteen in a row are a packet."""
+    """Column and row in a block of its k-th pixel: square by square, so that the pixels of a packet are a square."""
     square, rest = k // (_SQUARE * _SQUARE), k % (_SQUARE * _SQUARE)
     across = SIDE // _SQUARE
     return square % across * _SQUARE + rest % _SQUARE, square // across * _SQUARE + rest // _SQUARE
@@ -51,7 +51,7 @@ def _place(k):
 
 @inlined
 def _shoot(camera, scene, bundle, sample, block):
-    """Fill a bundle with the camera rays of a block = (x0, y0, x1, y1); pixels count row by row, SIDE a row."""
+    """Fill a bundle with the camera rays of a block = (x0, y0, x1, y1); pixels count row by row, SIDE per row."""
     x0, y0, x1, y1 = block
     clear(bundle, 0)
     for k in range(SIZE):
@@ -67,7 +67,7 @@ def _shoot(camera, scene, bundle, sample, block):
 
 @inlined
 def _write_first_hits(film, bundle, work, x0, y0):
-    """Depth, face and shading normal of the camera rays, straight after they were traced."""
+    """Write depth, face and shading normal of the camera rays that were just traced."""
     for i in range(count_of(bundle)):
         pixel, surface = get(bundle.pixels, i), at(work.surfaces, i * SURFACE_DOUBLES)
         x, y, face = x0 + pixel % SIDE, y0 + pixel // SIDE, get(work.found.face, i)
@@ -84,13 +84,13 @@ def _write_first_hits(film, bundle, work, x0, y0):
 
 @inlined
 def _middle(count):
-    """The sample that depth, face and normal are taken from: the pixel's centre where there is one."""
+    """The sample that depth, face and normal are taken from: at the pixel's centre, where a sample is there."""
     return count // 2 if count % 2 == 1 else (count + int(np.sqrt(count))) // 2
 
 
 @kernel
 def _end_sample(film, block, work, total):
-    """Add what a sample brought to the sums of its block."""
+    """Add the colours and ray counts of a sample to the sums of its block."""
     x0, y0, x1, y1 = block
     for y in range(y0, y1):
         for x in range(x0, x1):
@@ -102,14 +102,14 @@ def _end_sample(film, block, work, total):
 
 @kernel
 def _end_block(film, block, work, total, count):
-    """Write the radiance of a block. Returns how many of its pixels were cut."""
+    """Write the radiance of a block. Returns the number of its pixels that were cut by ``max_rays``."""
     x0, y0, x1, y1 = block
     cut = 0
     for y in range(y0, y1):
         for x in range(x0, x1):
             pixel = (y - y0) * SIDE + x - x0
             cut += get(work.cut, pixel)
-            # The brightest float32 stands for anything brighter: a light within 1e-15 of a surface.
+            # The largest float32 stands for anything brighter, as from a light within 1e-15 of a surface.
             for k in range(3):
                 film.radiance[y, x, k] = smaller(get(total, 3 * pixel + k) / count, _BRIGHTEST)
     return cut
@@ -124,22 +124,22 @@ def _clear_block(work, total):
 
 @inlined
 def _block_of(tile, k):
-    """The k-th block of a tile, row by row; below the tile after the last."""
+    """The k-th block of a tile, row by row; for k beyond the last, one below the tile."""
     x0, y0, x1, y1 = tile
     across = (x1 - x0 + SIDE - 1) // SIDE
     x, y = x0 + k % across * SIDE, y0 + k // across * SIDE
     return x, y, smaller(x + SIDE, x1), smaller(y + SIDE, y1)
 
 
-# Where a tile stands, int64: its block, how many samples of that were begun, the bundles that wait, whether the next
-# one has the camera's rays, and how many pixels were cut.
+# The progress of a tile, int64: its block, the number of the block's samples that were begun, the number of bundles
+# that wait, whether the next one holds camera rays, and the number of pixels that were cut.
 _BLOCK, _BEGUN, _WAITING, _FROM_CAMERA, CUT, _STATE = range(6)
 
 
 @kernel
 def _next_sample(scene, settings, camera, film, tile, work, total, state):
-    """End the sample under way and begin the next one, of the next block where that was the last. Returns whether there
-    is one.
+    """End the sample under way and begin the next one, in the next block after the last sample of a block. Returns
+    whether there is one.
     """
     block, begun = _block_of(tile, get(state, _BLOCK)), get(state, _BEGUN)
     if begun > 0:
@@ -163,8 +163,8 @@ def _next_sample(scene, settings, camera, film, tile, work, total, state):
 
 
 class TileMemory(NamedTuple):
-    """Memory of a tile that is rendered: for tracing, for a bundle's ``Work``, for the sums of a block and for where it
-    stands; and how many bundles are traced in a row.
+    """Memory to render a tile: for tracing, for its ``Work``, for the sums of a block and for its progress; and the
+    number of bundles that are traced per call.
     """
 
     trace: Memory
@@ -177,7 +177,7 @@ class TileMemory(NamedTuple):
 
 
 def tile_memory(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileMemory:
-    """What ``render_tile`` needs beside its film, for one tile and a tree of ``depth`` levels."""
+    """The memory that ``render_tile`` needs beside its film, for one tile and a tree of ``depth`` levels."""
     doubles, integers = work_lengths(settings)
     trace, hits = make_memory(depth, SIZE), np.empty(SIZE, np.bool_)
     return TileMemory(
@@ -188,7 +188,7 @@ def tile_memory(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileM
 
 @inlined
 def _trace_next(tree, scene, settings, camera, film, tile, work, state):
-    """Trace the bundle that was left last, and let it leave its own."""
+    """Trace the bundle that was spawned last, and spawn its bundles."""
     top = get(state, _WAITING) - 1
     bundle = slot(work, settings, top)
     trace_bundle(tree, scene, settings, bundle, work)
@@ -205,8 +205,8 @@ def render_tile(words, scene, settings, camera, samples, film, tile, memory):
     """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
 
     ``words`` are the tree's. Depth, face and normal come from the middle sample (the pixel's centre for one sample),
-    radiance from the mean, rays are added up from 0. Returns whether the tile is done. If not, so many bundles were
-    traced that the caller may want to look around: called again with the same memory, it goes on.
+    radiance from the mean, rays are added up from 0. Returns whether the tile is done. If not, ``memory.bundles``
+    bundles were traced, and the caller can react to Ctrl-C; called again with the same memory, it goes on.
     """
     doubles, integers, hits = pointer(memory.doubles), pointer(memory.integers), pointer(memory.hits)
     state, total = pointer(memory.state), pointer(memory.total)

@@ -2,8 +2,8 @@
 
 I(x) = k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light + k_r I(reflected) + k_t I(refracted)
 
-A bundle leaves two: its refracted and its reflected rays. The reflected one goes first, with all that comes of it, so
-each pixel adds up its light in the order of its own recursion, whichever pixels travel with it.
+A bundle spawns two: one of its refracted and one of its reflected rays. The reflected one is traced first, with all
+that it spawns. So each pixel adds up its light in the order of its own recursion, whatever other pixels its bundle has.
 """
 
 from typing import Any, NamedTuple
@@ -47,11 +47,14 @@ from renderer.trace.traverse import Scratch
 
 
 class Settings(NamedTuple):
-    """What holds for a whole picture.
+    """The settings of a whole picture.
 
-    Bounces, the weight below which a ray ends, the offset rule of spawned rays, how many media a ray remembers
-    (``surface.MAX_MEDIA``, or 0 where nothing refracts), whether surfaces hide lights, and after how many rays of a
-    sample of a pixel no more are spawned.
+    max_depth   the most bounces
+    min_weight  the weight below which a ray ends
+    offset      the offset rule of spawned rays
+    media       the most media that a ray remembers, ``surface.MAX_MEDIA``, or 0 where nothing refracts
+    shadows     whether surfaces hide lights
+    max_rays    the number of rays of a sample of a pixel after which no more are spawned
     """
 
     max_depth: int
@@ -65,10 +68,10 @@ class Settings(NamedTuple):
 class Work(NamedTuple):
     """Memory of one thread, as pointers.
 
-    The bundles and the order in which their places are used: first those that wait, then the free ones. What tracing
-    needs and finds, a zero and an infinity for its bounds. Of the bundle under way the surfaces, its shadow rays, the
-    list of its lit rays, and one ray's media beyond a surface. Of each pixel its colour, the rays traced, and whether
-    it left fewer than it would have without ``Settings.max_rays``.
+    The bundles and the order in which their places are used: first those that wait, then the free ones. For tracing,
+    its scratch, its hits, and a zero and an infinity as bounds. For the bundle under way, its surfaces, its shadow
+    rays, the list of its lit rays, and one ray's media beyond a surface. For each pixel its colour, the number of rays
+    traced, and whether it was cut: without ``Settings.max_rays`` it would have spawned more.
     """
 
     bundles: Any
@@ -90,7 +93,7 @@ class Work(NamedTuple):
 def work_lengths(settings: Settings) -> tuple[int, int]:
     """Words of float64 and of int64 of the arrays behind a ``Work``, less those of ``trace``.
 
-    Each bundle leaves at most one waiting a level; one more is under way and two are free for what it leaves.
+    At most one bundle waits per level; one more is under way, and two places are free for those that it spawns.
     """
     slots = settings.max_depth + 4
     doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE
@@ -120,7 +123,7 @@ def make_work(doubles, integers, hits, settings, scratch):
 
 @inlined
 def begin_work(work, settings):
-    """Set what every bundle takes for granted."""
+    """Set the bounds of all rays, and the order of the places at the start."""
     put(work.zero, 0, 0.0)
     put(work.infinity, 0, np.inf)
     for slot in range(settings.max_depth + 4):
@@ -141,7 +144,7 @@ def _goes_on(weight, min_weight):
 
 @kernel
 def _enter_or_leave(media, count, material, inside, limit):
-    """Cross the surface of ``material``: change ``media`` in place, return how many there are then, ``limit`` at most.
+    """Cross the surface of ``material``: change ``media`` in place, return their new number, at most ``limit``.
 
     Leaving takes out the innermost entry of that material, wherever it stands, so overlapping objects are left one
     by one.
@@ -166,7 +169,7 @@ def _innermost_ior(scene, media, count):
 
 @inlined
 def _meet_surface(scene, bundle, work, i):
-    """Note the surface that ray ``i`` met, and its ambient light."""
+    """Write the surface that ray ``i`` met, and its ambient light, to ``work``."""
     found, surface = work.found, at(work.surfaces, i * SURFACE_DOUBLES)
     d = row3(bundle.directions, i)
     met = surface_at(scene, get(found.face, i), get(found.u, i), get(found.v, i), d)
@@ -184,7 +187,7 @@ def _meet_surface(scene, bundle, work, i):
 
 @kernel
 def _meet_surfaces(scene, bundle, work):
-    """Note what each ray met; rays that left the scene add the background. Lists the lit ones."""
+    """Write the surfaces that rays met to ``work``, and list the lit rays; rays that met none add the background."""
     lit = 0
     for i in range(count_of(bundle)):
         pixel = get(bundle.pixels, i)
@@ -202,7 +205,7 @@ def _meet_surfaces(scene, bundle, work):
 def _refract(scene, m, d, n, inside, around, beyond):
     """The refracted ray of a ray in direction d at a surface of material ``m``, whose normal n faces it.
 
-    ``around`` = (media, count, limit) are the media that the ray is in, how many, and how many it may remember.
+    ``around`` = (media, count, limit) are the media that the ray is in, their number, and the most that it remembers.
     Returns (its direction, whether there is one, k_r, k_t, the number of media beyond, which go to ``beyond``).
     """
     materials, (media, count, limit) = scene.materials, around
@@ -210,7 +213,7 @@ def _refract(scene, m, d, n, inside, around, beyond):
     for k in range(count):
         put(beyond, k, get(media, k))
     left = _enter_or_leave(beyond, count, m, inside, limit)
-    # From inside, n1 is this material even where no entry was seen: an open mesh.
+    # From inside, n1 is that of this material even where the ray never entered it, as through the hole of a mesh.
     n1 = get(materials, m + IOR) if inside else _innermost_ior(scene, media, count)
     n2 = _innermost_ior(scene, beyond, left) if inside else get(materials, m + IOR)
     cos_t, through = refract(d, n, n1, n2)
@@ -230,7 +233,7 @@ def _passes_light(materials, m):
 def refract_from(arrays, m, d, n, inside, media, beyond):
     """For Python: (whether material ``m`` passes light, then as of ``_refract``) for a ray in ``media``, an array.
 
-    ``beyond`` has a place more than there are media that the ray may remember.
+    ``beyond`` has one place more than the most media that the ray remembers.
     """
     scene = scene_pointers(arrays)
     around = pointer(media), len(media), len(beyond) - 1
@@ -249,7 +252,7 @@ def _spawn(surface, pixel, w, weight, children, media, count, settings):
 
 @inlined
 def _may_leave(work, pixel, weight, settings):
-    """Whether a ray of this weight is traced. A pixel's own recursion decides, whichever pixels travel with it."""
+    """Whether a ray of this weight is spawned. That depends on its pixel alone, not on others of its bundle."""
     if not _goes_on(weight, settings.min_weight):
         return False
     if get(work.traced, pixel) >= settings.max_rays:
@@ -260,7 +263,7 @@ def _may_leave(work, pixel, weight, settings):
 
 @kernel
 def _bounce(scene, bundle, settings, work, refracted, reflected):
-    """Collect the rays that a bundle leaves."""
+    """Collect the refracted and the reflected rays that a bundle spawns."""
     materials = scene.materials
     for i in range(count_of(bundle)):
         if get(work.found.face, i) < 0:
@@ -282,7 +285,7 @@ def _bounce(scene, bundle, settings, work, refracted, reflected):
 
 @inlined
 def _collect_light(scene, bundle, work):
-    """Add what the surfaces of a bundle show of their own to the pixels."""
+    """Add the ambient and direct light of a bundle's surfaces to the pixels."""
     for i in range(count_of(bundle)):
         if get(work.found.face, i) < 0:
             continue
@@ -296,7 +299,7 @@ def _collect_light(scene, bundle, work):
 
 @kernel
 def trace_bundle(tree, scene, settings, bundle, work):
-    """Trace the rays of a bundle and light what they meet; what they leave is up to ``_bounce``."""
+    """Trace the rays of a bundle and light the surfaces that they meet; ``push_children`` spawns further rays."""
     rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 0, 0, 1.0)
     trace_any(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
     _meet_surfaces(scene, bundle, work)
@@ -306,7 +309,7 @@ def trace_bundle(tree, scene, settings, bundle, work):
 
 @inlined
 def push_children(scene, settings, work, bundle, top):
-    """Let the bundle in place ``top`` leave its rays in the two free places above it. Returns the new top.
+    """Spawn the rays of the bundle in place ``top`` into the two free places above it. Returns the new top.
 
     The bundle's own place is free then, and goes behind the others; an empty bundle does not wait.
     """

@@ -1,4 +1,4 @@
-"""The records in memory: what a node and a block of triangles look like. Kernels and builder both read this page."""
+"""The layout in memory of nodes and of blocks of triangles, which the kernels and the builder share."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 CACHE_LINE = 64
 
-# A node is NODE_WORDS 32-bit words, four cache lines. Words 0-47 are six rows of eight float32, one value an octant:
+# A node is NODE_WORDS 32-bit words, four cache lines. Words 0-47 are six rows of eight float32, one value per octant:
 # lower x, upper x, lower y, upper y, lower z, upper z. Words CHILDREN to CHILDREN + 7 are its children as int32 (the
 # same memory seen through ``links``); the last eight are unused. An empty octant has lower = +inf and upper = -inf,
-# which no ray enters, and the link UNUSED.
+# which no ray enters (but see UNUSED), and the link UNUSED.
 NODE_WORDS = 64
 CHILDREN = 48
 
@@ -21,12 +21,13 @@ CHILDREN = 48
 LEAF_BITS = 3
 MAX_LEAF_BLOCKS = 1 << LEAF_BITS
 
-# A ray of numbers that are none (NaN) may enter an empty octant all the same. It finds a leaf of one block there, the
-# tree's first, or its subtree's: then every path through a tree is finite, and what is hit is a face of the mesh.
+# The link of an empty octant. A ray with a NaN may enter one, because comparisons with NaN are false. As a child, the
+# link is a leaf of one block, the first of the tree or of a subtree. So every path through a tree is finite, and every
+# hit is on a face of the mesh.
 UNUSED = -1
 
-# A block is nine rows of four values, one a triangle: p0 x, p0 y, p0 z, p1 x, ... p2 z. An unused place repeats
-# one vertex three times, which nothing hits, and has face -1.
+# A block is nine rows of four values, one value per triangle: p0 x, p0 y, p0 z, p1 x, ... p2 z. An unused place of a
+# block has face -1 and three equal vertices, a triangle that no ray hits.
 LANES = 4
 BLOCK_WORDS = 36
 
@@ -37,12 +38,12 @@ NODES, BLOCKS, FACES, BLOCK_COUNT, DEPTH, WIDE, SCALE, TREE_WORDS = range(8)
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """What rays are shot at.
+    """A mesh as rays are traced against it: nodes and blocks of triangles.
 
-    nodes   (N * NODE_WORDS,) float32, rounded outwards from the float64 vertices; without any, every block is tested
+    nodes   (N * NODE_WORDS,) float32, rounded outwards from the float64 vertices; without nodes, every block is tested
     blocks  (B * BLOCK_WORDS,) float32 when every vertex is exactly a float32, else float64
     faces   (B * LANES,) int32, the face in each place of each block, -1 where unused
-    depth   the levels of nodes, 0 without any
+    depth   the levels of nodes, 0 without nodes
     scale   the power of two by which the vertices were multiplied
     """
 
@@ -54,7 +55,7 @@ class Tree:
 
     @property
     def has_nodes(self) -> bool:
-        """Whether rays go through nodes; else every ray meets every block."""
+        """Whether rays go through nodes; else every ray is tested against every block."""
         return self.depth > 0
 
     @property
@@ -64,7 +65,7 @@ class Tree:
 
     @cached_property
     def words(self) -> NDArray[np.int64]:
-        """(TREE_WORDS,) int64: the record as kernels read it, with the arrays' addresses; keep the tree meanwhile."""
+        """(TREE_WORDS,) int64: the tree as kernels read it. It holds addresses, valid as long as the tree is kept."""
         words = np.zeros(TREE_WORDS, np.int64)
         words[NODES], words[BLOCKS], words[FACES] = (a.ctypes.data for a in (self.nodes, self.blocks, self.faces))
         words[BLOCK_COUNT], words[DEPTH] = len(self.faces) // LANES, self.depth
@@ -73,7 +74,7 @@ class Tree:
         return words
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How it is copied and pickled: without the addresses, which are those of this object's arrays."""
+        """Copies and pickles leave out the addresses, which are those of this object's arrays."""
         return _restored, (self.nodes, self.blocks, self.faces, self.depth, self.scale)
 
 

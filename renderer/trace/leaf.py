@@ -1,4 +1,4 @@
-"""Triangles of a leaf's blocks, or of all blocks, against one ray: the one place that says what a hit is."""
+"""The triangles of a leaf's blocks, or of all blocks, against one ray; ``doubt`` settles the hits in doubt."""
 
 from typing import Any, NamedTuple
 
@@ -24,7 +24,7 @@ from renderer.trace.layout import BLOCK_COUNT, BLOCK_WORDS, BLOCKS, DEPTH, FACES
 class TreePointers(NamedTuple):
     """A ``Tree`` as the traversal reads it.
 
-    Blocks are float64 where ``wide`` is 1 and float32 where it is 0: one of two pointers to the same memory is of use.
+    ``blocks`` and ``wide_blocks`` point to the same memory: float64 where ``wide`` is 1, float32 where it is 0.
     """
 
     nodes: Any
@@ -57,7 +57,7 @@ def tree_pointers(words):
 
 
 NO_FACE = np.iinfo(np.int32).max
-# How often a search of all blocks for any hit looks whether it has one.
+# After each run of so many blocks a search of all blocks for any hit checks whether it has one.
 _BLOCKS_AT_ONCE = 16
 
 
@@ -65,9 +65,8 @@ _BLOCKS_AT_ONCE = 16
 def nearest_in_blocks(tree, first, count, t_min, shear, best):
     """The better of ``best`` = (t, face, u, v, w) and the sure hits in ``count`` blocks: smallest t, then lowest face.
 
-    The barycentrics are u / w and v / w; their division waits for the hit that stays.
-    Also returns whether a hit was in doubt. A call to settle it here would cost every ray its registers, so it is left
-    to ``nearest_carefully``.
+    The barycentrics are u / w and v / w; only those of the final hit are divided. Also returns whether a hit was in
+    doubt. A call here that settles it would cost every ray its registers, so that is left to ``nearest_carefully``.
     """
     t, face, u, v, w = best
     doubtful = np.int64(0)
@@ -87,7 +86,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
 
 @kernel
 def nearest_carefully(tree, first, count, ray, shear, best):
-    """``nearest_in_blocks`` with the hits in doubt too, at the t at which they count."""
+    """``nearest_in_blocks`` with the hits in doubt too, as ``settled`` makes them."""
     t, face, u, v, w = best
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
@@ -107,7 +106,7 @@ def nearest_carefully(tree, first, count, ray, shear, best):
 
 @kernel
 def search_all_blocks(tree, ray, t_max, any_hit):
-    """The best hit (t, face, u, v, w) over every block; with ``any_hit`` it may stop at the first."""
+    """The best hit (t, face, u, v, w) over all blocks; with ``any_hit`` it may be any hit."""
     shear, best, doubtful = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(0)
     for first in range(0, tree.count, _BLOCKS_AT_ONCE):
         count = smaller(_BLOCKS_AT_ONCE, tree.count - first)

@@ -57,10 +57,10 @@ BUDGET = 48
 
 
 class Beam(NamedTuple):
-    """What bounds sixteen rays that share their dominant axis w and the sign along it.
+    """The bounds of sixteen rays that share their dominant axis w and the sign along it.
 
     Rows of a node, then ranges of float32: near and far origins along w, origins along u and v, slopes along u and v;
-    the sign, the least distance that counts, and a ray in the middle by which the octants are ordered.
+    the sign, and the least distance that counts.
     """
 
     near_row: Any
@@ -107,7 +107,7 @@ def _highest_origin(floats, axis):
 
 @inlined
 def make_beam(rays):
-    """The beam around sixteen rays; the first one tells the axis."""
+    """The beam around sixteen rays; its axis is that of the first one."""
     floats = rays.floats
     w = get(rays.integers, BLOCK_ROW + 2 * WIDTH) >> 2
     u, v = (w + 1) % 3, (w + 2) % 3
@@ -187,10 +187,10 @@ def _middle_entry(nodes, base, beam, rays, t0):
 
 @inlined
 def _push_sorted(node, bits, t0, key, stack, top):
-    """Push the octants in ``bits`` of a node, the one with the least key last: t0 over the octant's number.
+    """Push the octants in ``bits`` of a node, the one with the least key last. An entry is t0 over the octant's number.
 
-    Each one's place is the number of those behind it, so that no branch depends on the keys. A NaN counts as -inf:
-    compared as it is, it would leave places unwritten.
+    The place of an octant is the number of those behind it, so no branch depends on the keys. A NaN counts as -inf,
+    because comparisons with NaN are false and would leave places of the stack unwritten.
     """
     key = select(key > splat8(np.float32(-np.inf)), key, splat8(np.float32(-np.inf)))
     for i in range(8):
@@ -213,7 +213,7 @@ def _push_all(node, bits, t0, stack, top):
 
 @inlined
 def _next_octant(stack, top, limit):
-    """The octant on top of the stack that is not beyond the limit, or -1, and the top below it."""
+    """The uppermost octant of the stack that is not beyond the limit, or -1, and the top below it."""
     while top > 0:
         top -= 1
         entry = get(stack, top)
@@ -224,7 +224,7 @@ def _next_octant(stack, top, limit):
 
 @inlined
 def child_of(tree, octant):
-    """The node or leaf behind an octant, counted 8 * node + place, and the octant's first word."""
+    """The node or leaf of the octant with number 8 * node + place, and the octant's first word."""
     base, place = (octant >> 3) * NODE_WORDS, octant & 7
     return np.int64(get(tree.links, base + CHILDREN + place)), base + place
 
@@ -239,18 +239,21 @@ def meet_octant(tree, rays, at):
 def trace_packet(tree, rays, stack, any_hit):
     """Search for hits of sixteen prepared rays with one dominant axis and sign; the results stay in ``rays``.
 
-    With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns how many octants it left waiting on the
-    stack, where it gave up, and the bits of the rays in doubt. ``stack`` is scratch as ``singly.stack_size`` says.
+    With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns the number of octants left on the
+    stack, 0 unless the packet gave up, and the bits of the rays in doubt. ``stack`` is scratch of ``singly.stack_size``
+    entries.
     """
     beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes
     limit, doubtful, top, node, left = _most(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET
     while True:
+        # Push the octants of the node that the beam meets.
         base = node * NODE_WORDS
         t0, bits = enter_beam(nodes, base, beam, limit)
         if any_hit:
             top = _push_all(node, bits, t0, stack, top)
         elif bits != 0:
             top = _push_sorted(node, bits, t0, _middle_entry(nodes, base, beam, rays, t0), stack, top)
+        # Take octants off the stack and test their leaves, until one leads to a node.
         while True:
             if left == 0:
                 return top, doubtful
@@ -277,6 +280,6 @@ def _test_leaf(tree, rays, meeting, leaf, any_hit):
         hit, doubts = nearest_in_leaf(tree, rays, r, leaf)
         doubtful |= np.int64(doubts != 0) << r
         if any_hit and hit:
-            # Nothing is nearer than this: the ray meets no further box.
+            # A limit that no box lies within: the ray meets no further one.
             put(rays.floats, LIMIT + r, np.float32(-np.inf))
     return doubtful

@@ -19,12 +19,12 @@ from renderer.trace.singly import FEW_DEPTH, stack_size, trace_few
 from renderer.trace.spawn import leave_faces
 from renderer.trace.traverse import Memory, make_memory, search_chunk, trace_chunk
 
-# Small enough to share 1e5 rays between many threads and to stop within milliseconds on Ctrl-C, large enough that
-# taking a chunk costs nothing beside its 1 to 10 ms of tracing.
+# The most rays of a chunk: small enough to share 1e5 rays between many threads and to stop within milliseconds on
+# Ctrl-C, large enough that taking a chunk costs nothing beside its 1 to 10 ms of tracing.
 CHUNK = 8192
-# Few rays go in smaller chunks, sixteen a thread, so that no thread has much more to do than another.
+# Few rays go in smaller chunks, sixteen per thread, so that no thread has much more to do than another.
 _LEAST_CHUNK = 1024
-# Of brute force, whose rays meet every block at some nanoseconds each, so many tests are a chunk.
+# A chunk of brute force is so many tests of a ray against a block, at some nanoseconds per test.
 _BLOCK_TESTS = 1 << 22
 # Fewer rays than a packet holds go one by one, by a kernel that compiles in a fraction of the time.
 FEW = WIDTH - 1
@@ -33,7 +33,7 @@ FEW = WIDTH - 1
 # Slots and not frozen: a call with one ray spends a third of its time on making objects.
 @dataclass(eq=False, slots=True)
 class Hits:
-    """Closest hits, one row a ray.
+    """Closest hits, one row per ray.
 
     t     (n,) float64, in units of |direction|; inf on a miss
     face  (n,) int64; -1 on a miss
@@ -48,7 +48,7 @@ class Hits:
 
     @property
     def hit(self) -> NDArray[np.bool_]:
-        """(n,) bool."""
+        """Whether each ray hit a face, (n,) bool."""
         return self.face >= 0
 
     @property
@@ -82,7 +82,7 @@ _MOST = float(np.finfo(np.float64).max)
 
 
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
-    """(n, 3); one vector (3,) is a row."""
+    """The values as an array (n, 3); one vector (3,) becomes one row."""
     array = _array(argument, values)
     if array.shape == (3,):
         return array[None]
@@ -100,7 +100,7 @@ def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArray[np.float64]:
-    """One bound for all rays or one each, from 0 to ``largest``, as a (1,) or (n,) array."""
+    """One bound for all rays or one per ray, from 0 to ``largest``, as a (1,) or (n,) array."""
     array = _array(argument, value)
     fits = array.ndim == 0 or array.shape == (count,)
     expect(fits, argument, f"a number or shape ({count},)", f"shape {array.shape}")
@@ -128,7 +128,7 @@ _ZERO, _INFINITY = np.zeros(1), np.full(1, np.inf)
 
 
 def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike) -> RayBatch:
-    """Check shapes, types and bounds of a batch; whether each ray is finite is seen when it is traced.
+    """Check shapes, types and bounds of a batch; whether each ray is in range is checked when it is traced.
 
     Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
@@ -137,7 +137,7 @@ def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_ma
     if len(origins) != len(directions):
         origins, directions = _paired(origins, directions)
     count = len(directions)
-    # The usual bounds, by identity of the defaults or as other zeros and infinities, need no arrays of their own.
+    # The usual bounds share arrays.
     low = _ZERO if type(t_min) is float and t_min == 0.0 else _bound("t_min", t_min, count, _MOST)
     high = _INFINITY if type(t_max) is float and t_max == np.inf else _bound("t_max", t_max, count, np.inf)
     # An eye broadcast to all rays, as of a camera, need not be copied for each.
@@ -155,7 +155,7 @@ def _paired(origins: NDArray[Any], directions: NDArray[Any]) -> tuple[NDArray[An
 
 
 def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
-    """Whether it is an (n, 3) array of float64, as most are; a quick answer for calls with few rays."""
+    """Whether it is an (n, 3) array of float64, as most are; a quick check for calls with few rays."""
     return type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2 and values.shape[1] == 3
 
 
@@ -174,10 +174,10 @@ def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: 
     if not good.all():
         row = int((~good).argmax())
         expect(False, "leaving", f"faces from 0 to {len(mesh.faces) - 1}, or -1", f"{faces[row]} in row {row}")
-    whole = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(rays.directions).all(axis=1)
-    if not whole.all():
-        # Before it moves, so that the error tells the numbers that were given.
-        _reject(rays, int((~whole).argmax()), scale)
+    sound = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(rays.directions).all(axis=1)
+    if not sound.all():
+        # Rejected before it is moved, so that the message names the numbers as given.
+        _reject(rays, int((~sound).argmax()), scale)
     starts = np.empty((count, 3))
 
     def leave(begin: int, end: int) -> None:
@@ -188,7 +188,7 @@ def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: 
 
 
 def _reject(rays: RayBatch, row: int, scale: float) -> None:
-    """Raise the error of a ray out of bounds."""
+    """Raise the error for a ray out of bounds."""
     origin = rays.origins[row if len(rays.origins) > 1 else 0]
     with np.errstate(over="ignore"):
         near = (np.abs(origin) * scale <= FARTHEST).all()
@@ -221,7 +221,7 @@ def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
 
 
 def _are_few(tree: Tree, rays: RayBatch) -> bool:
-    """Whether each ray goes alone."""
+    """Whether the rays are traced one by one."""
     return tree.has_nodes and len(rays.directions) <= FEW and tree.depth <= FEW_DEPTH
 
 
@@ -235,7 +235,9 @@ def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
 
 
 def rays_against_blocks(tree: Tree) -> int:
-    """How many rays, each against every block, are a chunk: some 10 ms, so that Ctrl-C and others are heard."""
+    """The number of rays in a chunk of brute force: some 10 ms of work, so that Ctrl-C and other threads need not wait
+    for long.
+    """
     return max(1, _BLOCK_TESTS * LANES // max(1, len(tree.faces)))
 
 
@@ -247,7 +249,7 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
     bad: list[int] = []
 
     def trace(begin: int, end: int) -> None:
-        # Only chunks behind a bad ray are left out, so the first bad ray is always among the found.
+        # Only chunks after a bad ray are left out, so the first bad ray is always found.
         if not bad or begin < bad[0]:
             if tree.has_nodes:
                 row = trace_chunk(tree.words, rays, out, begin, end, any_hit, _thread_memory(tree.depth))
@@ -265,7 +267,7 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
 
 
 class _Local(threading.local):
-    """Memory that one thread traces chunks in, kept from one chunk to the next: 100 kB."""
+    """The memory in which one thread traces chunks, kept from one chunk to the next: 100 kB."""
 
     memory: Memory | None = None
 

@@ -12,13 +12,14 @@ from renderer.trace.leaf import NO_FACE, nearest_in_blocks
 
 WIDTH = 16
 
-# Rows of float32: what ``Slabs`` holds, three axes each; the least and the farthest distance that count, in units in
-# which the largest component of the direction is 1; and, in these units too, the slopes along the two other axes.
+# Rows of float32: the origins and reciprocals of ``Slabs``, three axes each; the least and the farthest distance that
+# count, in units in which the largest component of the direction is 1; and the slopes along the two other axes in these
+# units.
 NEAR_ORIGIN, FAR_ORIGIN, NEAR_INVERSE, FAR_INVERSE = 0, 3 * WIDTH, 6 * WIDTH, 9 * WIDTH
 LOWER, LIMIT, SLOPE_U, SLOPE_V = 12 * WIDTH, 13 * WIDTH, 14 * WIDTH, 15 * WIDTH
 FLOATS = 16 * WIDTH
-# Rows of float64: what ``Shear`` holds, the interval, the best hit's barycentric numerators and their denominator, and
-# the largest component of the direction.
+# Rows of float64: origin, shear and direction of ``Shear``; t_min, and the t of the best hit, at first t_max; that
+# hit's barycentric numerators and their denominator; and the largest component of the direction.
 ORIGIN, SHEAR, DIRECTION_Z, T_MIN, T = 0, 3 * WIDTH, 5 * WIDTH, 6 * WIDTH, 7 * WIDTH
 U, V, W, LARGEST = 8 * WIDTH, 9 * WIDTH, 10 * WIDTH, 11 * WIDTH
 DOUBLES = 12 * WIDTH
@@ -37,7 +38,7 @@ class Prepared(NamedTuple):
 
 @inlined
 def prepare(rays, r, ray, t_max):
-    """Make ``ray`` the ray in place ``r``, which has met nothing yet."""
+    """Write ``ray``, which has met nothing yet, to place ``r``."""
     floats, doubles, integers = rays
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
@@ -47,7 +48,7 @@ def prepare(rays, r, ray, t_max):
     _put_axes(floats, FAR_INVERSE + r, slabs.far_inverse_x, slabs.far_inverse_y, slabs.far_inverse_z)
     put(floats, LOWER + r, round_down(ray.t_min * largest))
     put(floats, LIMIT + r, box_limit(t_max, largest))
-    # The shear counts in units of a component that may be negative, the slopes in units of its size.
+    # The shear divides by a component that may be negative, the slopes divide by its absolute value.
     sign = 1.0 if shear.direction_z > 0.0 else -1.0
     put(floats, SLOPE_U + r, np.float32(shear.shear_x * sign))
     put(floats, SLOPE_V + r, np.float32(shear.shear_y * sign))
@@ -120,7 +121,10 @@ def put_best(rays, r, best):
 
 @inlined
 def nearest_in_leaf(tree, rays, r, leaf):
-    """Test a leaf, a negative child, for a better hit of ray ``r``. Returns whether it has any hit now, and doubts."""
+    """Test a leaf, a negative child, for a better hit of ray ``r``.
+
+    Returns whether the ray has any hit now, and whether one was in doubt.
+    """
     code = ~leaf
     t, face, u, v, w, doubts = nearest_in_blocks(
         tree,

@@ -45,7 +45,7 @@ class RayPointers(NamedTuple):
 
 
 class HitPointers(NamedTuple):
-    """Pointers to what is written: t, face, u and v as ``Hits`` has them, or for any hits only ``hit``, a bool."""
+    """Pointers to the results: t, face, u and v as in ``Hits``, or for any hits only ``hit``, a bool."""
 
     t: Any
     face: Any
@@ -76,10 +76,10 @@ def hit_pointers(out, count):
 
 @kernel
 def first_bad_ray(rays, begin, end):
-    """Row of the first ray of a range that is out of bounds, or -1. NaN fails every comparison, so it is too.
+    """The row of the first ray of a range that is out of bounds, or -1.
 
-    In range: components of ``scale`` times the origin up to FARTHEST, the largest component of the direction from
-    SHORTEST to LONGEST.
+    In bounds, the components of ``scale`` times the origin are at most FARTHEST, and the largest component of the
+    direction is from SHORTEST to LONGEST. NaN is out of bounds.
     """
     for i in range(begin, end):
         far, largest, odd = 0.0, 0.0, 0.0
@@ -98,10 +98,10 @@ def ray_at(rays, i):
     """Ray ``i`` in the tree's units, and its t_max."""
     o, d, s = at(rays.origins, i * rays.origin_step), at(rays.directions, 3 * i), rays.scale
     least = get(rays.t_min, i * rays.min_step)
-    # Above 0 it stays so, that a hit at the start is still too near.
+    # A t_min above 0 stays above 0 in the tree's units too, so that a hit at the origin is still too near.
     t_min = larger(s * least, _TINIEST) if least > 0.0 else least
     ray = Ray(s * get(o, 0), s * get(o, 1), s * get(o, 2), get(d, 0), get(d, 1), get(d, 2), t_min)
-    # A hit beyond the largest number, in either unit, is none.
+    # A hit whose t is beyond the largest float64, in either unit, is none.
     return ray, smaller(s * smaller(get(rays.t_max, i * rays.max_step), _MOST), _MOST)
 
 
@@ -113,7 +113,7 @@ def write_hit(found, i, scale, best, any_hit):
     if any_hit:
         put(found.hit, i, hit)
         return
-    # No t, u or v is -0.0.
+    # + 0.0 turns -0.0 into 0.0.
     put(found.t, i, t / scale + 0.0 if hit else np.inf)
     put(found.face, i, np.int64(face if hit else -1))
     put(found.u, i, u / w + 0.0 if hit else np.nan)

@@ -1,4 +1,4 @@
-"""Rays that go alone: few of them, and those whose hits are in doubt."""
+"""Rays traced one by one: those of small batches, and those whose hits are in doubt."""
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointer
 
 
 def stack_size(depth: int) -> int:
-    """Entries of one stack: each level leaves at most seven octants waiting, and some are written above the top."""
+    """Entries of one stack: each level leaves at most seven octants waiting, and some are written beyond the top."""
     return 7 * depth + 24
 
 
-# The deepest tree whose stack fits into a kernel's own frame.
+# The levels of the deepest tree whose stack fits into a kernel's own frame.
 FEW_DEPTH = (LOCAL_WORDS - stack_size(0)) // 7
 
 
@@ -23,7 +23,7 @@ FEW_DEPTH = (LOCAL_WORDS - stack_size(0)) // 7
 def search_singly(tree, ray, t_max, stack):
     """The closest hit (t, face, u, v, w) of one ray, with every doubt settled; face = NO_FACE for none.
 
-    Octants are opened in the order in which they stand in their node, the last of them first. That suits few rays and
+    The octants of a node are visited from the last to the first, not by their distance. That suits few rays and
     compiles in a fraction of the time that packets and streams take.
     """
     largest = largest_of(ray)
@@ -49,9 +49,9 @@ def search_singly(tree, ray, t_max, stack):
 
 @kernel
 def trace_few(words, rays, out):
-    """Closest hits of so few rays that each goes alone, into the rows t, u, v and face of ``out``.
+    """Closest hits of a few rays, one by one, into the rows t, u, v and face of ``out``.
 
-    Bounds and return value as of ``trace_chunk``. The tree has at most FEW_DEPTH levels.
+    Bounds and return value are those of ``trace_chunk``. The tree has at most FEW_DEPTH levels.
     """
     tree, count = tree_pointers(words), len(rays[1])
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)

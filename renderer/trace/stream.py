@@ -1,8 +1,8 @@
-"""Incoherent rays through the tree in turn, sixteen at a time; a ray that ends makes room for the next one.
+"""Incoherent rays through the tree, sixteen at a time; the next ray takes the place of one that ends.
 
-Whether a ray goes on, waits or ends cannot be predicted, and a wrong guess costs all that was begun behind it. So every
-round first computes what each ray meets, without a branch, and then decides: by then the numbers are there, and a wrong
-guess costs little. Meanwhile the records for the next round come from memory.
+The processor cannot predict whether a ray goes to a node, goes to a leaf, or ends, and a mispredicted branch discards
+all work begun after it. So each round first computes what every ray meets, without a branch, and then decides: the
+results are there by then, and a misprediction costs little. Meanwhile the records for the next round come from memory.
 """
 
 from typing import Any, NamedTuple
@@ -31,8 +31,8 @@ from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, LANES, LEAF
 from renderer.trace.ray_lanes import LARGEST, LIMIT, LOWER, T_MIN, WIDTH, T, best_of, put_best, shear_of, slabs_of
 
 _LOW_WORD = 0xFFFFFFFF
-# What lies at the bottom of a ray's stack: no leaf's code, and at distance -inf, which is beyond no limit, not even a
-# NaN. So no ray, whatever its numbers, goes below its stack.
+# The entry at the bottom of each ray's stack. END is the code of no leaf. The distance -inf is beyond no limit, not
+# even beyond NaN, so no ray goes below its stack.
 END = -(1 << 31)
 _BOTTOM = (-0x800000 << 32) | (END & _LOW_WORD)
 _LINE = CACHE_LINE // 4
@@ -40,13 +40,13 @@ _LINE = CACHE_LINE // 4
 
 @inlined
 def _entry(tree, base, place, t0):
-    """An octant as it waits on the stack: the bits of its float32 distance above its child."""
+    """The entry of an octant on the stack: the bits of its float32 distance above its child."""
     return (float_bits(get(t0, place)) << 32) | (np.int64(get(tree.links, base + place)) & _LOW_WORD)
 
 
 @kernel
 def _push_octants(tree, base, t0, bits, stack, top, any_hit):
-    """Push the octants in ``bits`` of the node whose children begin at ``base``, nearest last unless any will do."""
+    """Push the octants in ``bits`` of the node whose children begin at ``base``: nearest last, unless ``any_hit``."""
     bottom = top
     while bits != 0:
         entry = _entry(tree, base, lowest_bit(bits), t0)
@@ -67,16 +67,16 @@ def _prefetch_child(tree, child):
         for line in range(NODE_WORDS // _LINE):
             prefetch(tree.nodes, child * NODE_WORDS + line * _LINE)
     else:
-        # The last vertex of a float64 block lies two lines further on; the hardware fetches what follows by itself.
+        # A float64 block is twice as long: every second line is asked for, the hardware fetches the next one by itself.
         first = (~child >> LEAF_BITS) * BLOCK_WORDS
         for line in range(3):
             prefetch(tree.blocks, (first + line * _LINE) << tree.wide)
 
 
 class Lanes(NamedTuple):
-    """Sixteen rays under way, as pointers: per ray its next child and the top of its stack; the lists of those that are
-    at a node and at a leaf; and what a round computed: the octants' distances, the triangles' t, u, v, w, and the bits
-    of both.
+    """Sixteen rays under way, as pointers: for each ray its next child, the top of its stack and the stack; the lists
+    of the rays at a node and at a leaf; and the results of a round: the bits of the octants or triangles met, those of
+    the triangles in doubt, the octants' distances, and the triangles' t, u, v, w.
     """
 
     child: Any
@@ -91,13 +91,13 @@ class Lanes(NamedTuple):
     hits: Any
 
 
-# Words that ``Lanes`` takes of int64, beside the stacks, of float32 and of float64.
+# The numbers of int64 (without the stacks), float32 and float64 in ``Lanes``.
 LANE_INTEGERS, LANE_FLOATS, LANE_DOUBLES = 6 * WIDTH, 8 * WIDTH, 4 * LANES * WIDTH
 
 
 @inlined
 def make_lanes(integers, floats, doubles, stack_size):
-    """Lanes in the given memory; the stacks, ``stack_size`` entries each, follow LANE_INTEGERS other words."""
+    """Lanes in the given memory; the stacks, ``stack_size`` entries each, follow the LANE_INTEGERS other words."""
     return Lanes(
         integers, at(integers, WIDTH), at(integers, LANE_INTEGERS), stack_size, at(integers, 2 * WIDTH),
         at(integers, 3 * WIDTH), at(integers, 4 * WIDTH), at(integers, 5 * WIDTH), floats, doubles,
@@ -114,7 +114,7 @@ def begin_ray(lanes, r):
 
 @inlined
 def wait_octant(lanes, r, entry, child):
-    """Let an octant wait on the stack of ray ``r``, above the others: the distance of ``entry``, and its child."""
+    """Push an octant onto the stack of ray ``r``: the distance of ``entry``, and its child."""
     top = get(lanes.top, r)
     put(lanes.stacks, r * lanes.stack_size + top, ((entry >> 32) << 32) | (child & _LOW_WORD))
     put(lanes.top, r, top + 1)
@@ -122,14 +122,14 @@ def wait_octant(lanes, r, entry, child):
 
 @inlined
 def resume(tree, rays, lanes, r):
-    """Choose where ray ``r`` goes from what waits on its stack. Returns that child."""
+    """Take the next child of ray ``r`` off its stack, and return it."""
     stack, top = at(lanes.stacks, r * lanes.stack_size), get(lanes.top, r) - 1
     return _go_on(tree, rays, lanes, r, stack, get(stack, top), top)
 
 
 @inlined
 def meet_nodes(tree, rays, lanes, count):
-    """Compute what each of ``count`` rays meets in its node."""
+    """Compute which octants of its node each of ``count`` rays meets."""
     for k in range(count):
         r = get(lanes.at_node, k)
         lower, upper = splat8(get(rays.floats, LOWER + r)), splat8(get(rays.floats, LIMIT + r))
@@ -140,10 +140,10 @@ def meet_nodes(tree, rays, lanes, count):
 
 @inlined
 def leave_node(tree, rays, lanes, r, any_hit):
-    """Choose where ray ``r`` goes from its node: the nearest octant it meets, or what waited. Returns that child.
+    """Choose the next child of ray ``r`` at a node: the nearest octant that it meets, else one off its stack.
 
-    The other octants are pushed. Up to two, the usual case, go without a branch; octant 7 stands in for those that are
-    not there.
+    Returns that child. The other octants are pushed. Up to two octants, the usual case, take no branch; octant 7 stands
+    in for those that are not met.
     """
     base, bits, top = get(lanes.child, r) * NODE_WORDS + CHILDREN, get(lanes.bits, r), get(lanes.top, r)
     t0, stack = at(lanes.distances, 8 * r), at(lanes.stacks, r * lanes.stack_size)
@@ -163,7 +163,7 @@ def leave_node(tree, rays, lanes, r, any_hit):
 
 @inlined
 def _go_on(tree, rays, lanes, r, stack, entry, top):
-    """Take ``entry``, or the next one below ``top`` that is not beyond the best hit."""
+    """Go on with ``entry``, or where that is beyond the best hit, with the next one below ``top`` that is not."""
     limit = get(rays.floats, LIMIT + r)
     while bits_float(entry >> 32) > limit:
         top -= 1
@@ -177,7 +177,10 @@ def _go_on(tree, rays, lanes, r, stack, entry, top):
 
 @inlined
 def meet_leaves(tree, rays, lanes, count):
-    """Compute what each of ``count`` rays hits in the first block of its leaf; END passes as a block like any other."""
+    """Compute what each of ``count`` rays hits in the first block of its leaf.
+
+    A ray at END is tested against block 0, and the result is ignored.
+    """
     for k in range(count):
         r = get(lanes.at_leaf, k)
         child = get(lanes.child, r)
@@ -197,7 +200,7 @@ def meet_leaves(tree, rays, lanes, count):
 
 @inlined
 def take_hits(tree, rays, lanes, r):
-    """Keep the best hit of a leaf's first block. Returns whether it has one, and whether there was a doubt."""
+    """Keep the best hit of a leaf's first block. Returns whether there is one, and whether any hit was in doubt."""
     block, bits, hits = ~get(lanes.child, r) >> LEAF_BITS, get(lanes.bits, r), at(lanes.hits, 4 * LANES * r)
     doubtful = get(lanes.doubts, r)
     if bits != 0:
@@ -217,10 +220,10 @@ def take_hits(tree, rays, lanes, r):
 
 @inlined
 def leave_leaf(tree, rays, lanes, r):
-    """Choose where ray ``r`` goes from its leaf: to its next block, or to what waited. Returns that child."""
+    """Choose the next child of ray ``r`` at a leaf: the rest of its blocks, else one off its stack. Returns it."""
     child = get(lanes.child, r)
     if ~child & (MAX_LEAF_BLOCKS - 1) != 0:
-        # One block on, and one less to go.
+        # The first block is one further on, and the number of blocks one less.
         child -= MAX_LEAF_BLOCKS - 1
         put(lanes.child, r, child)
         return child

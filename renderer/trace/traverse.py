@@ -30,14 +30,14 @@ from renderer.trace.stream import (
     wait_octant,
 )
 
-# Rays whose slopes against their dominant axis differ by more than this from the first one's are no packet. It only
-# spares rays that point anywhere the attempt: how far a packet goes, its budget tells.
+# Sixteen rays are no packet when a slope against their dominant axis differs by more than this from the first ray's.
+# The bound only spares scattered rays the attempt; a packet whose rays part later ends by its BUDGET.
 _SPREAD = 0.125
 
 
 class Scratch(NamedTuple):
-    """Memory of one thread, as pointers: sixteen prepared rays and their lanes; of each whether it met a doubt and its
-    number; a packet's stack; and the numbers of the rays that wait for a stream.
+    """Memory of one thread, as pointers: sixteen prepared rays and their lanes; a packet's stack; for each of the rays
+    whether a hit was in doubt, and its number; and the numbers of the rays that wait for a stream.
     """
 
     prepared: Prepared
@@ -49,7 +49,7 @@ class Scratch(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The arrays behind a ``Scratch``, and the entries of one stack."""
+    """The arrays behind a ``Scratch``, and the number of entries of one stack."""
 
     floats: NDArray[np.float32]
     doubles: NDArray[np.float64]
@@ -95,7 +95,7 @@ def are_coherent(rays, begin):
     for r in range(1, WIDTH):
         dw, du, dv = get(d, 3 * r + w), get(d, 3 * r + u), get(d, 3 * r + v)
         size = abs(dw)
-        # Of two equal components the axis that ``make_shear`` takes depends on which they are.
+        # Strictly larger: between equal components the choice of ``make_shear`` depends on which they are.
         dominant = size > abs(du) and size > abs(dv) and dw * first > 0.0
         if not (dominant and abs(du - slope_u * dw) <= _SPREAD * size and abs(dv - slope_v * dw) <= _SPREAD * size):
             return False
@@ -105,7 +105,7 @@ def are_coherent(rays, begin):
 
 @inlined
 def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
-    """Write the hit of ray ``i``, in place ``r``, after a careful search on its stack if there was a doubt."""
+    """Write the hit of ray ``i``, in lane ``r``; if one was in doubt, after a careful search on the lane's stack."""
     best = best_of(scratch.prepared, r)
     if doubtful:
         ray, t_max = ray_at(rays, i)
@@ -125,7 +125,7 @@ def _load(rays, scratch, r, i):
 
 @inlined
 def _list_lane(lanes, r, child, nodes, leaves):
-    """Put lane ``r`` into the list that its next child asks for; returns the lengths of both."""
+    """Put lane ``r`` into the list of nodes or of leaves, as its next child is. Returns the lengths of both lists."""
     put(lanes.at_node, nodes, r)
     put(lanes.at_leaf, leaves, r)
     return nodes + np.int64(child >= 0), leaves + np.int64(child < 0)
@@ -133,17 +133,19 @@ def _list_lane(lanes, r, child, nodes, leaves):
 
 @kernel
 def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_hit):
-    """Run the lanes that are listed to their ends; meanwhile the rays in ``scratch.waiting`` from ``following`` to
-    ``count`` take the places of those that end.
+    """Run the listed lanes to their ends; the rays in ``scratch.waiting`` from ``following`` to ``count`` take the
+    places of those that end.
     """
     prepared, lanes, waiting = scratch.prepared, scratch.lanes, scratch.waiting
     while nodes + leaves > 0:
+        # Take the lanes at nodes one step on.
         meet_nodes(tree, prepared, lanes, nodes)
         entered, nodes = nodes, 0
         for k in range(entered):
             r = get(lanes.at_node, k)
             child = leave_node(tree, prepared, lanes, r, any_hit)
             nodes, leaves = _list_lane(lanes, r, child, nodes, leaves)
+        # Take the lanes at leaves one block on; a lane whose ray ends loads the next ray.
         meet_leaves(tree, prepared, lanes, leaves)
         entered, leaves = leaves, 0
         for k in range(entered):
@@ -166,7 +168,7 @@ def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_
 
 @inlined
 def _trace_stream(tree, rays, found, scratch, count, any_hit):
-    """Trace the ``count`` rays in ``scratch.waiting``, sixteen in turn."""
+    """Trace the ``count`` rays in ``scratch.waiting``, sixteen at a time."""
     lanes, first = scratch.lanes, smaller(count, WIDTH)
     for r in range(first):
         _load(rays, scratch, r, get(scratch.waiting, r))
@@ -176,7 +178,7 @@ def _trace_stream(tree, rays, found, scratch, count, any_hit):
 
 @kernel
 def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
-    """Let the rays of a packet that gave up go on as lanes: each with the octants it meets of those that wait."""
+    """Let the rays of a packet that gave up go on as lanes, each with those of the waiting octants that it meets."""
     prepared, lanes = scratch.prepared, scratch.lanes
     for r in range(WIDTH):
         begin_ray(lanes, r)

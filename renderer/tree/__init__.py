@@ -1,1 +1,1 @@
-"""Trees: how they are built, checked and refitted."""
+"""Trees: building, checking and refitting them."""

@@ -10,7 +10,7 @@ from renderer.kernels.simd import float32_pointer, float64_pointer, put
 from renderer.process.parallel import for_chunks
 from renderer.trace.layout import BLOCK_WORDS, LANES, cache_aligned
 
-# A tenth of a millisecond each, so that taking a chunk costs nothing beside it.
+# Vertices and blocks per chunk: a tenth of a millisecond, beside which taking a chunk costs nothing.
 _VERTICES, _BLOCKS = 1 << 16, 1 << 12
 
 
@@ -52,7 +52,7 @@ def fill_blocks(
     blocks = cache_aligned(count * BLOCK_WORDS, np.float64 if inexact else np.float32)
     address, wide = blocks.ctypes.data, blocks.dtype == np.float64
 
-    # Whoever fills the blocks holds them, which their address alone does not.
+    # The default argument keeps the blocks alive as long as ``fill``, which their address does not.
     def fill(begin: int, end: int, _held: NDArray[Any] = blocks) -> None:
         _fill(vertices, faces, block_faces, address, wide, begin, end)
 

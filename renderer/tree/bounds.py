@@ -1,4 +1,4 @@
-"""The boxes of faces as the build sorts them, and what it asks of a box."""
+"""The boxes of faces as the build sorts them, and the operations on boxes."""
 
 from typing import NamedTuple
 
@@ -10,8 +10,8 @@ from renderer.kernels.simd import lane, load8, select, splat8, store
 from renderer.trace.intersect import face_range
 
 # A box is eight 32-bit words: lower x, y, z, a face, and the negated upper x, y, z, and an unused one. The upper corner
-# is negated so that one vector minimum is the union of two boxes. The face is an int32 where a face has the box; of a
-# union it means nothing.
+# is negated so that one vector minimum is the union of two boxes. The face is the int32 number of the face whose box it
+# is; in a union of boxes it means nothing.
 BOX = 8
 FACE = 3
 
@@ -19,7 +19,7 @@ FACE = 3
 class Faces(NamedTuple):
     """The faces being sorted.
 
-    boxes    (F * BOX,) float32, one box a face, which moves with it
+    boxes    (F * BOX,) float32, one box per face, which moves with it
     numbers  the same memory as int32
     spare    (F * BOX,) float32, scratch for sorting
     """

@@ -1,4 +1,4 @@
-"""Building the tree: a top that is cut level by level, subtrees below it that are built side by side, and their joint.
+"""Building the tree: the top is cut level by level, the subtrees below it are built in parallel, then both are joined.
 
 Faces are cut into a binary hierarchy, by octants at the midpoint or by the surface area heuristic, with fitted boxes;
 then parts of it are chosen as leaves and as children of nodes of eight. Where the top ends depends on the number of
@@ -23,7 +23,7 @@ SPLITS = {"midpoint": MIDPOINT, "sah": SAH}
 
 # Parts of at most so many faces are subtrees: some milliseconds of work, in memory that stays in a core's cache.
 _SUBTREE = 8192
-# Faces whose boxes are one chunk: some tenths of a millisecond.
+# Faces per chunk when their boxes are computed: some tenths of a millisecond.
 _BOXES = 1 << 14
 # The most parts of one cut: itself, two halves, four quarters and eight octants.
 _PARTS = 15
@@ -96,7 +96,7 @@ def _cut_top(order: Faces, rule: Rule, threads: int) -> tuple[Hierarchy, list[in
 def _cut_each(
     order: Faces, rule: Rule, top: Hierarchy, levels: list[int], parts: list[int], threads: int
 ) -> list[tuple[Hierarchy, int]]:
-    """Cut each of some parts once: what it becomes, as a hierarchy of its own, and the level of what was cut off."""
+    """Cut each of ``parts`` once. Returns for each the hierarchy that it becomes, and the level of the new parts."""
     cut: dict[int, tuple[Hierarchy, int]] = {}
 
     def work(begin: int, end: int) -> None:
@@ -112,7 +112,7 @@ def _cut_each(
 
 
 def _grafted(top: Hierarchy, parts: list[int], pieces: list[Hierarchy]) -> Hierarchy:
-    """The hierarchy in which each of some whole parts has become its piece; new parts come last."""
+    """The hierarchy in which each of the whole ``parts`` is replaced by its piece; new parts come last."""
     halves, count = [top.halves.copy()], len(top.halves)
     for part, piece in zip(parts, pieces, strict=True):
         moved = np.where(piece.halves < 0, np.int32(-1), piece.halves + np.int32(count - 1))

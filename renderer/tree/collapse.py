@@ -1,4 +1,4 @@
-"""Which parts of a binary hierarchy become the children of nodes of eight: the choice of least expected cost.
+"""The collapse of a binary hierarchy into nodes of eight children, by the choice of least expected cost.
 
 Dynamic programming from the leaves up (Ylitie, Karras and Laine, Efficient Incoherent Ray Traversal on GPUs Through
 Compressed Wide BVHs, HPG 2017, sec. 3.1), with leaves counted in blocks.
@@ -11,7 +11,7 @@ from renderer.kernels.simd import load8
 from renderer.trace.layout import LANES
 from renderer.tree.bounds import BOX, half_area
 
-# What a ray pays for entering a node and for testing a block.
+# The costs of entering a node and of testing a block.
 NODE_COST = np.float32(1.0)
 BLOCK_COST = np.float32(1.0)
 
@@ -25,11 +25,12 @@ def leaf_cost(tree, part):
 
 @kernel
 def collapse(tree, count, leaf_size):
-    """Fill ``costs`` and ``choices`` of ``count`` parts; of whole parts only ``costs[8 * part]`` must be there.
+    """Fill ``costs`` and ``choices`` of ``count`` parts; ``costs[8 * part]`` of the whole parts must be set before.
 
-    costs[8 * part + i - 1] is the least cost of the part as at most i children. Its choice is, for i = 1, 0 for a leaf,
-    or how many of the eight children of the node that it becomes come from its first half; for more, 0 when one child
-    less costs no more, or how many of the i children come from the first half.
+    costs[8 * part + i - 1] is the least cost of the part as at most i children of a node. The choice at that index is a
+    number of children. For i = 1 the part becomes a leaf where the choice is 0; else it becomes a node, of whose eight
+    children so many come from the part's first half. For i > 1 the part takes i - 1 children where the choice is 0,
+    because these cost no more; else so many of the i children come from its first half.
     """
     for part in range(count - 1, -1, -1):
         at = 8 * part
@@ -39,7 +40,7 @@ def collapse(tree, count, leaf_size):
                 tree.costs[at + i], tree.choices[at + i] = tree.costs[at], 0
             continue
         for children in range(8, 0, -1):
-            # At last, in the place of i = 1, the node whose eight children the part may be.
+            # For i = 1, which comes last, the eight children of the node that the part may become.
             share = children if children > 1 else 8
             tree.costs[at + children - 1], tree.choices[at + children - 1] = _share(tree.costs, first, share)
         tree.costs[at] += half_area(load8(tree.boxes, part * BOX)) * NODE_COST

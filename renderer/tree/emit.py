@@ -10,8 +10,8 @@ from renderer.kernels.simd import larger
 from renderer.trace.layout import CHILDREN, LANES, LEAF_BITS, NODE_WORDS, UNUSED
 from renderer.tree.bounds import BOX, FACE
 
-# Parts that wait to become nodes: at most seven a level. Levels of cuts end at 3 * 64 by ``max_depth``, even halves
-# within 31 more.
+# The most parts that wait to become nodes: seven per level. Cuts by the split rule end after 3 * 64 levels, the
+# greatest ``max_depth``, and cuts in even halves within 31 more.
 WAITING = 8 * 256
 
 
@@ -31,9 +31,10 @@ def emit_room() -> EmitRoom:
 def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
     """Write the nodes below part 0, which becomes node 0, depth first. Returns (nodes, blocks, levels of nodes).
 
-    ``ends`` (n, 2) int32 tells the link and the levels below it for each whole part; when it is empty, whole parts and
+    ``ends`` (n, 2) int32 holds the link and the levels below it for each whole part; when it is empty, whole parts and
     those that ``collapse`` chose are written as leaves. ``nodes`` and ``links`` are the same memory.
     """
+    # Begin with part 0, which has no parent.
     waiting, shares = room
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 1, -1
     top, used, blocks, depth = 1, np.int64(0), np.int64(0), np.int64(0)
@@ -47,7 +48,7 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
         if parent >= 0:
             links[parent] = used
         used += 1
-        # Its children: hand out its eight places between the halves, until each part takes one.
+        # Find its children: share out its eight places between halves, until each part takes one place.
         place, shared = 0, _first_shares(tree, part, shares)
         while shared > 0:
             shared -= 1
@@ -57,6 +58,7 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
             if share > 1:
                 shared = _share_out(tree, child, tree.choices[8 * child + share - 1], share, shares, shared)
                 continue
+            # Write the child: a node that waits, a subtree that is built already, or a leaf.
             _set_bounds(nodes, base, place, tree.boxes, child * BOX)
             link = base + CHILDREN + place
             place += 1
@@ -74,7 +76,7 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
 
 @kernel
 def _first_shares(tree, part, shares):
-    """Start to hand out a node's places; a whole part has itself as its only child."""
+    """Start to share out a node's places; a part that ``collapse`` made no node has itself as its only child."""
     if tree.choices[8 * part] > 0:
         return _share_out(tree, part, tree.choices[8 * part], 8, shares, 0)
     shares[0, 0], shares[0, 1] = part, 1
@@ -98,7 +100,7 @@ def leaf_link(block, count):
 
 @kernel
 def emit_leaf(tree, part, numbers, block_faces, blocks):
-    """Write a part's faces into blocks, which it fills up with -1; returns the number of blocks then."""
+    """Write a part's faces to the blocks from ``blocks`` on, the last filled up with -1. Returns the block after it."""
     begin, end = tree.ranges[part]
     at = blocks * LANES
     for i in range(begin, end):

@@ -14,7 +14,7 @@ MIDPOINT, SAH = 0, 1
 
 
 class Rule(NamedTuple):
-    """How to build: the split rule, the most faces of a leaf, and the deepest level that the rule may split."""
+    """The rule of a build: the split rule, the most faces of a leaf, and the deepest level that the rule may split."""
 
     split: int
     leaf_size: int
@@ -22,13 +22,13 @@ class Rule(NamedTuple):
 
 
 class Hierarchy(NamedTuple):
-    """Parts: ranges of faces, each whole or cut in two. The two stand side by side, after what they were cut from.
+    """Parts: ranges of faces, each whole or cut in two halves, which stand side by side, after the part itself.
 
     boxes    (n * BOX,) float32, their bounds
     ranges   (n, 2) int32, begin and end
-    halves   (n,) int32, the first of the two, or -1 for a part that is whole
-    costs    (n * 8,) float32, what rays pay for the part as one to eight children of a node
-    choices  (n * 8,) uint8, how to pay least, see ``collapse``
+    halves   (n,) int32, the first half, or -1 for a part that is whole
+    costs    (n * 8,) float32, the expected cost of the part as one to eight children of a node, see ``collapse``
+    choices  (n * 8,) uint8, the choices of least cost, see ``collapse``
     """
 
     boxes: NDArray[np.float32]
@@ -39,7 +39,7 @@ class Hierarchy(NamedTuple):
 
 
 def new_hierarchy(parts: int) -> Hierarchy:
-    """Room for ``parts``."""
+    """Room for ``parts`` parts."""
     costs, choices = np.empty(parts * 8, np.float32), np.empty(parts * 8, np.uint8)
     boxes, ranges, halves = np.empty(parts * BOX, np.float32), np.empty((parts, 2), np.int32), np.empty(parts, np.int32)
     return Hierarchy(boxes, ranges, halves, costs, choices)
@@ -65,5 +65,5 @@ def add_part(tree, part, begin, end):
 
 @kernel
 def whole_size(rule):
-    """Parts of so many faces are never cut: they fill one block."""
+    """The most faces of a part that is never cut, because they fit into one block."""
     return smaller(rule.leaf_size, LANES)

@@ -9,7 +9,7 @@ from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_L
 
 
 def faults(tree: Tree, mesh: Mesh) -> list[str]:
-    """What is wrong with ``tree`` as the octree of ``mesh``, in words; empty when all of these hold.
+    """The faults of ``tree`` as the octree of ``mesh``, in words; empty when all of these hold.
 
     Every node and block is reached exactly once; without faces there is none. A child's box contains its descendants'
     and the boxes of its faces, see ``intersect.face_range``. Every face with its own vertices stands in exactly one

@@ -12,7 +12,7 @@ from renderer.tree.hierarchy import add_part
 
 
 class OctantRoom(NamedTuple):
-    """Scratch of ``cut_octants``: where each octant's faces start, the octants' boxes, and parts to be cut."""
+    """Scratch of ``cut_octants``: the start of each octant's faces, the octants' boxes, and parts to be cut."""
 
     starts: NDArray[np.int64]
     boxes: NDArray[np.float32]
@@ -25,18 +25,20 @@ def octant_room() -> OctantRoom:
 
 @kernel
 def cut_octants(faces, tree, part, whole, count, room):
-    """Cut a part into octants about the middle of its box. Returns the number of parts, which was ``count``.
+    """Cut a part into octants about the middle of its box. Returns the number of parts, which was ``count`` before.
 
-    The octants are cut off along the longest axis first, and halves of at most ``whole`` faces are not cut further.
-    Where all faces lie in one octant the middle of their centres takes its place; where that separates none either,
+    The part is cut in two along the longest axis first, and halves of at most ``whole`` faces are not cut further.
+    Where all faces lie in one octant, the middle of their centres is taken instead; where that separates none either,
     nothing is cut.
     """
+    # Sort the faces by octant.
     begin, end = tree.ranges[part]
     axes, middle = _box_middle(tree.boxes, part * BOX)
     if _sort_octants(faces, begin, end, axes, middle, room):
         middle = _centres_middle(faces.boxes, begin, end, axes)
         if _sort_octants(faces, begin, end, axes, middle, room):
             return count
+    # Cut in two, from all eight octants down: a waiting entry is a part, its first octant and its number of octants.
     waiting, starts = room.waiting, room.starts
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = part, 0, 8
     top = 1

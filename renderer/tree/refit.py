@@ -10,7 +10,7 @@ from renderer.trace.intersect import face_range
 from renderer.trace.layout import CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, cache_aligned
 from renderer.tree.blocks import fill_blocks
 
-# Nodes whose leaves are one chunk: some tenths of a millisecond.
+# Nodes per chunk when leaves are fitted: some tenths of a millisecond.
 _NODES = 1 << 10
 
 
@@ -62,7 +62,7 @@ def refit_tree(tree: Tree, vertices: NDArray[np.float64], faces: NDArray[np.int3
     """``tree`` over moved vertices, in new arrays; the faces of its blocks, which do not change, are shared."""
     nodes = cache_aligned(len(tree.nodes), np.float32)
     links = nodes.view(np.int32)
-    # As integers: no link need be a number as a float.
+    # Copied as integers, because the bits of a link may be a NaN as a float.
     links[:] = tree.links
     for_chunks(
         lambda begin, end: _fit_leaves(vertices, faces, tree.faces, nodes, links, begin, end),

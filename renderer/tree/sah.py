@@ -29,8 +29,8 @@ def bin_room() -> BinRoom:
 
 @kernel
 def cut_sah(faces, tree, part, count, room):
-    """Cut a part in two at the cheapest plane, cost counted in blocks. Returns the number of parts, which was
-    ``count`` and stays so where no plane separates the centres.
+    """Cut a part in two at the cheapest plane, cost counted in blocks. Returns the number of parts, which was ``count``
+    before and stays so where no plane separates the centres.
     """
     begin, end = tree.ranges[part]
     bins = _MOST_BINS if end - begin > 32 else 6
@@ -55,7 +55,7 @@ def cut_sah(faces, tree, part, count, room):
 
 @kernel
 def _spread_bins(boxes, begin, end, bins):
-    """Where the bins start on each axis, and bins for each unit of length, 0 where the centres do not differ."""
+    """The start of the bins on each axis, and the bins per unit of length, 0 where the centres do not differ."""
     x0 = y0 = z0 = np.float32(np.inf)
     x1 = y1 = z1 = np.float32(-np.inf)
     for i in range(begin, end):
@@ -93,7 +93,7 @@ def _fill_bins(boxes, begin, end, spread, room):
 
 @kernel
 def _best_plane(room, first, bins):
-    """The least sum of half area times blocks on both sides of a plane, and the bin before it; -1 for none."""
+    """The least sum of half area times blocks on both sides of a plane, and the bin before the plane; -1 for none."""
     counts, beyond = room.counts, room.beyond
     box, n = empty_box(), np.int64(0)
     for k in range(bins - 1, 0, -1):

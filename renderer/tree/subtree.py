@@ -14,14 +14,14 @@ from renderer.tree.hierarchy import SAH, Hierarchy, add_part, new_hierarchy, who
 from renderer.tree.midpoint import OctantRoom, cut_octants, octant_room
 from renderer.tree.sah import BinRoom, bin_room, cut_sah
 
-# Of so few faces the octants are mostly empty and their blocks half so: 72 % of the places are used. The surface area
-# heuristic for these last cuts uses 86 %, which saves a sixth of the memory and 2 % of the node visits, for a third
-# more time to build.
+# Parts of at most so many faces are cut by the surface area heuristic, under the midpoint rule too. Most of their
+# octants would be empty, and only 72 % of the blocks' places used. With the heuristic it is 86 %, which saves a sixth
+# of the memory and 2 % of the node visits, for a third more time to build.
 _FEW = 32
 
 
 class Room(NamedTuple):
-    """Scratch to cut parts: what the rules need, and the parts that wait, each with the levels of cuts above it."""
+    """Scratch for one subtree: that of both split rules, and that of ``emit_nodes``, which ``_cut_all`` uses too."""
 
     octants: OctantRoom
     bins: BinRoom
@@ -55,7 +55,7 @@ def new_workspace(faces: int) -> Workspace:
 @kernel
 def cut_part(faces, tree, part, rule, level, count, room):
     """Cut a part by the rule, or in half where the rule cannot or has cut ``max_depth`` levels. Returns the number of
-    parts, which was ``count``, and the level of the new ones; three cuts in two are a level of octants.
+    parts, which was ``count`` before, and the level of the new ones. A level is one cut in two; octants are three.
     """
     after, below = count, level + 1
     if level < 3 * rule.max_depth:
@@ -70,7 +70,7 @@ def cut_part(faces, tree, part, rule, level, count, room):
 
 @kernel
 def _cut_in_half(faces, tree, part, count):
-    """Cut a part whose faces do not separate into equal halves, so that the build ends."""
+    """Cut a part into equal halves where no rule separates its faces, so that the build ends."""
     begin, end = tree.ranges[part]
     middle = (begin + end) // 2
     tree.halves[part] = count
@@ -86,7 +86,7 @@ def _cut_all(faces, tree, rule, level, room):
     """Cut part 0 until every part is whole; returns the number of parts."""
     waiting, whole = room.emit.waiting, whole_size(rule)
     waiting[0, 0], waiting[0, 1] = 0, level
-    # Counters are int64 from the start: Numba would compile what it calls for the literal and for the number.
+    # Counters are int64 from the start, or Numba would compile the callees twice: for the literal and for the number.
     top, count = 1, np.int64(1)
     while top > 0:
         top -= 1
@@ -104,7 +104,7 @@ def _cut_all(faces, tree, rule, level, room):
 
 @kernel
 def cut_once(faces, tree, rule, level, room):
-    """Cut part 0, the only one, once; returns as ``cut_part``."""
+    """Cut part 0, the only one, once. Returns the same as ``cut_part``."""
     return cut_part(faces, tree, np.int64(0), rule, level, np.int64(1), room)
 
 
@@ -113,7 +113,7 @@ def build_subtree(faces, rule, begin, end, level, space):
     """Build over the faces ``begin:end``, which were cut off by ``level`` cuts, into ``space``.
 
     Returns (link, cost, nodes, blocks, levels of nodes), the link counted from the subtree's own first node and block.
-    What makes one leaf has no node, unless it is the whole tree, which begins with a node in any case.
+    A subtree of one leaf has no node, unless it is the whole tree, which always begins with a node.
     """
     tree, room, block_faces = space.tree, space.room, space.block_faces
     add_part(tree, 0, begin, end)

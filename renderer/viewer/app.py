@@ -1,4 +1,4 @@
-"""The server's routes: the page, what it fetches, and the WebSocket."""
+"""The server's routes: the page, the data that it fetches, and the WebSocket."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -23,16 +23,16 @@ from renderer.viewer.session import Connection, Session
 from renderer.viewer.shown import ShownScene, open_file
 
 PAGE = Path(__file__).parent / "page"
-# Each may keep all processors busy; beyond this many none would see its pictures move.
+# Each connection may keep all processors busy; beyond this many, pictures would come too slowly for all.
 MAX_CONNECTIONS = 16
-# A session's picture under way, the one before it whose last tiles end, and a click.
+# Threads per session: for its picture under way, the one before it whose last tiles end, and a click.
 _THREADS_A_SESSION = 3
 _BINARY = "application/octet-stream"
 _TRY_LATER = 1013  # RFC 6455's registry of close codes
 
 
 class Viewer:
-    """What all connections share: the scene on show, and the threads that compute."""
+    """The state that all connections share: the scene on show, and the threads that compute."""
 
     def __init__(self, shown: ShownScene) -> None:
         self.shown = shown
@@ -90,7 +90,7 @@ class Viewer:
 
 
 def _telling(send: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:
-    """``send`` that says of a page that has gone meanwhile that it has gone, and not that we were wrong to send."""
+    """``send`` that raises ``WebSocketDisconnect`` where the page has gone, in place of a ``RuntimeError``."""
 
     async def tell(message: Any) -> None:
         try:
@@ -111,7 +111,7 @@ async def _receive_all(socket: WebSocket, session: Session) -> None:
 
 
 def make_app(shown: ShownScene, host: str, port: int, token: str | None, ancestors: str) -> Starlette:
-    """The application that shows ``shown`` on ``host`` and ``port``; without ``token`` to whoever reaches it.
+    """The application that shows ``shown`` on ``host`` and ``port``; without ``token``, to every client.
 
     ``ancestors`` is the content security policy's rule about frames around the page.
     """

@@ -19,13 +19,13 @@ from renderer.viewer.viewpoint import camera_of
 
 # Longest sides of the first passes: a sixteenth and a quarter of the pixels of a picture of 512 x 512.
 COARSE = (128, 256)
-# Pillow's scale; above it files grow faster than what can be seen of it.
+# On Pillow's scale; above it files grow faster than the quality that can be seen.
 _JPEG_QUALITY = 90
 
 
 @dataclass(frozen=True)
 class Pass:
-    """One answer to a view: its number from 0, whether it is the last, size (w, h) and samples a pixel."""
+    """One answer to a view: its number from 0, whether it is the last, size (w, h) and samples per pixel."""
 
     step: int
     last: bool
@@ -34,15 +34,15 @@ class Pass:
 
 
 def passes_of(view: CameraMessage) -> list[Pass]:
-    """What is sent for ``view``: nothing for "gl", face colours for "phong", one picture or growing ones.
+    """The passes that answer ``view``: none for "gl", face colours for "phong", one picture or growing ones.
 
-    Brute force takes one sample a pixel: of many samples it would take minutes.
+    Brute force takes one sample per pixel: with many it would take minutes.
     """
     if view.mode == "gl":
         return []
     longest = max(view.w, view.h)
     coarse = [side for side in COARSE if side < longest] if view.mode == "octree" else []
-    # The first pass is shown whatever comes meanwhile, so it must not be one of many samples.
+    # The first pass is shown even if a newer view comes meanwhile, so it must not be one of many samples.
     if view.mode == "octree" and view.settings.samples > 1 and not coarse:
         coarse = [longest]
     sizes = [(_scaled(view.w, side, longest), _scaled(view.h, side, longest)) for side in coarse]
@@ -59,9 +59,10 @@ class Answer(NamedTuple):
 
 
 def answer(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[int], None]) -> Answer:
-    """What answers one pass. ``finished(tiles)`` is called after each tile; what it raises ends the pass.
+    """The answer of one pass. ``finished(tiles)`` is called after each tile; what it raises ends the pass.
 
-    The milliseconds told are from the pass's begin to its payload, the rays a second those of tracing alone.
+    The milliseconds that it gives are from the start of the pass to its payload, the rays per second those of tracing
+    alone.
     """
     began, limits = time.perf_counter(), None
     if view.mode == "phong":
@@ -82,7 +83,7 @@ def answer(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Calla
 def picture(
     shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[int], None] | None = None
 ) -> Image:
-    """What ``render`` gives for the view's camera and settings."""
+    """The same picture that ``render`` gives for the view's camera and settings."""
     prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)
     settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, wanted.last)
     return prepared.picture(camera_of(view.m, view.fovy), settings, BOUNDED, shown.threads, finished)
@@ -99,7 +100,7 @@ def _rgba(rgb: NDArray[np.uint8]) -> bytes:
 
 
 def _jpeg(rgb: NDArray[np.uint8]) -> bytes:
-    from PIL import Image as Pillow  # loopback sends no JPEG
+    from PIL import Image as Pillow  # not needed where a page asks for "rgba"
 
     buffer = io.BytesIO()
     Pillow.fromarray(rgb).save(buffer, "jpeg", quality=_JPEG_QUALITY)

@@ -1,4 +1,4 @@
-"""What the page fetches of a scene: its description as JSON, its triangles and its octree's boxes as plain arrays."""
+"""The data that the page fetches: a scene's description as JSON, its triangles and its octree's boxes as arrays."""
 
 import struct
 from typing import Any

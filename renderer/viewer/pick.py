@@ -1,4 +1,4 @@
-"""The answer to a click: what the ray through a pixel meets, the rays it becomes, and the octree's nodes it opens."""
+"""The answer to a click: the hit of the ray through a pixel, the rays it spawns, and the octree's nodes it opens."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,12 +15,12 @@ from renderer.viewer.protocol import Pick
 from renderer.viewer.shown import ShownScene, varied
 from renderer.viewer.viewpoint import camera_of
 
-# Boxes told of one ray, the first that it opens: more cover each other on the screen. ``visited`` counts all.
+# The most boxes sent for one ray, the first that it opens: more cover each other on the screen. ``visited`` counts all.
 _MAX_BOXES = 512
 
 
 def picked(shown: ShownScene, pick: Pick) -> dict[str, Any]:
-    """The message for ``pick``: the ray through the pixel's centre; null in place of what a miss does not have."""
+    """The message for ``pick``: the ray through the pixel's centre; null for values that a miss does not have."""
     prepared = varied(shown.prepared, pick.settings)
     rows = camera_of(pick.m, pick.fovy).rows(pick.w, pick.h)
     origin, direction = rows[0], rows[3] + (pick.x + 0.5) * rows[4] + (pick.y + 0.5) * rows[5]

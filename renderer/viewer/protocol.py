@@ -1,4 +1,4 @@
-"""What page and server say to each other on the WebSocket: the page's messages checked, the server's packed."""
+"""The messages between page and server on the WebSocket: the page's are checked, the server's packed."""
 
 import struct
 from typing import Annotated, Literal, Self
@@ -8,18 +8,18 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 from renderer.scene.camera import sample_offsets
 from renderer.scene.fields import FiniteVector
 
-# Of a picture's sides: four megabytes a picture, as much as a browser draws without a hitch.
+# The longest side of a picture: four megabytes per picture, as much as a browser draws without a hitch.
 MAX_SIDE = 1024
 # A page's largest message is a pick of under 1 kB; this leaves room for numbers of any length.
 MAX_MESSAGE_BYTES = 16384
-# An 8 x 8 grid: with 1024 x 1024 pixels as many camera rays as a person may want to wait for.
+# An 8 x 8 grid per pixel: with 1024 x 1024 pixels, 67 million camera rays, the most that are worth the wait.
 MAX_SAMPLES = 64
 # Below a thousandth of a radian neighbouring rays differ by less than a page's float32 matrices resolve; above 3.1
 # almost all of the picture is its rim.
 MIN_FOVY, MAX_FOVY = 0.001, 3.1
 
 RGBA, JPEG, FACE_COLORS = 1, 2, 3
-# kind, seq, step, last, w, h as uint32, then milliseconds and million rays a second as float32, little-endian.
+# kind, seq, step, last, w, h as uint32, then milliseconds and million rays per second as float32, little-endian.
 HEADER = struct.Struct("<6I2f")
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -37,8 +37,8 @@ class _Message(BaseModel):
 
 
 class ViewSettings(_Message):
-    """What the panel chooses. ``light`` is the direction in which the first directional light travels, null for the
-    scene's own; ``aov`` what a pixel shows; ``pixels`` how pictures travel.
+    """The settings of the panel. ``light`` is the direction in which the first directional light travels, null for the
+    scene's own; ``aov`` the value that a pixel shows; ``pixels`` the format in which pictures are sent.
     """
 
     max_depth: Annotated[int, Field(ge=0, le=64)] = 6
@@ -65,7 +65,7 @@ class ViewSettings(_Message):
 
 
 class CameraMessage(_Message):
-    """Show this: ``m`` camera to world as in ``viewpoint``, ``fovy`` in radians, a picture of ``w`` x ``h`` pixels."""
+    """A view to show: ``m`` camera to world as in ``viewpoint``, ``fovy`` in radians, ``w`` x ``h`` pixels."""
 
     type: Literal["view"]
     seq: _Sequence
@@ -92,7 +92,7 @@ class Cancel(_Message):
 
 
 class Pick(_Message):
-    """Which ray goes through pixel (``x``, ``y``), counted from the top left, and what comes of it?"""
+    """A click on pixel (``x``, ``y``), counted from the top left, that asks for its ray and all that this spawns."""
 
     type: Literal["pick"]
     seq: _Sequence
@@ -132,21 +132,21 @@ _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 
 
 def parse(text: str) -> Message:
-    """The message that ``text`` is. Raises ``ValueError`` with one line: where, what was expected, what came."""
+    """The message in ``text``. Raises ``ValueError`` with one line: the key, what was expected, and what was given."""
     try:
         return _MESSAGE.validate_json(text)
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         where = ".".join(str(key) for key in fault["loc"]) or "message"
-        # What came may be long and is the sender's own; forty characters tell which value it was.
+        # The given value may be long; forty characters show which one it is.
         raise ValueError(f"{where}: {fault['msg']}, got {repr(fault['input'])[:40]}") from None
 
 
 def packed(
     kind: int, view: CameraMessage, step: int, last: bool, size: tuple[int, int], pace: tuple[float, float]
 ) -> bytes:
-    """The header of a picture or of face colours; ``size`` is (w, h), ``pace`` milliseconds and million rays a second.
+    """The header of a picture or of face colours; ``size`` is (w, h), ``pace`` ms and million rays per second.
 
-    32 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 a face.
+    32 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 bytes per face.
     """
     return HEADER.pack(kind, view.seq, step, last, *size, *pace)

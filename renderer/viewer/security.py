@@ -1,4 +1,4 @@
-"""Who is let in: rules that hold before any route is reached, whether for HTTP or for the WebSocket.
+"""The rules of access, which hold before any route is reached, whether for HTTP or for the WebSocket.
 
 A page of another site can send requests to this machine, but it cannot forge Host and Origin: a foreign Host means a
 foreign name made to point here (DNS rebinding), a foreign Origin a foreign page. Where other machines may connect too,
@@ -37,7 +37,7 @@ def new_token() -> str:
 
 
 class ResponseHeaders:
-    """Tell the browser what the page may do: load from here alone, be framed by ``ancestors``, and leave no trace."""
+    """Headers that let the page load from here alone and be framed by ``ancestors``, and keep it out of caches."""
 
     def __init__(self, app: ASGIApp, ancestors: str) -> None:
         self.app = app
@@ -63,7 +63,7 @@ class ResponseHeaders:
 class SameOrigin:
     """Refuse a WebSocket whose page did not come from here: 403 unless Origin names this Host.
 
-    Programs send no Origin; they are let in where ``token_required``, as what checks the token does the rest.
+    Programs send no Origin; they are let in where ``token_required``, because ``TokenRequired`` checks them.
     """
 
     def __init__(self, app: ASGIApp, token_required: bool) -> None:
@@ -91,10 +91,10 @@ def _authority(origin: str) -> str | None:
 
 
 class TokenRequired:
-    """Serve only who brings the token: in the address (``?token=``), or in the cookie that the answer then sets.
+    """Serve only requests with the token: in the address (``?token=``), or in the cookie that the answer then sets.
 
-    The cookie is there for what the page loads by plain links. Its name has the port, because cookies of one host
-    reach all its ports.
+    The cookie is there for the files that the page loads by plain links. Its name has the port, because cookies of one
+    host reach all its ports.
     """
 
     def __init__(self, app: ASGIApp, token: str | None, port: int) -> None:
@@ -121,5 +121,5 @@ class TokenRequired:
 
 
 def _equal(given: str, token: str) -> bool:
-    """Compared in a time that does not tell how much of it is right."""
+    """Whether both are equal, compared in a time that does not depend on how much of them is."""
     return hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())

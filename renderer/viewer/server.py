@@ -1,4 +1,4 @@
-"""The server in a thread of its own: where it listens, and how it ends."""
+"""The server in a thread of its own: its socket, its address and its end."""
 
 import logging
 import os
@@ -15,9 +15,9 @@ from renderer.viewer.protocol import MAX_MESSAGE_BYTES
 from renderer.viewer.security import is_loopback, new_token
 from renderer.viewer.shown import ShownScene
 
-# Seconds for connections to end; what they compute stops between tiles.
+# Seconds for connections to end; their pictures stop between tiles.
 _LAST_WORDS = 1
-# Seconds after which waiting looks up: on Windows Ctrl-C would not be heard before.
+# Seconds per turn of ``wait``: on Windows Ctrl-C has no effect before a turn ends.
 _PATIENCE = 0.5
 
 
@@ -30,19 +30,19 @@ class ViewerServer:
     def __init__(self, shown: ShownScene, host: str, port: int, framed: bool) -> None:
         """Listen on ``host`` and ``port``, 0 for a free one; ``framed`` lets pages of this machine frame this one.
 
-        On a ``host`` that other machines reach, only who knows the address as printed, with its token, is served.
+        On a ``host`` that other machines reach, only requests with the token of the printed address are served.
         Raises ``ValueError`` where the host is none of this machine's or the port is taken.
         """
         listening = _listen(host, port)
         address, port = listening.getsockname()[:2]
         token = None if is_loopback(address) else new_token()
         self.url = _address(host, port, token)
-        # The notebook's server is another origin, on a port that nobody can know here.
+        # The notebook's server is another origin, on a port that is not known here.
         ancestors = "frame-ancestors 'self'" + (" http://127.0.0.1:* http://localhost:*" if framed else "")
         config = uvicorn.Config(
             make_app(shown, host, port, token, ancestors),
             log_config=None,  # the caller's logging is its own
-            log_level="error",  # so that a bad client fills nobody's screen
+            log_level="error",  # so that a bad client does not fill the screen
             access_log=False,
             server_header=False,
             ws_max_size=MAX_MESSAGE_BYTES,
@@ -87,17 +87,17 @@ class ViewerServer:
 
 
 def _no_mere_refusal(record: logging.LogRecord) -> bool:
-    """Leaves out what uvicorn says of each WebSocket that is refused by an HTTP answer: 0.54 takes it for our fault."""
+    """Leaves out uvicorn's message on each WebSocket refused by an HTTP answer, which 0.54 takes for an app's error."""
     return record.getMessage() != "ASGI callable returned without completing handshake."
 
 
 def _no_lost_client(record: logging.LogRecord) -> bool:
-    """Leaves out what asyncio says of words that our server sends to a page that has gone."""
+    """Leaves out asyncio's message on data that our server sends to a page that has gone."""
     return not (record.threadName == "viewer" and record.getMessage() == "socket.send() raised exception.")
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    """A listening socket. A busy port is an error: another one would not be where the user looks for it."""
+    """A listening socket. A busy port is an error, because the user expects the page on this port."""
     expect(isinstance(host, str), "host", "a string", type(host).__name__)
     expect(isinstance(port, int) and 0 <= port <= 65535, "port", "an integer from 0 to 65535", repr(port))
     try:
@@ -106,7 +106,7 @@ def _listen(host: str, port: int) -> socket.socket:
         raise ValueError(f"host: expected a name or address of this machine, got {host!r} ({error})") from None
     listening = socket.socket(family, kind, protocol)
     try:
-        if os.name == "posix":  # where it means: even if a connection of an ended server still lingers
+        if os.name == "posix":  # there it allows a port on which a connection of an ended server still lingers
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(address)
         listening.listen()
@@ -117,6 +117,6 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def _address(host: str, port: int, token: str | None) -> str:
-    """What to enter in a browser on this machine."""
+    """The address to enter in a browser on this machine."""
     name = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
     return f"http://{name}:{port}/" + (f"?token={token}" if token else "")

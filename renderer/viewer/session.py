@@ -1,7 +1,7 @@
 """One page's connection: its newest view is shown pass by pass, its clicks answered, its scene changed.
 
-Messages arrive on the event loop and only leave word there; what computes runs on threads, so that nothing waits for
-it. Of what arrives faster than it can be answered only the newest counts.
+Messages arrive on the event loop and are only noted there; pictures are computed on threads, so that no message waits
+for them. Of messages that arrive faster than they can be answered only the newest counts.
 """
 
 import asyncio
@@ -21,14 +21,14 @@ from renderer.viewer.protocol import Ack, CameraMessage, Cancel, OpenScene, Pick
 from renderer.viewer.shown import ShownScene
 from renderer.viewer.viewpoint import camera_of, camera_toml
 
-# Seconds between words of progress: ten a second look smooth and cost nothing.
+# Seconds between messages of progress: ten per second look smooth and cost nothing.
 _PROGRESS = 0.1
 
 T = TypeVar("T")
 
 
 class SupersededError(Exception):
-    """Raised between the tiles of a picture that nobody waits for any more."""
+    """Raised between the tiles of a picture that is not wanted any more."""
 
 
 class Newest(Generic[T]):
@@ -39,7 +39,7 @@ class Newest(Generic[T]):
         self._came = asyncio.Event()
 
     def put(self, item: T | None) -> None:
-        """Leave ``item``; None leaves nothing, and makes what was taken before outdated all the same."""
+        """Leave ``item``. None leaves nothing, but makes the item that was taken last outdated all the same."""
         self._item = item
         self._came.set()
 
@@ -58,7 +58,7 @@ class Newest(Generic[T]):
 
 
 class SceneHost(Protocol):
-    """Where the scene is shown to all connections."""
+    """The holder of the scene that is shown to all connections."""
 
     shown: ShownScene
 
@@ -68,7 +68,7 @@ class SceneHost(Protocol):
 
 @dataclass
 class Connection:
-    """How messages leave."""
+    """The functions that send messages to the page."""
 
     text: Callable[[str], Awaitable[None]]
     binary: Callable[[bytes], Awaitable[None]]
@@ -76,7 +76,7 @@ class Connection:
 
 @dataclass(eq=False)
 class Session:
-    """One connection. ``threads`` runs what computes: a picture, one more whose last tiles end, and a click."""
+    """One connection. ``threads`` computes a picture, the one before it whose last tiles end, and a click."""
 
     host: SceneHost
     connection: Connection
@@ -92,7 +92,7 @@ class Session:
         self._leaving: set[asyncio.Future[Any]] = set()
 
     async def receive(self, text: str) -> None:
-        """Take one message in. What is wrong with it is told to the page."""
+        """Take one message in, and tell the page of a fault in it."""
         try:
             message = parse(text)
             if isinstance(message, CameraMessage):
@@ -120,7 +120,7 @@ class Session:
             tasks.create_task(self._open_scenes())
 
     async def complain(self, error: Exception) -> None:
-        """Tell the page what is wrong, on one line."""
+        """Send the page an error's message, on one line."""
         await self._tell(type="error", message=" ".join(str(error).split()) or type(error).__name__)
 
     async def tell_of_scene(self) -> None:
@@ -130,7 +130,7 @@ class Session:
 
     async def _show_views(self) -> None:
         while True:
-            # Its first pass is not begun before the page has drawn the last picture: by then there may be a newer view.
+            # No view is begun before the page has drawn the last picture: by then there may be a newer one.
             await self._acknowledged.wait()
             view = await self.views.take()
             try:
@@ -142,8 +142,8 @@ class Session:
                 await self.complain(error)
 
     async def _show(self, view: CameraMessage, wanted: Pass) -> None:
-        """Compute and send one pass. The first is always shown, however fast views come, or a slow machine would show
-        none while the camera moves; brute force is not, as it takes seconds.
+        """Compute and send one pass. The first of a view is always shown, however fast views come, or a slow machine
+        would show none while the camera moves. That of brute force is not, because it takes seconds.
         """
         stubborn = wanted.step == 0 and view.mode != "brute"
         if view.mode == "brute" and self._leaving:
@@ -159,9 +159,7 @@ class Session:
         await self.connection.binary(message)
 
     async def _computed(self, view: CameraMessage, wanted: Pass, stubborn: bool) -> Answer:
-        """The pass's answer. A newer view leaves the tiles under way to themselves: they end soon, the others never
-        begin.
-        """
+        """The pass's answer. A newer view does not wait for the tiles under way, which end soon; no others begin."""
         shown, left, done = self.host.shown, threading.Event(), 0
 
         def finished(tiles: int) -> None:
@@ -216,7 +214,7 @@ class Session:
                 await self.complain(error)
 
     def _camera(self, message: SaveCamera) -> str:
-        """The camera as TOML. Its target is where its axis passes the middle of the scene, if that lies ahead."""
+        """The camera as TOML. Its target is the point of its axis nearest the scene's middle, if that lies ahead."""
         camera = camera_of(message.m, message.fovy)
         if not message.walk:
             middle = np.mean(self.host.shown.prepared.mesh.bounds, axis=0)

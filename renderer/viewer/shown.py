@@ -1,4 +1,4 @@
-"""A scene on show: made ready once for all who look at it, and varied by what their panels choose."""
+"""A scene on show: prepared once for all connections, and varied by the settings of their panels."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,9 +19,9 @@ from renderer.viewer.protocol import ViewSettings
 
 @dataclass(frozen=True, eq=False)
 class ShownScene:
-    """What the page shows.
+    """The scene as the page shows it.
 
-    path   the scene file, or None for a scene made in Python
+    path      the scene file, or None for a scene made in Python
     prepared  the scene over its octree, ready for any number of bounces
     """
 
@@ -54,16 +54,16 @@ class ShownScene:
 
 
 def prepare(scene: Scene, path: Path | None = None) -> ShownScene:
-    """Make ``scene`` ready and its kernels warm. Raises ``ValueError`` for a scene that cannot be shown."""
+    """Prepare ``scene`` and load its kernels. Raises ``ValueError`` for a scene that cannot be shown."""
     expect(any(len(i.mesh.faces) for i in scene.instances), "scene", "at least one face", "none")
-    # One bounce stands for any number of them: a panel may ask for more than the file does.
+    # At least one bounce, because a panel may ask for more than the file does; needs are the same for any number above.
     threads, needs = available_threads(), needs_of(scene, max_depth=max(1, scene.render.max_depth))
     prepared = prepare_scene(scene, needs, "octree", "midpoint", threads)
-    # Mirrors and glass need no lights, and a scene of them alone has none packed; their colours a face do.
+    # No lights are packed for a scene of mirrors and glass alone, which needs none; but its face colours need them.
     prepared = replace(
         prepared, arrays=prepared.arrays._replace(lights=light_rows(scene, replace(prepared.needs, shadows=True)))
     )
-    # The first call of a kernel loads or compiles it, which the first picture should not wait for.
+    # The first call of a kernel loads or compiles it; the first picture should not wait for that.
     few = {"resolution": (8, 8), "samples": 1, "max_rays": 1}
     prepared.picture(scene.camera, scene.render.model_copy(update=few), BOUNDED, threads)
     touch_viewing(prepared)
@@ -76,9 +76,9 @@ def open_file(path: Path) -> ShownScene:
 
 
 def varied(prepared: PreparedScene, settings: ViewSettings) -> PreparedScene:
-    """``prepared`` without what ``settings`` switch off, its first directional light turned; no tree is rebuilt.
+    """``prepared`` without the features that ``settings`` switch off, and with its first directional light turned.
 
-    Lights that are dark do not count, and without a directional light none is turned.
+    No tree is rebuilt. Lights that are dark do not count, and without a directional light none is turned.
     """
     materials, lights = prepared.arrays.materials.copy(), prepared.arrays.lights.copy()
     needs, media = prepared.needs, prepared.arrays.media
@@ -96,7 +96,7 @@ def varied(prepared: PreparedScene, settings: ViewSettings) -> PreparedScene:
     )
 
 
-# Rays a pixel of a first picture, of 16,384 pixels: a second of tracing at the most.
+# The most rays per pixel in a first picture of 16,384 pixels: a second of tracing at the most.
 SOON = 256
 
 
@@ -105,7 +105,7 @@ def render_settings(
 ) -> RenderSettings:
     """The renderer's settings for a picture of ``size`` (w, h). Depth, normal and face need no light and no bounce.
 
-    Pictures before the last must come soon, whatever the scene does to rays.
+    Pictures before the last have at most SOON rays per sample, so that they come soon in any scene.
     """
     seen_directly = settings.aov in ("depth", "normal", "face")
     return RenderSettings(

@@ -16,7 +16,7 @@ def view(
 ) -> "ViewerServer":
     """Show ``scene``, or a scene file, in the interactive viewer, and return at once.
 
-    host     where to listen; other than this machine's own addresses it takes a token, which ``url`` then holds
+    host     the address to listen on; one that other machines reach takes a token, which ``url`` then holds
     port     0 takes a free one
     browser  whether to open a browser; by default unless this is a notebook, which shows the result inline
 

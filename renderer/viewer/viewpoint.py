@@ -1,7 +1,7 @@
-"""The page's camera as one of ours, and as the table of a scene file.
+"""The page's camera as a ``PerspectiveCamera``, and as the table of a scene file.
 
-The page says where its camera stands by a matrix from camera to world, sixteen numbers column by column: unit vectors
-to the right, up and back, and the eye, each with a fourth number.
+The page sends its camera as a matrix from camera to world, sixteen numbers column by column: unit vectors to the right,
+up and back, and the eye, each with a fourth number.
 """
 
 import math
