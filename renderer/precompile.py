@@ -22,6 +22,7 @@ from renderer.kernels import store as kernel_store
 from renderer.kernels.jit import is_on_disk
 from renderer.kernels.notice import QUIET_VARIABLE
 from renderer.mesh.mesh import Mesh
+from renderer.mesh.polygons import triangulate
 from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 from renderer.picture.prepare import PreparedScene, prepare_scene
@@ -62,6 +63,15 @@ def _trace(count: int) -> None:
     Octree.from_mesh(_TRIANGLE).closest_hit(rays, -rays)
 
 
+def _leave() -> None:
+    Octree.from_mesh(_TRIANGLE).any_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
+
+
+def _cut() -> None:
+    notched = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 0.5, 0.0], [0.0, 2.0, 0.0]])
+    triangulate(notched, np.array([1, 2, 3, 0]), np.array([0, 4]))
+
+
 def _search() -> None:
     BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
@@ -82,7 +92,9 @@ _QUERIES = (
     Part("refit", _refit),
     Part("a few rays", partial(_trace, 1)),
     Part("many rays", partial(_trace, 20)),
+    Part("rays that leave faces", _leave),
     Part("brute force", _search),
+    Part("concave polygons", _cut),
 )
 _PICTURES = (Part("pictures", _render), Part("the viewer", _view))
 # By the name of the command's option.

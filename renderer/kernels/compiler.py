@@ -12,7 +12,7 @@ and does without this module where it fails.
 import pickle
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from functools import cached_property, update_wrapper
+from functools import update_wrapper
 from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
@@ -34,6 +34,7 @@ from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, 
 
 from renderer.kernels.notice import compiling
 from renderer.kernels.store import KernelStore
+from renderer.lazy import lazy
 
 # No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
 # Every option is set, because Numba would take an unset one from the kernel whose compiling asked for this one.
@@ -250,7 +251,7 @@ class Kernel:
     def __call__(self, *arguments: Any) -> Any:
         return self.entry(*arguments)
 
-    @cached_property
+    @lazy
     def entry(self) -> Any:
         """The dispatcher that Python calls."""
         entry = CPUDispatcher(self.py_func, targetoptions=self._options, pipeline_class=_EntryCompiler)
@@ -258,12 +259,12 @@ class Kernel:
             entry._cache = self.store
         return entry
 
-    @cached_property
+    @lazy
     def piece(self) -> _Piece:
         """The dispatcher that kernels call."""
         return _Piece(self.py_func, targetoptions=self._options, pipeline_class=_PieceCompiler)
 
-    @cached_property
+    @lazy
     def store(self) -> KernelStore:
         """The files of its machine code."""
         return KernelStore(self.py_func)

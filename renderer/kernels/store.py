@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from logging import getLogger
 from pathlib import Path
 from stat import S_ISREG
@@ -29,6 +29,7 @@ from numba.core.serialize import dumps
 
 from renderer.kernels.digest import PACKAGE, is_ours, source_digest
 from renderer.kernels.levels import AHEAD_VARIABLE, FEATURES, LEVELS
+from renderer.lazy import lazy
 from renderer.process.files import write_atomically
 
 # The kernels that a wheel for one platform contains.
@@ -66,7 +67,7 @@ class KernelStore:
         written = _folders(self._home).written
         return None if written is None or self._digest is None else str(written)
 
-    @cached_property
+    @lazy
     def _digest(self) -> str | None:
         """The digest of all that the kernel's code depends on; None where that is not known.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import plain_array, real_array
 from renderer.errors import MeshError
+from renderer.lazy import lazy
 
 Float64Array = NDArray[np.float64]
 Int32Array = NDArray[np.int32]
@@ -147,7 +147,7 @@ class Mesh:
             raise self._error(f"faces: expected {there}, got {faces[row, corner]} in row {row}")
         return faces.astype(np.int32, copy=False)
 
-    @cached_property
+    @lazy
     def bounds(self) -> tuple[Float64Array, Float64Array]:
         """Least and greatest corner, each (3,) float64; (inf, -inf) when there are no vertices."""
         if len(self.vertices) == 0:
@@ -165,7 +165,7 @@ class Mesh:
         """Corner positions, (F, 3 corners, 3) float64, a new array."""
         return self.vertices[self.faces]
 
-    @cached_property
+    @lazy
     def is_float32(self) -> bool:
         """Whether float32 holds every vertex exactly."""
         with np.errstate(over="ignore", under="ignore"):

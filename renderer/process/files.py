@@ -58,6 +58,8 @@ def _temporary_beside(path: str | os.PathLike[str]) -> Iterator[tuple[Path, Path
         raise ValueError(f"path: expected a name of a file, got {os.fspath(path)!r}: {error}") from None
     if target.is_symlink():  # after all were followed
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    if target.is_file() and not os.access(target, os.W_OK):  # renaming would not ask
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
     # Created by open(), so that it gets the permissions that any new file would.
     temporary = target.with_name(f".{target.name[:100]}.{uuid4().hex[:12]}")
     try:

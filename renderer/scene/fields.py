@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from renderer.errors import SceneError
+from renderer.lazy import lazy
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 FiniteVector = tuple[_Number, _Number, _Number]
@@ -32,7 +33,7 @@ class Fields(BaseModel):
     Raises ``SceneError``, which is a ``ValueError``, with one line that names the field.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, ignored_types=(lazy,))
 
     def __init__(self, /, **values: Any) -> None:
         try:

@@ -7,7 +7,6 @@ bad value is one ``SceneError`` that names the file, the key's path, the value t
 import os
 import tomllib
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from renderer.errors import MeshError, SceneError, expect
+from renderer.lazy import lazy
 from renderer.mesh.load import MESH_SUFFIXES, load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.process.files import read_whole, write_atomically
@@ -142,7 +142,7 @@ class Instance:
     material: str
     smooth: bool
 
-    @cached_property
+    @lazy
     def normals(self) -> NDArray[np.float64]:
         """The file's own vertex normals, or else the mean of the faces around each vertex, (V, 3) float64."""
         return self.mesh.normals if self.mesh.normals is not None else self.mesh.vertex_normals()
@@ -173,7 +173,7 @@ class Scene(Fields):
     def _union_member(keys: Keys) -> int | None:
         return {"camera": 1, "materials": 2, "lights": 2}.get(str(keys[0])) if keys else None
 
-    @cached_property
+    @lazy
     def instances(self) -> tuple[Instance, ...]:
         """The world-space meshes: the objects in their order, then the floor's (one for each material)."""
         placed = [

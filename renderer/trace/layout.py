@@ -1,11 +1,12 @@
 """The layout in memory of nodes and of blocks of triangles, which the kernels and the builder share."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from renderer.lazy import lazy
 
 CACHE_LINE = 64
 
@@ -63,7 +64,7 @@ class Tree:
         """The memory of ``nodes`` as int32."""
         return self.nodes.view(np.int32)
 
-    @cached_property
+    @lazy
     def words(self) -> NDArray[np.int64]:
         """(TREE_WORDS,) int64: the tree as kernels read it. It holds addresses, valid as long as the tree is kept."""
         words = np.zeros(TREE_WORDS, np.int64)

@@ -1,10 +1,10 @@
 """A scene on show: prepared once for all connections, and varied by the settings of their panels."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 from renderer.errors import expect
+from renderer.lazy import lazy
 from renderer.picture.pack import light_rows
 from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene, tree_for
 from renderer.precompile import touch_viewing
@@ -46,7 +46,7 @@ class ShownScene:
         assert self.path is not None  # which mypy cannot tell
         return self.path.parent / file
 
-    @cached_property
+    @lazy
     def brute(self) -> PreparedScene:
         """The same scene with every ray tested against every face."""
         octree = build_octree(self.prepared.mesh, "brute", "midpoint", self.prepared.needs, self.threads)

@@ -124,10 +124,11 @@ for points in (vertices, vertices.astype(np.float32)):
         for rays in (points, np.asfortranarray(points), points[::2], points.tolist(), constant):
             target.closest_hit(rays, rays)
             target.any_hit(rays, rays, t_min=0.5, t_max=np.full(len(rays), 9.0))
+            target.closest_hit(rays[:9], rays[:9], leaving=np.arange(9, dtype=np.int32))
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(script).splitlines()[-1].split(maxsplit=1)
-    assert int(count) == 30 and not new
+    assert int(count) == 33 and not new
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
@@ -230,6 +231,6 @@ sys.stderr = Terminal()
 assert main(["compile", "--queries"]) == 0
 shown = sys.stderr.getvalue()
 sys.stderr = sys.__stderr__
-print("brute force" in shown, "/5 " in shown)
+print("brute force" in shown, "/7 " in shown)
 """
     assert output(script).split()[-2:] == ["True", "True"]

@@ -161,3 +161,19 @@ def test_an_origin_out_of_bounds_is_told_as_it_was_given(origin):
     with pytest.raises(ValueError, match=r"origins: .*row 1") as told:
         octree.any_hit([[0.0, 0.0, 3.0], origin], [[0.0, 0.0, 1.0]] * 2, leaving=0)
     assert str(origin) in str(told.value)
+
+
+@pytest.mark.parametrize("exponent", [-1000, -830, -600, -512, 512, 700, 1000])
+def test_meshes_of_extreme_size_are_left_too(exponent):
+    """The cross product of the sides vanished, or was infinite: NaN for a start, or the face itself at t = 0."""
+    rng = np.random.default_rng(1)
+    corners = rng.normal(size=(3, 3)) * 2.0**exponent
+    octree = Octree(corners, [[0, 1, 2]])
+    starts = rng.dirichlet([1.0] * 3, 2000) @ corners
+    assert not octree.any_hit(starts, rng.normal(size=(2000, 3)), leaving=0).any()
+
+
+def test_a_direction_that_is_no_number_is_blamed_not_the_origin():
+    octree = Octree.from_mesh(icosphere(1))
+    with pytest.raises(ValueError, match=r"directions: .*nan.* in row 1"):
+        octree.any_hit(np.zeros((2, 3)), [[0.0, 0.0, 1.0], [np.nan, 0.0, 1.0]], leaving=[0, 1])

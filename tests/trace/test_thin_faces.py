@@ -72,6 +72,21 @@ def test_a_ray_leaves_a_face_of_no_area():
     assert not octree.any_hit(hits.points[thin], outwards[thin], leaving=hits.face[thin]).any()
 
 
+@pytest.mark.parametrize("beside", [0.0, 1e-17, 1e-16, 1e-15, 3e-15, 1e-14, 5e-14, 1e-12, 1e-9, 1e-6])
+def test_a_ray_leaves_a_face_however_thin_in_whatever_direction(beside):
+    """The start had stayed within rounding of the face, because the normal pointed along it."""
+    rng = np.random.default_rng(4)
+    for size in 10.0 ** rng.uniform(-30, 30, 10):
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [rng.random(), beside, 0.0]]) @ turn.T * size
+        starts = np.concatenate([rng.dirichlet([0.4] * 3, 900), np.repeat(np.eye(3), 34, axis=0)]) @ corners
+        directions = rng.normal(size=starts.shape)
+        # Half of them nearly along the face.
+        directions[::2] = directions[::2] * 10.0 ** rng.uniform(-14, 0, (501, 1)) + (corners[1] - corners[0]) / size
+        octree = Octree(corners, [[0, 1, 2]])
+        assert not octree.any_hit(starts, directions, leaving=0).any()
+
+
 @pytest.mark.parametrize("material", [Phong(diffuse=0.5, specular=0.3), Mirror(), Dielectric(ior=1.5)])
 def test_a_picture_of_a_face_of_no_area_is_finite_and_has_no_hole(material):
     """Tiny fields of view, because wider ones would need luck to meet it."""
