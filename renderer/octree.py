@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.errors import MeshError, expect
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.process.parallel import checked_threads
-from renderer.trace.layout import CHILDREN, LANES, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
-from renderer.trace.query import Hits, any_hits, check_rays, closest_hits, left
+from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.trace.query import Hits, any_hits, check_rays, closest_hits, moved_off
 from renderer.tree.build import SPLITS, build_blocks, build_tree
 from renderer.tree.hierarchy import Rule
 from renderer.tree.refit import refit_tree
 
-MAX_LEAF_SIZE = LANES * MAX_LEAF_BLOCKS
+MAX_LEAF_SIZE = BLOCK_FACES * MAX_LEAF_BLOCKS
 MAX_DEPTH = 64
 # Boxes are float32, and the products of two of their extents must neither overflow nor vanish. Meshes beyond these
 # sizes are scaled by a power of two, which is exact.
@@ -49,7 +49,7 @@ class Stats:
     @property
     def fill(self) -> float:
         """The share of the blocks' places that hold a face; 1 where there is no block."""
-        return self.references / (self.blocks * LANES) if self.blocks else 1.0
+        return self.references / (self.blocks * BLOCK_FACES) if self.blocks else 1.0
 
 
 class _Accelerator:
@@ -107,7 +107,7 @@ class _Accelerator:
         mesh, tree = self._built
         rays = check_rays(origins, directions, t_min, t_max)
         if leaving is not None:
-            rays = left(rays, leaving, mesh, tree.scale, self.threads)
+            rays = moved_off(rays, leaving, mesh, tree.scale, self.threads)
         return closest_hits(tree, rays, mesh, self.threads)
 
     def any_hit(
@@ -127,7 +127,7 @@ class _Accelerator:
         mesh, tree = self._built
         rays = check_rays(origins, directions, t_min, t_max)
         if leaving is not None:
-            rays = left(rays, leaving, mesh, tree.scale, self.threads)
+            rays = moved_off(rays, leaving, mesh, tree.scale, self.threads)
         return any_hits(tree, rays, self.threads)
 
     def refit(self, vertices: ArrayLike) -> None:
@@ -163,7 +163,7 @@ class _Accelerator:
             nodes=len(children),
             leaves=int((used & (children < 0)).sum()),
             depth=tree.depth,
-            blocks=len(tree.faces) // LANES,
+            blocks=len(tree.faces) // BLOCK_FACES,
             references=int((tree.faces >= 0).sum()),
             bytes=tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes,
             cost=_cost(tree),
@@ -300,7 +300,7 @@ def _octants(tree: Tree) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
 def _cost(tree: Tree) -> float:
     """``Stats.cost``; every box counts whole where the root's has no area, and every block where there is no node."""
     if not len(tree.nodes):
-        return float(len(tree.faces) // LANES)
+        return float(len(tree.faces) // BLOCK_FACES)
     rows = tree.nodes.reshape(-1, NODE_WORDS)[:, :CHILDREN].reshape(-1, 3, 2, 8)
     children, used = _octants(tree)
     extents = np.where(used[:, None], np.float64(rows[:, :, 1]) - rows[:, :, 0], 0.0)

@@ -1,7 +1,7 @@
 """Short vectors as values in Numba kernels: 8 x float32, 4 x float64 and their masks.
 
 This is the one file that touches llvmlite. A vector lives in a register; it is made by ``load*`` or ``splat*`` and
-leaves through ``store``, ``lane`` or ``movemask``. ``+ - * /`` and the comparisons work lane by lane. A comparison
+leaves through ``store``, ``extract`` or ``movemask``. ``+ - * /`` and the comparisons work lane by lane. A comparison
 gives a mask that is unset where either value is NaN, for ``!=`` too; masks have ``&`` and ``|``. No operation carries
 fast-math flags, so nothing becomes a fused multiply-add: the signs of the edge functions in ``intersect`` depend on
 that.
@@ -327,7 +327,7 @@ def magnitude(typingctx, vector):
 
 
 @intrinsic
-def lane(typingctx, vector, index):
+def extract(typingctx, vector, index):
     """The value in one lane; the index may vary at run time."""
     result = types.float32 if vector.scalar == "f32" else types.float64
 

@@ -24,7 +24,7 @@ _TOWARDS, _ARRIVING, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE
 
 
 @kernel
-def trace_any(tree, rays, found, count, scratch, any_hit):
+def trace_rays(tree, rays, found, count, scratch, any_hit):
     """``trace`` of the first ``count`` rays, or ``search_blocks`` where the tree has no nodes."""
     if tree.has_nodes:
         trace(tree, rays, found, 0, count, scratch, any_hit)
@@ -84,7 +84,7 @@ def _trace_shadows(tree, bundle, lit, aimed, work):
     """Find which of the ``aimed`` shadow rays hit anything, and count all of them in their pixels."""
     shadows = work.shadows
     rays = RayPointers(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0)
-    trace_any(tree, rays, work.found, aimed, work.trace, np.bool_(True))
+    trace_rays(tree, rays, work.found, aimed, work.trace, np.bool_(True))
     for k in range(aimed):
         pixel = get(bundle.pixels, get(lit, SIZE + k))
         put(work.traced, pixel, get(work.traced, pixel) + 1)

@@ -36,7 +36,7 @@ from renderer.shade.direct import (
     is_lit,
     light_surfaces,
     put3,
-    trace_any,
+    trace_rays,
 )
 from renderer.shade.records import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
@@ -301,7 +301,7 @@ def _collect_light(scene, bundle, work):
 def trace_bundle(tree, scene, settings, bundle, work):
     """Trace the rays of a bundle and light the surfaces that they meet; ``push_children`` spawns further rays."""
     rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 0, 0, 1.0)
-    trace_any(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
+    trace_rays(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
     _meet_surfaces(scene, bundle, work)
     light_surfaces(tree, scene, bundle, work.surfaces, work.lit, settings, work)
     _collect_light(scene, bundle, work)

@@ -29,7 +29,7 @@ UNUSED = -1
 
 # A block is nine rows of four values, one value per triangle: p0 x, p0 y, p0 z, p1 x, ... p2 z. An unused place of a
 # block has face -1 and three equal vertices, a triangle that no ray hits.
-LANES = 4
+BLOCK_FACES = 4
 BLOCK_WORDS = 36
 
 # A tree as kernels read it, int64: addresses of its arrays, the number of blocks, the levels of nodes, whether vertices
@@ -43,7 +43,7 @@ class Tree:
 
     nodes   (N * NODE_WORDS,) float32, rounded outwards from the float64 vertices; without nodes, every block is tested
     blocks  (B * BLOCK_WORDS,) float32 when every vertex is exactly a float32, else float64
-    faces   (B * LANES,) int32, the face in each place of each block, -1 where unused
+    faces   (B * BLOCK_FACES,) int32, the face in each place of each block, -1 where unused
     depth   the levels of nodes, 0 without nodes
     scale   the power of two by which the vertices were multiplied
     """
@@ -69,7 +69,7 @@ class Tree:
         """(TREE_WORDS,) int64: the tree as kernels read it. It holds addresses, valid as long as the tree is kept."""
         words = np.zeros(TREE_WORDS, np.int64)
         words[NODES], words[BLOCKS], words[FACES] = (a.ctypes.data for a in (self.nodes, self.blocks, self.faces))
-        words[BLOCK_COUNT], words[DEPTH] = len(self.faces) // LANES, self.depth
+        words[BLOCK_COUNT], words[DEPTH] = len(self.faces) // BLOCK_FACES, self.depth
         words[WIDE] = self.blocks.dtype == np.float64
         words[SCALE] = np.float64(self.scale).view(np.int64)
         return words

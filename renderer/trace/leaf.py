@@ -7,18 +7,18 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import (
     double_of,
+    extract,
     float32_pointer,
     float64_pointer,
     get,
     int32_pointer,
-    lane,
     lowest_bit,
     pointer,
     smaller,
 )
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import hit_triangles, make_shear
-from renderer.trace.layout import BLOCK_COUNT, BLOCK_WORDS, BLOCKS, DEPTH, FACES, LANES, NODES, SCALE, WIDE
+from renderer.trace.layout import BLOCK_COUNT, BLOCK_FACES, BLOCK_WORDS, BLOCKS, DEPTH, FACES, NODES, SCALE, WIDE
 
 
 class TreePointers(NamedTuple):
@@ -77,10 +77,10 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            ti = lane(t4, i)
-            fi = get(tree.faces, block * LANES + i)
+            ti = extract(t4, i)
+            fi = get(tree.faces, block * BLOCK_FACES + i)
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
-                t, face, u, v, w = ti, fi, lane(u4, i), lane(v4, i), lane(w4, i)
+                t, face, u, v, w = ti, fi, extract(u4, i), extract(v4, i), extract(w4, i)
     return t, face, u, v, w, doubtful
 
 
@@ -94,8 +94,8 @@ def nearest_carefully(tree, first, count, ray, shear, best):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            fi = get(tree.faces, block * LANES + i)
-            hit = lane(t4, i), lane(u4, i), lane(v4, i), lane(w4, i)
+            fi = get(tree.faces, block * BLOCK_FACES + i)
+            hit = extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)
             if (doubts >> i) & 1 != 0:
                 hit = settled(tree, base + i, ray, hit, (blurred >> i) & 1 != 0)
             if hit[0] >= ray.t_min and (hit[0] < t or (hit[0] == t and fi < face)):

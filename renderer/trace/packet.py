@@ -14,9 +14,9 @@ from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import (
     bits_float,
     count_bits,
+    extract,
     float_bits,
     get,
-    lane,
     larger,
     least,
     load8,
@@ -194,10 +194,10 @@ def _push_sorted(node, bits, t0, key, stack, top):
     """
     key = select(key > splat8(np.float32(-np.inf)), key, splat8(np.float32(-np.inf)))
     for i in range(8):
-        k = splat8(lane(key, i))
+        k = splat8(extract(key, i))
         before, after = movemask(key >= k) & ((1 << i) - 1), movemask(key > k) & (0xFF << (i + 1))
         place = count_bits((before | after) & bits) if (bits >> i) & 1 else 8
-        put(stack, top + place, (float_bits(lane(t0, i)) << 32) | (node * 8 + i))
+        put(stack, top + place, (float_bits(extract(t0, i)) << 32) | (node * 8 + i))
     return top + count_bits(bits)
 
 
@@ -206,7 +206,7 @@ def _push_all(node, bits, t0, stack, top):
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        put(stack, top, (float_bits(lane(t0, i)) << 32) | (node * 8 + i))
+        put(stack, top, (float_bits(extract(t0, i)) << 32) | (node * 8 + i))
         top += 1
     return top
 

@@ -12,7 +12,7 @@ from renderer.errors import expect
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh.mesh import Mesh, face_normals
 from renderer.process.parallel import for_chunks
-from renderer.trace.layout import LANES, Tree
+from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HIT_ROWS
 from renderer.trace.singly import FEW_DEPTH, stack_size, trace_few
@@ -159,7 +159,7 @@ def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
     return type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2 and values.shape[1] == 3
 
 
-def left(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: int) -> RayBatch:
+def moved_off(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: int) -> RayBatch:
     """The rays with their starts moved off the faces ``leaving``, see ``spawn.leave_faces``; ``scale`` is the tree's.
 
     Raises ``ValueError`` naming the argument and, for a face that is not there or an origin out of bounds, its row.
@@ -238,7 +238,7 @@ def rays_against_blocks(tree: Tree) -> int:
     """The number of rays in a chunk of brute force: some 10 ms of work, so that Ctrl-C and other threads need not wait
     for long.
     """
-    return max(1, _BLOCK_TESTS * LANES // max(1, len(tree.faces)))
+    return max(1, _BLOCK_TESTS * BLOCK_FACES // max(1, len(tree.faces)))
 
 
 def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any_hit: bool) -> None:

@@ -37,7 +37,7 @@ class Prepared(NamedTuple):
 
 
 @inlined
-def prepare(rays, r, ray, t_max):
+def prepare_ray(rays, r, ray, t_max):
     """Write ``ray``, which has met nothing yet, to place ``r``."""
     floats, doubles, integers = rays
     largest = largest_of(ray)

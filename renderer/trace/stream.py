@@ -27,7 +27,7 @@ from renderer.kernels.simd import (
     store,
 )
 from renderer.trace.intersect import box_limit, enter_boxes, meet_planes, see_triangles
-from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.trace.ray_lanes import LARGEST, LIMIT, LOWER, T_MIN, WIDTH, T, best_of, put_best, shear_of, slabs_of
 
 _LOW_WORD = 0xFFFFFFFF
@@ -92,7 +92,7 @@ class Lanes(NamedTuple):
 
 
 # The numbers of int64 (without the stacks), float32 and float64 in ``Lanes``.
-LANE_INTEGERS, LANE_FLOATS, LANE_DOUBLES = 6 * WIDTH, 8 * WIDTH, 4 * LANES * WIDTH
+LANE_INTEGERS, LANE_FLOATS, LANE_DOUBLES = 6 * WIDTH, 8 * WIDTH, 4 * BLOCK_FACES * WIDTH
 
 
 @inlined
@@ -191,27 +191,27 @@ def meet_leaves(tree, rays, lanes, count):
         t, doubt, _, due = meet_planes(edges, shear, t_min, t_max)
         put(lanes.bits, r, movemask(seen & (t >= splat4(t_min)) & (t <= splat4(t_max))) & ~movemask(doubt))
         put(lanes.doubts, r, movemask(seen & due))
-        hits = 4 * LANES * r
+        hits = 4 * BLOCK_FACES * r
         store(lanes.hits, hits, t)
-        store(lanes.hits, hits + LANES, edges.e1)
-        store(lanes.hits, hits + 2 * LANES, edges.e2)
-        store(lanes.hits, hits + 3 * LANES, edges.determinant)
+        store(lanes.hits, hits + BLOCK_FACES, edges.e1)
+        store(lanes.hits, hits + 2 * BLOCK_FACES, edges.e2)
+        store(lanes.hits, hits + 3 * BLOCK_FACES, edges.determinant)
 
 
 @inlined
 def take_hits(tree, rays, lanes, r):
     """Keep the best hit of a leaf's first block. Returns whether there is one, and whether any hit was in doubt."""
-    block, bits, hits = ~get(lanes.child, r) >> LEAF_BITS, get(lanes.bits, r), at(lanes.hits, 4 * LANES * r)
+    block, bits, hits = ~get(lanes.child, r) >> LEAF_BITS, get(lanes.bits, r), at(lanes.hits, 4 * BLOCK_FACES * r)
     doubtful = get(lanes.doubts, r)
     if bits != 0:
         t, face, u, v, w = best_of(rays, r)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            ti, fi = get(hits, i), get(tree.faces, block * LANES + i)
+            ti, fi = get(hits, i), get(tree.faces, block * BLOCK_FACES + i)
             if ti < t or (ti == t and fi < face):
                 t, face = ti, fi
-                u, v, w = get(hits, LANES + i), get(hits, 2 * LANES + i), get(hits, 3 * LANES + i)
+                u, v, w = get(hits, BLOCK_FACES + i), get(hits, 2 * BLOCK_FACES + i), get(hits, 3 * BLOCK_FACES + i)
         put_best(rays, r, (t, face, u, v, w))
         put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
         return True, doubtful != 0

@@ -10,7 +10,7 @@ from renderer.kernels.simd import at, get, lowest_bit, pointer, put, smaller
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import NO_FACE, search_all_blocks, tree_pointers
 from renderer.trace.packet import child_of, meet_octant, trace_packet
-from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare
+from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare_ray
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.singly import search_singly, stack_size
 from renderer.trace.stream import (
@@ -117,7 +117,7 @@ def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
 def _load(rays, scratch, r, i):
     """Let ray ``i`` begin in lane ``r``."""
     ray, t_max = ray_at(rays, i)
-    prepare(scratch.prepared, r, ray, t_max)
+    prepare_ray(scratch.prepared, r, ray, t_max)
     begin_ray(scratch.lanes, r)
     put(scratch.number, r, i)
     put(scratch.doubtful, r, 0)
@@ -206,7 +206,7 @@ def _trace_sixteen(tree, rays, found, first, scratch, any_hit):
     prepared = scratch.prepared
     for r in range(WIDTH):
         ray, t_max = ray_at(rays, first + r)
-        prepare(prepared, r, ray, t_max)
+        prepare_ray(prepared, r, ray, t_max)
     top, doubtful = trace_packet(tree, prepared, scratch.packet_stack, any_hit)
     if top > 0:
         _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import float32_pointer, float64_pointer, put
 from renderer.process.parallel import for_chunks
-from renderer.trace.layout import BLOCK_WORDS, LANES, cache_aligned
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, cache_aligned
 
 # Vertices and blocks per chunk: a tenth of a millisecond, beside which taking a chunk costs nothing.
 _VERTICES, _BLOCKS = 1 << 16, 1 << 12
@@ -21,14 +21,14 @@ def _fill(vertices, faces, block_faces, address, wide, begin, end):
     The blocks stand at ``address``, float64 where ``wide``, else float32: one kernel for both.
     """
     doubles, floats = float64_pointer(address), float32_pointer(address)
-    for place in range(begin * LANES, end * LANES):
+    for place in range(begin * BLOCK_FACES, end * BLOCK_FACES):
         face = block_faces[place]
-        first = faces[block_faces[place // LANES * LANES], 0]
-        base = place // LANES * BLOCK_WORDS + place % LANES
+        first = faces[block_faces[place // BLOCK_FACES * BLOCK_FACES], 0]
+        base = place // BLOCK_FACES * BLOCK_WORDS + place % BLOCK_FACES
         for corner in range(3):
             vertex = first if face < 0 else faces[face, corner]
             for axis in range(3):
-                at = base + LANES * (3 * corner + axis)
+                at = base + BLOCK_FACES * (3 * corner + axis)
                 if wide:
                     put(doubles, at, vertices[vertex, axis])
                 else:
@@ -48,7 +48,7 @@ def fill_blocks(
                 inexact.append(begin)
 
     for_chunks(check, len(vertices), _VERTICES, threads)
-    count = len(block_faces) // LANES
+    count = len(block_faces) // BLOCK_FACES
     blocks = cache_aligned(count * BLOCK_WORDS, np.float64 if inexact else np.float32)
     address, wide = blocks.ctypes.data, blocks.dtype == np.float64
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import lane, load8, select, splat8, store
+from renderer.kernels.simd import extract, load8, select, splat8, store
 from renderer.trace.intersect import face_range
 
 # A box is eight 32-bit words: lower x, y, z, a face, and the negated upper x, y, z, and an unused one. The upper corner
@@ -57,7 +57,7 @@ def united(a, b):
 @inlined
 def half_area(box):
     """Half the area of a box as a vector."""
-    x, y, z = -lane(box, 4) - lane(box, 0), -lane(box, 5) - lane(box, 1), -lane(box, 6) - lane(box, 2)
+    x, y, z = -extract(box, 4) - extract(box, 0), -extract(box, 5) - extract(box, 1), -extract(box, 6) - extract(box, 2)
     return x * y + y * z + z * x
 
 

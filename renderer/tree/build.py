@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.process.parallel import for_chunks
-from renderer.trace.layout import LANES, NODE_WORDS, Tree, cache_aligned
+from renderer.trace.layout import BLOCK_FACES, NODE_WORDS, Tree, cache_aligned
 from renderer.tree.blocks import fill_blocks
 from renderer.tree.bounds import BOX, Faces, face_boxes, fit
 from renderer.tree.collapse import collapse
@@ -57,7 +57,7 @@ def build_tree(
 
 def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], scale: float = 1.0, threads: int = 1) -> Tree:
     """The blocks alone, in the order of the faces, for a search without a tree."""
-    block_faces = np.full(-(-len(faces) // LANES) * LANES, -1, np.int32)
+    block_faces = np.full(-(-len(faces) // BLOCK_FACES) * BLOCK_FACES, -1, np.int32)
     block_faces[: len(faces)] = np.arange(len(faces))
     return Tree(np.empty(0, np.float32), fill_blocks(vertices, faces, block_faces, threads), block_faces, 0, scale)
 
@@ -139,7 +139,11 @@ def _build_subtrees(order: Faces, rule: Rule, top: Hierarchy, levels: list[int],
             found = build_subtree(order, rule, *top.ranges[part].tolist(), levels[part], space)
             link, cost, nodes, blocks, depth = found
             built[part] = _Subtree(
-                space.nodes[: nodes * NODE_WORDS].copy(), space.block_faces[: blocks * LANES].copy(), link, cost, depth
+                space.nodes[: nodes * NODE_WORDS].copy(),
+                space.block_faces[: blocks * BLOCK_FACES].copy(),
+                link,
+                cost,
+                depth,
             )
         idle.append(space)
 
@@ -158,11 +162,11 @@ def _join(
     above, _ = _emit_top(top, subtrees, [(0, 0)] * len(subtrees))
     parts = list(subtrees.values())
     nodes_before = np.cumsum([len(above)] + [len(built.nodes) for built in parts]) // NODE_WORDS
-    blocks_before = np.cumsum([0] + [len(built.block_faces) for built in parts]) // LANES
+    blocks_before = np.cumsum([0] + [len(built.block_faces) for built in parts]) // BLOCK_FACES
     starts = list(zip(nodes_before.tolist(), blocks_before.tolist(), strict=True))
     above, depth = _emit_top(top, subtrees, starts[:-1])
     nodes = cache_aligned(int(nodes_before[-1]) * NODE_WORDS, np.float32)
-    block_faces = np.empty(int(blocks_before[-1]) * LANES, np.int32)
+    block_faces = np.empty(int(blocks_before[-1]) * BLOCK_FACES, np.int32)
     nodes[: len(above)] = above
     links = nodes.view(np.int32)
 

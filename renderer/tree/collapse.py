@@ -8,7 +8,7 @@ import numpy as np
 
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import load8
-from renderer.trace.layout import LANES
+from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX, half_area
 
 # The costs of entering a node and of testing a block.
@@ -19,7 +19,7 @@ BLOCK_COST = np.float32(1.0)
 @kernel
 def leaf_cost(tree, part):
     """The expected cost of a part as one leaf."""
-    blocks = (tree.ranges[part, 1] - tree.ranges[part, 0] + LANES - 1) // LANES
+    blocks = (tree.ranges[part, 1] - tree.ranges[part, 0] + BLOCK_FACES - 1) // BLOCK_FACES
     return half_area(load8(tree.boxes, part * BOX)) * np.float32(blocks) * BLOCK_COST
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import larger
-from renderer.trace.layout import CHILDREN, LANES, LEAF_BITS, NODE_WORDS, UNUSED
+from renderer.trace.layout import BLOCK_FACES, CHILDREN, LEAF_BITS, NODE_WORDS, UNUSED
 from renderer.tree.bounds import BOX, FACE
 
 # The most parts that wait to become nodes: seven per level. Cuts by the split rule end after 3 * 64 levels, the
@@ -95,21 +95,21 @@ def _share_out(tree, part, left, share, shares, shared):
 @kernel
 def leaf_link(block, count):
     """The link to a leaf of ``count`` faces whose first block is ``block``."""
-    return ~((block << LEAF_BITS) | ((count + LANES - 1) // LANES - 1))
+    return ~((block << LEAF_BITS) | ((count + BLOCK_FACES - 1) // BLOCK_FACES - 1))
 
 
 @kernel
 def emit_leaf(tree, part, numbers, block_faces, blocks):
     """Write a part's faces to the blocks from ``blocks`` on, the last filled up with -1. Returns the block after it."""
     begin, end = tree.ranges[part]
-    at = blocks * LANES
+    at = blocks * BLOCK_FACES
     for i in range(begin, end):
         block_faces[at] = numbers[i * BOX + FACE]
         at += 1
-    while at % LANES > 0:
+    while at % BLOCK_FACES > 0:
         block_faces[at] = -1
         at += 1
-    return at // LANES
+    return at // BLOCK_FACES
 
 
 @kernel
@@ -146,4 +146,4 @@ def place_subtree(words, block_faces, start, links, all_block_faces):
         for k in range(at + CHILDREN, at + CHILDREN + 8):
             links[k] = moved_link(links[k], node, block)
     for i in range(len(block_faces)):
-        all_block_faces[block * LANES + i] = block_faces[i]
+        all_block_faces[block * BLOCK_FACES + i] = block_faces[i]

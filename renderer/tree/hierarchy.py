@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import smaller
-from renderer.trace.layout import LANES
+from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX
 
 MIDPOINT, SAH = 0, 1
@@ -66,4 +66,4 @@ def add_part(tree, part, begin, end):
 @kernel
 def whole_size(rule):
     """The most faces of a part that is never cut, because they fit into one block."""
-    return smaller(rule.leaf_size, LANES)
+    return smaller(rule.leaf_size, BLOCK_FACES)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.trace.intersect import ROOM
-from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 
 
 def faults(tree: Tree, mesh: Mesh) -> list[str]:
@@ -18,7 +18,7 @@ def faults(tree: Tree, mesh: Mesh) -> list[str]:
     """
     found = _block_faults(tree, mesh)
     nodes = len(tree.nodes) // NODE_WORDS
-    reached, blocks_reached = np.zeros(nodes, np.int64), np.zeros(len(tree.faces) // LANES, np.int64)
+    reached, blocks_reached = np.zeros(nodes, np.int64), np.zeros(len(tree.faces) // BLOCK_FACES, np.int64)
     infinite = (np.full(3, -np.inf), np.full(3, np.inf))
     pending = [(0, 1, *infinite)] if nodes or len(mesh.faces) else []
     while pending:
@@ -66,7 +66,7 @@ def _leaf_faults(
     if first + count > len(blocks_reached):
         return [f"{where}: leaf of blocks {first} to {first + count - 1} of {len(blocks_reached)}"]
     blocks_reached[first : first + count] += 1
-    faces = tree.faces[first * LANES : (first + count) * LANES]
+    faces = tree.faces[first * BLOCK_FACES : (first + count) * BLOCK_FACES]
     faces = faces[(faces >= 0) & (faces < len(mesh.faces))]
     corners = mesh.vertices[mesh.faces[faces]]
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -84,7 +84,7 @@ def _block_faults(tree: Tree, mesh: Mesh) -> list[str]:
     found += [f"place {p}: face {tree.faces[p]} of {len(mesh.faces)}" for p in np.flatnonzero(bad)]
     counts = np.bincount(tree.faces[known], minlength=len(mesh.faces))
     found += [f"face {f}: expected in 1 place, is in {counts[f]}" for f in np.flatnonzero(counts != 1)]
-    rows = tree.blocks.reshape(-1, BLOCK_WORDS // LANES, LANES).transpose(0, 2, 1).reshape(-1, 3, 3)
+    rows = tree.blocks.reshape(-1, BLOCK_WORDS // BLOCK_FACES, BLOCK_FACES).transpose(0, 2, 1).reshape(-1, 3, 3)
     wrong = (rows[known] != mesh.vertices[mesh.faces[tree.faces[known]]]).any(axis=(1, 2))
     found += [f"face {f}: its vertices in the block differ from the mesh's" for f in tree.faces[known][wrong]]
     idle = rows[~used]

@@ -7,7 +7,7 @@ from renderer.kernels.jit import kernel
 from renderer.kernels.simd import larger, smaller
 from renderer.process.parallel import for_chunks
 from renderer.trace.intersect import face_range
-from renderer.trace.layout import CHILDREN, LANES, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, cache_aligned
+from renderer.trace.layout import BLOCK_FACES, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, cache_aligned
 from renderer.tree.blocks import fill_blocks
 
 # Nodes per chunk when leaves are fitted: some tenths of a millisecond.
@@ -22,8 +22,8 @@ def _fit_leaves(vertices, faces, block_faces, nodes, links, begin, end):
             at = node * NODE_WORDS + place
             code = ~links[at + CHILDREN]
             if code >= 0 and nodes[at] <= nodes[at + 8]:
-                first = (code >> LEAF_BITS) * LANES
-                last = first + ((code & (MAX_LEAF_BLOCKS - 1)) + 1) * LANES
+                first = (code >> LEAF_BITS) * BLOCK_FACES
+                last = first + ((code & (MAX_LEAF_BLOCKS - 1)) + 1) * BLOCK_FACES
                 _fit_leaf(vertices, faces, block_faces, (first, last), nodes, at)
 
 

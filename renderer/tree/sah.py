@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import larger, load8, smaller, store
-from renderer.trace.layout import LANES
+from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX, double_centre, empty_box, half_area, united
 from renderer.tree.hierarchy import add_part
 
@@ -100,7 +100,7 @@ def _best_plane(room, first, bins):
         if counts[first + k] > 0:
             box = united(box, load8(room.boxes, (first + k) * BOX))
             n += counts[first + k]
-        beyond[k] = half_area(box) * np.float32((n + LANES - 1) // LANES) if n > 0 else np.float32(-1.0)
+        beyond[k] = half_area(box) * np.float32((n + BLOCK_FACES - 1) // BLOCK_FACES) if n > 0 else np.float32(-1.0)
     best, at = np.float32(np.inf), -1
     box, n = empty_box(), np.int64(0)
     for k in range(bins - 1):
@@ -109,7 +109,7 @@ def _best_plane(room, first, bins):
         if counts[first + k] > 0:
             box = united(box, load8(room.boxes, (first + k) * BOX))
             n += counts[first + k]
-            cost = half_area(box) * np.float32((n + LANES - 1) // LANES) + beyond[k + 1]
+            cost = half_area(box) * np.float32((n + BLOCK_FACES - 1) // BLOCK_FACES) + beyond[k + 1]
             if at < 0 or cost < best:
                 best, at = cost, k
     return best, at

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import kernel
-from renderer.trace.layout import LANES, NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, NODE_WORDS
 from renderer.tree.bounds import BOX, fit
 from renderer.tree.collapse import collapse, leaf_cost
 from renderer.tree.emit import EmitRoom, emit_leaf, emit_nodes, emit_room, leaf_link
@@ -48,7 +48,7 @@ def new_workspace(faces: int) -> Workspace:
     """Memory for subtrees of up to ``faces`` faces, most of which a subtree leaves untouched."""
     nodes = np.empty(max(1, faces) * NODE_WORDS, np.float32)
     tree = new_hierarchy(max(1, 2 * faces - 1))
-    block_faces, no_ends = np.empty(faces * LANES, np.int32), np.empty((0, 2), np.int32)
+    block_faces, no_ends = np.empty(faces * BLOCK_FACES, np.int32), np.empty((0, 2), np.int32)
     return Workspace(tree, new_room(), nodes, nodes.view(np.int32), block_faces, no_ends)
 
 

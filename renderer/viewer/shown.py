@@ -53,7 +53,7 @@ class ShownScene:
         return replace(self.prepared, octree=octree, tree=tree_for(octree, self.prepared.needs))
 
 
-def prepare(scene: Scene, path: Path | None = None) -> ShownScene:
+def prepare_shown(scene: Scene, path: Path | None = None) -> ShownScene:
     """Prepare ``scene`` and load its kernels. Raises ``ValueError`` for a scene that cannot be shown."""
     expect(any(len(i.mesh.faces) for i in scene.instances), "scene", "at least one face", "none")
     # At least one bounce, because a panel may ask for more than the file does; needs are the same for any number above.
@@ -72,7 +72,7 @@ def prepare(scene: Scene, path: Path | None = None) -> ShownScene:
 
 def open_file(path: Path) -> ShownScene:
     """Load a scene file and make it ready. Raises ``ValueError``, which ``SceneError`` is, naming file and fault."""
-    return prepare(load_scene(path), path)
+    return prepare_shown(load_scene(path), path)
 
 
 def varied(prepared: PreparedScene, settings: ViewSettings) -> PreparedScene:

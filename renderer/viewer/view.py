@@ -31,10 +31,10 @@ def view(
         told = f"the viewer needs the package {package}; {extra_hint('viewer')}"
         raise ModuleNotFoundError(told, name=package) from None
     from renderer.precompile import compile_in_two
-    from renderer.viewer.shown import open_file, prepare
+    from renderer.viewer.shown import open_file, prepare_shown
 
     compile_in_two()
-    shown = prepare(scene) if isinstance(scene, Scene) else open_file(Path(scene))
+    shown = prepare_shown(scene) if isinstance(scene, Scene) else open_file(Path(scene))
     notebook = in_notebook()
     viewing = ViewerServer(shown, host, port, framed=notebook)
     if browser if browser is not None else not notebook:

@@ -12,7 +12,7 @@ from renderer.inspect.tree_boxes import boxes_at, levels, visited
 from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import BruteForce, Octree
 from renderer.trace.intersect import ROOM
-from renderer.trace.layout import CHILDREN, LANES, NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, CHILDREN, NODE_WORDS
 from tests.meshes import KINDS, make_mesh, rays_at
 
 
@@ -41,7 +41,7 @@ def places(octree: Octree) -> list[Place]:
             box, faces = np.array(lower + upper) / octree.tree.scale, None
             if child < 0:
                 first, count = ~child // 8, ~child % 8 + 1
-                faces = tree.faces[LANES * first : LANES * (first + count)]
+                faces = tree.faces[BLOCK_FACES * first : BLOCK_FACES * (first + count)]
             else:
                 pending.append((child, level + 1, len(found)))
             found.append(Place(level + 1, box, parent, faces))

@@ -7,12 +7,12 @@ from numba import njit
 from renderer.kernels.simd import (
     bits_float,
     double_of,
+    extract,
     float32_pointer,
     float64_pointer,
     float_bits,
     get,
     int32_pointer,
-    lane,
     larger,
     load4,
     load8,
@@ -104,9 +104,9 @@ def test_products_and_differences_are_not_fused():
 @njit
 def lanes_of(a8, a4, out8, out4):
     for i in range(8):
-        out8[i] = lane(load8(a8, 0), i)
+        out8[i] = extract(load8(a8, 0), i)
     for i in range(4):
-        out4[i] = lane(load4(a4, 0), i)
+        out4[i] = extract(load4(a4, 0), i)
 
 
 def test_lanes_may_be_chosen_at_run_time():

@@ -12,7 +12,7 @@ from meshes import arrays, assert_same_hits, make_mesh, rays_at
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import grid, icosphere
 from renderer.octree import MAX_DEPTH, MAX_LEAF_SIZE, BruteForce, Octree
-from renderer.trace.layout import CHILDREN, LANES, NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, CHILDREN, NODE_WORDS
 from renderer.tree.invariants import faults
 
 ROOT = Path(__file__).parents[2]
@@ -238,8 +238,8 @@ def test_stats_count_what_is_there():
     stats, tree = octree.stats, octree.tree
     assert stats.faces == stats.references == 1280
     assert stats.bytes == tree.nodes.nbytes + tree.blocks.nbytes + tree.faces.nbytes
-    assert stats.fill == 1280 / (LANES * stats.blocks)
-    assert stats.nodes * NODE_WORDS * 4 == tree.nodes.nbytes and stats.blocks * LANES == len(tree.faces)
+    assert stats.fill == 1280 / (BLOCK_FACES * stats.blocks)
+    assert stats.nodes * NODE_WORDS * 4 == tree.nodes.nbytes and stats.blocks * BLOCK_FACES == len(tree.faces)
     # Each leaf and each node but the root hangs in one place of a node.
     used = int((tree.nodes.reshape(stats.nodes, -1)[:, :8] < np.inf).sum())
     assert used == stats.leaves + stats.nodes - 1
@@ -261,7 +261,7 @@ def test_options_shape_the_tree(split):
         used = octree.tree.nodes.reshape(-1, NODE_WORDS)[:, :8] < np.inf
         for code in ~links[used & (links < 0)]:
             first, count = code >> 3, (code & 7) + 1
-            assert (octree.tree.faces[first * LANES : (first + count) * LANES] >= 0).sum() <= size
+            assert (octree.tree.faces[first * BLOCK_FACES : (first + count) * BLOCK_FACES] >= 0).sum() <= size
 
 
 def test_float32_vertices_take_half_the_memory_and_give_the_same_hits():

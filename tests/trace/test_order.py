@@ -13,11 +13,11 @@ from meshes import assert_same_hits, make_mesh, options, rays_at, separate
 from numba import njit
 from numpy.random import Generator
 
-from renderer.kernels.simd import lane
+from renderer.kernels.simd import extract
 from renderer.octree import BruteForce, Octree
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import Ray, hit_triangles, make_shear
-from renderer.trace.layout import BLOCK_WORDS, LANES
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.query import Hits
 
@@ -177,9 +177,9 @@ def judged(words, origins, directions, out):
     for i in range(len(origins)):
         o, d = origins[i], directions[i]
         ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
-        base, place = (i // LANES) * BLOCK_WORDS, i % LANES
+        base, place = (i // BLOCK_FACES) * BLOCK_WORDS, i % BLOCK_FACES
         bits, doubts, blurred, _, t4 = hit_triangles(tree, base, make_shear(ray), 0.0, np.inf)[:5]
-        t = lane(t4, place)
+        t = extract(t4, place)
         if (bits >> place) & 1 == 1 and t >= 0.0:
             out[i, 0], out[i, 1] = 1 + ((doubts >> place) & 1) + ((blurred >> place) & 1), t
             # A sure hit is settled too, to see that its t stays.

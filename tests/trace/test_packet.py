@@ -13,7 +13,7 @@ from renderer.octree import BruteForce, Octree
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
 from renderer.trace.layout import NODE_WORDS
 from renderer.trace.packet import enter_beam, make_beam
-from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare
+from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare_ray
 from renderer.trace.rays import RayPointers
 from renderer.trace.traverse import are_coherent
 
@@ -114,7 +114,7 @@ def _meet_beam_and_rays(nodes, origins, directions, t_max, room):
     for r in range(WIDTH):
         o, d = origins[r], directions[r]
         ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
-        prepare(rays, r, ray, t_max)
+        prepare_ray(rays, r, ray, t_max)
         largest = max(abs(d[0]), max(abs(d[1]), abs(d[2])))
         farthest = box_limit(t_max, largest)
         limit = max(limit, farthest)

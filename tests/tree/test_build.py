@@ -13,7 +13,7 @@ from meshes import KINDS, arrays, make_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
-from renderer.trace.layout import LANES
+from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX, FACE, Faces, face_boxes
 from renderer.tree.build import SPLITS, build_parts, build_tree
 from renderer.tree.collapse import BLOCK_COST, NODE_COST, collapse
@@ -105,7 +105,7 @@ def test_octants_lie_on_their_sides_of_the_middle(kind):
     whole = [tree.ranges[part] for part in np.flatnonzero(tree.halves < 0)]
     sides = [{tuple(side) for side in above[numbers[begin:end]]} for begin, end in whole]
     # A part of several octants has no more faces than a block.
-    assert all(len(found) == 1 or end - begin <= LANES for found, (begin, end) in zip(sides, whole, strict=True))
+    assert all(len(found) == 1 or end - begin <= BLOCK_FACES for found, (begin, end) in zip(sides, whole, strict=True))
     assert len(whole) == 8
 
 
@@ -116,7 +116,7 @@ def test_the_sah_cut_is_as_cheap_as_the_best_of_its_planes(seed):
 
     def cost(faces):
         x, y, z = own[faces, 1].max(axis=0) - own[faces, 0].min(axis=0)
-        return (x * y + y * z + z * x) * -(-len(faces) // LANES)
+        return (x * y + y * z + z * x) * -(-len(faces) // BLOCK_FACES)
 
     found = sum(cost(numbers[begin:end]) for begin, end in tree.ranges[1:3])
     centres = own.sum(axis=1)
@@ -153,7 +153,7 @@ def cheapest(tree, leaf_size):
         ways = []
         first = int(tree.halves[part])
         if size <= leaf_size or first < 0:
-            ways.append(area * float(BLOCK_COST) * -(-size // LANES))
+            ways.append(area * float(BLOCK_COST) * -(-size // BLOCK_FACES))
         if first >= 0:
             ways.append(area * float(NODE_COST) + min(forest(first, k) + forest(first + 1, 8 - k) for k in range(1, 8)))
         return min(ways)

@@ -11,7 +11,7 @@ from meshes import KINDS, make_mesh, meshes, options
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
-from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LANES, LEAF_BITS, NODE_WORDS, Tree
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, Tree
 from renderer.tree.invariants import faults
 
 
@@ -68,7 +68,7 @@ class Broken:
 
     def corners(self, place):
         """The nine words of one place of the blocks, as indices."""
-        return place // LANES * BLOCK_WORDS + place % LANES + LANES * np.arange(9)
+        return place // BLOCK_FACES * BLOCK_WORDS + place % BLOCK_FACES + BLOCK_FACES * np.arange(9)
 
 
 def shrink(side):

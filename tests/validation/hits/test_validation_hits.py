@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.trace.layout import LANES
+from renderer.trace.layout import BLOCK_FACES
 from renderer.trace.query import Hits
 from validation.gates import Gate
 from validation.hits import check as check_hits
@@ -74,7 +74,7 @@ def broken(monkeypatch: pytest.MonkeyPatch, change: Callable[[Octree], None]) ->
 
 def _drop_a_face(octree: Octree) -> None:
     """Collapse the triangle in the first place of block 7 to a point, as an unused place is."""
-    rows = octree.tree.blocks.reshape(-1, 9, LANES)
+    rows = octree.tree.blocks.reshape(-1, 9, BLOCK_FACES)
     rows[7, 3:6, 0] = rows[7, 0:3, 0]
     rows[7, 6:9, 0] = rows[7, 0:3, 0]
 
@@ -86,7 +86,7 @@ def _scale_vertices(octree: Octree) -> None:
 def _swap_two_faces(octree: Octree) -> None:
     """Report the face of another block, so that t belongs to a face that is elsewhere."""
     faces = octree.tree.faces
-    faces[[0, LANES * 40]] = faces[[LANES * 40, 0]]
+    faces[[0, BLOCK_FACES * 40]] = faces[[BLOCK_FACES * 40, 0]]
 
 
 @pytest.mark.parametrize("change", [_drop_a_face, _scale_vertices, _swap_two_faces])
