@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import MeshError, expect
 from renderer.mesh.mesh import Mesh, Repairs
+from renderer.points.contains import contains
 from renderer.process.parallel import checked_threads
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 from renderer.trace.query import Hits, any_hits, check_rays, closest_hits, moved_off
@@ -129,6 +130,33 @@ class _Accelerator:
         if leaving is not None:
             rays = moved_off(rays, leaving, mesh, tree.scale, self.threads)
         return any_hits(tree, rays, self.threads)
+
+    def contains(
+        self, points: ArrayLike, boundary: bool = True, rule: Literal["nonzero", "even-odd"] = "nonzero"
+    ) -> NDArray[np.bool_]:
+        """Whether each point lies inside the closed mesh, (...,) bool, exactly: no votes and no tolerance.
+
+        points    (..., 3), finite
+        boundary  the answer for points on the surface itself, which is told exactly too
+        rule      "nonzero": inside where the surface winds around the point, so solids may overlap. "even-odd": inside
+                  where a way out crosses the surface an odd number of times, however its faces are turned
+
+        The mesh is closed where each edge is passed as often in one direction as in the other ("nonzero") or an even
+        number of faces has it ("even-odd"), vertices told apart by position. The answer is that of real arithmetic for
+        the float64 coordinates given, and the same bits for any number of threads. Raises ``ValueError`` for points
+        that are not finite, with the row, and for a mesh that is not closed, with its open edges.
+
+        Source: Shewchuk, Adaptive Precision Floating-Point Arithmetic, 1997, for the signs.
+
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree.from_mesh(box())
+        >>> octree.contains([[0.5, 0.5, 0.5], [1, 0.5, 0.5], [2, 0, 0]])
+        array([ True,  True, False])
+        >>> octree.contains([[0.5, 0.5, 0.5], [1, 0.5, 0.5], [2, 0, 0]], boundary=False)
+        array([ True, False, False])
+        """
+        mesh, tree = self._built
+        return contains(tree, mesh, points, boundary, rule, self.threads)
 
     def refit(self, vertices: ArrayLike) -> None:
         """Move the vertices and keep the faces: ``vertices`` is (V, 3), finite, V as built.

@@ -72,6 +72,12 @@ def _cut() -> None:
     triangulate(notched, np.array([1, 2, 3, 0]), np.array([0, 4]))
 
 
+def _contain() -> None:
+    mesh = icosphere(0)
+    for accelerator in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+        accelerator.contains([0.0, 0.0, 0.0])
+
+
 def _search() -> None:
     BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
@@ -94,6 +100,7 @@ _QUERIES = (
     Part("many rays", partial(_trace, 20)),
     Part("rays that leave faces", _leave),
     Part("brute force", _search),
+    Part("points inside", _contain),
     Part("concave polygons", _cut),
 )
 _PICTURES = (Part("pictures", _render), Part("the viewer", _view))

@@ -28,7 +28,8 @@ def difference(a, b):
 
 
 @inlined
-def _sum(a, b):
+def exact_sum(a, b):
+    """a + b of two float64, exactly."""
     head = a + b
     back = head - a
     return head, (a - (head - back)) + (b - back)
@@ -43,7 +44,7 @@ def _halves(a):
 
 
 @inlined
-def _product(a, b):
+def exact_product(a, b):
     """a b of two float64, exactly."""
     head = a * b
     (a1, a2), (b1, b2) = _halves(a), _halves(b)
@@ -53,9 +54,9 @@ def _product(a, b):
 @kernel
 def plus(a, b):
     """a + b of two pairs."""
-    s, t = _sum(a[0], b[0]), _sum(a[1], b[1])
-    s = _sum(s[0], s[1] + t[0])
-    return _sum(s[0], s[1] + t[1])
+    s, t = exact_sum(a[0], b[0]), exact_sum(a[1], b[1])
+    s = exact_sum(s[0], s[1] + t[0])
+    return exact_sum(s[0], s[1] + t[1])
 
 
 @kernel
@@ -67,8 +68,8 @@ def minus(a, b):
 @kernel
 def product(a, b):
     """a b of two pairs."""
-    head, tail = _product(a[0], b[0])
-    return _sum(head, tail + (a[0] * b[1] + a[1] * b[0]))
+    head, tail = exact_product(a[0], b[0])
+    return exact_sum(head, tail + (a[0] * b[1] + a[1] * b[0]))
 
 
 @kernel

@@ -187,6 +187,17 @@ def local_words(typingctx):
 
 
 @intrinsic
+def local_doubles(typingctx):
+    """A ``pointer`` to LOCAL_WORDS float64, as ``local_words``."""
+
+    def codegen(context, builder, sig, args):
+        words = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), LOCAL_WORDS))
+        return builder.bitcast(words, ir.DoubleType().as_pointer())
+
+    return types.CPointer(types.float64)(), codegen
+
+
+@intrinsic
 def double_of(typingctx, bits):
     """The float64 whose bits are those of an int64."""
 

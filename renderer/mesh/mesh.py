@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.arrays import plain_array, real_array
 from renderer.errors import MeshError
 from renderer.lazy import lazy
+from renderer.mesh.edges import open_edges
 
 Float64Array = NDArray[np.float64]
 Int32Array = NDArray[np.int32]
@@ -208,6 +209,16 @@ class Mesh:
         forward = np.sort(start * count + end)
         backward = np.sort(end * np.int64(count) + start)
         return bool((forward[1:] != forward[:-1]).all() and (forward == backward).all())
+
+    @lazy
+    def open_edges(self) -> NDArray[np.int64]:
+        """(k, 2) vertices of the edges that are not passed as often in one direction as in the other, by position."""
+        return open_edges(self.vertices, self.faces, oriented=True)
+
+    @lazy
+    def odd_edges(self) -> NDArray[np.int64]:
+        """(k, 2) vertices of the edges that an odd number of faces has, by position."""
+        return open_edges(self.vertices, self.faces, oriented=False)
 
     def transformed(self, matrix: object) -> Mesh:
         """A copy moved by an affine map.

@@ -110,6 +110,7 @@ from renderer.inspect.face_phong import face_colors
 from renderer.inspect.ray_path import ray_path
 from renderer.picture.prepare import prepare_scene
 from renderer.inspect.tree_boxes import visited
+from renderer.mesh.shapes import box
 for name in ("three_models", "stairs", "glass"):
     for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
         render(load_scene(f"scenes/{name}.toml"), resolution=(3, 2), **options)
@@ -125,10 +126,12 @@ for points in (vertices, vertices.astype(np.float32)):
             target.closest_hit(rays, rays)
             target.any_hit(rays, rays, t_min=0.5, t_max=np.full(len(rays), 9.0))
             target.closest_hit(rays[:9], rays[:9], leaving=np.arange(9, dtype=np.int32))
+BruteForce.from_mesh(box()).contains(vertices.tolist())
+Octree.from_mesh(box(), threads=2).contains(np.asfortranarray(vertices.astype(np.float32)))
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(script).splitlines()[-1].split(maxsplit=1)
-    assert int(count) == 33 and not new
+    assert int(count) == 34 and not new
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
@@ -231,6 +234,6 @@ sys.stderr = Terminal()
 assert main(["compile", "--queries"]) == 0
 shown = sys.stderr.getvalue()
 sys.stderr = sys.__stderr__
-print("brute force" in shown, "/7 " in shown)
+print("brute force" in shown, "/8 " in shown)
 """
     assert output(script).split()[-2:] == ["True", "True"]

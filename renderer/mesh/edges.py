@@ -1,0 +1,26 @@
+"""Edges of a mesh that bound nothing: those at which its surface is open."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def open_edges(vertices: NDArray[np.float64], faces: NDArray[np.int32], oriented: bool) -> NDArray[np.int64]:
+    """(k, 2) vertex numbers of the edges at which a surface is open, one row for each place, in the order of the faces.
+
+    Vertices are told apart by position, so triangle soup is as closed as a shared mesh. With ``oriented`` an edge is
+    closed where as many faces pass it in one direction as in the other, else where an even number of faces has it.
+    """
+    # 0.0 added, so that -0.0 is the same place.
+    place = np.unique(np.ascontiguousarray(vertices + 0.0).view("V24").ravel(), return_inverse=True)[1].ravel()
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    first, second = place[start], place[end]
+    # An edge from a place to itself, of a face with two corners in one place, bounds nothing.
+    real = first != second
+    start, end, first, second = start[real], end[real], first[real], second[real]
+    low, high = np.minimum(first, second).astype(np.int64), np.maximum(first, second)
+    _, rows, edge = np.unique(low * len(vertices) + high, return_index=True, return_inverse=True)
+    ways = np.where(first < second, 1.0, -1.0) if oriented else None
+    passed = np.bincount(edge.ravel(), weights=ways, minlength=len(rows))
+    is_open = passed != 0 if oriented else passed % 2 == 1
+    found = np.sort(rows[is_open])
+    return np.stack([start[found], end[found]], axis=1).astype(np.int64)

@@ -1,0 +1,1 @@
+"""Questions that points ask of a mesh."""

@@ -1,0 +1,64 @@
+"""Points inside a closed mesh: checks at the boundary, chunks on threads."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.arrays import real_array
+from renderer.errors import expect
+from renderer.mesh.mesh import Mesh
+from renderer.points.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_crossings
+from renderer.points.fractions import crossings_of
+from renderer.points.signs import UNDECIDED
+from renderer.process.parallel import for_chunks
+from renderer.trace.layout import Tree
+
+_CHUNK = 4096
+RULES = ("nonzero", "even-odd")
+
+
+def contains(tree: Tree, mesh: Mesh, points: ArrayLike, boundary: bool, rule: str, threads: int) -> NDArray[np.bool_]:
+    """Whether each point lies inside, see ``Octree.contains``."""
+    expect(rule in RULES, "rule", f"one of {RULES}", repr(rule))
+    expect(len(mesh.faces) > 0, "mesh", "faces", "none")
+    _check_closed(mesh, rule)
+    try:
+        given = real_array(points)
+    except ValueError as error:
+        raise ValueError(f"points: {error}") from None
+    expect(given.ndim >= 1 and given.shape[-1] == 3, "points", "shape (..., 3)", f"shape {given.shape}")
+    rows = np.ascontiguousarray(given, np.float64).reshape(-1, 3)
+    finite = np.isfinite(rows).all(axis=1)
+    if not finite.all():
+        row = int((~finite).argmax())
+        expect(False, "points", "finite numbers", f"{rows[row].tolist()} in row {row}")
+    counts = _counted(tree, mesh, rows, threads)
+    on = counts[:, ON]
+    inside = counts[:, WINDING] != 0 if rule == "nonzero" else counts[:, CROSSINGS] % 2 == 1
+    return np.where(on == 1, boundary, inside).reshape(given.shape[:-1])
+
+
+def _check_closed(mesh: Mesh, rule: str) -> None:
+    """Raise ``ValueError`` for a mesh that has no inside."""
+    edges = mesh.open_edges if rule == "nonzero" else mesh.odd_edges
+    if len(edges):
+        start, end = mesh.vertices[edges[0]].tolist()
+        expected = "a closed mesh" if rule == "nonzero" else "a mesh each of whose edges an even number of faces has"
+        expect(False, "mesh", expected, f"{len(edges)} open edges, the first from {start} to {end}")
+
+
+def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) -> NDArray[np.int64]:
+    """Crossings (n, COLUMNS) of points in the mesh's units."""
+    counts = np.zeros((len(points), COLUMNS), np.int64)
+    lower, upper = mesh.bounds
+    axis = int(np.argmin(upper - lower))
+    middle = tree.scale * (lower[axis] / 2 + upper[axis] / 2)
+
+    def count(begin: int, end: int) -> None:
+        count_crossings(tree.words, points, tree.scale, axis, middle, counts, begin, end)
+
+    for_chunks(count, len(points), _CHUNK, threads)
+    triangles = None
+    for row in np.flatnonzero(counts[:, ON] >= UNDECIDED):
+        triangles = mesh.triangles if triangles is None else triangles
+        counts[row] = crossings_of(points[row], triangles, axis)
+    return counts

@@ -1,0 +1,155 @@
+"""Points inside closed meshes: against exact arithmetic, and every answer the same however it is asked."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from renderer import BruteForce, Mesh, Octree
+from renderer.mesh.shapes import box, icosphere, torus
+from validation.oracle.distance import rational
+from validation.oracle.inside import winding_number
+
+
+def two(first, second):
+    """Two meshes as one."""
+    return Mesh(
+        np.concatenate([first.vertices, second.vertices]),
+        np.concatenate([first.faces, second.faces + len(first.vertices)]),
+    )
+
+
+def soup(mesh):
+    """Each face with corners of its own."""
+    return Mesh(mesh.triangles.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
+
+
+def integer_star(seed):
+    """A closed mesh of small integer coordinates, so that points meet its planes, edges and corners often."""
+    ball = icosphere(1)
+    rng = np.random.default_rng(seed)
+    return Mesh(np.round(ball.vertices * rng.integers(2, 6, (len(ball.vertices), 1))), ball.faces)
+
+
+MESHES = {
+    "box": box((-1, -1, -1), (1, 1, 1)),
+    "ball": icosphere(1),
+    "icosahedron": icosphere(0),
+    "nested boxes": two(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -1), (1, 1, 1))),
+    "hollow box": two(box((-2, -2, -2), (2, 2, 2)), Mesh(box((-1, -1, -1), (1, 1, 1)).vertices, box().faces[:, ::-1])),
+    "overlapping boxes": two(box((-2, -2, -2), (1, 1, 1)), box((-1, -1, -1), (2, 2, 2))),
+    "touching boxes": two(box((-2, -1, -1), (0, 1, 1)), box((0, -1, -1), (2, 1, 1))),
+    "soup": soup(icosphere(1)),
+    "integers": integer_star(1),
+    "more integers": integer_star(2),
+}
+
+
+def points_at(mesh, rng, count):
+    """Points anywhere, in planes of vertices, on vertices, edges and faces, and a rounding beside those."""
+    lower, upper = mesh.bounds
+    anywhere = lower + (upper - lower) * (1.4 * rng.random((count, 3)) - 0.2)
+    planes = np.where(rng.random((count, 3)) < 0.5, rng.choice(mesh.vertices.ravel(), (count, 3)), anywhere)
+    corners = mesh.triangles[rng.integers(0, len(mesh.faces), count)]
+    share = rng.choice([0.0, 0.25, 0.5, 1.0], (count, 1))
+    edges = corners[:, 0] * share + corners[:, 1] * (1 - share)
+    inner = corners[:, 0] * 0.5 + corners[:, 1] * 0.25 + corners[:, 2] * 0.25
+    exact = np.concatenate([anywhere, planes, corners[:, 0], edges, inner])
+    return np.concatenate([exact, np.nextafter(exact, rng.choice([-9.0, 9.0], exact.shape))])
+
+
+def judged(mesh, points):
+    """Winding numbers by exact arithmetic, None on the surface."""
+    triangles = [rational(triangle.tolist()) for triangle in mesh.triangles]
+    return [winding_number(point, triangles) for point in rational(points.tolist())]
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_every_answer_is_that_of_exact_arithmetic(name):
+    mesh, rng = MESHES[name], np.random.default_rng(7)
+    points = points_at(mesh, rng, 4)
+    winding = judged(mesh, points)
+    on = np.array([w is None for w in winding])
+    inside = np.array([w is not None and w != 0 for w in winding])
+    odd = np.array([w is not None and w % 2 == 1 for w in winding])
+    assert on.any() and inside.any() and (~on & ~inside).any()
+    for accelerator in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh), Octree.from_mesh(mesh, split="sah")):
+        np.testing.assert_array_equal(accelerator.contains(points), inside | on)
+        np.testing.assert_array_equal(accelerator.contains(points, boundary=False), inside & ~on)
+        np.testing.assert_array_equal(accelerator.contains(points, boundary=False, rule="even-odd"), odd & ~on)
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 2**30), st.sampled_from([1e-6, 1.0, 1e6]), st.sampled_from([0.0, 1e6]))
+def test_moved_and_scaled_solids_are_judged_exactly(seed, scale, offset):
+    rng = np.random.default_rng(seed)
+    mesh = list(MESHES.values())[seed % len(MESHES)]
+    mesh = Mesh(mesh.vertices * scale + offset * rng.random(3), mesh.faces)
+    points = points_at(mesh, rng, 1)
+    winding = judged(mesh, points)
+    octree = Octree.from_mesh(mesh)
+    np.testing.assert_array_equal(octree.contains(points), [w is None or w != 0 for w in winding])
+    np.testing.assert_array_equal(octree.contains(points, boundary=False), [w is not None and w != 0 for w in winding])
+
+
+def test_threads_batches_and_shapes_change_nothing():
+    mesh, rng = torus(), np.random.default_rng(3)
+    points = points_at(mesh, rng, 300)
+    expected = Octree.from_mesh(mesh, threads=1).contains(points)
+    octree = Octree.from_mesh(mesh, threads=2)
+    np.testing.assert_array_equal(octree.contains(points), expected)
+    np.testing.assert_array_equal(octree.contains(points.reshape(-1, 100, 3)), expected.reshape(-1, 100))
+    assert octree.contains(points[0]).shape == () and octree.contains(np.empty((0, 3))).shape == (0,)
+    order = rng.permutation(len(points))
+    np.testing.assert_array_equal(octree.contains(points[order]), expected[order])
+
+
+def test_a_refit_serves_it_too():
+    octree = Octree.from_mesh(box())
+    octree.refit(octree.mesh.vertices + 10.0)
+    np.testing.assert_array_equal(octree.contains([[0.5, 0.5, 0.5], [10.5, 10.5, 10.5]]), [False, True])
+
+
+@pytest.mark.parametrize(("rule", "count"), [("nonzero", 3), ("even-odd", 3)])
+def test_an_open_mesh_has_no_inside(rule, count):
+    mesh = box()
+    with pytest.raises(ValueError, match=rf"mesh: expected a .*, got {count} open edges, the first from \[.*\] to \["):
+        Octree(mesh.vertices, mesh.faces[1:]).contains([[0.5, 0.5, 0.5]], rule=rule)
+
+
+def test_faces_turned_at_will_are_closed_for_even_odd_alone():
+    mesh = box((-1, -1, -1), (1, 1, 1))
+    faces = mesh.faces.copy()
+    faces[::2] = faces[::2, ::-1]
+    octree = Octree(mesh.vertices, faces)
+    assert octree.contains([[0.1, 0.2, 0.3], [3, 0, 0]], rule="even-odd").tolist() == [True, False]
+    with pytest.raises(ValueError, match="mesh: expected a closed mesh"):
+        octree.contains([[0.1, 0.2, 0.3]])
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        ([[0.0, 0.0]], r"points: expected shape \(\.\.\., 3\), got shape \(1, 2\)"),
+        ([[0.0, 0.0, 0.0], [0.0, np.nan, 0.0]], r"points: expected finite numbers, got \[0\.0, nan, 0\.0\] in row 1"),
+        ([["a", "b", "c"]], "points: "),
+    ],
+)
+def test_bad_points_are_named(points, said):
+    with pytest.raises(ValueError, match=said):
+        Octree.from_mesh(box()).contains(points)
+
+
+def test_an_empty_mesh_and_an_unknown_rule_are_refused():
+    with pytest.raises(ValueError, match="mesh: expected faces, got none"):
+        Octree(np.empty((0, 3)), np.empty((0, 3), int)).contains([[0.0, 0.0, 0.0]])
+    with pytest.raises(ValueError, match="rule: expected one of"):
+        Octree.from_mesh(box()).contains([[0.0, 0.0, 0.0]], rule="odd")
+
+
+def test_the_oracle_knows_a_box():
+    triangles = [rational(triangle.tolist()) for triangle in MESHES["box"].triangles]
+    for point, expected in (((0, 0, 0), 1), ((1, 0, 0), None), ((1, 1, 1), None), ((2, 0, 0), 0)):
+        assert winding_number([Fraction(x) for x in point], triangles) == expected

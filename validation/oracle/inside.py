@@ -1,0 +1,43 @@
+"""Winding numbers of closed meshes around points, in exact rational arithmetic: the judge of ``contains``."""
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+from validation.oracle.distance import Vector, cross, difference, dot, squared_distance
+
+
+def winding_number(point: Vector, triangles: Sequence[Sequence[Vector]]) -> int | None:
+    """How often the triangles of a closed mesh wind around a point, None where the point lies on one of them.
+
+    By the signed crossings of a ray in a direction that meets no edge and no corner; others are tried until one does.
+    """
+    relative = [[difference(corner, point) for corner in triangle] for triangle in triangles]
+    origin = [Fraction(0)] * 3
+    if any(squared_distance(origin, triangle) == 0 for triangle in relative):
+        return None
+    for direction in _directions():
+        crossings = [_crossing(triangle, direction) for triangle in relative]
+        if None not in crossings:
+            return sum(crossing for crossing in crossings if crossing is not None)
+    raise AssertionError("there are infinitely many directions")
+
+
+def _directions() -> Iterator[Vector]:
+    """Directions that lie in no plane that anyone would choose."""
+    k = 1
+    while True:
+        yield [Fraction(1009 * k + 1, 7919), Fraction(k * k + 3, 104729), Fraction(611953 - 17 * k, 1299709)]
+        k += 1
+
+
+def _crossing(triangle: Sequence[Vector], direction: Vector) -> int | None:
+    """1 where the ray from 0 passes a triangle from back to front, -1 the other way, None at an edge, else 0."""
+    a, b, c = triangle
+    sides = [dot(direction, cross(p, q)) for p, q in ((a, b), (b, c), (c, a))]
+    if min(sides) < 0 < max(sides):
+        return 0
+    if 0 in sides:
+        return None
+    volume = dot(a, cross(b, c))
+    # t = volume / sum of the sides.
+    return 0 if (volume > 0) != (sides[0] > 0) else (1 if sides[0] > 0 else -1)
