@@ -9,6 +9,7 @@ This relies on Numba's internals, which ``probe`` tests. ``jit`` calls it for ve
 and does without this module where it fails.
 """
 
+import os
 import pickle
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -19,6 +20,7 @@ import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from numba.core import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, compile_result
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.registry import CPUDispatcher
@@ -38,6 +40,14 @@ from renderer.lazy import lazy
 
 # No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
 # Every option is set, because Numba would take an unset one from the kernel whose compiling asked for this one.
+if hasattr(os, "register_at_fork"):
+    # A child forked while another thread compiles or loads would wait for ever for Numba's lock.
+    os.register_at_fork(
+        before=global_compiler_lock.acquire,
+        after_in_parent=global_compiler_lock.release,
+        after_in_child=global_compiler_lock.release,
+    )
+
 OPTIONS = {
     "nopython": True,
     "nogil": True,

@@ -116,7 +116,9 @@ def _parse_glb(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
 _TRIANGLES, _TRIANGLE_FAN = 4, 6
 # trimesh's time grows with the cube of the depth: a second at this one.
 _MAX_NODE_DEPTH = 256
-_UNREAD_EXTENSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+# What a file may require without a change of its triangles: the beginnings of names of extensions.
+_HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "KHR_animation_", "KHR_xmp")
+_FLOAT32 = 5126
 
 
 def _check_glb_frame(content: bytes) -> None:
@@ -142,18 +144,30 @@ def _refuse_unread(document: Any) -> None:
 
     required = document.get("extensionsRequired") if isinstance(document, dict) else None
     for extension in required if isinstance(required, list) else []:
-        if extension in _UNREAD_EXTENSIONS:
+        if not str(extension).startswith(_HARMLESS):
             raise MeshError(f"GLB: expected plain buffers, got the extension {extension}: save it without compression")
+    accessors = dicts(document, "accessors")
     for number, mesh in enumerate(dicts(document, "meshes")):
         for primitive in dicts(mesh, "primitives"):
+            _refuse_integers(primitive, accessors, number)
             if primitive.get("mode", _TRIANGLES) == _TRIANGLE_FAN:
                 raise MeshError(f"GLB: expected triangles or strips, got a TRIANGLE_FAN in mesh {number}")
-    for number, accessor in enumerate(dicts(document, "accessors")):
+    for number, accessor in enumerate(accessors):
         if "sparse" in accessor:
             raise MeshError(f"GLB: expected plain accessors, got a sparse one, accessor {number}")
         if "bufferView" not in accessor:  # all zeros, as many as it says
             raise MeshError(f"GLB: expected accessors with data, got none in accessor {number}")
     _refuse_deep(dicts(document, "nodes"))
+
+
+def _refuse_integers(primitive: dict[str, Any], accessors: list[dict[str, Any]], mesh: int) -> None:
+    """Raise ``MeshError`` for positions that are no float32: trimesh reads quantized ones as they stand."""
+    attributes = primitive.get("attributes")
+    position = attributes.get("POSITION") if isinstance(attributes, dict) else None
+    if isinstance(position, int) and 0 <= position < len(accessors):
+        kind = accessors[position].get("componentType")
+        if kind != _FLOAT32:
+            raise MeshError(f"GLB: expected float32 positions, got component type {kind} in mesh {mesh}: not quantized")
 
 
 def _refuse_deep(nodes: list[dict[str, Any]]) -> None:

@@ -44,6 +44,8 @@ _BEFORE = (1.0 + 2.0**-30) / np.float64(FAR_PADDING)
 # A face thinner than this share of its length is a line: its normal errs by 2^-100, its product with a corner by 2^-97,
 # and so the distance from the plane of any other face by 2^-49, a sixteenth of ROUNDING.
 LINE = 2.0**-48
+# What a place along the longest side errs by at most, as a share of it and of the distance: eight roundings.
+_SLACK = 2.0**-50
 
 
 @kernel
@@ -212,7 +214,9 @@ def _weights(face, normal, t):
     point = scale(sub(scale(face.direction, t), heads(face.first)), face.ratio)
     square = dot(along, along)
     place, foot = smaller(larger(dot(along, point) / square, 0.0), 1.0), dot(along, other) / square
-    most = smaller(place / foot if place < foot else 1.0, (1.0 - place) / (1.0 - foot) if place > foot else 1.0)
+    # The place errs by some roundings, which are much of it near the ends.
+    before, behind = place + _SLACK * larger(face.ratio, 1.0), 1.0 - place + _SLACK * larger(face.ratio, 1.0)
+    most = smaller(before / foot if before < foot else 1.0, behind / (1.0 - foot) if behind < 1.0 - foot else 1.0)
     apex = smaller(larger(dot(cross(normal, along), point) / dot(normal, normal), 0.0), most)
     return smaller(larger(place - apex * foot, 0.0), 1.0 - apex), apex
 
@@ -220,15 +224,28 @@ def _weights(face, normal, t):
 @kernel
 def _meet_line(face, low, high):
     """t and weights of a face whose corners lie on a line: where the ray passes its longest side."""
-    d, along, first = face.direction, heads(face.along), heads(face.first)
+    d = face.direction
     across = cross_pairs(as_pairs(d), face.along)
     # Of a ray along the side every place is as near as another.
     square = larger(dot(heads(across), heads(across)), np.finfo(np.float64).tiny)
     t = dot_pairs(cross_pairs(face.first, face.along), across)[0] / square
-    t = smaller(larger(t, low), high)
-    second = dot(sub(scale(d, t), first), along) / dot(along, along) * face.ratio
-    second = smaller(larger(second, 0.0), 1.0)
-    place = add(first, scale(along, second / face.ratio))
-    if not length(sub(place, scale(d, t))) <= ROUNDING:
+    # Where the line is nearest beyond an end of the side, or out of the box, the nearest there counts.
+    t = smaller(larger(dot(_place(face, t), d) / dot(d, d), low), high)
+    second = _second(face, t)
+    if not length(sub(_place(face, t), scale(d, t))) <= ROUNDING:
         return np.nan, 0.0, 0.0
     return t, second, 0.0
+
+
+@inlined
+def _second(face, t):
+    """The weight of the second corner at the place of the longest side that is nearest to the ray at t."""
+    along = heads(face.along)
+    way = dot(sub(scale(face.direction, t), heads(face.first)), along) / dot(along, along) * face.ratio
+    return smaller(larger(way, 0.0), 1.0)
+
+
+@inlined
+def _place(face, t):
+    """The place of the longest side that is nearest to the ray at t, relative to the origin."""
+    return add(heads(face.first), scale(heads(face.along), _second(face, t) / face.ratio))

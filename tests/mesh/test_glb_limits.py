@@ -48,3 +48,23 @@ def test_a_plain_file_and_a_chain_of_some_nodes_load(tmp_path):
 def test_what_has_no_end_is_refused(tmp_path, document, message):
     with pytest.raises(MeshError, match=f"GLB: expected (nodes .*)?{message}"):
         load_mesh(glb(tmp_path, document))
+
+
+@pytest.mark.parametrize("kind", [5120, 5121, 5122, 5123])
+@pytest.mark.parametrize("required", [[], ["KHR_mesh_quantization"]])
+def test_quantized_positions_are_refused(tmp_path, kind, required):
+    """They were read as they stand: 32767 for 1.0."""
+    accessor = {"bufferView": 0, "componentType": kind, "normalized": True, "count": 3, "type": "VEC3"}
+    message = "KHR_mesh_quantization" if required else f"component type {kind}"
+    with pytest.raises(MeshError, match=message):
+        load_mesh(glb(tmp_path, {"accessors": [accessor], "extensionsRequired": required}))
+
+
+@pytest.mark.parametrize("extension", ["EXT_mesh_gpu_instancing", "KHR_meshopt_compression", "FOO_bar"])
+def test_required_extensions_that_may_change_triangles_are_refused(tmp_path, extension):
+    with pytest.raises(MeshError, match=f"got the extension {extension}"):
+        load_mesh(glb(tmp_path, {"extensionsRequired": [extension]}))
+
+
+def test_required_extensions_of_materials_change_no_triangle(tmp_path):
+    assert len(load_mesh(glb(tmp_path, {"extensionsRequired": ["KHR_materials_unlit"]})).faces) == 1

@@ -19,7 +19,7 @@ from renderer import (
     render,
 )
 from renderer.mesh.shapes import icosphere
-from validation.stability.cases.thin import BESIDE, at_the_side, split_side
+from validation.stability.cases.thin import BESIDE, SHORT, at_the_needle, at_the_side, needle, split_side
 
 
 @pytest.mark.parametrize("beside", BESIDE)
@@ -39,6 +39,37 @@ def test_no_ray_from_within_is_lost_at_a_split_side(beside, turned):
         np.testing.assert_allclose(hits.points, origins + hits.t[:, None] * directions, rtol=0, atol=1e-8)
         few = [accelerator.closest_hit(origins[i : i + 5], directions[i : i + 5]).t for i in range(0, 500, 5)]
         np.testing.assert_array_equal(np.concatenate(few), hits.t[:500])
+
+
+@pytest.mark.parametrize("short", SHORT)
+@pytest.mark.parametrize("turned", [False, True])
+def test_no_ray_from_within_is_lost_at_the_short_side_of_a_needle(short, turned):
+    """A needle that is taken for a line was met where the line passes, not where its end does."""
+    mesh, rays = needle(short), at_the_needle(short, 20_000)
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0] if turned else np.eye(3)
+    mesh, origins, directions = (
+        Mesh(mesh.vertices @ turn.T, mesh.faces),
+        rays.origins @ turn.T,
+        rays.directions @ turn.T,
+    )
+    for accelerator in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+        assert accelerator.closest_hit(origins, directions).hit.all()
+        assert accelerator.any_hit(origins, directions).all()
+
+
+def test_the_barycentrics_of_a_needle_name_the_place_at_its_short_side():
+    """Of the ends of its long sides rounding had made any corner: 0.8 off at a width of 2^-26."""
+    rng = np.random.default_rng(2)
+    for width in (2.0**-22, 2.0**-26, 2.0**-30):
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        corners = np.array([[0.0, 0.0, 0.0], [width, 0.0, 0.0], [0.0, 1.0, 0.0]]) @ turn.T
+        shares = np.array([0.9, 0.05, 0.05]) + rng.uniform(-0.04, 0.04, (500, 1)) * [1.0, -1.0, 0.0]
+        shares[:, 2], shares[:, 0] = 2.0**-45, shares[:, 0] + 0.05 - 2.0**-45
+        directions = rng.normal(size=(500, 3))
+        hits = Octree(corners, [[0, 1, 2]]).closest_hit(shares @ corners - directions, directions)
+        u = shares[hits.hit, 1]
+        assert len(u) > 400
+        np.testing.assert_allclose(hits.u[hits.hit], u, rtol=0, atol=1e-2)
 
 
 @pytest.mark.parametrize("seed", range(12))
