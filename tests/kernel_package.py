@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "renderer"
-_NEEDED = ("__init__.py", "kernels/*.py", "process/__init__.py", "process/files.py")
+_NEEDED = ("__init__.py", "lazy.py", "kernels/*.py", "process/__init__.py", "process/files.py")
 
 # One small kernel two imports away from the constant it uses, so that each run compiles in a second.
 UPPER = """

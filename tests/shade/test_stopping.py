@@ -223,7 +223,7 @@ def test_the_viewers_first_picture_comes_soon_and_any_can_be_cancelled() -> None
     """On a scene whose whole picture takes hours."""
     from renderer.viewer.passes import Pass, picture
     from renderer.viewer.protocol import CameraMessage, ViewSettings
-    from renderer.viewer.shown import prepare as prepare_shown
+    from renderer.viewer.shown import prepare_shown
 
     shown = prepare_shown(half_mirrors().altered(render=RenderSettings(max_depth=64, max_rays=2**61)))
     m = [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]
