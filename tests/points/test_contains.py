@@ -8,69 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from renderer import BruteForce, Mesh, Octree
-from renderer.mesh.shapes import box, icosphere, torus
+from renderer.mesh.shapes import box, torus
 from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
+from validation.stability.cases.inside import closed_solids, points_at, winding_numbers
 
-
-def two(first, second):
-    """Two meshes as one."""
-    return Mesh(
-        np.concatenate([first.vertices, second.vertices]),
-        np.concatenate([first.faces, second.faces + len(first.vertices)]),
-    )
-
-
-def soup(mesh):
-    """Each face with corners of its own."""
-    return Mesh(mesh.triangles.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
-
-
-def integer_star(seed):
-    """A closed mesh of small integer coordinates, so that points meet its planes, edges and corners often."""
-    ball = icosphere(1)
-    rng = np.random.default_rng(seed)
-    return Mesh(np.round(ball.vertices * rng.integers(2, 6, (len(ball.vertices), 1))), ball.faces)
-
-
-MESHES = {
-    "box": box((-1, -1, -1), (1, 1, 1)),
-    "ball": icosphere(1),
-    "icosahedron": icosphere(0),
-    "nested boxes": two(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -1), (1, 1, 1))),
-    "hollow box": two(box((-2, -2, -2), (2, 2, 2)), Mesh(box((-1, -1, -1), (1, 1, 1)).vertices, box().faces[:, ::-1])),
-    "overlapping boxes": two(box((-2, -2, -2), (1, 1, 1)), box((-1, -1, -1), (2, 2, 2))),
-    "touching boxes": two(box((-2, -1, -1), (0, 1, 1)), box((0, -1, -1), (2, 1, 1))),
-    "soup": soup(icosphere(1)),
-    "integers": integer_star(1),
-    "more integers": integer_star(2),
-}
-
-
-def points_at(mesh, rng, count):
-    """Points anywhere, in planes of vertices, on vertices, edges and faces, and a rounding beside those."""
-    lower, upper = mesh.bounds
-    anywhere = lower + (upper - lower) * (1.4 * rng.random((count, 3)) - 0.2)
-    planes = np.where(rng.random((count, 3)) < 0.5, rng.choice(mesh.vertices.ravel(), (count, 3)), anywhere)
-    corners = mesh.triangles[rng.integers(0, len(mesh.faces), count)]
-    share = rng.choice([0.0, 0.25, 0.5, 1.0], (count, 1))
-    edges = corners[:, 0] * share + corners[:, 1] * (1 - share)
-    inner = corners[:, 0] * 0.5 + corners[:, 1] * 0.25 + corners[:, 2] * 0.25
-    exact = np.concatenate([anywhere, planes, corners[:, 0], edges, inner])
-    return np.concatenate([exact, np.nextafter(exact, rng.choice([-9.0, 9.0], exact.shape))])
-
-
-def judged(mesh, points):
-    """Winding numbers by exact arithmetic, None on the surface."""
-    triangles = [rational(triangle.tolist()) for triangle in mesh.triangles]
-    return [winding_number(point, triangles) for point in rational(points.tolist())]
+MESHES = closed_solids()
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_every_answer_is_that_of_exact_arithmetic(name):
     mesh, rng = MESHES[name], np.random.default_rng(7)
     points = points_at(mesh, rng, 4)
-    winding = judged(mesh, points)
+    winding = winding_numbers(mesh, points)
     on = np.array([w is None for w in winding])
     inside = np.array([w is not None and w != 0 for w in winding])
     odd = np.array([w is not None and w % 2 == 1 for w in winding])
@@ -88,7 +38,7 @@ def test_moved_and_scaled_solids_are_judged_exactly(seed, scale, offset):
     mesh = list(MESHES.values())[seed % len(MESHES)]
     mesh = Mesh(mesh.vertices * scale + offset * rng.random(3), mesh.faces)
     points = points_at(mesh, rng, 1)
-    winding = judged(mesh, points)
+    winding = winding_numbers(mesh, points)
     octree = Octree.from_mesh(mesh)
     np.testing.assert_array_equal(octree.contains(points), [w is None or w != 0 for w in winding])
     np.testing.assert_array_equal(octree.contains(points, boundary=False), [w is not None and w != 0 for w in winding])

@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import TypeVar
 
 Vector = Sequence[Fraction]
+Number = TypeVar("Number", int, Fraction)
 
 
 def rational(rows: Sequence[Sequence[float]]) -> list[list[Fraction]]:
@@ -34,12 +36,12 @@ def _from_side(point: Vector, start: Vector, end: Vector) -> Fraction:
     return dot(rest, rest)
 
 
-def dot(a: Vector, b: Vector) -> Fraction:
+def dot(a: Sequence[Number], b: Sequence[Number]) -> Number:
     """Scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def cross(a: Vector, b: Vector) -> list[Fraction]:
+def cross(a: Sequence[Number], b: Sequence[Number]) -> list[Number]:
     """Vector product."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 

@@ -13,24 +13,28 @@ def winding_number(point: Vector, triangles: Sequence[Sequence[Vector]]) -> int 
     """
     relative = [[difference(corner, point) for corner in triangle] for triangle in triangles]
     origin = [Fraction(0)] * 3
-    if any(squared_distance(origin, triangle) == 0 for triangle in relative):
+    flat = [triangle for triangle in relative if dot(triangle[0], cross(triangle[1], triangle[2])) == 0]
+    if any(squared_distance(origin, triangle) == 0 for triangle in flat):
         return None
+    # Integers, which are many times as fast: times a power of two, which changes no sign.
+    unit = max(x.denominator for triangle in relative for corner in triangle for x in corner)
+    integers = [[[int(x * unit) for x in corner] for corner in triangle] for triangle in relative]
     for direction in _directions():
-        crossings = [_crossing(triangle, direction) for triangle in relative]
+        crossings = [_crossing(triangle, direction) for triangle in integers]
         if None not in crossings:
             return sum(crossing for crossing in crossings if crossing is not None)
     raise AssertionError("there are infinitely many directions")
 
 
-def _directions() -> Iterator[Vector]:
+def _directions() -> Iterator[Sequence[int]]:
     """Directions that lie in no plane that anyone would choose."""
     k = 1
     while True:
-        yield [Fraction(1009 * k + 1, 7919), Fraction(k * k + 3, 104729), Fraction(611953 - 17 * k, 1299709)]
+        yield [127413 * k + 1, 28807 + k * k, 470881 - 17 * k]
         k += 1
 
 
-def _crossing(triangle: Sequence[Vector], direction: Vector) -> int | None:
+def _crossing(triangle: Sequence[Sequence[int]], direction: Sequence[int]) -> int | None:
     """1 where the ray from 0 passes a triangle from back to front, -1 the other way, None at an edge, else 0."""
     a, b, c = triangle
     sides = [dot(direction, cross(p, q)) for p, q in ((a, b), (b, c), (c, a))]

@@ -1,6 +1,6 @@
-"""Extreme cases 1 to 32, 46, 49 and 50: hits."""
+"""Extreme cases 1 to 32, 46 and 49 to 51: hits."""
 
-from validation.stability.cases import builds, edge_on, order, precision, rays, thin
+from validation.stability.cases import builds, edge_on, inside, order, precision, rays, thin
 from validation.stability.cases.case import ExtremeCase
 
 CASES: tuple[ExtremeCase, ...] = (
@@ -10,4 +10,5 @@ CASES: tuple[ExtremeCase, ...] = (
     *order.CASES,
     *thin.CASES,
     *edge_on.CASES,
+    *inside.CASES,
 )
