@@ -29,6 +29,14 @@ def real_array(values: Any) -> NDArray[Any]:
     return array
 
 
+def real_argument(argument: str, values: Any) -> NDArray[Any]:
+    """``real_array``, with the argument's name in its error."""
+    try:
+        return real_array(values)
+    except ValueError as error:
+        raise ValueError(f"{argument}: {error}") from None
+
+
 def _is_number(value: object) -> bool:
     """Whether float64 holds an object of Python."""
     if not isinstance(value, Real) or isinstance(value, bool):

@@ -15,8 +15,8 @@ from renderer.kernels.jit import kernel
 from renderer.kernels.simd import splat8, store
 from renderer.octree import BruteForce, Octree
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
-from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
+from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, tree_pointers
 from renderer.trace.query import check_rays
 
 Boxes = NDArray[np.float64]
@@ -144,8 +144,7 @@ def _limit(ray: Ray, t: float) -> float:
 @kernel
 def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, best: tuple[float, int]) -> tuple[float, np.int64]:
     """The better of ``best`` = (t, face) and the hits in a leaf."""
-    code, seen, t_max = ~leaf, tree_pointers(words), best[0]
-    first, count = code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1
-    start = (t_max, np.int32(best[1]), 0.0, 0.0, 1.0)
+    seen, (first, count) = tree_pointers(words), blocks_of(leaf)
+    start = (best[0], np.int32(best[1]), 0.0, 0.0, 1.0)
     t, face, _, _, _ = nearest_carefully(seen, first, count, ray, make_shear(ray), start)
     return t, np.int64(face)

@@ -22,9 +22,7 @@ def power_below(x):
 @inlined
 def difference(a, b):
     """a - b of two float64, exactly."""
-    head = a - b
-    back = head - a
-    return head, (a - (head - back)) - (b + back)
+    return exact_sum(a, -b)
 
 
 @inlined

@@ -175,26 +175,26 @@ def smaller(typingctx, a, b):
 LOCAL_WORDS = 500
 
 
+def _local(number: Any, element: ir.Type) -> Any:
+    """The intrinsic's answer for LOCAL_WORDS numbers in the kernel's own frame."""
+
+    def codegen(context, builder, sig, args):
+        words = cgutils.alloca_once(builder, ir.ArrayType(element, LOCAL_WORDS))
+        return builder.bitcast(words, element.as_pointer())
+
+    return types.CPointer(number)(), codegen
+
+
 @intrinsic
 def local_words(typingctx):
     """A ``pointer`` to LOCAL_WORDS int64 in the kernel's own frame, uninitialised and gone when it returns."""
-
-    def codegen(context, builder, sig, args):
-        words = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), LOCAL_WORDS))
-        return builder.bitcast(words, ir.IntType(64).as_pointer())
-
-    return types.CPointer(types.int64)(), codegen
+    return _local(types.int64, ir.IntType(64))
 
 
 @intrinsic
 def local_doubles(typingctx):
     """A ``pointer`` to LOCAL_WORDS float64, as ``local_words``."""
-
-    def codegen(context, builder, sig, args):
-        words = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), LOCAL_WORDS))
-        return builder.bitcast(words, ir.DoubleType().as_pointer())
-
-    return types.CPointer(types.float64)(), codegen
+    return _local(types.float64, ir.DoubleType())
 
 
 @intrinsic

@@ -3,14 +3,15 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_array
+from renderer.arrays import real_argument
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.points.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_crossings
-from renderer.points.fractions import crossings_of
+from renderer.points.rational import crossings_of
 from renderer.points.signs import UNDECIDED
 from renderer.process.parallel import for_chunks
 from renderer.trace.layout import Tree
+from renderer.trace.singly import stack_size
 
 _CHUNK = 4096
 RULES = ("nonzero", "even-odd")
@@ -21,10 +22,7 @@ def contains(tree: Tree, mesh: Mesh, points: ArrayLike, boundary: bool, rule: st
     expect(rule in RULES, "rule", f"one of {RULES}", repr(rule))
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
     _check_closed(mesh, rule)
-    try:
-        given = real_array(points)
-    except ValueError as error:
-        raise ValueError(f"points: {error}") from None
+    given = real_argument("points", points)
     expect(given.ndim >= 1 and given.shape[-1] == 3, "points", "shape (..., 3)", f"shape {given.shape}")
     rows = np.ascontiguousarray(given, np.float64).reshape(-1, 3)
     finite = np.isfinite(rows).all(axis=1)
@@ -54,7 +52,9 @@ def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) 
     middle = tree.scale * (lower[axis] / 2 + upper[axis] / 2)
 
     def count(begin: int, end: int) -> None:
-        count_crossings(tree.words, points, tree.scale, axis, middle, counts, begin, end)
+        # Memory for the deepest tree: a kernel's own frame holds the stack of most trees, not of all.
+        stack = np.empty(stack_size(tree.depth), np.int64)
+        count_crossings(tree.words, points, axis, middle, counts, stack, begin, end)
 
     for_chunks(count, len(points), _CHUNK, threads)
     triangles = None

@@ -7,16 +7,13 @@ of their rounding errors or by expansions, so the counts are those of real arith
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import (
     at,
+    count_bits,
     get,
-    load4,
     load8,
     local_doubles,
-    local_words,
     lowest_bit,
     magnitude,
     movemask,
@@ -26,9 +23,10 @@ from renderer.kernels.simd import (
     splat8,
 )
 from renderer.points.signs import UNDECIDED, area_sign, volume_sign
-from renderer.trace.intersect import round_down, round_up
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
-from renderer.trace.leaf import tree_pointers
+from renderer.trace.doubt import coordinate
+from renderer.trace.intersect import load_corners, round_down, round_up
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
+from renderer.trace.leaf import blocks_of, push_children, tree_pointers
 
 # Columns of the answer: winding number, crossings, and whether the point lies on a face (or is UNDECIDED).
 WINDING, CROSSINGS, ON = range(3)
@@ -40,40 +38,40 @@ _VOLUME_ERROR = (7.0 + 56.0 * _ROUNDOFF) * _ROUNDOFF
 
 
 class Column(NamedTuple):
-    """A point and the half-line from it along an axis: its axes turned so that w is that axis.
+    """A point and the half-line from it along an axis: its axes turned so that z is that axis.
 
-    axis_u, axis_v, axis_w  0, 1, 2 for x, y, z
-    u, v, w                 the point
-    up                      whether the half-line goes to larger w
+    row_x, row_y, row_z  where a block has the coordinates of each axis
+    x, y, z              the point
+    up                   whether the half-line goes to larger z
     """
 
-    axis_u: Any
-    axis_v: Any
-    axis_w: Any
-    u: float
-    v: float
-    w: float
+    row_x: Any
+    row_y: Any
+    row_z: Any
+    x: float
+    y: float
+    z: float
     up: bool
 
 
 @kernel
-def count_crossings(words, points, scale, axis, middle, out, begin, end):
+def count_crossings(words, points, axis, middle, out, stack, begin, end):
     """Fill rows begin:end of ``out`` (n, COLUMNS) int64 for ``points`` (n, 3) float64.
 
-    The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down, which is the shorter
-    way.
+    The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
+    ``stack`` is memory for ``singly.stack_size`` int64.
     """
-    tree, stack, parts = tree_pointers(words), local_words(), local_doubles()
-    axis_u, axis_v = (axis + 1) % 3, (axis + 2) % 3
+    tree, parts = tree_pointers(words), local_doubles()
+    scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
     for i in range(begin, end):
         row = at(pointer(points), 3 * i)
-        u, v, w = scale * get(row, axis_u), scale * get(row, axis_v), scale * get(row, axis)
-        column = Column(axis_u, axis_v, axis, u, v, w, w >= middle)
-        if u / scale != get(row, axis_u) or v / scale != get(row, axis_v) or w / scale != get(row, axis):
+        x, y, z = scale * get(row, axis_x), scale * get(row, axis_y), scale * get(row, axis)
+        column = Column(4 * axis_x, 4 * axis_y, 4 * axis, x, y, z, z >= middle)
+        if x / scale != get(row, axis_x) or y / scale != get(row, axis_y) or z / scale != get(row, axis):
             # The tree's units cannot hold it exactly.
             winding, crossings, on = 0, 0, UNDECIDED
         elif tree.has_nodes:
-            winding, crossings, on = _search_nodes(tree, column, stack, parts)
+            winding, crossings, on = _search_nodes(tree, column, pointer(stack), parts)
         else:
             winding, crossings, on = _cross_blocks(tree, 0, tree.count, column, parts, (0, 0, 0))
         result = at(pointer(out), COLUMNS * i)
@@ -91,27 +89,24 @@ def _search_nodes(tree, column, stack, parts):
         top -= 1
         child = get(stack, top)
         if child < 0:
-            code = ~child
-            found = _cross_blocks(tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, column, parts, found)
+            first, count = blocks_of(child)
+            found = _cross_blocks(tree, first, count, column, parts, found)
             continue
-        bits = _meet_boxes(tree.nodes, child * NODE_WORDS, column)
-        while bits != 0:
-            put(stack, top, np.int64(get(tree.links, child * NODE_WORDS + CHILDREN + lowest_bit(bits))))
-            bits &= bits - 1
-            top += 1
+        top = push_children(tree, child, _meet_boxes(tree.nodes, child * NODE_WORDS, column), stack, top)
     return found
 
 
 @inlined
 def _meet_boxes(nodes, base, column):
     """The bits of the octants that a column meets; boxes are only ever too large."""
-    u, v, w = base + 16 * column.axis_u, base + 16 * column.axis_v, base + 16 * column.axis_w
-    meets = (load8(nodes, u) <= splat8(round_up(column.u))) & (load8(nodes, u + 8) >= splat8(round_down(column.u)))
-    meets = meets & (load8(nodes, v) <= splat8(round_up(column.v)))
-    meets = meets & (load8(nodes, v + 8) >= splat8(round_down(column.v)))
+    # A node's rows, lower and upper, are four times as long as a block's.
+    x, y, z = base + 4 * column.row_x, base + 4 * column.row_y, base + 4 * column.row_z
+    meets = (load8(nodes, x) <= splat8(round_up(column.x))) & (load8(nodes, x + 8) >= splat8(round_down(column.x)))
+    meets = meets & (load8(nodes, y) <= splat8(round_up(column.y)))
+    meets = meets & (load8(nodes, y + 8) >= splat8(round_down(column.y)))
     if column.up:
-        return movemask(meets & (load8(nodes, w + 8) >= splat8(round_down(column.w))))
-    return movemask(meets & (load8(nodes, w) <= splat8(round_up(column.w))))
+        return movemask(meets & (load8(nodes, z + 8) >= splat8(round_down(column.z))))
+    return movemask(meets & (load8(nodes, z) <= splat8(round_up(column.z))))
 
 
 @kernel
@@ -121,8 +116,8 @@ def _cross_blocks(tree, first, count, column, parts, found):
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
         sure, unsure, turns = _cross_block(tree, base, column)
-        crossings += _count(sure)
-        winding += 2 * _count(sure & turns) - _count(sure)
+        crossings += count_bits(sure)
+        winding += 2 * count_bits(sure & turns) - count_bits(sure)
         while unsure != 0:
             i = lowest_bit(unsure)
             unsure &= unsure - 1
@@ -133,42 +128,29 @@ def _cross_blocks(tree, first, count, column, parts, found):
 
 
 @inlined
-def _count(bits):
-    """The number of bits set in four."""
-    return (bits & 1) + ((bits >> 1) & 1) + ((bits >> 2) & 1) + ((bits >> 3) & 1)
-
-
-@inlined
 def _cross_block(tree, base, column):
     """Bits of four faces: those surely crossed, those that float64 cannot tell, and where the winding rises by one."""
-    ru, rv, rw = base + 4 * column.axis_u, base + 4 * column.axis_v, base + 4 * column.axis_w
-    u, v, w = splat4(column.u), splat4(column.v), splat4(column.w)
-    if tree.wide != 0:
-        u0, u1, u2 = load4(tree.wide_blocks, ru), load4(tree.wide_blocks, ru + 12), load4(tree.wide_blocks, ru + 24)
-        v0, v1, v2 = load4(tree.wide_blocks, rv), load4(tree.wide_blocks, rv + 12), load4(tree.wide_blocks, rv + 24)
-        w0, w1, w2 = load4(tree.wide_blocks, rw), load4(tree.wide_blocks, rw + 12), load4(tree.wide_blocks, rw + 24)
-    else:
-        u0, u1, u2 = load4(tree.blocks, ru), load4(tree.blocks, ru + 12), load4(tree.blocks, ru + 24)
-        v0, v1, v2 = load4(tree.blocks, rv), load4(tree.blocks, rv + 12), load4(tree.blocks, rv + 24)
-        w0, w1, w2 = load4(tree.blocks, rw), load4(tree.blocks, rw + 12), load4(tree.blocks, rw + 24)
-    u0, u1, u2, v0, v1, v2, w0, w1, w2 = u0 - u, u1 - u, u2 - u, v0 - v, v1 - v, v2 - v, w0 - w, w1 - w, w2 - w
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, column)
+    x, y, z = splat4(column.x), splat4(column.y), splat4(column.z)
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = x0 - x, x1 - x, x2 - x, y0 - y, y1 - y, y2 - y, z0 - z, z1 - z, z2 - z
 
     # On which side of each edge the column passes, as far as rounding tells.
-    a, b, c, d, e, f = u1 * v2, v1 * u2, u2 * v0, v2 * u0, u0 * v1, v0 * u1
+    a, b, c, d, e, f = x1 * y2, y1 * x2, x2 * y0, y2 * x0, x0 * y1, y0 * x1
     e0, e1, e2 = a - b, c - d, e - f
     m0, m1, m2 = magnitude(a) + magnitude(b), magnitude(c) + magnitude(d), magnitude(e) + magnitude(f)
-    zero, bound = splat4(0.0), splat4(_AREA_ERROR)
-    above = (e0 > m0 * bound) | (e1 > m1 * bound) | (e2 > m2 * bound)
-    below = (zero - e0 > m0 * bound) | (zero - e1 > m1 * bound) | (zero - e2 > m2 * bound)
+    zero, share = splat4(0.0), splat4(_AREA_ERROR)
+    r0, r1, r2 = m0 * share, m1 * share, m2 * share
+    above = (e0 > r0) | (e1 > r1) | (e2 > r2)
+    below = (zero - e0 > r0) | (zero - e1 > r1) | (zero - e2 > r2)
     possible = 15 & ~movemask(above & below)
     if possible == 0:
         return possible, possible, possible
-    left = (e0 > m0 * bound) & (e1 > m1 * bound) & (e2 > m2 * bound)
-    right = (zero - e0 > m0 * bound) & (zero - e1 > m1 * bound) & (zero - e2 > m2 * bound)
+    left = (e0 > r0) & (e1 > r1) & (e2 > r2)
+    right = (zero - e0 > r0) & (zero - e1 > r1) & (zero - e2 > r2)
 
     # Whether the plane there lies above or below the point.
-    volume = e0 * w0 + e1 * w1 + e2 * w2
-    error = (m0 * magnitude(w0) + m1 * magnitude(w1) + m2 * magnitude(w2)) * splat4(_VOLUME_ERROR)
+    volume = e0 * z0 + e1 * z1 + e2 * z2
+    error = (m0 * magnitude(z0) + m1 * magnitude(z1) + m2 * magnitude(z2)) * splat4(_VOLUME_ERROR)
     over = movemask((left & (volume > error)) | (right & (zero - volume > error)))
     under = movemask((left & (zero - volume > error)) | (right & (volume > error)))
     sure, rising = (over, movemask(left)) if column.up else (under, movemask(right))
@@ -176,26 +158,20 @@ def _cross_block(tree, base, column):
 
 
 @inlined
-def _corner(tree, at_, column):
-    """A corner (u, v, w) of a face, exactly."""
-    if tree.wide != 0:
-        return (
-            get(tree.wide_blocks, at_ + 4 * column.axis_u),
-            get(tree.wide_blocks, at_ + 4 * column.axis_v),
-            get(tree.wide_blocks, at_ + 4 * column.axis_w),
-        )
+def _corner(tree, place, column):
+    """A corner (x, y, z) of a face, exactly."""
     return (
-        np.float64(get(tree.blocks, at_ + 4 * column.axis_u)),
-        np.float64(get(tree.blocks, at_ + 4 * column.axis_v)),
-        np.float64(get(tree.blocks, at_ + 4 * column.axis_w)),
+        coordinate(tree, place + column.row_x),
+        coordinate(tree, place + column.row_y),
+        coordinate(tree, place + column.row_z),
     )
 
 
 @kernel
-def _cross_exactly(tree, at_, column, parts):
+def _cross_exactly(tree, place, column, parts):
     """The change of the winding number at one face, 0 where it is not crossed, and whether the point lies on it."""
-    a, b, c = _corner(tree, at_, column), _corner(tree, at_ + 12, column), _corner(tree, at_ + 24, column)
-    p = column.u, column.v, column.w
+    a, b, c = _corner(tree, place, column), _corner(tree, place + 12, column), _corner(tree, place + 24, column)
+    p = column.x, column.y, column.z
     s0, s1, s2 = area_sign(b, c, p, parts), area_sign(c, a, p, parts), area_sign(a, b, p, parts)
     if s0 == UNDECIDED or s1 == UNDECIDED or s2 == UNDECIDED:
         return 0, UNDECIDED

@@ -77,7 +77,7 @@ def settled(tree, at, ray, hit, blurred):
 def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
     """Narrow [t0, t1] to one axis of a face's own box."""
     row = at + 4 * axis
-    near, far = face_range(_coordinate(tree, row), _coordinate(tree, row + 12), _coordinate(tree, row + 24))
+    near, far = face_range(coordinate(tree, row), coordinate(tree, row + 12), coordinate(tree, row + 24))
     near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = make_slab(axis, o, d, largest)
     if near_row > far_row:
         near, far = far, near
@@ -87,14 +87,14 @@ def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
 
 
 @inlined
-def _coordinate(tree, at):
+def coordinate(tree, at):
     """One coordinate of a block, exactly."""
     return get(tree.wide_blocks, at) if tree.wide != 0 else np.float64(get(tree.blocks, at))
 
 
 @inlined
 def _corner(tree, at, axis):
-    return turned(axis, _coordinate(tree, at), _coordinate(tree, at + 4), _coordinate(tree, at + 8))
+    return turned(axis, coordinate(tree, at), coordinate(tree, at + 4), coordinate(tree, at + 8))
 
 
 class _Face(NamedTuple):

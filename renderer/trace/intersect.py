@@ -251,9 +251,14 @@ class Edges(NamedTuple):
 
 
 @inlined
-def _load_rows(blocks, base, ray):
-    """The nine rows of a block in the order of the ray's axes: x, y and z of each corner."""
-    x, y, z = base + ray.row_x, base + ray.row_y, base + ray.row_z
+def load_corners(tree, base, rows):
+    """The nine rows of a block, x, y and z of each corner, in the order of axes that ``rows`` has as row_x to row_z."""
+    return _load_rows(tree.wide_blocks, base, rows) if tree.wide != 0 else _load_rows(tree.blocks, base, rows)
+
+
+@inlined
+def _load_rows(blocks, base, rows):
+    x, y, z = base + rows.row_x, base + rows.row_y, base + rows.row_z
     return (
         load4(blocks, x), load4(blocks, x + 12), load4(blocks, x + 24),
         load4(blocks, y), load4(blocks, y + 12), load4(blocks, y + 24),
@@ -270,10 +275,7 @@ def see_triangles(tree, base, ray):
     there. A triangle is missed when all three edge functions are 0: the ray lies in its plane, or two corners are one.
     A triangle whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded edges leave.
     """
-    if tree.wide != 0:
-        x0, x1, x2, y0, y1, y2, z0, z1, z2 = _load_rows(tree.wide_blocks, base, ray)
-    else:
-        x0, x1, x2, y0, y1, y2, z0, z1, z2 = _load_rows(tree.blocks, base, ray)
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, ray)
     zero, ox, oy, oz = splat4(0.0), splat4(ray.origin_x), splat4(ray.origin_y), splat4(ray.origin_z)
     sx, sy = splat4(ray.shear_x), splat4(ray.shear_y)
     z0, z1, z2 = z0 - oz, z1 - oz, z2 - oz

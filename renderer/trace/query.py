@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_array
+from renderer.arrays import real_argument
 from renderer.errors import expect
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh.mesh import Mesh, face_normals
@@ -71,19 +71,12 @@ class Hits:
         return normals
 
 
-def _array(argument: str, values: ArrayLike) -> NDArray[Any]:
-    try:
-        return real_array(values)
-    except ValueError as error:
-        raise ValueError(f"{argument}: {error}") from None
-
-
 _MOST = float(np.finfo(np.float64).max)
 
 
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
     """The values as an array (n, 3); one vector (3,) becomes one row."""
-    array = _array(argument, values)
+    array = real_argument(argument, values)
     if array.shape == (3,):
         return array[None]
     expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
@@ -101,7 +94,7 @@ def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
 
 def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArray[np.float64]:
     """One bound for all rays or one per ray, from 0 to ``largest``, as a (1,) or (n,) array."""
-    array = _array(argument, value)
+    array = real_argument(argument, value)
     fits = array.ndim == 0 or array.shape == (count,)
     expect(fits, argument, f"a number or shape ({count},)", f"shape {array.shape}")
     array = _doubles(np.atleast_1d(array))
@@ -165,7 +158,7 @@ def moved_off(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, thre
     Raises ``ValueError`` naming the argument and, for a face that is not there or an origin out of bounds, its row.
     """
     count = len(rays.directions)
-    array = _array("leaving", leaving)
+    array = real_argument("leaving", leaving)
     whole = array.dtype.kind in "iu" and (array.ndim == 0 or array.shape == (count,))
     expect(whole, "leaving", f"an integer or integers of shape ({count},)", f"{array.dtype} of shape {array.shape}")
     # A copy, which no other thread can change once it is checked.

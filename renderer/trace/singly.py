@@ -3,10 +3,9 @@
 import numpy as np
 
 from renderer.kernels.jit import kernel
-from renderer.kernels.simd import LOCAL_WORDS, get, local_words, lowest_bit, put, splat8
+from renderer.kernels.simd import LOCAL_WORDS, get, local_words, put, splat8
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_children, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 
 
@@ -36,14 +35,11 @@ def search_singly(tree, ray, t_max, stack):
         top -= 1
         child = get(stack, top)
         if child < 0:
-            code = ~child
-            best = nearest_carefully(tree, code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1, ray, shear, best)
+            first, count = blocks_of(child)
+            best = nearest_carefully(tree, first, count, ray, shear, best)
             continue
         _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
-        while bits != 0:
-            put(stack, top, np.int64(get(tree.links, child * NODE_WORDS + CHILDREN + lowest_bit(bits))))
-            bits &= bits - 1
-            top += 1
+        top = push_children(tree, child, bits, stack, top)
     return best
 
 

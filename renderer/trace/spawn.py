@@ -1,4 +1,4 @@
-"""Where a ray starts that leaves a surface: off it by more than rounding errors, and by no epsilon of anyone's choice.
+"""The start of a ray that leaves a surface: off it by more than rounding errors, without a chosen epsilon.
 
 Vectors are tuples of float64.
 """
@@ -42,7 +42,7 @@ MITSUBA_EPSILON = 1500.0 * 2.0**-24
 
 
 class OffsetRule(NamedTuple):
-    """How far from its surface a ray starts: by the bound of the rounding errors, or (1 + max|p|) ``epsilon``."""
+    """The distance from its surface at which a ray starts: the bound of roundings, or (1 + max|p|) ``epsilon``."""
 
     bounded: bool
     epsilon: float
@@ -71,8 +71,9 @@ def normal_of(p0, p1, p2, d):
 
 @inlined
 def _clearance(p0, p1, p2, double_area, reach):
-    """How far a point ``reach`` from the corners must be from a face's plane, so that no ray meets the face that leads
-    away from it.
+    """The distance from a face's plane beyond which no ray that leads away meets the face.
+
+    ``reach`` is the largest component of a corner relative to the ray's start.
     """
     side = larger(
         largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2)))
@@ -85,7 +86,7 @@ def _clearance(p0, p1, p2, double_area, reach):
 
 @inlined
 def offset_distance(p, p0, p1, p2, u, v, n_g):
-    """How far p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
+    """The distance by which p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
 
     The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
     matters where the first vanishes (on a plane through the origin) and for slivers.
@@ -112,7 +113,7 @@ def _away(x, step):
 
 @inlined
 def spawn_origin(p, error, n_g, w, offset):
-    """Where a ray from the surface point p in direction w starts, so that it does not meet that surface again.
+    """The start of a ray from the surface point p in direction w that does not meet that surface again.
 
     By the rule ``offset``: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away; or as
     Mitsuba does, by its epsilon.

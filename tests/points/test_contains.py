@@ -9,6 +9,9 @@ from hypothesis import strategies as st
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, torus
+from renderer.points.crossings import COLUMNS, count_crossings
+from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
+from renderer.trace.singly import stack_size
 from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
 from validation.stability.cases.inside import closed_solids, points_at, winding_numbers
@@ -103,3 +106,21 @@ def test_the_oracle_knows_a_box():
     triangles = [rational(triangle.tolist()) for triangle in MESHES["box"].triangles]
     for point, expected in (((0, 0, 0), 1), ((1, 0, 0), None), ((1, 1, 1), None), ((2, 0, 0), 0)):
         assert winding_number([Fraction(x) for x in point], triangles) == expected
+
+
+def test_the_deepest_tree_has_a_stack_that_holds_its_column():
+    """The stack had lain in the kernel's frame, for 500 octants; here 576 wait at once."""
+    levels = 82
+    nodes = np.zeros((levels, NODE_WORDS), np.float32)
+    nodes[:, :CHILDREN].reshape(levels, 3, 2, 8)[:, :, 0], nodes[:, :CHILDREN].reshape(levels, 3, 2, 8)[:, :, 1] = -9, 9
+    links = nodes.view(np.int32)
+    links[:, CHILDREN : CHILDREN + 8] = -1  # the tree's first block
+    links[:-1, CHILDREN + 7] = np.arange(1, levels)
+    corners = np.array([[-4.0, -4.0, 1.0], [4.0, -4.0, 1.0], [0.0, 4.0, 1.0]])
+    flat = BruteForce(corners, [[0, 1, 2]]).tree
+    tree = Tree(nodes.ravel(), flat.blocks, flat.faces, levels)
+    counts = np.zeros((1, COLUMNS), np.int64)
+    stack = np.full(stack_size(levels) + 8, -7, np.int64)
+    count_crossings(tree.words, np.zeros((1, 3)), 2, -1.0, counts, stack, 0, 1)
+    assert counts[0].tolist() == [7 * levels + 1, 7 * levels + 1, 0]
+    assert (stack[-8:] == -7).all() and (stack[500:-8] != -7).any()

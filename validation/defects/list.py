@@ -102,8 +102,9 @@ HITS = (
             "limit = _most(floats, LIMIT)\n"
             "top = min(top, 8) if any_hit else top"),
     _kernel("hits", "single rays skip a leaf's last block", "search_singly",
-            "(code & (MAX_LEAF_BLOCKS - 1)) + 1",
-            "np.int64((code & (MAX_LEAF_BLOCKS - 1)) == 0) + (code & (MAX_LEAF_BLOCKS - 1))"),
+            "first, count = blocks_of(child)",
+            "first, count = blocks_of(child)\n"
+            "count = count - 1 if count > 1 else count"),
     _kernel("hits", "single rays are an ulp too far", "trace_few",
             "best = search_singly(tree, ray, limit, stack)",
             "t, face, u, v, w = search_singly(tree, ray, limit, stack)\nbest = t * (1.0 + 2.0**-52), face, u, v, w"),

@@ -7,7 +7,7 @@ from validation.oracle.distance import Vector, cross, difference, dot, squared_d
 
 
 def winding_number(point: Vector, triangles: Sequence[Sequence[Vector]]) -> int | None:
-    """How often the triangles of a closed mesh wind around a point, None where the point lies on one of them.
+    """The winding number of a closed mesh's triangles around a point, None where the point lies on one of them.
 
     By the signed crossings of a ray in a direction that meets no edge and no corner; others are tried until one does.
     """
