@@ -27,7 +27,7 @@ validate: $(STAMP)
 	$(BIN)/python -m validation $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)
 
 test: $(STAMP)
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal $(ARGS)
 
 bench: $(STAMP)
 	$(BIN)/python -m validation.benchmark $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)

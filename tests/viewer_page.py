@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -115,6 +115,13 @@ class Viewer:
         self.page.wait_for_selector("body[data-ready]", timeout=PATIENCE)
         self.settled("octree")
         return self
+
+    def wait_until(self, seen: Callable[[], bool]) -> None:
+        """Until it is seen; fails where that takes longer than PATIENCE."""
+        end = time.monotonic() + PATIENCE / 1e3
+        while not seen():
+            assert time.monotonic() < end
+            self.page.wait_for_timeout(50)
 
     def restart(self) -> None:
         """Everything as it was when the page opened."""

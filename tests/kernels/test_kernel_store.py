@@ -7,7 +7,7 @@ import sys
 
 import llvmlite.binding as llvm
 import pytest
-from kernel_package import COMPILED, LOADED, MIDDLE, PACKAGE, RUN, UPPER, bottom_of, run, start, write_package
+from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, copy_package, run, start, write_package
 
 from renderer.kernels.levels import FEATURES, LEVELS
 from renderer.kernels.store import runnable_levels
@@ -49,9 +49,8 @@ def test_an_edit_below_a_kernel_shows_and_an_edit_beside_it_keeps_the_cache(pack
 
 
 def test_an_edit_of_the_real_triangle_test_shows(tmp_path):
-    # The whole package, where the kernel that runs is two modules above the one edited.
-    folder = tmp_path / "renderer"
-    shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    # The whole package, where the kernel that runs is two modules above the one edited; what is compiled comes along.
+    folder = copy_package(tmp_path)
     script = """
 from renderer.octree import BruteForce
 brute = BruteForce([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], threads=1)

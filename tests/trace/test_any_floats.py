@@ -20,6 +20,7 @@ from renderer import (
     load_scene,
     render,
 )
+from renderer.kernels.jit import kernel
 from renderer.kernels.simd import bits_float
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh.shapes import icosphere
@@ -37,7 +38,7 @@ ANY = np.concatenate([WORST, -WORST, [np.nan]])
 GUARD = 0x7EADBEEF
 
 
-@njit(error_model="numpy")
+@kernel
 def unchecked(words, rays, out, any_hit, memory, by_blocks):
     """``trace_chunk`` without its check of the rays."""
     tree = tree_pointers(words)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from meshes import make_mesh, rays_at
-from numba import njit
 
+from renderer.kernels.jit import kernel
 from renderer.kernels.simd import splat8, store
 from renderer.mesh.shapes import box, grid
 from renderer.octree import BruteForce, Octree
@@ -246,7 +246,7 @@ def test_rounding_is_outward_and_close(x):
         assert up - x <= 2 * ulp and x - down <= 2 * ulp
 
 
-@njit
+@kernel
 def entered(nodes, o, d, t_min, t_max, entry):
     largest = max(abs(d[0]), abs(d[1]), abs(d[2]))
     slabs = make_slabs(Ray(o[0], o[1], o[2], d[0], d[1], d[2], t_min), largest)

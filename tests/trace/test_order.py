@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import assert_same_hits, make_mesh, options, rays_at, separate
-from numba import njit
 from numpy.random import Generator
 
+from renderer.kernels.jit import kernel
 from renderer.kernels.simd import extract
 from renderer.octree import BruteForce, Octree
 from renderer.trace.doubt import settled
@@ -170,7 +170,7 @@ def test_every_way_to_ask_has_the_same_answer(kind, seed, count, chosen):
         np.testing.assert_array_equal(np.concatenate([getattr(p, name) for p in parts]), getattr(expected, name))
 
 
-@njit(error_model="numpy")
+@kernel
 def judged(words, origins, directions, out):
     """Of ray i at face i: 0 for a miss, 1 for a hit, 2 where t is in doubt, 3 where the determinant is; then both t."""
     tree = tree_pointers(words)

@@ -11,7 +11,9 @@ from xml.etree import ElementTree
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 
 # Errors of 0 cannot be drawn on a logarithmic axis; this is below the roundoff of float64, 1.1e-16.
 FLOOR = 1e-17
@@ -88,6 +90,7 @@ def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
         for panel, axes in zip(panels, rows, strict=True):
             _plot(panel, axes)
+            _label_plainly(axes.xaxis)
         rows[-1].set_xlabel(x_label)
         named = {name: h for axes in rows[::-1] for h, name in zip(*axes.get_legend_handles_labels(), strict=True)}
         names = dict.fromkeys(name for axes in rows for name in axes.get_legend_handles_labels()[1])
@@ -141,9 +144,11 @@ def _plot(panel: Panel, axes: Axes) -> None:
         axes.set_yticks([0.0, 0.5, 1.0], ["0 %", "50 %", "100 %"])
     elif not panel.linear:
         axes.set_yscale("log")
+        _label_plainly(axes.yaxis)
     if panel.roundoffs:
         right = axes.secondary_yaxis("right", functions=(_in_ulp, _relative))
         right.set_ylabel("in ulp of float64")
+        _label_plainly(right.yaxis)
     for index, series in enumerate(panel.series):
         colour, marker, stroke = _LOOKS[(index if series.look is None else series.look) % len(_LOOKS)]
         y = [math.nan if value is None else value if panel.share else max(value, FLOOR) for value in series.y]
@@ -151,6 +156,18 @@ def _plot(panel: Panel, axes: Axes) -> None:
     if panel.linear:
         axes.set_ylim(bottom=0.0)
     axes.grid(color=_GREY, alpha=0.25, linewidth=0.6)
+
+
+class _PlainLabels(LogFormatter):
+    """Numbers as Python writes them, and no formulas, whose parsing takes most of a figure's time."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
+def _label_plainly(axis: Axis) -> None:
+    axis.set_major_formatter(_PlainLabels())
+    axis.set_minor_formatter(_PlainLabels())
 
 
 def _in_ulp(relative: Any) -> Any:

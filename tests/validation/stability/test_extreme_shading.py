@@ -2,10 +2,8 @@
 
 import json
 import math
-import shutil
 import subprocess
 import sys
-from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,8 +12,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kernel_package import copy_package
 
-import renderer
 from renderer import Image, Mesh, Scene, render
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.scene.camera import PerspectiveCamera
@@ -116,14 +114,7 @@ NOTICED = [40, 41, 42, 43, 44, 45]
 
 def test_cases_find_faults_in_the_kernels(tmp_path: Path) -> None:
     """A copy of the package with six rules broken, run by itself; the kernels that no fault reaches come compiled."""
-
-    def copy_file(source: str, target: str) -> None:
-        with suppress(FileNotFoundError):  # another process may replace a compiled kernel just now
-            shutil.copy2(source, target)
-
-    copy = tmp_path / "renderer"
-    sound = Path(renderer.__file__).parent
-    shutil.copytree(sound, copy, ignore=shutil.ignore_patterns("*.pyc"), copy_function=copy_file)
+    copy = copy_package(tmp_path)
     for name, rule, broken in FAULTS:
         place = find_place(copy, name)
         place.path.write_text(replaced(place, rule, broken), encoding="utf-8")
