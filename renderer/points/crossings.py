@@ -23,10 +23,10 @@ from renderer.kernels.simd import (
     splat8,
 )
 from renderer.points.signs import UNDECIDED, area_sign, volume_sign
-from renderer.trace.doubt import coordinate
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+from renderer.trace.sides import coordinate
 
 # Columns of the answer: winding number, crossings, and whether the point lies on a face (or is UNDECIDED).
 WINDING, CROSSINGS, ON = range(3)

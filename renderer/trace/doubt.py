@@ -1,6 +1,6 @@
-"""Settles hits in doubt: those whose t, or whose determinant, rounding may have made.
+"""Settles hits in doubt: those whose t or determinant rounding may have made, and those at an edge.
 
-Two rules hold afterwards. No t lies outside the stretch in which the ray is within its face's own box, so the search
+Three rules hold afterwards. At an edge the exact signs decide whether the ray meets a face. No t lies outside the stretch in which the ray is within its face's own box, so the search
 for it leaves out no box on its way. And a hit whose determinant was in doubt is computed anew with twice the digits: it
 counts where the ray comes within ROUNDING of the face.
 """
@@ -33,6 +33,7 @@ from renderer.trace.intersect import (
     round_down,
     turned,
 )
+from renderer.trace.sides import coordinate, exact_sides, passes_within
 
 # How near a ray must come to a face to hit it, in units of the power of two below L, the largest component of a corner
 # relative to the origin. A sheared coordinate errs by 5 u L (``spawn`` derives it), so a ray that passes a face on the
@@ -49,13 +50,15 @@ _SLACK = 2.0**-50
 
 
 @kernel
-def settled(tree, at, ray, hit, blurred):
+def settled(tree, at, ray, shear, hit, blurred):
     """The hit (t, u, v, w) that a hit in doubt of the face at ``at`` counts as. t is NaN where it counts as none.
 
-    ``blurred`` says that the determinant is in doubt, not t alone. t lies where the ray is within the face's own box,
+    ``blurred`` says that the determinant is in doubt, not t or an edge alone. t lies where the ray is within the face's own box,
     in the arithmetic of ``enter_boxes``. That is monotone: the ray enters no box around this one later, and leaves none
     earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
     """
+    if not passes_within(exact_sides(tree, at, shear)):
+        return np.nan, 0.0, 0.0, 1.0
     # From the ray itself: to keep its ``Slabs`` for this would cost every ray.
     largest = largest_of(ray)
     t0, t1 = np.float32(0.0), np.float32(np.inf)
@@ -84,12 +87,6 @@ def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
     n = np.float32(np.float32(near - near_origin) * near_inverse)
     f = np.float32(np.float32(far - far_origin) * far_inverse)
     return (n if n > t0 else t0), (f if f < t1 else t1)
-
-
-@inlined
-def coordinate(tree, at):
-    """One coordinate of a block, exactly."""
-    return get(tree.wide_blocks, at) if tree.wide != 0 else np.float64(get(tree.blocks, at))
 
 
 @inlined

@@ -271,9 +271,8 @@ def see_triangles(tree, base, ray):
     """The ``Edges`` of a block's four triangles, and the mask of those whose edges a ray passes on the same side.
 
     Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
-    ab - cd or is 0, and it is antisymmetric. 0 counts as inside. So of two triangles that share an edge one is hit
-    there. A triangle is missed when all three edge functions are 0: the ray lies in its plane, or two corners are one.
-    A triangle whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded edges leave.
+    ab - cd or is 0. 0 counts as inside here, and puts the hit in doubt; ``sides`` then decides exactly. A triangle
+    whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded edges leave.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, ray)
     zero, ox, oy, oz = splat4(0.0), splat4(ray.origin_x), splat4(ray.origin_y), splat4(ray.origin_z)
@@ -286,20 +285,20 @@ def see_triangles(tree, base, ray):
     e2 = x1 * y0 - y1 * x0
     not_negative = (e0 >= zero) & (e1 >= zero) & (e2 >= zero)
     not_positive = (e0 <= zero) & (e1 <= zero) & (e2 <= zero)
-    determinant = e0 + e1 + e2
-    seen = (not_negative | not_positive) & (determinant != zero)
-    return Edges(x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant), seen
+    return Edges(x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, e0 + e1 + e2), not_negative | not_positive
 
 
 @inlined
 def meet_planes(edges, ray, t_min, t_max):
     """t of four triangles, and three masks: doubt, blurred and due.
 
-    In doubt is a triangle whose t rounding may have made; blurred, one of those whose determinant it may have made. Due
-    is one in doubt whose hit may lie from t_min to t_max once it is settled.
+    In doubt is a triangle whose t rounding may have made, or an edge of which the ray may pass; blurred, one whose
+    determinant rounding may have made. Due is one in doubt that may be hit from t_min to t_max once that is settled.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant = edges
-    across = magnitude(x0) + magnitude(x1) + magnitude(x2) + magnitude(y0) + magnitude(y1) + magnitude(y2)
+    zero, wide = splat4(0.0), magnitude(x0) + magnitude(x1) + magnitude(x2)
+    high = magnitude(y0) + magnitude(y1) + magnitude(y2)
+    across = wide + high
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
     numerator, product = e0 * z0 + e1 * z1 + e2 * z2, across * (across + along)
     denominator = determinant * splat4(ray.direction_z)
@@ -307,9 +306,13 @@ def meet_planes(edges, ray, t_min, t_max):
     limit, error = product * along * splat4(DOUBT), product * along * splat4(_ERROR)
     slant = product * (magnitude(z1 - z0) + magnitude(z2 - z0)) * splat4(SLANT)
     blurred = magnitude(determinant) * along <= select(slant > limit, slant, limit)
-    doubt = blurred | (height <= limit)
+    on_edge = (e0 == zero) | (e1 == zero) | (e2 == zero)
+    doubt = blurred | on_edge | (height <= limit)
+    # No ray meets a triangle that it sees as a point or as a piece of an axis. These are told here, because rays along
+    # walls would all be in doubt.
+    seen = ((x0 != x1) | (x1 != x2) | (y0 != y1) | (y1 != y2)) & (wide > zero) & (high > zero)
     within = (height + error >= splat4(t_min) * base) & (height - error <= splat4(t_max) * base)
-    return t, doubt, blurred, blurred | (doubt & (t >= splat4(0.0)) & within)
+    return t, doubt, blurred, (blurred | (doubt & (t >= zero) & within)) & seen
 
 
 @inlined

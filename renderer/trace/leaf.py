@@ -128,7 +128,7 @@ def nearest_carefully(tree, first, count, ray, shear, best):
             fi = get(tree.faces, block * BLOCK_FACES + i)
             hit = extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)
             if (doubts >> i) & 1 != 0:
-                hit = settled(tree, base + i, ray, hit, (blurred >> i) & 1 != 0)
+                hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
             if hit[0] >= ray.t_min and (hit[0] < t or (hit[0] == t and fi < face)):
                 t, u, v, w = hit
                 face = fi

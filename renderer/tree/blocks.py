@@ -16,23 +16,22 @@ _VERTICES, _BLOCKS = 1 << 16, 1 << 12
 
 @kernel
 def _fill(vertices, faces, block_faces, address, wide, begin, end):
-    """Copy the vertices of each face of blocks ``begin:end`` into its rows; unused places repeat one vertex.
+    """Copy the vertices of each face of blocks ``begin:end`` into its rows; unused places hold NaN, which no ray meets.
 
     The blocks stand at ``address``, float64 where ``wide``, else float32: one kernel for both.
     """
     doubles, floats = float64_pointer(address), float32_pointer(address)
     for place in range(begin * BLOCK_FACES, end * BLOCK_FACES):
         face = block_faces[place]
-        first = faces[block_faces[place // BLOCK_FACES * BLOCK_FACES], 0]
         base = place // BLOCK_FACES * BLOCK_WORDS + place % BLOCK_FACES
         for corner in range(3):
-            vertex = first if face < 0 else faces[face, corner]
             for axis in range(3):
                 at = base + BLOCK_FACES * (3 * corner + axis)
+                x = vertices[faces[face, corner], axis] if face >= 0 else np.nan
                 if wide:
-                    put(doubles, at, vertices[vertex, axis])
+                    put(doubles, at, x)
                 else:
-                    put(floats, at, np.float32(vertices[vertex, axis]))
+                    put(floats, at, np.float32(x))
 
 
 def fill_blocks(

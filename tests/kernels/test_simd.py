@@ -41,7 +41,7 @@ def operations8(a, b, c, out, masks):
     store(out, 48, x * y - s)
     store(out, 56, select((x > y) | (x < s), s, x))
     masks[0], masks[1], masks[2], masks[3] = movemask(x < y), movemask(x <= y), movemask(x > y), movemask(x >= y)
-    masks[4] = movemask(x != y)
+    masks[4], masks[7] = movemask(x != y), movemask(x == y)
     masks[5], masks[6] = movemask((x < y) & (x < s)), movemask((x < y) | (x < s))
 
 
@@ -57,7 +57,7 @@ def operations4(a, b, c, out, masks):
     store(out, 24, x * y - s)
     store(out, 28, select((x > y) | (x < s), s, x))
     masks[0], masks[1], masks[2], masks[3] = movemask(x < y), movemask(x <= y), movemask(x > y), movemask(x >= y)
-    masks[4] = movemask(x != y)
+    masks[4], masks[7] = movemask(x != y), movemask(x == y)
     masks[5], masks[6] = movemask((x < y) & (x < s)), movemask((x < y) | (x < s))
 
 
@@ -72,7 +72,7 @@ def test_operations_equal_numpy(lanes, stored, seed):
     kind = np.float32 if lanes == 8 else np.float64
     a, b = (rng.choice([*F32, *rng.normal(size=8)], 16).astype(stored) for _ in range(2))
     # Everything outside the lanes stays as it is.
-    out, masks = np.full(8 * lanes + 3, 77, kind), np.zeros(7, np.int64)
+    out, masks = np.full(8 * lanes + 3, 77, kind), np.zeros(8, np.int64)
     c = kind(rng.normal())
     (operations8 if lanes == 8 else operations4)(a, b, c, out, masks)
     x, y, s = a[3 : 3 + lanes].astype(kind), b[1 : 1 + lanes].astype(kind), np.full(lanes, c)
@@ -87,7 +87,7 @@ def test_operations_equal_numpy(lanes, stored, seed):
     assert (out[8 * lanes :] == 77).all()
     # Comparisons with NaN are false, != included: it is ordered.
     ordered = (x != y) & ~np.isnan(x) & ~np.isnan(y)
-    wanted = [x < y, x <= y, x > y, x >= y, ordered, (x < y) & (x < s), (x < y) | (x < s)]
+    wanted = [x < y, x <= y, x > y, x >= y, ordered, (x < y) & (x < s), (x < y) | (x < s), x == y]
     assert masks.tolist() == [bits_of(mask) for mask in wanted]
 
 
@@ -96,7 +96,7 @@ def test_products_and_differences_are_not_fused():
     for lanes, kind, operation in ((8, np.float32, operations8), (4, np.float64, operations4)):
         u = np.finfo(kind).eps
         a, b = np.full(16, 1 + u, kind), np.full(16, 1 - u, kind)
-        out, masks = np.empty(8 * lanes, kind), np.zeros(7, np.int64)
+        out, masks = np.empty(8 * lanes, kind), np.zeros(8, np.int64)
         operation(a, b, kind(1), out, masks)
         assert (out[6 * lanes : 7 * lanes] == 0).all()
 

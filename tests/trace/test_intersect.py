@@ -184,11 +184,12 @@ def woop(corners, origin, direction):
     ax, bx, cx = (p[x] - shear_x * p[z] for p in (a, b, c))
     ay, by, cy = (p[y] - shear_y * p[z] for p in (a, b, c))
     u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
-    if min(u, v, w) < 0 < max(u, v, w):
+    # Where rounding leaves 0, the exact sign decides.
+    ax, bx, cx, ay, by, cy = map(Fraction, (ax, bx, cx, ay, by, cy))
+    exact = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
+    if min(exact) < 0 < max(exact) or not any(exact):
         return None
     whole = u + v + w
-    if whole == 0:
-        return None
     return (u * a[z] + v * b[z] + w * c[z]) / (whole * direction[z]), v / whole, w / whole
 
 

@@ -183,7 +183,8 @@ def judged(words, origins, directions, out):
         if (bits >> place) & 1 == 1 and t >= 0.0:
             out[i, 0], out[i, 1] = 1 + ((doubts >> place) & 1) + ((blurred >> place) & 1), t
             # A sure hit is settled too, to see that its t stays.
-            out[i, 2] = settled(tree, base + place, ray, (t, 0.0, 0.0, 1.0), (blurred >> place) & 1 != 0)[0]
+            hit, is_blurred = (t, 0.0, 0.0, 1.0), (blurred >> place) & 1 != 0
+            out[i, 2] = settled(tree, base + place, ray, make_shear(ray), hit, is_blurred)[0]
 
 
 def rays_close_to_planes(rng, count):

@@ -226,9 +226,9 @@ def test_a_changed_vertex_is_found(word):
     assert any(f"face {broken.tree.faces[place]}:" in fault for fault in broken.found())
 
 
-@pytest.mark.parametrize("value", [1e3, np.nan])
+@pytest.mark.parametrize("value", [0.0, 1e3])
 @pytest.mark.parametrize("word", range(9))
-def test_an_unused_place_with_an_area_is_found(word, value):
+def test_an_unused_place_that_is_not_empty_is_found(word, value):
     broken = Broken()
     place = broken.unused_place()
     broken.tree.blocks[broken.corners(place)[word]] = value

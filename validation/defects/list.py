@@ -76,7 +76,7 @@ HITS = (
     _kernel("hits", "a determinant that is noise is believed", "settled",
             "_meet_face(tree, at, ray, first / largest, np.float64(last) / largest) if blurred else hit", "hit"),
     _kernel("hits", "streams drop a doubt whose t is noise", "meet_planes",
-            "blurred | (doubt & (t >= splat4(0.0)) & within)", "doubt & (t >= splat4(0.0)) & within"),
+            "blurred | (doubt & (t >= zero) & within)", "doubt & (t >= zero) & within"),
     _kernel("hits", "determinants that blow roundings up are not in doubt", "SLANT",
             "SLANT = 2.0**-16", "SLANT = 2.0**-40"),
     _kernel("hits", "points on an edge are not moved off it", "_cross_exactly",
