@@ -26,12 +26,13 @@ if TYPE_CHECKING:
     from renderer.scene.material import Dielectric, Mirror, Phong
     from renderer.scene.needs import Needs, needs_of
     from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
-    from renderer.trace.query import Hits
+    from renderer.trace.hits import AllHits, Hits
     from renderer.viewer.view import view
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "AllHits",
     "BruteForce",
     "CutWarning",
     "Dielectric",
@@ -66,12 +67,13 @@ __all__ = [
 ]
 
 _HOMES = {
+    "AllHits": "trace.hits",
     "BruteForce": "octree",
     "CutWarning": "picture.image",
     "Dielectric": "scene.material",
     "DirectionalLight": "scene.light",
     "Floor": "scene.scene",
-    "Hits": "trace.query",
+    "Hits": "trace.hits",
     "Image": "picture.image",
     "Mesh": "mesh.mesh",
     "MeshError": "errors",

@@ -10,8 +10,11 @@ from renderer.errors import MeshError, expect
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.points.contains import contains
 from renderer.process.parallel import checked_threads
+from renderer.trace.all_hits import all_hits, count_hits
+from renderer.trace.batch import RayBatch, check_rays, moved_off
+from renderer.trace.hits import AllHits, Hits
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
-from renderer.trace.query import Hits, any_hits, check_rays, closest_hits, moved_off
+from renderer.trace.query import any_hits, closest_hits
 from renderer.tree.build import SPLITS, build_blocks, build_tree
 from renderer.tree.hierarchy import Rule
 from renderer.tree.refit import refit_tree
@@ -105,10 +108,8 @@ class _Accelerator:
         >>> octree.closest_hit(hits.points[:1], [[0, 0, -1]], leaving=hits.face[:1]).hit
         array([False])
         """
-        mesh, tree = self._built
-        rays = check_rays(origins, directions, t_min, t_max)
-        if leaving is not None:
-            rays = moved_off(rays, leaving, mesh, tree.scale, self.threads)
+        mesh, tree = built = self._built
+        rays = self._leaving(built, check_rays(origins, directions, t_min, t_max), leaving)
         return closest_hits(tree, rays, mesh, self.threads)
 
     def any_hit(
@@ -125,11 +126,68 @@ class _Accelerator:
         >>> octree.any_hit([[0.1, 0.2, 3.0]], [[0, 0, -1]], t_max=[2.5])
         array([False])
         """
-        mesh, tree = self._built
-        rays = check_rays(origins, directions, t_min, t_max)
-        if leaving is not None:
-            rays = moved_off(rays, leaving, mesh, tree.scale, self.threads)
-        return any_hits(tree, rays, self.threads)
+        built = self._built
+        rays = self._leaving(built, check_rays(origins, directions, t_min, t_max), leaving)
+        return any_hits(built[1], rays, self.threads)
+
+    def all_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
+        *,
+        contacts: bool = True,
+        max_hits: int | None = None,
+    ) -> AllHits:
+        """All hits of each ray in the closed interval [t_min, t_max], sorted by t, then face; arguments as above.
+
+        contacts  True: the hits of a ray at one edge or corner of the surface, told apart by position, are one contact,
+                  which is reported as the first of them. Thin walls and double faces stay two. False: each face that is
+                  hit has its row
+        max_hits  keep at most so many of each ray, the nearest
+
+        The first row of a ray is its ``closest_hit``, bit for bit, and a ray has rows where ``any_hit`` is true. The
+        tree is searched once, and no hit is told from another by its distance. Memory grows with what is found.
+
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree.from_mesh(box())
+        >>> hits = octree.all_hits([[0.5, 0.5, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.t, hits.offsets
+        (array([2., 3.]), array([0, 2, 2]))
+        >>> octree.all_hits([[0.5, 0.5, 3]], [[0, 0, -1]], contacts=False).t
+        array([2., 2., 3., 3.])
+        """
+        mesh, tree = built = self._built
+        rays = self._leaving(built, check_rays(origins, directions, t_min, t_max), leaving)
+        return all_hits(tree, rays, mesh, contacts, max_hits, self.threads)
+
+    def count_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
+        *,
+        contacts: bool = True,
+    ) -> NDArray[np.int64]:
+        """The number of rows that ``all_hits`` has for each ray, (n,) int64.
+
+        >>> from renderer.mesh.shapes import box
+        >>> Octree.from_mesh(box()).count_hits([[0.5, 0.5, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        array([2, 0])
+        """
+        built = self._built
+        rays = self._leaving(built, check_rays(origins, directions, t_min, t_max), leaving)
+        return count_hits(built[1], rays, contacts, self.threads)
+
+    def _leaving(self, built: tuple[Mesh, Tree], rays: RayBatch, leaving: ArrayLike | None) -> RayBatch:
+        """The rays, moved off the faces that they leave."""
+        if leaving is None:
+            return rays
+        return moved_off(rays, leaving, built[0], built[1].scale, self.threads)
 
     def contains(
         self, points: ArrayLike, boundary: bool = True, rule: Literal["nonzero", "even-odd"] = "nonzero"

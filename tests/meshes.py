@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from renderer.trace.query import Hits
+from renderer.trace.hits import Hits
 
 Floats = NDArray[np.float64]
 Arrays = tuple[Floats, NDArray[np.int32]]

@@ -14,10 +14,10 @@ from renderer.errors import expect, is_count
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import splat8, store
 from renderer.octree import BruteForce, Octree
+from renderer.trace.batch import check_rays
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
 from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, tree_pointers
-from renderer.trace.query import check_rays
 
 Boxes = NDArray[np.float64]
 

@@ -31,8 +31,9 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
 
     Polygons are cut into triangles: by a fan from the first corner, concave ones by their ears. The fan stays, though
     it may be wrong, where a polygon touches or crosses itself, repeats a corner, has a hole by a bridge, more than 4096
-    corners, or strays from its plane. Normals, colours and texture coordinates of vertices are kept. Positions are
-    float64 whatever the file holds. An STL file shares no vertices between its faces.
+    corners, or strays from its plane. Normals, colours and texture coordinates of vertices are kept; of GLB, colours
+    only where a mesh has no material, and texture coordinates only where it has one. Positions are float64 whatever the
+    file holds. An STL file shares no vertices between its faces.
 
     Raises ``MeshError`` that names the file and the fault: not there, not a file, unknown suffix, malformed
     or truncated, no faces, a face index out of range, a face of fewer than three vertices, values that are
@@ -148,6 +149,9 @@ def _refuse_unread(document: Any) -> None:
             raise MeshError(f"GLB: expected plain buffers, got the extension {extension}: save it without compression")
     accessors = dicts(document, "accessors")
     for number, mesh in enumerate(dicts(document, "meshes")):
+        weights = mesh.get("weights")
+        if isinstance(weights, list) and any(weights):
+            raise MeshError(f"GLB: expected a mesh that stands still, got morph weights in mesh {number}: apply them")
         for primitive in dicts(mesh, "primitives"):
             _refuse_integers(primitive, accessors, number)
             if primitive.get("mode", _TRIANGLES) == _TRIANGLE_FAN:
@@ -157,17 +161,22 @@ def _refuse_unread(document: Any) -> None:
             raise MeshError(f"GLB: expected plain accessors, got a sparse one, accessor {number}")
         if "bufferView" not in accessor:  # all zeros, as many as it says
             raise MeshError(f"GLB: expected accessors with data, got none in accessor {number}")
-    _refuse_deep(dicts(document, "nodes"))
+    nodes = dicts(document, "nodes")
+    for number, node in enumerate(nodes):
+        for key in ("skin", "weights"):  # they move the vertices of the node's mesh
+            if "mesh" in node and node.get(key) not in (None, []):
+                raise MeshError(f"GLB: expected a mesh that stands still, got {key} in node {number}: apply them")
+    _refuse_deep(nodes)
 
 
 def _refuse_integers(primitive: dict[str, Any], accessors: list[dict[str, Any]], mesh: int) -> None:
-    """Raise ``MeshError`` for positions that are no float32: trimesh reads quantized ones as they stand."""
+    """Raise ``MeshError`` for vertices that are no float32: trimesh reads quantized ones as they stand."""
     attributes = primitive.get("attributes")
-    position = attributes.get("POSITION") if isinstance(attributes, dict) else None
-    if isinstance(position, int) and 0 <= position < len(accessors):
-        kind = accessors[position].get("componentType")
-        if kind != _FLOAT32:
-            raise MeshError(f"GLB: expected float32 positions, got component type {kind} in mesh {mesh}: not quantized")
+    for key in ("POSITION", "TEXCOORD_0"):
+        number = attributes.get(key) if isinstance(attributes, dict) else None
+        kind = accessors[number].get("componentType") if isinstance(number, int) and 0 <= number < len(accessors) else 0
+        if kind not in (0, _FLOAT32):
+            raise MeshError(f"GLB: expected float32 {key}, got component type {kind} in mesh {mesh}: not quantized")
 
 
 def _refuse_deep(nodes: list[dict[str, Any]]) -> None:

@@ -19,7 +19,8 @@ RULES = ("nonzero", "even-odd")
 
 def contains(tree: Tree, mesh: Mesh, points: ArrayLike, boundary: bool, rule: str, threads: int) -> NDArray[np.bool_]:
     """Whether each point lies inside, see ``Octree.contains``."""
-    expect(rule in RULES, "rule", f"one of {RULES}", repr(rule))
+    expect(isinstance(boundary, bool | np.bool_), "boundary", "True or False", repr(boundary))
+    expect(isinstance(rule, str) and rule in RULES, "rule", f"one of {RULES}", repr(rule))
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
     _check_closed(mesh, rule)
     given = real_argument("points", points)

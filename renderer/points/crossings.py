@@ -35,6 +35,9 @@ _ROUNDOFF = 2.0**-53
 # Shewchuk's bounds of the rounding errors of both determinants, as shares of the sums of their terms without signs.
 _AREA_ERROR = (3.0 + 16.0 * _ROUNDOFF) * _ROUNDOFF
 _VOLUME_ERROR = (7.0 + 56.0 * _ROUNDOFF) * _ROUNDOFF
+# What both lose besides where products vanish: an area four times 2^-1075; a volume that times a coordinate, which is
+# 2^130 at most where the other terms are finite.
+_AREA_LOSS, _VOLUME_LOSS = 2.0**-1070, 2.0**-930
 
 
 class Column(NamedTuple):
@@ -138,8 +141,8 @@ def _cross_block(tree, base, column):
     a, b, c, d, e, f = x1 * y2, y1 * x2, x2 * y0, y2 * x0, x0 * y1, y0 * x1
     e0, e1, e2 = a - b, c - d, e - f
     m0, m1, m2 = magnitude(a) + magnitude(b), magnitude(c) + magnitude(d), magnitude(e) + magnitude(f)
-    zero, share = splat4(0.0), splat4(_AREA_ERROR)
-    r0, r1, r2 = m0 * share, m1 * share, m2 * share
+    zero, share, loss = splat4(0.0), splat4(_AREA_ERROR), splat4(_AREA_LOSS)
+    r0, r1, r2 = m0 * share + loss, m1 * share + loss, m2 * share + loss
     above = (e0 > r0) | (e1 > r1) | (e2 > r2)
     below = (zero - e0 > r0) | (zero - e1 > r1) | (zero - e2 > r2)
     possible = 15 & ~movemask(above & below)
@@ -150,7 +153,8 @@ def _cross_block(tree, base, column):
 
     # Whether the plane there lies above or below the point.
     volume = e0 * z0 + e1 * z1 + e2 * z2
-    error = (m0 * magnitude(z0) + m1 * magnitude(z1) + m2 * magnitude(z2)) * splat4(_VOLUME_ERROR)
+    terms = m0 * magnitude(z0) + m1 * magnitude(z1) + m2 * magnitude(z2)
+    error = terms * splat4(_VOLUME_ERROR) + splat4(_VOLUME_LOSS)
     over = movemask((left & (volume > error)) | (right & (zero - volume > error)))
     under = movemask((left & (zero - volume > error)) | (right & (volume > error)))
     sure, rising = (over, movemask(left)) if column.up else (under, movemask(right))

@@ -154,7 +154,14 @@ def _start(work: Callable[[], None], count: int, running: list[Future[None]]) ->
 
     Adds to ``running`` one by one, so that Ctrl-C between two of them loses none.
     """
+    pool = _pool()
     # Raised where the main thread has ended, or the system gives no more threads.
     with suppress(RuntimeError):
         for _ in range(count):
-            running.append(_pool().submit(work))
+            try:
+                running.append(pool.submit(work))
+            except KeyboardInterrupt:
+                # A thread that started just now may be on no list, and the interpreter would wait for it forever.
+                pool.shutdown(wait=False)
+                _pool.cache_clear()
+                raise

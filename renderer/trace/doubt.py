@@ -1,8 +1,9 @@
 """Settles hits in doubt: those whose t or determinant rounding may have made, and those at an edge.
 
-Three rules hold afterwards. At an edge the exact signs decide whether the ray meets a face. No t lies outside the stretch in which the ray is within its face's own box, so the search
-for it leaves out no box on its way. And a hit whose determinant was in doubt is computed anew with twice the digits: it
-counts where the ray comes within ROUNDING of the face.
+Three rules hold afterwards. At an edge the exact signs decide whether the ray meets a face. No t lies outside the
+stretch in which the ray is within its face's own box, so the search for it leaves out no box on its way. And a hit
+whose determinant was in doubt is computed anew with twice the digits: it counts where the ray comes within ROUNDING of
+the face.
 """
 
 from typing import Any, NamedTuple
@@ -20,7 +21,7 @@ from renderer.kernels.pairs import (
     product,
     scaled_difference,
 )
-from renderer.kernels.simd import get, larger, smaller
+from renderer.kernels.simd import larger, smaller
 from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, scale, sub
 from renderer.trace.intersect import (
     FAR_PADDING,
@@ -53,9 +54,9 @@ _SLACK = 2.0**-50
 def settled(tree, at, ray, shear, hit, blurred):
     """The hit (t, u, v, w) that a hit in doubt of the face at ``at`` counts as. t is NaN where it counts as none.
 
-    ``blurred`` says that the determinant is in doubt, not t or an edge alone. t lies where the ray is within the face's own box,
-    in the arithmetic of ``enter_boxes``. That is monotone: the ray enters no box around this one later, and leaves none
-    earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
+    ``blurred`` says that the determinant is in doubt, not t or an edge alone. t lies where the ray is within the face's
+    own box, in the arithmetic of ``enter_boxes``. That is monotone: the ray enters no box around this one later, and
+    leaves none earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
     """
     if not passes_within(exact_sides(tree, at, shear)):
         return np.nan, 0.0, 0.0, 1.0

@@ -65,8 +65,19 @@ def normal_of(p0, p1, p2, d):
         return normalized(n)
     longest = normalized(side2 if l2 >= l0 and l2 >= l1 else (side1 if l1 >= l0 else side0))
     across = normalized(sub(scale(longest, dot(d, longest)), d))
+    if largest_component(across) == 0.0:
+        # Of a d along the side every direction across looks as far back.
+        across = normalized(cross(longest, _least_axis(longest)))
     # Once more, because of a d nearly along the side rounding leaves much of what points along it.
     return normalized(sub(across, scale(longest, dot(across, longest))))
+
+
+@inlined
+def _least_axis(a):
+    """The axis along which a vector has its least component."""
+    x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
+    on_x, on_y = x <= y and x <= z, y <= z
+    return (1.0 if on_x else 0.0), (0.0 if on_x or not on_y else 1.0), (0.0 if on_x or on_y else 1.0)
 
 
 @inlined

@@ -10,7 +10,7 @@ from renderer.inspect.tree_boxes import visited
 from renderer.picture.prepare import PreparedScene
 from renderer.shade.records import MATERIAL_COLUMNS
 from renderer.shade.surface import surface_of
-from renderer.trace.query import Hits
+from renderer.trace.hits import Hits
 from renderer.viewer.protocol import Pick
 from renderer.viewer.shown import ShownScene, varied
 from renderer.viewer.viewpoint import camera_of

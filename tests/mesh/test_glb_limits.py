@@ -60,6 +60,36 @@ def test_quantized_positions_are_refused(tmp_path, kind, required):
         load_mesh(glb(tmp_path, {"accessors": [accessor], "extensionsRequired": required}))
 
 
+def test_quantized_texture_coordinates_are_refused(tmp_path):
+    """They were read as they stand, and 1 - v wrapped around."""
+    accessors = [
+        {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+        {"bufferView": 0, "componentType": 5123, "normalized": True, "count": 3, "type": "VEC2"},
+    ]
+    meshes = [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}}]}]
+    with pytest.raises(MeshError, match="expected float32 TEXCOORD_0, got component type 5123 in mesh 0"):
+        load_mesh(glb(tmp_path, {"accessors": accessors, "meshes": meshes}))
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ({"nodes": [{"mesh": 0, "skin": 0}]}, "skin in node 0"),
+        ({"nodes": [{"mesh": 0, "weights": [0.5]}]}, "weights in node 0"),
+        ({"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}], "weights": [0.0, 1.0]}]}, "weights in mesh 0"),
+    ],
+)
+def test_what_moves_vertices_is_refused(tmp_path, document, message):
+    """They were left out: the mesh stood at another place, in another size."""
+    with pytest.raises(MeshError, match=f"GLB: expected a mesh that stands still, got .*{message}"):
+        load_mesh(glb(tmp_path, document))
+
+
+def test_weights_that_move_nothing_are_taken(tmp_path):
+    meshes = [{"primitives": [{"attributes": {"POSITION": 0}}], "weights": [0.0, 0.0]}]
+    assert len(load_mesh(glb(tmp_path, {"meshes": meshes})).faces) == 1
+
+
 @pytest.mark.parametrize("extension", ["EXT_mesh_gpu_instancing", "KHR_meshopt_compression", "FOO_bar"])
 def test_required_extensions_that_may_change_triangles_are_refused(tmp_path, extension):
     with pytest.raises(MeshError, match=f"got the extension {extension}"):

@@ -124,3 +124,37 @@ def test_the_deepest_tree_has_a_stack_that_holds_its_column():
     count_crossings(tree.words, np.zeros((1, 3)), 2, -1.0, counts, stack, 0, 1)
     assert counts[0].tolist() == [7 * levels + 1, 7 * levels + 1, 0]
     assert (stack[-8:] == -7).all() and (stack[500:-8] != -7).any()
+
+
+TETRAHEDRON = [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)]
+
+
+@pytest.mark.parametrize(
+    ("vertices", "point"),
+    [
+        (
+            [[2.24525504e-316, -2.7133658e-316, -2.58718795e-316], [3.7686394e-316, 1.0113675e-316, 0.5]]
+            + [[-5.2599764e-316, -1.0, 0.2], [-1.0, -0.1, 0.3]],
+            [1.7279163e-316, -0.21554341831003698, 0.404266547588439],
+        ),
+        (
+            [[7.333203929232191e-286, 0.0, -2.2345715630123243e-286]]
+            + [[-2.0404438073251352e-287, 2.028240960365167e31, -2.435064557410902e-288]]
+            + [[4.056481920730334e31, 8.112963841460669e30, 1.1493845419600659e-285]]
+            + [[4.0564819207303343e30, 1.2169445762191002e31, 4.056481920730334e31]],
+            [1.373307914066658e30, 3.579981410714537e30, -1.409615782665431e-286],
+        ),
+    ],
+)
+def test_signs_whose_products_vanish_are_not_believed(vertices, point):
+    """The bound of a sign's rounding left out what a product loses where it vanishes."""
+    triangles = [rational([vertices[i] for i in face]) for face in TETRAHEDRON]
+    expected = winding_number(rational([point])[0], triangles) != 0
+    assert Octree(vertices, TETRAHEDRON).contains([point]) == expected
+    assert BruteForce(vertices, TETRAHEDRON).contains([point]) == expected
+
+
+@pytest.mark.parametrize("boundary", ["false", 1, None])
+def test_an_answer_for_the_boundary_that_is_none_is_refused(boundary):
+    with pytest.raises(ValueError, match="boundary: expected True or False"):
+        Octree.from_mesh(box()).contains([[0, 0, 0]], boundary=boundary)

@@ -275,6 +275,31 @@ def test_control_c_while_threads_start_stops_those_that_did(monkeypatch, submitt
     released.set()
 
 
+INTERRUPTED = """
+import signal, threading
+from renderer.process.parallel import for_chunks
+start = threading.Thread.start
+def interrupted(self):
+    start(self)
+    if self.name.startswith("renderer"):
+        signal.raise_signal(signal.SIGINT)
+threading.Thread.start = interrupted
+try:
+    for_chunks(lambda begin, end: None, 100, 1, 4)
+except KeyboardInterrupt:
+    threading.Thread.start = start
+    for_chunks(lambda begin, end: print(begin), 1, 1, 4)
+"""
+
+
+def test_control_c_while_a_thread_starts_leaves_none_that_the_interpreter_waits_for():
+    """The thread was on no list, so nobody woke it, and the process said that it was interrupted and never ended."""
+    command = [sys.executable, "-c", INTERRUPTED]
+    handler = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, preexec_fn=handler)
+    assert done.stdout == "0\n"
+
+
 DAEMON = """
 import threading
 from renderer.process.parallel import for_chunks

@@ -97,7 +97,7 @@ def plane_distance(vertices, face, point):
 
 
 def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_distance():
-    from renderer.trace.query import check_rays, moved_off
+    from renderer.trace.batch import check_rays, moved_off
 
     ball = icosphere(2)
     for offset in OFFSETS:
@@ -177,3 +177,22 @@ def test_a_direction_that_is_no_number_is_blamed_not_the_origin():
     octree = Octree.from_mesh(icosphere(1))
     with pytest.raises(ValueError, match=r"directions: .*nan.* in row 1"):
         octree.any_hit(np.zeros((2, 3)), [[0.0, 0.0, 1.0], [np.nan, 0.0, 1.0]], leaving=[0, 1])
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+@pytest.mark.parametrize("toward", [0, 1])
+def test_a_ray_along_a_face_on_a_line_leaves_it(accelerator, toward):
+    """Of a direction along the side no normal looked back, so the start was not moved."""
+    corners = np.array(
+        [
+            [0.47691293898668974, 0.8120147782475116, 0.7482027731609157],
+            [-1.2846917166076126, 2.302273590569028, 1.157085049802302],
+            [-0.07884622248081871, 1.2821685016014936, 0.8771988396072095],
+        ]
+    )
+    direction = np.array([0.7144270209313762, -0.6043814429772874, -0.1658241228444045]) * (1 - 2 * toward)
+    queries = accelerator(corners, [[0, 1, 2]])
+    assert not queries.any_hit(corners[2], [direction], leaving=0).any()
+    # Other directions so near to the side that their roundings are all that points across it.
+    near = direction * (1.0 + 2.0**-52 * np.random.default_rng(0).integers(-2, 3, (500, 3)))
+    assert not queries.any_hit(corners[2], near, leaving=0).any()

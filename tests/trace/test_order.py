@@ -16,10 +16,10 @@ from renderer.kernels.jit import kernel
 from renderer.kernels.simd import extract
 from renderer.octree import BruteForce, Octree
 from renderer.trace.doubt import settled
+from renderer.trace.hits import Hits
 from renderer.trace.intersect import Ray, hit_triangles, make_shear
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.query import Hits
 
 SIDE = 100
 

@@ -39,7 +39,15 @@ def test_products_that_rounding_makes_one(seed, scale):
 
 @pytest.mark.parametrize(
     ("sides", "within"),
-    [((1, 1, 1), 1), ((-1, -1, -1), 1), ((1, 0, 1), 1), ((0, 0, -1), 1), ((0, 0, 0), 0), ((1, -1, 1), 0), ((0, 1, -1), 0)],
+    [
+        ((1, 1, 1), 1),
+        ((-1, -1, -1), 1),
+        ((1, 0, 1), 1),
+        ((0, 0, -1), 1),
+        ((0, 0, 0), 0),
+        ((1, -1, 1), 0),
+        ((0, 1, -1), 0),
+    ],
 )
 def test_a_face_is_closed_and_has_no_side_in_its_plane(sides, within):
     assert passes_within(sides) == bool(within)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from renderer import BruteForce, MeshError, Octree
-from renderer.mesh.shapes import icosphere
+from renderer.limits import SHORTEST
+from renderer.mesh.shapes import box, icosphere
 from renderer.octree import _LEAST_SIDE
 from validation.oracle import exact
 
@@ -81,3 +82,18 @@ def test_no_hit_is_at_infinity_or_minus_zero(exponent):
     assert hits.face[0] == 0
     assert not np.signbit(hits.t).any()
     assert np.isfinite(hits.t[hits.hit]).all()
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+@pytest.mark.parametrize("side", [2.0**-329, 1e-90, 1e-72])
+def test_the_smallest_box_with_the_shortest_directions_leaks_nowhere(accelerator, side):
+    """A determinant times a direction vanished: rays passed the box to the triangle behind it, and t was wrong."""
+    small = box((-0.37, -0.37, -0.37), (0.63, 0.63, 0.63))
+    vertices = np.concatenate([small.vertices * side, [[1, 1, 1], [1, 2, 1], [2, 1, 1]]])
+    queries = accelerator(vertices, np.concatenate([small.faces, [[8, 9, 10]]]))
+    directions = np.random.default_rng(0).normal(size=(500, 3))
+    directions /= np.abs(directions).max(axis=1)[:, None]
+    plain, short = (queries.closest_hit([0, 0, 0], directions * d) for d in (1.0, SHORTEST))
+    assert plain.hit.all() and (plain.face < 12).all()
+    np.testing.assert_array_equal(short.face, plain.face)
+    np.testing.assert_array_equal(short.t * SHORTEST, plain.t)

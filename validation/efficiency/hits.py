@@ -19,7 +19,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.process.parallel import available_threads
-from renderer.trace.query import Hits
+from renderer.trace.hits import Hits
 from validation.error_curves import front
 from validation.hits.compare import HitArrays
 from validation.hits.rays import RayFamily, camera_rays, float32_exact, leak_rays

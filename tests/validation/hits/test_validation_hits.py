@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
+from renderer.trace.hits import Hits
 from renderer.trace.layout import BLOCK_FACES
-from renderer.trace.query import Hits
 from validation.gates import Gate
 from validation.hits import check as check_hits
 from validation.hits import leaks as hit_leaks

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.trace.query import Hits
+from renderer.trace.hits import Hits
 from validation.efficiency.hits import answer, errors, turned_mesh
 from validation.error_curves import front
 from validation.hits.rays import RayFamily, camera_rays, float32_exact, random_rays

@@ -1,0 +1,251 @@
+"""All hits of each ray of a range, in compressed rows: found through the tree in any order, merged, then sorted.
+
+A contact is the hits of one ray at one edge or corner of the surface, told apart by position, or one hit between them.
+It counts as its first hit, so the first contact is the closest hit.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, extract, get, lowest_bit, pointer, put, smaller, splat8
+from renderer.trace.doubt import settled
+from renderer.trace.intersect import (
+    box_limit,
+    enter_boxes,
+    hit_triangles,
+    largest_of,
+    make_shear,
+    make_slabs,
+    round_down,
+)
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
+from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
+from renderer.trace.sides import coordinate, exact_sides
+
+# Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
+# place of the face in its block, the edges passed as bits, and the order as int64. Of the hits of the rays before it:
+# t, u, v, and face.
+_T, _U, _V, _W, OUT_T, OUT_U, OUT_V, DOUBLE_ROWS = range(8)
+_FACE, _AT, _EDGES, _ORDER, OUT_FACE, INTEGER_ROWS = range(6)
+_MERGED = -1
+
+
+class Found(NamedTuple):
+    """Pointers to the memory's rows, and their length."""
+
+    doubles: Any
+    integers: Any
+    capacity: int
+
+
+@inlined
+def _row(found, row, i):
+    return found.capacity * row + i
+
+
+@kernel
+def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, stack):
+    """Gather the hits of the rays from bounds[0] to bounds[1]; what they have goes to ``counts``, one int64 a ray.
+
+    choice    (merge, most, keep): whether hits become contacts, the most of them of a ray, whether they are kept or
+              counted only
+    doubles   (DOUBLE_ROWS, capacity) float64, integers (INTEGER_ROWS, capacity) int64: memory, and what is kept
+    stack     memory for ``singly.stack_size`` int64
+
+    Returns the ray before which it ended because the memory was full, or bounds[1]; and the row of a ray out of range,
+    for which nothing is gathered, or -1.
+    """
+    tree = tree_pointers(words)
+    source, found = ray_pointers(rays, tree.scale), Found(pointer(doubles), pointer(integers), doubles.shape[1])
+    bad, kept = first_bad_ray(source, bounds[0], bounds[1]), np.int64(0)
+    if bad >= 0:
+        return bounds[0], bad
+    merge, most, keep = choice
+    for i in range(bounds[0], bounds[1]):
+        ray, t_max = ray_at(source, i)
+        count = _search(tree, ray, t_max, found, pointer(stack))
+        if kept + count > found.capacity:
+            return i, -1
+        counts[i] = smaller(_ordered(tree, found, count, merge, keep), most)
+        if keep:
+            _keep(found, kept, counts[i], tree.scale)
+        # Where hits are counted only, so that a chunk ends after some work, and Ctrl-C need not wait for long.
+        kept += count if not keep else counts[i]
+    return bounds[1], -1
+
+
+@kernel
+def _search(tree, ray, t_max, found, stack):
+    """List all hits of one ray; returns their number, of which the capacity is listed."""
+    shear = make_shear(ray)
+    if not tree.has_nodes:
+        return _list_hits(tree, (0, tree.count), ray, shear, t_max, found, 0)
+    largest = largest_of(ray)
+    slabs = make_slabs(ray, largest)
+    lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
+    count, top = np.int64(0), 1
+    put(stack, 0, 0)
+    while top > 0:
+        top -= 1
+        child = get(stack, top)
+        if child < 0:
+            count = _list_hits(tree, blocks_of(child), ray, shear, t_max, found, count)
+            continue
+        _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
+        top = push_children(tree, child, bits, stack, top)
+    return count
+
+
+@kernel
+def _list_hits(tree, blocks, ray, shear, t_max, found, count):
+    """Add the hits in some blocks (first, number) to the list."""
+    for block in range(blocks[0], blocks[0] + blocks[1]):
+        base = block * BLOCK_WORDS
+        bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, t_max)
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            hit, edges = (extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)), np.int64(0)
+            if (doubts >> i) & 1 != 0:
+                hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
+                edges = _edges_passed(exact_sides(tree, base + i, shear))
+            if ray.t_min <= hit[0] <= t_max:
+                if count < found.capacity:
+                    _list_hit(found, count, hit, get(tree.faces, block * BLOCK_FACES + i), base + i, edges)
+                count += 1
+    return count
+
+
+@inlined
+def _edges_passed(sides):
+    """The edges that a ray passes, as bits: 1 for the edge opposite to the first corner, 2 and 4 for the others."""
+    return np.int64(sides[0] == 0) | (np.int64(sides[1] == 0) << 1) | (np.int64(sides[2] == 0) << 2)
+
+
+@inlined
+def _list_hit(found, i, hit, face, place, edges):
+    put(found.doubles, _row(found, _T, i), hit[0])
+    put(found.doubles, _row(found, _U, i), hit[1])
+    put(found.doubles, _row(found, _V, i), hit[2])
+    put(found.doubles, _row(found, _W, i), hit[3])
+    put(found.integers, _row(found, _FACE, i), np.int64(face))
+    put(found.integers, _row(found, _AT, i), place)
+    put(found.integers, _row(found, _EDGES, i), edges)
+
+
+@kernel
+def _ordered(tree, found, count, merge, sort):
+    """Write the order of the listed hits, or of the contacts that they make, by t, then face; returns their number."""
+    order = at(found.integers, _row(found, _ORDER, 0))
+    if merge:
+        _merge(tree, found, count, order)
+    kept = 0
+    for i in range(count):
+        put(order, kept, i)
+        kept += np.int64(get(found.integers, _row(found, _FACE, i)) != _MERGED)
+    if sort:
+        _sort(tree, found, order, kept, False)
+    return kept
+
+
+@kernel
+def _merge(tree, found, count, order):
+    """Mark, of the hits at one edge or corner, all but the first as merged."""
+    on_edges = 0
+    for i in range(count):
+        put(order, on_edges, i)
+        on_edges += np.int64(get(found.integers, _row(found, _EDGES, i)) != 0)
+    _sort(tree, found, order, on_edges, True)
+    for k in range(1, on_edges):
+        # Those of one place follow each other. The first one's place stands for all, merged or not.
+        if _compare_places(tree, found, get(order, k - 1), get(order, k)) == 0:
+            put(found.integers, _row(found, _FACE, get(order, k)), np.int64(_MERGED))
+
+
+@kernel
+def _sort(tree, found, order, count, by_place):
+    """Sort ``order`` by t, then face, of the hits it names; or by their places first. A heap, as rays may hit much."""
+    for start in range(count // 2 - 1, -1, -1):
+        _sift(tree, found, order, start, count, by_place)
+    for end in range(count - 1, 0, -1):
+        first = get(order, 0)
+        put(order, 0, get(order, end))
+        put(order, end, first)
+        _sift(tree, found, order, 0, end, by_place)
+
+
+@kernel
+def _sift(tree, found, order, parent, count, by_place):
+    """Let an entry of a heap sink to its place."""
+    sinking = get(order, parent)
+    while 2 * parent + 1 < count:
+        child = 2 * parent + 1
+        if child + 1 < count and _precedes(tree, found, get(order, child), get(order, child + 1), by_place):
+            child += 1
+        if not _precedes(tree, found, sinking, get(order, child), by_place):
+            break
+        put(order, parent, get(order, child))
+        parent = child
+    put(order, parent, sinking)
+
+
+@kernel
+def _precedes(tree, found, i, j, by_place):
+    """Whether hit i comes before hit j."""
+    if by_place:
+        compared = _compare_places(tree, found, i, j)
+        if compared != 0:
+            return compared < 0
+    ti, tj = get(found.doubles, _row(found, _T, i)), get(found.doubles, _row(found, _T, j))
+    return ti < tj or (
+        ti == tj and get(found.integers, _row(found, _FACE, i)) < get(found.integers, _row(found, _FACE, j))
+    )
+
+
+@kernel
+def _compare_places(tree, found, i, j):
+    """The order, -1, 0 or 1, of the edges or corners that two hits lie at, by their ends' coordinates."""
+    a, b = _ends(tree, found, i)
+    c, d = _ends(tree, found, j)
+    first = _compare_corners(tree, a, c)
+    return first if first != 0 else _compare_corners(tree, b, d)
+
+
+@kernel
+def _ends(tree, found, i):
+    """Where the ends of the edge of a hit stand in its block, the lower first; of a corner, that twice."""
+    place = get(found.integers, _row(found, _AT, i))
+    edges = get(found.integers, _row(found, _EDGES, i))
+    if edges & (edges - 1) != 0:
+        # Two edges meet in the corner that is opposite to the third.
+        corner = place + 12 * lowest_bit(~edges & 7)
+        return corner, corner
+    opposite = lowest_bit(edges)
+    a, b = place + 12 * ((opposite + 1) % 3), place + 12 * ((opposite + 2) % 3)
+    return (a, b) if _compare_corners(tree, a, b) <= 0 else (b, a)
+
+
+@kernel
+def _compare_corners(tree, a, b):
+    """The order of two corners, -1, 0 or 1, by x, then y, then z."""
+    for row in range(0, 12, 4):
+        x, y = coordinate(tree, a + row), coordinate(tree, b + row)
+        if x != y:
+            return -1 if x < y else 1
+    return 0
+
+
+@kernel
+def _keep(found, kept, count, scale):
+    """Append the first ``count`` hits in order to those kept, t in the rays' units."""
+    for k in range(count):
+        i, to = get(found.integers, _row(found, _ORDER, k)), kept + k
+        w = get(found.doubles, _row(found, _W, i))
+        # + 0.0 turns -0.0 into 0.0.
+        put(found.doubles, _row(found, OUT_T, to), get(found.doubles, _row(found, _T, i)) / scale + 0.0)
+        put(found.doubles, _row(found, OUT_U, to), get(found.doubles, _row(found, _U, i)) / w + 0.0)
+        put(found.doubles, _row(found, OUT_V, to), get(found.doubles, _row(found, _V, i)) / w + 0.0)
+        put(found.integers, _row(found, OUT_FACE, to), get(found.integers, _row(found, _FACE, i)))

@@ -1,0 +1,96 @@
+"""What queries answer: the closest hits, a row per ray, and all hits, in compressed rows."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh, face_normals
+
+
+# Slots and not frozen: a call with one ray spends a third of its time on making objects.
+@dataclass(eq=False, slots=True)
+class Hits:
+    """Closest hits, one row per ray.
+
+    t     (n,) float64, in units of |direction|; inf on a miss
+    face  (n,) int64; -1 on a miss
+    u, v  (n,) float64, P = (1 - u - v) p0 + u p1 + v p2; nan on a miss
+    """
+
+    t: NDArray[np.float64]
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    _mesh: Mesh = field(repr=False)
+
+    @property
+    def hit(self) -> NDArray[np.bool_]:
+        """Whether each ray hit a face, (n,) bool."""
+        return self.face >= 0
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """Hit points from the barycentrics, (n, 3) float64; nan on a miss."""
+        points = np.full((len(self.t), 3), np.nan)
+        hit = self.hit
+        points[hit] = _points(self._mesh, self.face[hit], self.u[hit], self.v[hit])
+        return points
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit geometric normals by the faces' winding, (n, 3) float64; nan on a miss."""
+        normals = np.full((len(self.t), 3), np.nan)
+        hit = self.hit
+        normals[hit] = _normals(self._mesh, self.face[hit])
+        return normals
+
+
+@dataclass(eq=False, slots=True)
+class AllHits:
+    """All hits of n rays, m in all, in compressed rows: those of ray i are the rows offsets[i] to offsets[i + 1].
+
+    The rows of a ray are sorted by t, then face.
+
+    offsets  (n + 1,) int64, from 0 to m
+    t        (m,) float64, in units of |direction|
+    face     (m,) int64
+    u, v     (m,) float64, P = (1 - u - v) p0 + u p1 + v p2
+    """
+
+    offsets: NDArray[np.int64]
+    t: NDArray[np.float64]
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    _mesh: Mesh = field(repr=False)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """The number of hits of each ray, (n,) int64."""
+        return np.diff(self.offsets)
+
+    @property
+    def ray(self) -> NDArray[np.int64]:
+        """The ray of each hit, (m,) int64."""
+        return np.repeat(np.arange(len(self.offsets) - 1), self.counts)
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """Hit points from the barycentrics, (m, 3) float64."""
+        return _points(self._mesh, self.face, self.u, self.v)
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit geometric normals by the faces' winding, (m, 3) float64."""
+        return _normals(self._mesh, self.face)
+
+
+def _points(mesh: Mesh, face: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    corners, u, v = mesh.vertices[mesh.faces[face]], u[:, None], v[:, None]
+    points: NDArray[np.float64] = (1.0 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
+    return points
+
+
+def _normals(mesh: Mesh, face: NDArray[np.int64]) -> NDArray[np.float64]:
+    return face_normals(mesh.vertices[mesh.faces[face]])
