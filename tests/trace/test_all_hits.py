@@ -46,8 +46,8 @@ SOLIDS = {
     "doubled": joined(box((-2, -2, -2), (2, 2, 2)), box((-2, -2, -2), (2, 2, 2))),
     "thin": flattened(joined(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -2), (2, 2, 3)))),
     "star": rounded(icosphere(1), 4),
-    "ring": rounded(torus(6, 4), 3),
-    "grid": Mesh(grid(6, 6).vertices * [6, 6, 1], grid(6, 6).faces),
+    "ring": rounded(torus(around=6, across=4), 3),
+    "grid": rounded(grid(6, 6), 6),
     "soup": soup_of(rounded(icosphere(1), 3)),
     "slivers": Mesh(
         [[0, 0, 0], [4, 0, 0], [2, 0, 0], [2, 3, 0], [2, -3, 1], [1, 1, 1], [1, 1, 1]],
@@ -119,7 +119,7 @@ def test_laws(mesh, chosen, seed):
 @pytest.mark.parametrize("scale", [1e-300, 1e-6, 1.0, 1e6, 1e150])
 def test_laws_at_any_size(scale):
     rng = np.random.default_rng(1)
-    for mesh in (icosphere(2), soup_of(torus(12, 8))):
+    for mesh in (icosphere(2), soup_of(torus(around=12, across=8))):
         mesh = Mesh(mesh.vertices * scale, mesh.faces)
         corners = mesh.triangles[rng.integers(0, len(mesh.faces), 600)]
         share = rng.choice([0.0, 0.3, 0.5, 1.0], (600, 1))
@@ -165,7 +165,7 @@ def test_one_ray_may_hit_more_than_the_memory_holds_at_first():
 
 
 def test_the_nearest_are_kept():
-    octree, rng = Octree.from_mesh(torus(40, 20)), np.random.default_rng(3)
+    octree, rng = Octree.from_mesh(torus(around=40, across=20)), np.random.default_rng(3)
     rays = 3 * rng.normal(size=(500, 3)), rng.normal(size=(500, 3))
     whole = octree.all_hits(*rays)
     for most in (1, 2, 3, 10**30):
@@ -177,7 +177,7 @@ def test_the_nearest_are_kept():
 
 
 def test_the_same_bits_with_any_threads_and_any_cut():
-    mesh, rng = torus(60, 30), np.random.default_rng(4)
+    mesh, rng = torus(around=60, across=30), np.random.default_rng(4)
     rays = 2 * rng.normal(size=(20_000, 3)), rng.normal(size=(20_000, 3))
     whole = Octree.from_mesh(mesh, threads=1).all_hits(*rays)
     for threads in (2, 3):

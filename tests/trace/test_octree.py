@@ -27,7 +27,7 @@ def cast(accelerator, origin, direction):
 def test_empty_mesh_and_empty_batch():
     for vertices in (np.empty((0, 3)), np.zeros((2, 3))):
         for accelerator in (Octree(vertices, np.empty((0, 3), int)), BruteForce(vertices, np.empty((0, 3), int))):
-            hits = accelerator.closest_hit([[0, 0, 1], [1, 2, 3]], [[0, 0, -1], [1e-150, 0, 0]])
+            hits = accelerator.closest_hit([[0, 0, 1], [1, 2, 3]], [[0, 0, -1], [1e-90, 0, 0]])
             assert hits.t.tolist() == [np.inf, np.inf] and hits.face.tolist() == [-1, -1]
             assert np.isnan(hits.points).all() and hits.points.shape == (2, 3)
             assert accelerator.any_hit([[0, 0, 1]], [[0, 0, -1]]).tolist() == [False]
