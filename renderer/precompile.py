@@ -78,6 +78,10 @@ def _contain() -> None:
         accelerator.contains([0.0, 0.0, 0.0])
 
 
+def _gather() -> None:
+    Octree.from_mesh(_TRIANGLE).all_hits([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
+
+
 def _search() -> None:
     BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
@@ -100,6 +104,7 @@ _QUERIES = (
     Part("many rays", partial(_trace, 20)),
     Part("rays that leave faces", _leave),
     Part("brute force", _search),
+    Part("all hits", _gather),
     Part("points inside", _contain),
     Part("concave polygons", _cut),
 )

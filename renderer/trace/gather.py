@@ -109,9 +109,11 @@ def _list_hits(tree, blocks, ray, shear, t_max, found, count):
             i = lowest_bit(bits)
             bits &= bits - 1
             hit, edges = (extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)), np.int64(0)
-            if (doubts >> i) & 1 != 0:
-                hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
+            doubtful = (doubts >> i) & 1 != 0
+            if doubtful or hit[1] == 0.0 or hit[2] == 0.0 or hit[1] + hit[2] == hit[3]:
                 edges = _edges_passed(exact_sides(tree, base + i, shear))
+            if doubtful:
+                hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
             if ray.t_min <= hit[0] <= t_max:
                 if count < found.capacity:
                     _list_hit(found, count, hit, get(tree.faces, block * BLOCK_FACES + i), base + i, edges)

@@ -271,8 +271,9 @@ def see_triangles(tree, base, ray):
     """The ``Edges`` of a block's four triangles, and the mask of those whose edges a ray passes on the same side.
 
     Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
-    ab - cd or is 0. 0 counts as inside here, and puts the hit in doubt; ``sides`` then decides exactly. A triangle
-    whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded edges leave.
+    ab - cd or is 0. 0 counts as inside here. Where rounding may have made it the hit is in doubt, and ``sides`` decides
+    exactly. A triangle whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded edges
+    leave.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, ray)
     zero, ox, oy, oz = splat4(0.0), splat4(ray.origin_x), splat4(ray.origin_y), splat4(ray.origin_z)
@@ -306,13 +307,23 @@ def meet_planes(edges, ray, t_min, t_max):
     limit, error = product * along * splat4(DOUBT), product * along * splat4(_ERROR)
     slant = product * (magnitude(z1 - z0) + magnitude(z2 - z0)) * splat4(SLANT)
     blurred = magnitude(determinant) * along <= select(slant > limit, slant, limit)
-    on_edge = (e0 == zero) | (e1 == zero) | (e2 == zero)
-    doubt = blurred | on_edge | (height <= limit)
+    doubt = blurred | _may_be_on_edge(edges) | (height <= limit)
     # No ray meets a triangle that it sees as a point or as a piece of an axis. These are told here, because rays along
     # walls would all be in doubt.
     seen = ((x0 != x1) | (x1 != x2) | (y0 != y1) | (y1 != y2)) & (wide > zero) & (high > zero)
     within = (height + error >= splat4(t_min) * base) & (height - error <= splat4(t_max) * base)
     return t, doubt, blurred, (blurred | (doubt & (t >= zero) & within)) & seen
+
+
+@inlined
+def _may_be_on_edge(edges):
+    """The mask of triangles with an edge function that is 0 as rounded, though its products are not."""
+    x0, x1, x2, y0, y1, y2, _, _, _, e0, e1, e2, _ = edges
+    zero = splat4(0.0)
+    x0, x1, x2, y0, y1, y2 = x0 != zero, x1 != zero, x2 != zero, y0 != zero, y1 != zero, y2 != zero
+    on0 = (e0 == zero) & ((x2 & y1) | (y2 & x1))
+    on1 = (e1 == zero) & ((x0 & y2) | (y0 & x2))
+    return on0 | on1 | ((e2 == zero) & ((x1 & y0) | (y1 & x0)))
 
 
 @inlined

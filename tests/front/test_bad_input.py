@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import renderer
 from renderer import (
+    AllHits,
     BruteForce,
     Image,
     Mesh,
@@ -64,6 +65,8 @@ ATTRIBUTES = {"normals": np.ones((ROWS, 3)), "colors": np.full((ROWS, 3), 0.5), 
 MESH = {"vertices": BOX.vertices, "faces": BOX.faces}
 CALLS = {
     "Octree.closest_hit": Call(OCTREE.closest_hit, RAYS),
+    "Octree.all_hits": Call(OCTREE.all_hits, RAYS),
+    "Octree.count_hits": Call(OCTREE.count_hits, RAYS),
     "Octree.any_hit": Call(OCTREE.any_hit, RAYS),
     "BruteForce.closest_hit": Call(BRUTE.closest_hit, RAYS),
     "BruteForce.any_hit": Call(BRUTE.any_hit, RAYS),
@@ -331,6 +334,8 @@ def test_no_faces_are_missed_by_all(accelerator: Any, vertices: Any) -> None:
     hits = built.closest_hit(ORIGINS, DIRECTIONS)
     assert (hits.face == -1).all() and np.isinf(hits.t).all() and np.isnan(hits.points).all()
     assert np.isnan(hits.normals).all() and built.stats.faces == built.stats.references == 0
+    found = built.all_hits(ORIGINS, DIRECTIONS)
+    assert isinstance(found, AllHits) and not len(found.t) and not found.counts.any()
 
 
 # --- Hits, Mesh and their sizes -------------------------------------------------------------------------------

@@ -96,6 +96,6 @@ def hits(job: Job) -> Iterator[Gate]:
 
 # A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
-    "hits": (hits, extreme(1, 32), extreme(46, 46), extreme(49, 51), sweep, curves),
+    "hits": (hits, extreme(1, 32), extreme(46, 46), extreme(49, 52), sweep, curves),
     "pictures": (pictures, extreme(33, 45), extreme(47, 48)),
 }

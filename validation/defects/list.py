@@ -36,11 +36,11 @@ _IMAGE = "return Image(*film, build_seconds=self.build_seconds, render_seconds=c
 
 HITS = (
     _kernel("hits", "a triangle missing from the tree", "_fill",
-            "first if face < 0 else faces[face, corner]",
-            "first if face < 0 or face == 5 else faces[face, corner]"),
+            "vertices[faces[face, corner], axis] if face >= 0 else np.nan",
+            "vertices[faces[face, corner], axis] if face >= 0 and face != 5 else np.nan"),
     _kernel("hits", "one triangle in 512 missing beyond the 65,536th", "_fill",
-            "first if face < 0 else faces[face, corner]",
-            "first if face < 0 or (face > 0xFFFF and face % 512 == 0) else faces[face, corner]"),
+            "vertices[faces[face, corner], axis] if face >= 0 else np.nan",
+            "vertices[faces[face, corner], axis] if face >= 0 and (face <= 0xFFFF or face % 512 > 0) else np.nan"),
     _kernel("hits", "packets exit with their first hit", "trace_packet",
             "limit = _most(floats, LIMIT)",
             "limit = least(select(load8(floats, LIMIT) < load8(floats, LIMIT + 8), load8(floats, LIMIT), "
@@ -89,6 +89,22 @@ HITS = (
             "_on_upright(a, b, c, p, parts)", "0"),
     _kernel("hits", "expansions forget what products round off", "_add_pair",
             "_add(parts, _add(parts, count, pair[1]), pair[0])", "_add(parts, count, pair[0])"),
+    _kernel("hits", "exact signs forget what products round off", "products_sign",
+            "one[1] - other[1]", "0.0"),
+    _kernel("hits", "edges as rounded are believed", "_may_be_on_edge",
+            "(e0 == zero) & ((x2 & y1) | (y2 & x1))", "(e0 != e0) & x1"),
+    _kernel("hits", "hits at one edge are contacts of their own", "_merge",
+            "_compare_places(tree, found, get(order, k - 1), get(order, k)) == 0", "False"),
+    _kernel("hits", "a corner is taken for one of its edges", "_ends",
+            "edges & (edges - 1) != 0", "False"),
+    _kernel("hits", "of hits at one t the highest face comes first", "gather._precedes",
+            "get(found.integers, _row(found, _FACE, i)) < get(found.integers, _row(found, _FACE, j))",
+            "get(found.integers, _row(found, _FACE, i)) > get(found.integers, _row(found, _FACE, j))"),
+    _kernel("hits", "all hits of scaled meshes keep the tree's t", "_keep",
+            "get(found.doubles, _row(found, _T, i)) / scale + 0.0", "get(found.doubles, _row(found, _T, i)) + 0.0"),
+    _kernel("hits", "max_hits keeps one more", "gather_chunk",
+            "smaller(_ordered(tree, found, count, merge, keep), most)",
+            "smaller(_ordered(tree, found, count, merge, keep), most + 1)"),
     _kernel("hits", "hits are in doubt too late", "DOUBT",
             "DOUBT = 2.0**-27", "DOUBT = 2.0**-40"),
     _kernel("hits", "stale boxes of inner nodes after a refit", "refit_tree",
@@ -110,9 +126,9 @@ HITS = (
             "t, face, u, v, w = search_singly(tree, ray, limit, stack)\nbest = t * (1.0 + 2.0**-52), face, u, v, w"),
     _python("hits", "bad rays are let through", "_run",
             "if bad:\n"
-            "    _reject(rays, min(bad), tree.scale)",
+            "    reject(rays, min(bad), tree.scale)",
             "if False:\n"
-            "    _reject(rays, min(bad), tree.scale)"),
+            "    reject(rays, min(bad), tree.scale)"),
 )  # fmt: skip
 
 PICTURES = (

@@ -1,6 +1,6 @@
-"""Extreme cases 1 to 32, 46 and 49 to 51: hits."""
+"""Extreme cases 1 to 32, 46 and 49 to 52: hits."""
 
-from validation.stability.cases import builds, edge_on, inside, order, precision, rays, thin
+from validation.stability.cases import builds, contacts, edge_on, inside, order, precision, rays, thin
 from validation.stability.cases.case import ExtremeCase
 
 CASES: tuple[ExtremeCase, ...] = (
@@ -11,4 +11,5 @@ CASES: tuple[ExtremeCase, ...] = (
     *thin.CASES,
     *edge_on.CASES,
     *inside.CASES,
+    *contacts.CASES,
 )
