@@ -1,4 +1,4 @@
-"""Rows 1 to 32, 46 and 49 to 51 of the extreme cases hold, and each judgement fails when what it judges is broken."""
+"""Rows 1 to 32, 46 and 49 to 52 of the extreme cases hold, and each judgement fails when what it judges is broken."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,7 +16,7 @@ Break = Callable[[Hits], Hits]
 
 
 def test_the_table_has_every_row_once_and_in_order():
-    assert [case.number for case in CASES] == [*range(1, 33), 46, 49, 50, 51]
+    assert [case.number for case in CASES] == [*range(1, 33), 46, 49, 50, 51, 52]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: str(case.number))

@@ -47,7 +47,7 @@ def fine_mesh(mesh: Mesh, rng: Generator) -> Mesh:
 
 def rays_beside_edges(mesh: Mesh, rng: Generator, count: int) -> tuple[Floats, Floats]:
     """Rays along z whose edge function of some edge is 1 or -1: the nearest that integers come to it."""
-    origins = []
+    origins: list[list[int]] = []
     while len(origins) < count:
         triangle = mesh.triangles[rng.integers(len(mesh.faces))].astype(np.int64)
         a, b, _ = np.roll(triangle, rng.integers(3), axis=0).tolist()
