@@ -75,7 +75,7 @@ def _inside(quick: bool) -> Outcome:
     for solid in closed_solids().values():
         for offset, scale in PLACES:
             mesh = Mesh(solid.vertices * scale + offset * rng.random(3), solid.faces)
-            points = points_at(mesh, rng, 2 if quick else 20)
+            points = points_at(mesh, rng, 4 if quick else 20)
             wrong, asked = wrong + wrong_answers(mesh, points), asked + len(points)
     return Outcome(f"{wrong} of {asked:,} points wrong", wrong == 0)
 
