@@ -109,7 +109,7 @@ class _Accelerator:
         array([False])
         """
         mesh, tree = built = self._built
-        rays = self._leaving(built, check_rays(origins, directions, t_min, t_max), leaving)
+        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
         return closest_hits(tree, rays, mesh, self.threads)
 
     def any_hit(
@@ -127,7 +127,7 @@ class _Accelerator:
         array([False])
         """
         built = self._built
-        rays = self._leaving(built, check_rays(origins, directions, t_min, t_max), leaving)
+        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
         return any_hits(built[1], rays, self.threads)
 
     def all_hits(
@@ -160,7 +160,7 @@ class _Accelerator:
         array([2., 2., 3., 3.])
         """
         mesh, tree = built = self._built
-        rays = self._leaving(built, check_rays(origins, directions, t_min, t_max), leaving)
+        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
         return all_hits(tree, rays, mesh, contacts, max_hits, self.threads)
 
     def count_hits(
@@ -180,11 +180,20 @@ class _Accelerator:
         array([2, 0])
         """
         built = self._built
-        rays = self._leaving(built, check_rays(origins, directions, t_min, t_max), leaving)
+        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
         return count_hits(built[1], rays, contacts, self.threads)
 
-    def _leaving(self, built: tuple[Mesh, Tree], rays: RayBatch, leaving: ArrayLike | None) -> RayBatch:
-        """The rays, moved off the faces that they leave."""
+    def _rays(
+        self,
+        built: tuple[Mesh, Tree],
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike,
+        t_max: ArrayLike,
+        leaving: ArrayLike | None,
+    ) -> RayBatch:
+        """The arguments of a query, checked, and moved off the faces that the rays leave."""
+        rays = check_rays(origins, directions, t_min, t_max)
         if leaving is None:
             return rays
         return moved_off(rays, leaving, built[0], built[1].scale, self.threads)

@@ -30,7 +30,7 @@ _ANY_NUMBER = np.iinfo(np.int64).max
 
 
 class Choice(NamedTuple):
-    """What is gathered: contacts or each hit, how many of a ray at most, and whether they are kept or counted only."""
+    """Contacts or each hit, how many of a ray at most, and whether they are kept or counted only."""
 
     contacts: bool
     most: int

@@ -218,7 +218,7 @@ def _compare_places(tree, found, i, j):
 
 @kernel
 def _ends(tree, found, i):
-    """Where the ends of the edge of a hit stand in its block, the lower first; of a corner, that twice."""
+    """The places in its block of the ends of a hit's edge, the lower first; of a corner, that twice."""
     place = get(found.integers, _row(found, _AT, i))
     edges = get(found.integers, _row(found, _EDGES, i))
     if edges & (edges - 1) != 0:

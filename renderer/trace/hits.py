@@ -1,4 +1,4 @@
-"""What queries answer: the closest hits, a row per ray, and all hits, in compressed rows."""
+"""The answers of queries: closest hits, a row per ray, and all hits, in compressed rows."""
 
 from dataclasses import dataclass, field
 

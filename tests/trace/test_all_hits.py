@@ -13,20 +13,10 @@ from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.octree import BruteForce, Octree
 from renderer.trace import all_hits as module
 from validation.oracle.contacts import contacts, hits
+from validation.stability.cases.judgement import both, soup_of
 
 SEEDS = st.integers(0, 2**20)
 BOTH = pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-
-
-def joined(*parts):
-    """One mesh of several, each a ``Mesh``."""
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts])
-    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-    return Mesh(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
-
-
-def soup_of(mesh):
-    return Mesh(mesh.triangles.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
 
 
 def rounded(mesh, size):
@@ -41,10 +31,10 @@ def flattened(mesh):
 
 SOLIDS = {
     "box": box((-2, -2, -2), (2, 2, 2)),
-    "nested": joined(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -1), (1, 1, 1))),
-    "touching": joined(box((-2, -2, -2), (0, 2, 2)), box((0, -2, -2), (2, 2, 2))),
-    "doubled": joined(box((-2, -2, -2), (2, 2, 2)), box((-2, -2, -2), (2, 2, 2))),
-    "thin": flattened(joined(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -2), (2, 2, 3)))),
+    "nested": both(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -1), (1, 1, 1))),
+    "touching": both(box((-2, -2, -2), (0, 2, 2)), box((0, -2, -2), (2, 2, 2))),
+    "doubled": both(box((-2, -2, -2), (2, 2, 2)), box((-2, -2, -2), (2, 2, 2))),
+    "thin": flattened(both(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -2), (2, 2, 3)))),
     "star": rounded(icosphere(1), 4),
     "ring": rounded(torus(around=6, across=4), 3),
     "grid": rounded(grid(6, 6), 6),

@@ -10,7 +10,7 @@ from renderer import BruteForce, Mesh, Octree
 from validation.oracle.contacts import contacts, hits
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.inside import closed_solids
-from validation.stability.cases.judgement import SEED, Floats, both
+from validation.stability.cases.judgement import SEED, Floats, both, soup_of
 
 # Powers of two and whole numbers, so that a mesh of whole numbers stays one that float64 holds exactly.
 PLACES = ((0.0, 1.0), (2.0**20, 1.0), (0.0, 2.0**-20), (2.0**20, 2.0**40))
@@ -21,8 +21,7 @@ def whole_meshes() -> dict[str, Mesh]:
     solids = {name: mesh for name, mesh in closed_solids().items() if (mesh.vertices == np.round(mesh.vertices)).all()}
     star = solids["integers"]
     flat = Mesh(np.floor(solids["nested boxes"].vertices / [1, 1, 4]), solids["nested boxes"].faces)
-    soup = Mesh(star.triangles.reshape(-1, 3), np.arange(3 * len(star.faces)).reshape(-1, 3))
-    return solids | {"twice": both(star, star), "walls": flat, "soup of integers": soup}
+    return solids | {"twice": both(star, star), "walls": flat, "soup of integers": soup_of(star)}
 
 
 def rays_of(mesh: Mesh, rng: Generator, count: int) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ from renderer.mesh.shapes import box, icosphere
 from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
 from validation.stability.cases.case import ExtremeCase, Outcome
-from validation.stability.cases.judgement import SEED, Floats, both
+from validation.stability.cases.judgement import SEED, Floats, both, soup_of
 
 # Places and sizes at which each mesh is asked: offset and scale.
 PLACES = ((0.0, 1.0), (1e6, 1.0), (0.0, 1e-6), (1e6, 1e6))
@@ -25,7 +25,7 @@ def closed_solids() -> dict[str, Mesh]:
         "hollow box": both(large, turned),
         "overlapping boxes": both(box((-2, -2, -2), (1, 1, 1)), box((-1, -1, -1), (2, 2, 2))),
         "touching boxes": both(box((-2, -1, -1), (0, 1, 1)), box((0, -1, -1), (2, 1, 1))),
-        "soup": Mesh(ball.triangles.reshape(-1, 3), np.arange(3 * len(ball.faces)).reshape(-1, 3)),
+        "soup": soup_of(ball),
         "integers": _integer_star(1),
         "more integers": _integer_star(2),
     }
