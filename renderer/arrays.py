@@ -7,6 +7,8 @@ import numpy as np
 from numpy.ma import MaskedArray, getmaskarray
 from numpy.typing import NDArray
 
+from renderer.errors import expect
+
 # Beyond it float64 skips whole numbers.
 _LARGEST_WHOLE = 2**53
 
@@ -35,6 +37,12 @@ def real_argument(argument: str, values: Any) -> NDArray[Any]:
         return real_array(values)
     except ValueError as error:
         raise ValueError(f"{argument}: {error}") from None
+
+
+def flag_argument(argument: str, value: object) -> bool:
+    """A bool of Python or NumPy; anything else is an error that names the argument."""
+    expect(isinstance(value, bool | np.bool_), argument, "True or False", repr(value))
+    return bool(value)
 
 
 def _is_number(value: object) -> bool:

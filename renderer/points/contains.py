@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_argument
+from renderer.arrays import flag_argument, real_argument
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.points.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_crossings
@@ -19,7 +19,7 @@ RULES = ("nonzero", "even-odd")
 
 def contains(tree: Tree, mesh: Mesh, points: ArrayLike, boundary: bool, rule: str, threads: int) -> NDArray[np.bool_]:
     """Whether each point lies inside, see ``Octree.contains``."""
-    expect(isinstance(boundary, bool | np.bool_), "boundary", "True or False", repr(boundary))
+    boundary = flag_argument("boundary", boundary)
     expect(isinstance(rule, str) and rule in RULES, "rule", f"one of {RULES}", repr(rule))
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
     _check_closed(mesh, rule)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arrays import flag_argument
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.process.parallel import for_chunks
@@ -46,7 +47,7 @@ class _Part(NamedTuple):
 
 def all_hits(tree: Tree, rays: RayBatch, mesh: Mesh, contacts: bool, max_hits: int | None, threads: int) -> AllHits:
     """All hits of a batch, see ``Octree.all_hits``."""
-    counts, parts = _gathered(tree, rays, Choice(_flag(contacts), _most(max_hits), True), threads)
+    counts, parts = _gathered(tree, rays, Choice(flag_argument("contacts", contacts), _most(max_hits), True), threads)
     offsets = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])
     t, u, v = np.concatenate([np.empty((3, 0)), *(part.doubles for part in parts)], axis=1)
@@ -56,12 +57,7 @@ def all_hits(tree: Tree, rays: RayBatch, mesh: Mesh, contacts: bool, max_hits: i
 
 def count_hits(tree: Tree, rays: RayBatch, contacts: bool, threads: int) -> NDArray[np.int64]:
     """The number of hits of each ray of a batch, see ``Octree.count_hits``."""
-    return _gathered(tree, rays, Choice(_flag(contacts), _ANY_NUMBER, False), threads)[0]
-
-
-def _flag(contacts: bool) -> bool:
-    expect(isinstance(contacts, bool | np.bool_), "contacts", "True or False", repr(contacts))
-    return bool(contacts)
+    return _gathered(tree, rays, Choice(flag_argument("contacts", contacts), _ANY_NUMBER, False), threads)[0]
 
 
 def _most(max_hits: int | None) -> int:

@@ -22,7 +22,7 @@ from renderer.trace.intersect import (
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
-from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
+from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.sides import coordinate, exact_sides
 
 # Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
@@ -242,12 +242,17 @@ def _compare_corners(tree, a, b):
 
 @kernel
 def _keep(found, kept, count, scale):
-    """Append the first ``count`` hits in order to those kept, t in the rays' units."""
+    """Append the first ``count`` hits in order to those kept, as a closest hit would be written."""
+    t, u, v = (at(found.doubles, _row(found, OUT_T, kept)), at(found.doubles, _row(found, OUT_U, kept)),
+               at(found.doubles, _row(found, OUT_V, kept)))  # fmt: skip
+    face = at(found.integers, _row(found, OUT_FACE, kept))
     for k in range(count):
-        i, to = get(found.integers, _row(found, _ORDER, k)), kept + k
-        w = get(found.doubles, _row(found, _W, i))
-        # + 0.0 turns -0.0 into 0.0.
-        put(found.doubles, _row(found, OUT_T, to), get(found.doubles, _row(found, _T, i)) / scale + 0.0)
-        put(found.doubles, _row(found, OUT_U, to), get(found.doubles, _row(found, _U, i)) / w + 0.0)
-        put(found.doubles, _row(found, OUT_V, to), get(found.doubles, _row(found, _V, i)) / w + 0.0)
-        put(found.integers, _row(found, OUT_FACE, to), get(found.integers, _row(found, _FACE, i)))
+        i = get(found.integers, _row(found, _ORDER, k))
+        hit = (
+            get(found.doubles, _row(found, _T, i)),
+            get(found.integers, _row(found, _FACE, i)),
+            get(found.doubles, _row(found, _U, i)),
+            get(found.doubles, _row(found, _V, i)),
+            get(found.doubles, _row(found, _W, i)),
+        )
+        write_hit(HitPointers(t, face, u, v, t), k, scale, hit, False)
