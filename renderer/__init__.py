@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from renderer.picture.image import CutWarning, Image, srgb
     from renderer.picture.prepare import PreparedScene
     from renderer.picture.render import prepare, render
+    from renderer.points.closest import ClosestPoints
     from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
     from renderer.scene.light import DirectionalLight, PointLight
     from renderer.scene.material import Dielectric, Mirror, Phong
@@ -34,6 +35,7 @@ __version__ = "0.1.0"
 __all__ = [
     "AllHits",
     "BruteForce",
+    "ClosestPoints",
     "CutWarning",
     "Dielectric",
     "DirectionalLight",
@@ -69,6 +71,7 @@ __all__ = [
 _HOMES = {
     "AllHits": "trace.hits",
     "BruteForce": "octree",
+    "ClosestPoints": "points.closest",
     "CutWarning": "picture.image",
     "Dielectric": "scene.material",
     "DirectionalLight": "scene.light",

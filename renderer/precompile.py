@@ -82,6 +82,11 @@ def _gather() -> None:
     Octree.from_mesh(_TRIANGLE).all_hits([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
 
+def _find_nearest() -> None:
+    for accelerator in (Octree.from_mesh(_TRIANGLE), BruteForce.from_mesh(_TRIANGLE)):
+        accelerator.closest_point([0.0, 0.0, 1.0])
+
+
 def _search() -> None:
     BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
@@ -106,6 +111,7 @@ _QUERIES = (
     Part("brute force", _search),
     Part("all hits", _gather),
     Part("points inside", _contain),
+    Part("closest points", _find_nearest),
     Part("concave polygons", _cut),
 )
 _PICTURES = (Part("pictures", _render), Part("the viewer", _view))

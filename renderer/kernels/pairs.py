@@ -8,7 +8,9 @@ Available Precision, Numerische Mathematik 18, 1971; Shewchuk, Adaptive Precisio
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import larger
 
+_LEAST_NORMAL = 2.0**-1022
 _SPLITTER = 2.0**27 + 1.0
 _EXPONENT = 0x7FF0000000000000
 
@@ -71,6 +73,14 @@ def product(a, b):
 
 
 @kernel
+def quotient(a, b):
+    """a / b of two pairs."""
+    head = a[0] / b[0]
+    rest = minus(a, product(b, (head, 0.0)))
+    return exact_sum(head, rest[0] / b[0])
+
+
+@kernel
 def dot_pairs(a, b):
     """Scalar product of two vectors of pairs."""
     return plus(plus(product(a[0], b[0]), product(a[1], b[1])), product(a[2], b[2]))
@@ -91,6 +101,23 @@ def scaled_difference(a, b, factor):
     """(a - b) times a power of two, exactly, of two vectors of float64."""
     x, y, z = difference(a[0], b[0]), difference(a[1], b[1]), difference(a[2], b[2])
     return (x[0] * factor, x[1] * factor), (y[0] * factor, y[1] * factor), (z[0] * factor, z[1] * factor)
+
+
+@kernel
+def length_pair(a):
+    """The length of a vector of pairs, as a pair."""
+    largest = larger(larger(abs(a[0][0]), abs(a[1][0])), abs(a[2][0]))
+    if largest == 0.0:
+        return 0.0, 0.0
+    # Scaled, so that no square vanishes.
+    unit = power_below(larger(largest, _LEAST_NORMAL))
+    x, y, z = a
+    b = (x[0] / unit, x[1] / unit), (y[0] / unit, y[1] / unit), (z[0] / unit, z[1] / unit)
+    square = dot_pairs(b, b)
+    head = np.sqrt(square[0])
+    rest = minus(square, exact_product(head, head))
+    head, tail = exact_sum(head, rest[0] / (2.0 * head))
+    return head * unit, tail * unit
 
 
 @kernel

@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import flag_argument, real_argument
+from renderer.arrays import flag_argument
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
+from renderer.points.argument import check_points
 from renderer.points.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_crossings
 from renderer.points.rational import crossings_of
 from renderer.points.signs import UNDECIDED
@@ -23,17 +24,11 @@ def contains(tree: Tree, mesh: Mesh, points: ArrayLike, boundary: bool, rule: st
     expect(isinstance(rule, str) and rule in RULES, "rule", f"one of {RULES}", repr(rule))
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
     _check_closed(mesh, rule)
-    given = real_argument("points", points)
-    expect(given.ndim >= 1 and given.shape[-1] == 3, "points", "shape (..., 3)", f"shape {given.shape}")
-    rows = np.ascontiguousarray(given, np.float64).reshape(-1, 3)
-    finite = np.isfinite(rows).all(axis=1)
-    if not finite.all():
-        row = int((~finite).argmax())
-        expect(False, "points", "finite numbers", f"{rows[row].tolist()} in row {row}")
+    rows, shape = check_points("points", points)
     counts = _counted(tree, mesh, rows, threads)
     on = counts[:, ON]
     inside = counts[:, WINDING] != 0 if rule == "nonzero" else counts[:, CROSSINGS] % 2 == 1
-    return np.where(on == 1, boundary, inside).reshape(given.shape[:-1])
+    return np.where(on == 1, boundary, inside).reshape(shape)
 
 
 def _check_closed(mesh: Mesh, rule: str) -> None:

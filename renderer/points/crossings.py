@@ -22,7 +22,7 @@ from renderer.kernels.simd import (
     splat4,
     splat8,
 )
-from renderer.points.signs import UNDECIDED, area_sign, volume_sign
+from renderer.points.signs import UNDECIDED, area_sign, differ, lies_within, volume_sign
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
@@ -179,7 +179,7 @@ def _cross_exactly(tree, place, column, parts):
     s0, s1, s2 = area_sign(b, c, p, parts), area_sign(c, a, p, parts), area_sign(a, b, p, parts)
     if s0 == UNDECIDED or s1 == UNDECIDED or s2 == UNDECIDED:
         return 0, UNDECIDED
-    if _differ(s0, s1, s2):
+    if differ(s0, s1, s2):
         return 0, 0
     side = volume_sign(a, b, c, p, parts)
     if side == UNDECIDED:
@@ -187,7 +187,7 @@ def _cross_exactly(tree, place, column, parts):
     if side == 0 and (s0 != 0 or s1 != 0 or s2 != 0):
         return 0, 1
     if side == 0:
-        return 0, _on_upright(a, b, c, p, parts)
+        return 0, lies_within(a, b, c, p, parts)
     # The point moves by (e, e^2), so an edge that it lies on passes it on one side.
     s0 = s0 if s0 != 0 else _moved_sign(b, c)
     s1 = s1 if s1 != 0 else _moved_sign(c, a)
@@ -201,12 +201,6 @@ def _cross_exactly(tree, place, column, parts):
 
 
 @inlined
-def _differ(s0, s1, s2):
-    """Whether signs contradict each other, 0 none."""
-    return (s0 > 0 or s1 > 0 or s2 > 0) and (s0 < 0 or s1 < 0 or s2 < 0)
-
-
-@inlined
 def _moved_sign(a, b):
     """The sign of (a - p) x (b - p) where it is 0 and p moves by (e, e^2)."""
     if a[1] != b[1]:
@@ -214,26 +208,3 @@ def _moved_sign(a, b):
     if a[0] != b[0]:
         return 1 if b[0] > a[0] else -1
     return 0
-
-
-@kernel
-def _on_upright(a, b, c, p, parts):
-    """Whether a point on the plane of a face that is seen as a line, or of one without area, lies on the face.
-
-    The other two views tell, of which one shows an area if there is one; on a line all coordinates tell.
-    """
-    informed = False
-    for _ in range(2):
-        a, b, c, p = (a[1], a[2], a[0]), (b[1], b[2], b[0]), (c[1], c[2], c[0]), (p[1], p[2], p[0])
-        s0, s1, s2 = area_sign(b, c, p, parts), area_sign(c, a, p, parts), area_sign(a, b, p, parts)
-        if s0 == UNDECIDED or s1 == UNDECIDED or s2 == UNDECIDED:
-            return UNDECIDED
-        if _differ(s0, s1, s2):
-            return 0
-        informed = informed or s0 != 0 or s1 != 0 or s2 != 0
-    if informed:
-        return 1
-    for k in range(3):
-        if p[k] < min(a[k], b[k], c[k]) or p[k] > max(a[k], b[k], c[k]):
-            return 0
-    return 1

@@ -1,119 +1,51 @@
-"""Exact signs of the determinants that say on which side of a line or plane a point lies.
+"""Exact signs of areas and volumes: on which side of a line or plane a point lies, and whether on a face."""
 
-A determinant of differences is a sum of products. Each difference is exact as a pair, each product of float64 is exact
-as a pair, and a sum of float64 is exact as an expansion: parts that do not overlap, whose largest has the sum's sign.
-Source: Shewchuk, Adaptive Precision Floating-Point Arithmetic, Discrete and Computational Geometry 18, 1997.
-"""
+from renderer.kernels.jit import inlined, kernel
+from renderer.points.expansions import OUT_OF_RANGE, expand_area, expand_volume, sign_of
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.pairs import difference, exact_product, exact_sum
-from renderer.kernels.simd import get, larger, put, smaller
-
-# What ``area_sign`` and ``volume_sign`` say where products would vanish or overflow.
+# What all functions here say where products would vanish or overflow.
 UNDECIDED = 2
-_SMALLEST, _LARGEST = 2.0**-960, 2.0**960
 
 
 @kernel
 def area_sign(a, b, p, parts):
     """The sign of (a - p) x (b - p) of points (x, y), 1, 0, -1, or UNDECIDED; ``parts`` is memory for an expansion."""
-    ax, ay, bx, by = difference(a[0], p[0]), difference(a[1], p[1]), difference(b[0], p[0]), difference(b[1], p[1])
-    if not _in_range(_least(ax, bx) * _least(ay, by), _most(ax, bx) * _most(ay, by)):
-        return UNDECIDED
-    count = _add_area(parts, 0, ax, by, 1.0)
-    count = _add_area(parts, count, ay, bx, -1.0)
-    return _sign(parts, count)
+    count = expand_area(a, b, p, parts)
+    return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
 
 
 @kernel
 def volume_sign(a, b, c, p, parts):
     """The sign of (a - p) . ((b - p) x (c - p)), as of ``area_sign``."""
-    ax, ay, az = difference(a[0], p[0]), difference(a[1], p[1]), difference(a[2], p[2])
-    bx, by, bz = difference(b[0], p[0]), difference(b[1], p[1]), difference(b[2], p[2])
-    cx, cy, cz = difference(c[0], p[0]), difference(c[1], p[1]), difference(c[2], p[2])
-    least = smaller(_least(ax, bx), _least(cx, cx)) * smaller(_least(ay, by), _least(cy, cy))
-    most = larger(_most(ax, bx), _most(cx, cx)) * larger(_most(ay, by), _most(cy, cy))
-    least *= smaller(_least(az, bz), _least(cz, cz))
-    most *= larger(_most(az, bz), _most(cz, cz))
-    if not _in_range(least, most):
-        return UNDECIDED
-    count = _add_volume(parts, 0, ax, by, cz, 1.0)
-    count = _add_volume(parts, count, ay, bz, cx, 1.0)
-    count = _add_volume(parts, count, az, bx, cy, 1.0)
-    count = _add_volume(parts, count, az, by, cx, -1.0)
-    count = _add_volume(parts, count, ax, bz, cy, -1.0)
-    count = _add_volume(parts, count, ay, bx, cz, -1.0)
-    return _sign(parts, count)
+    count = expand_volume(a, b, c, p, parts)
+    return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
+
+
+@inlined
+def differ(s0, s1, s2):
+    """Whether signs contradict each other, 0 none."""
+    return (s0 > 0 or s1 > 0 or s2 > 0) and (s0 < 0 or s1 < 0 or s2 < 0)
 
 
 @kernel
-def _least(a, b):
-    """The least part of two pairs, without signs and zeros; 1 at most."""
-    least = 1.0
-    for x in (a[0], a[1], b[0], b[1]):
-        least = smaller(least, abs(x)) if x != 0.0 else least
-    return least
+def lies_within(a, b, c, p, parts):
+    """Whether a point in the plane of a face lies on the face, or UNDECIDED.
 
-
-@kernel
-def _most(a, b):
-    """The largest part of two pairs, without signs; 1 at least."""
-    return larger(larger(abs(a[0]), abs(b[0])), 1.0)
-
-
-@kernel
-def _in_range(least, most):
-    """Whether no product of parts can vanish or overflow."""
-    return least > _SMALLEST and most < _LARGEST
-
-
-@kernel
-def _add_area(parts, count, a, b, sign):
-    """Add a product of two pairs to an expansion; returns the number of its parts, as all below do."""
-    for x in a:
-        for y in b:
-            if x != 0.0 and y != 0.0:
-                count = _add_pair(parts, count, exact_product(x, sign * y))
-    return count
-
-
-@kernel
-def _add_volume(parts, count, a, b, c, sign):
-    """Add a product of three pairs to an expansion."""
-    for x in a:
-        for y in b:
-            head, tail = exact_product(x, sign * y)
-            for z in c:
-                if z != 0.0 and head != 0.0:
-                    count = _add_pair(parts, count, exact_product(head, z))
-                    if tail != 0.0:
-                        count = _add_pair(parts, count, exact_product(tail, z))
-    return count
-
-
-@kernel
-def _add_pair(parts, count, pair):
-    return _add(parts, _add(parts, count, pair[1]), pair[0])
-
-
-@kernel
-def _add(parts, count, x):
-    """Add a number to an expansion, whose parts rise; parts that are 0 are left out."""
-    kept = 0
-    for i in range(count):
-        x, rest = exact_sum(x, get(parts, i))
-        if rest != 0.0:
-            put(parts, kept, rest)
-            kept += 1
-    if x != 0.0:
-        put(parts, kept, x)
-        kept += 1
-    return kept
-
-
-@kernel
-def _sign(parts, count):
-    """The sign of an expansion: that of its largest part."""
-    if count == 0:
-        return 0
-    return 1 if get(parts, count - 1) > 0.0 else -1
+    Along each axis it is seen within the face's outline. A face that is seen as a line each time is one, and then all
+    coordinates tell.
+    """
+    informed = False
+    for _ in range(3):
+        a, b, c, p = (a[1], a[2], a[0]), (b[1], b[2], b[0]), (c[1], c[2], c[0]), (p[1], p[2], p[0])
+        s0, s1, s2 = area_sign(b, c, p, parts), area_sign(c, a, p, parts), area_sign(a, b, p, parts)
+        if s0 == UNDECIDED or s1 == UNDECIDED or s2 == UNDECIDED:
+            return UNDECIDED
+        if differ(s0, s1, s2):
+            return 0
+        informed = informed or s0 != 0 or s1 != 0 or s2 != 0
+    if informed:
+        return 1
+    for k in range(3):
+        if p[k] < min(a[k], b[k], c[k]) or p[k] > max(a[k], b[k], c[k]):
+            return 0
+    return 1

@@ -97,21 +97,25 @@ def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
     return type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2 and values.shape[1] == 3
 
 
-def moved_off(rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: int) -> RayBatch:
-    """The rays with their starts moved off the faces ``leaving``, see ``spawn.leave_faces``; ``scale`` is the tree's.
+def moved_off(
+    rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: int, argument: str = "leaving"
+) -> RayBatch:
+    """The rays with their starts moved off the faces ``leaving``, see ``spawn.leave_faces``.
+
+    ``scale`` is the tree's, ``argument`` the name of ``leaving`` in errors.
 
     Raises ``ValueError`` naming the argument and, for a face that is not there or an origin out of bounds, its row.
     """
     count = len(rays.directions)
-    array = real_argument("leaving", leaving)
+    array = real_argument(argument, leaving)
     whole = array.dtype.kind in "iu" and (array.ndim == 0 or array.shape == (count,))
-    expect(whole, "leaving", f"an integer or integers of shape ({count},)", f"{array.dtype} of shape {array.shape}")
+    expect(whole, argument, f"an integer or integers of shape ({count},)", f"{array.dtype} of shape {array.shape}")
     # A copy, which no other thread can change once it is checked.
     faces = np.array(np.broadcast_to(array, (count,)), np.int64)
     good = (faces >= -1) & (faces < len(mesh.faces))
     if not good.all():
         row = int((~good).argmax())
-        expect(False, "leaving", f"faces from 0 to {len(mesh.faces) - 1}, or -1", f"{faces[row]} in row {row}")
+        expect(False, argument, f"faces from 0 to {len(mesh.faces) - 1}, or -1", f"{faces[row]} in row {row}")
     sound = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(rays.directions).all(axis=1)
     if not sound.all():
         # Rejected before it is moved, so that the message names the numbers as given.

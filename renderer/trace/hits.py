@@ -34,7 +34,7 @@ class Hits:
         """Hit points from the barycentrics, (n, 3) float64; nan on a miss."""
         points = np.full((len(self.t), 3), np.nan)
         hit = self.hit
-        points[hit] = _points(self._mesh, self.face[hit], self.u[hit], self.v[hit])
+        points[hit] = points_on(self._mesh, self.face[hit], self.u[hit], self.v[hit])
         return points
 
     @property
@@ -78,7 +78,7 @@ class AllHits:
     @property
     def points(self) -> NDArray[np.float64]:
         """Hit points from the barycentrics, (m, 3) float64."""
-        return _points(self._mesh, self.face, self.u, self.v)
+        return points_on(self._mesh, self.face, self.u, self.v)
 
     @property
     def normals(self) -> NDArray[np.float64]:
@@ -86,7 +86,10 @@ class AllHits:
         return _normals(self._mesh, self.face)
 
 
-def _points(mesh: Mesh, face: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+def points_on(
+    mesh: Mesh, face: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The points (k, 3) of faces at barycentrics u and v."""
     corners, u, v = mesh.vertices[mesh.faces[face]], u[:, None], v[:, None]
     points: NDArray[np.float64] = (1.0 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
     return points

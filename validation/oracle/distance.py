@@ -1,5 +1,6 @@
 """Distances of points from triangles in exact rational arithmetic: squared, so that no root rounds them."""
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import TypeVar
@@ -49,3 +50,24 @@ def cross(a: Sequence[Number], b: Sequence[Number]) -> list[Number]:
 def difference(a: Vector, b: Vector) -> list[Fraction]:
     """a - b."""
     return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def nearest(point: Vector, triangles: Sequence[Sequence[Vector]]) -> tuple[Fraction, list[int]]:
+    """The least squared distance of a point from some triangles, and those that have it, ascending."""
+    squares = [squared_distance(point, triangle) for triangle in triangles]
+    least = min(squares)
+    return least, [i for i, square in enumerate(squares) if square == least]
+
+
+def ulps_from_root(value: float, square: Fraction) -> float:
+    """How far a float64 is from the root of a rational number, in units of the root's last place; inf for a wrong 0.
+
+    >>> ulps_from_root(2.0, Fraction(4)), ulps_from_root(1.0, Fraction(1) + Fraction(2) ** -51)
+    (0.0, 1.0)
+    """
+    if square == 0 or value == 0.0:
+        return 0.0 if square == 0 and value == 0.0 else math.inf
+    # Some 64 bits of the root beyond those of float64.
+    shift = max(0, 130 - (square.numerator.bit_length() - square.denominator.bit_length()) // 2)
+    root = Fraction(math.isqrt((square.numerator << 2 * shift) // square.denominator), 1 << shift)
+    return abs(float((Fraction(value) - root) / Fraction(math.ulp(float(root)))))

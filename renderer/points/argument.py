@@ -1,0 +1,34 @@
+"""Points as queries get them: shape, type and finiteness are checked."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.arrays import real_argument
+from renderer.errors import expect
+from renderer.limits import FARTHEST
+
+
+def check_points(
+    argument: str, points: ArrayLike, farthest: float = np.inf
+) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    """Points (..., 3) as rows (n, 3) of float64, and their leading dimensions.
+
+    Raises ``ValueError`` that names the argument and, for a coordinate that is not finite or beyond ``farthest``, its
+    row.
+    """
+    given = real_argument(argument, points)
+    expect(given.ndim >= 1 and given.shape[-1] == 3, argument, "shape (..., 3)", f"shape {given.shape}")
+    with np.errstate(over="ignore", invalid="ignore"):  # infinities and NaN are refused with their row
+        rows = np.require(given, np.float64, ("C_CONTIGUOUS", "WRITEABLE")).reshape(-1, 3)
+        near = (np.abs(rows) <= farthest) & np.isfinite(rows)
+    if not near.all():
+        row = int((~near.all(axis=1)).argmax())
+        expected = "finite numbers" if np.isinf(farthest) else f"finite numbers within {farthest:.3g}"
+        expect(False, argument, expected, f"{rows[row].tolist()} in row {row}")
+    return rows, given.shape[:-1]
+
+
+def farthest_of(scale: float) -> float:
+    """The largest coordinate of a point whose distance from a mesh is asked; ``scale`` is the tree's."""
+    with np.errstate(over="ignore"):
+        return float(np.float64(FARTHEST) / scale)

@@ -1,0 +1,94 @@
+"""Bounds of the distances of a point from the four faces of a block, in float64, four at a time.
+
+Any point of a face bounds its distance from above. From below, any direction does: no point of the face is nearer than
+the corner that is nearest along it. With the nearest point and its direction both bounds are the distance, but for
+rounding; where rounding misses that point they are wider, and still bounds.
+"""
+
+import numpy as np
+
+from renderer.kernels.jit import inlined
+from renderer.kernels.simd import extract, magnitude, movemask, select, splat4
+from renderer.trace.intersect import load_corners
+
+# Corners less the point, u, v and the nearest point err by 2^-53 each, of a corner's reach; together by 20 such errors
+# at most. The same holds for the products along the direction, as shares of the direction's length.
+_ERROR = 2.0**-48
+_MORE = 1.0 + 2.0**-48
+
+
+@inlined
+def bound_distances(tree, base, point, limit):
+    """Of a block's four faces the bits of those that may be within ``limit``, and what ``bounds_of`` reads."""
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, point)
+    px, py, pz = splat4(point.x), splat4(point.y), splat4(point.z)
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = x0 - px, x1 - px, x2 - px, y0 - py, y1 - py, y2 - py, z0 - pz, z1 - pz, z2 - pz
+    bx, by, bz, cx, cy, cz = x1 - x0, y1 - y0, z1 - z0, x2 - x0, y2 - y0, z2 - z0
+    u, v = _nearest(
+        _dot(bx, by, bz, bx, by, bz), _dot(bx, by, bz, cx, cy, cz), _dot(cx, cy, cz, cx, cy, cz),
+        splat4(0.0) - _dot(x0, y0, z0, bx, by, bz), splat4(0.0) - _dot(x0, y0, z0, cx, cy, cz),
+    )  # fmt: skip
+    x, y, z = x0 + u * bx + v * cx, y0 + u * by + v * cy, z0 + u * bz + v * cz
+    square = _dot(x, y, z, x, y, z)
+    least = _smaller(
+        _dot(x0, y0, z0, x, y, z), _smaller(_dot(x1, y1, z1, x, y, z), _dot(x2, y2, z2, x, y, z))
+    )  # fmt: skip
+    error = splat4(_ERROR) * _larger(_size(x0, y0, z0), _larger(_size(x1, y1, z1), _size(x2, y2, z2)))
+    reach = splat4(limit) + error
+    # Of an unused place all is NaN, which is not within any limit.
+    near = (least <= splat4(0.0)) | (least * least <= reach * reach * square * splat4(_MORE))
+    return movemask(near), least, square, error
+
+
+@inlined
+def bounds_of(least, square, error, i):
+    """The least and the greatest distance that face ``i`` may have."""
+    distance, e = np.sqrt(extract(square, i)), extract(error, i)
+    return (extract(least, i) / distance - e if distance > 0.0 else 0.0), distance * _MORE + e
+
+
+@inlined
+def _dot(ax, ay, az, bx, by, bz):
+    return ax * bx + ay * by + az * bz
+
+
+@inlined
+def _size(x, y, z):
+    return magnitude(x) + magnitude(y) + magnitude(z)
+
+
+@inlined
+def _larger(a, b):
+    return select(a > b, a, b)
+
+
+@inlined
+def _smaller(a, b):
+    return select(a < b, a, b)
+
+
+@inlined
+def _share(part, whole):
+    """part / whole, from 0 to 1; 0 for 0 / 0."""
+    zero, one = splat4(0.0), splat4(1.0)
+    share = select(part > zero, part / whole, zero)
+    return select(share < one, share, one)
+
+
+@inlined
+def _nearest(bb, bc, cc, b, c):
+    """u and v of the nearest points, from the products of the sides with each other, and with the way to the point."""
+    zero, one, two = splat4(0.0), splat4(1.0), splat4(2.0)
+    # On the three edges, and how their squared distances differ from that of the first corner.
+    sides, along = bb + cc - two * bc, c - b + bb - bc
+    s, t, r = _share(b, bb), _share(c, cc), _share(along, sides)
+    on_b, on_c = s * (s * bb - two * b), t * (t * cc - two * c)
+    on_a = bb - two * b + r * (r * sides - two * along)
+    first = on_b <= on_c
+    u, v, square = select(first, s, zero), select(first, zero, t), select(first, on_b, on_c)
+    second = on_a < square
+    u, v = select(second, one - r, u), select(second, r, v)
+    # In the plane, where that lies within the face.
+    area, u_area, v_area = bb * cc - bc * bc, cc * b - bc * c, bb * c - bc * b
+    inside = (u_area >= zero) & (v_area >= zero) & (u_area + v_area <= area) & (area > zero)
+    return select(inside, u_area / area, u), select(inside, v_area / area, v)

@@ -1,0 +1,78 @@
+"""Where closest points are asked: checks at the boundary, chunks on threads, and the answer."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.arrays import real_argument
+from renderer.errors import expect
+from renderer.mesh.mesh import Mesh
+from renderer.points.argument import check_points, farthest_of
+from renderer.points.nearest import LISTED, find_nearest
+from renderer.process.parallel import for_chunks
+from renderer.trace.hits import points_on
+from renderer.trace.layout import Tree
+from renderer.trace.query import rays_against_blocks
+from renderer.trace.rays import HIT_ROWS
+from renderer.trace.singly import stack_size
+
+# Some milliseconds of search.
+_CHUNK = 1024
+
+
+@dataclass(eq=False, slots=True)
+class ClosestPoints:
+    """The point of a mesh that is nearest to each of some points; shapes are the leading dimensions of those.
+
+    distance  (...) float64; inf where none is within max_distance
+    face      (...) int64; -1 there
+    u, v      (...) float64, P = (1 - u - v) p0 + u p1 + v p2; nan there
+    """
+
+    distance: NDArray[np.float64]
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    _mesh: Mesh = field(repr=False)
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """Whether a point of the mesh is within max_distance, (...) bool."""
+        return self.face >= 0
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """The nearest points from the barycentrics, (..., 3) float64; nan where there is none."""
+        points, found = np.full((*self.face.shape, 3), np.nan), self.found
+        points[found] = points_on(self._mesh, self.face[found], self.u[found], self.v[found])
+        return points
+
+
+def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: ArrayLike, threads: int) -> ClosestPoints:
+    """The nearest point of the mesh to each point, see ``Octree.closest_point``."""
+    expect(len(mesh.faces) > 0, "mesh", "faces", "none")
+    rows, shape = check_points("points", points, farthest_of(tree.scale))
+    limits = _limits(max_distance, shape)
+    out = np.empty((HIT_ROWS, len(rows)))
+
+    def find(begin: int, end: int) -> None:
+        size = stack_size(tree.depth) + LISTED
+        integers, doubles = np.empty(size, np.int64), np.empty(size + 8)
+        find_nearest(tree.words, rows, limits, out, integers, doubles, begin, end)
+
+    for_chunks(find, len(rows), _CHUNK if tree.has_nodes else min(_CHUNK, rays_against_blocks(tree)), threads)
+    distance, u, v, face = (row.reshape(shape) for row in out)
+    return ClosestPoints(distance, face.view(np.int64), u, v, mesh)
+
+
+def _limits(max_distance: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """One largest distance for all points, or one for each."""
+    given = real_argument("max_distance", max_distance)
+    expect(given.ndim == 0 or given.shape == shape, "max_distance", f"a number or shape {shape}", f"{given.shape}")
+    limits = np.array(given, np.float64).reshape(-1)
+    good = limits >= 0.0
+    if not good.all():
+        row = int((~good).argmax())
+        expect(False, "max_distance", "numbers from 0", f"{limits[row]} in row {row}")
+    return limits

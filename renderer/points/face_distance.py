@@ -1,0 +1,161 @@
+"""The distance of a point from a face, with twice the digits: rounded once, and 0 only on the face itself.
+
+The nearest point is in the face's interior where the point lies on the inner side of all edges, as seen along the
+normal, and else on an edge. Two faces that share an edge compute the same bits for it.
+"""
+
+from typing import Any, NamedTuple
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import cross_pairs, dot_pairs, length_pair, power_below, quotient, scaled_difference
+from renderer.kernels.simd import larger
+from renderer.points.expansions import OUT_OF_RANGE, expand_area, expand_volume, pair_of
+from renderer.points.signs import lies_within, volume_sign
+
+# Shares of the terms of a sum of products of pairs, which errs by 2^-98 of them. Below CANCELLED it loses so many
+# digits that it is computed as an expansion. Below LOST its sign is in doubt: a point so near an edge, as seen along
+# the normal, is taken as on it, which moves its distance from the face by LOST of its reach at most.
+_CANCELLED, _LOST = 2.0**-40, 2.0**-90
+_TINIEST = 2.0**-1000
+
+
+class _Seen(NamedTuple):
+    """A face seen from a point: corners less the point and sides, as pairs, and the factors that scaled them."""
+
+    pa: Any
+    pb: Any
+    pc: Any
+    ab: Any
+    bc: Any
+    ca: Any
+    to_reach: float
+    to_side: float
+
+
+@kernel
+def distance_to_face(a, b, c, p, parts):
+    """The distance of the point p from a face, and u and v of the face's nearest point.
+
+    The distance errs by less than an ulp, or by 2^-90 of that of the farthest corner if that is more, and is 0 on the
+    face only. ``parts`` is memory for an expansion.
+    """
+    seen = _see(a, b, c, p)
+    normal = _normal(seen, a, b, c, parts)
+    wa = dot_pairs(seen.pb, cross_pairs(seen.bc, normal))[0]
+    wb = dot_pairs(seen.pc, cross_pairs(seen.ca, normal))[0]
+    wc = dot_pairs(seen.pa, cross_pairs(seen.ab, normal))[0]
+    limit = _LOST * _largest(normal)
+    if wa > limit and wb > limit and wc > limit:
+        height, total = _height(seen, normal, a, b, c, p, parts), wa + wb + wc
+        distance = quotient(height, length_pair(normal))[0]
+        return distance / seen.to_reach, wb / total, wc / total
+    distance, u, v = 2.0**1000, 0.0, 0.0
+    if wc <= limit:
+        d, t = _distance_to_edge(a, b, p, seen, (seen.pa, seen.pb, seen.ab), parts)
+        if d < distance:
+            distance, u, v = d, t, 0.0
+    if wa <= limit:
+        d, t = _distance_to_edge(b, c, p, seen, (seen.pb, seen.pc, seen.bc), parts)
+        if d < distance:
+            distance, u, v = d, 1.0 - t, t
+    if wb <= limit:
+        d, t = _distance_to_edge(c, a, p, seen, (seen.pc, seen.pa, seen.ca), parts)
+        if d < distance:
+            distance, u, v = d, 0.0, 1.0 - t
+    if 0.0 < distance < 2.0 * _LOST and volume_sign(a, b, c, p, parts) == 0 and lies_within(a, b, c, p, parts) == 1:
+        distance = 0.0
+    return distance / seen.to_reach, u, v
+
+
+@kernel
+def _see(a, b, c, p):
+    reach, side = _TINIEST, _TINIEST
+    for k in range(3):
+        reach = larger(reach, larger(larger(abs(a[k] - p[k]), abs(b[k] - p[k])), abs(c[k] - p[k])))
+        side = larger(side, larger(larger(abs(b[k] - a[k]), abs(c[k] - b[k])), abs(a[k] - c[k])))
+    to_reach, to_side = 1.0 / power_below(reach), 1.0 / power_below(side)
+    return _Seen(
+        scaled_difference(a, p, to_reach), scaled_difference(b, p, to_reach), scaled_difference(c, p, to_reach),
+        scaled_difference(b, a, to_side), scaled_difference(c, b, to_side), scaled_difference(a, c, to_side),
+        to_reach, to_side,
+    )  # fmt: skip
+
+
+@inlined
+def _largest(vector):
+    """The largest component of a vector of pairs, without its sign."""
+    return larger(larger(abs(vector[0][0]), abs(vector[1][0])), abs(vector[2][0]))
+
+
+@inlined
+def _scaled(pair, x, y):
+    return pair[0] * x * y, pair[1] * x * y
+
+
+@kernel
+def _normal(seen, a, b, c, parts):
+    """The vector product of a face's sides."""
+    normal = cross_pairs(seen.ca, seen.ab)
+    if _largest(normal) < _CANCELLED:
+        return _expanded(b, c, a, seen.to_side, seen.to_side, normal, parts)
+    return normal
+
+
+@kernel
+def _expanded(a, b, p, first, second, otherwise, parts):
+    """(a - p) x (b - p) times two factors, by expansions, or ``otherwise`` where they are out of range."""
+    x = expand_area((a[1], a[2]), (b[1], b[2]), (p[1], p[2]), parts)
+    x_pair = pair_of(parts, x)
+    y = expand_area((a[2], a[0]), (b[2], b[0]), (p[2], p[0]), parts)
+    y_pair = pair_of(parts, y)
+    z = expand_area((a[0], a[1]), (b[0], b[1]), (p[0], p[1]), parts)
+    z_pair = pair_of(parts, z)
+    if x == OUT_OF_RANGE or y == OUT_OF_RANGE or z == OUT_OF_RANGE:
+        return otherwise
+    return _scaled(x_pair, first, second), _scaled(y_pair, first, second), _scaled(z_pair, first, second)
+
+
+@kernel
+def _height(seen, normal, a, b, c, p, parts):
+    """The distance of the point from the face's plane times the length of the normal."""
+    height = dot_pairs(seen.pa, normal)
+    if abs(height[0]) < _CANCELLED * _largest(normal):
+        count = expand_volume(a, b, c, p, parts)
+        if count != OUT_OF_RANGE:
+            height = _scaled(_scaled(pair_of(parts, count), seen.to_side, seen.to_reach), seen.to_side, 1.0)
+    return height if height[0] >= 0.0 else (-height[0], -height[1])
+
+
+@kernel
+def _distance_to_edge(a, b, p, seen, edge, parts):
+    """The distance of the point from the edge from a to b, in units of its reach, and the share of the way from a."""
+    pa, pb, ab = edge
+    if _precedes(b, a):
+        d, t = _distance_to_ordered(b, a, p, seen, (pb, pa, _negative(ab)), parts)
+        return d, 1.0 - t
+    return _distance_to_ordered(a, b, p, seen, edge, parts)
+
+
+@kernel
+def _distance_to_ordered(a, b, p, seen, edge, parts):
+    pa, pb, ab = edge
+    behind, ahead = -dot_pairs(pa, ab)[0], dot_pairs(pb, ab)[0]
+    if behind <= 0.0:
+        return length_pair(pa)[0], 0.0
+    if ahead <= 0.0:
+        return length_pair(pb)[0], 1.0
+    area = cross_pairs(pa, ab)
+    if _largest(area) < _CANCELLED * _largest(pa):
+        area = _expanded(a, b, p, seen.to_reach, seen.to_side, area, parts)
+    return quotient(length_pair(area), length_pair(ab))[0], behind / (behind + ahead)
+
+
+@inlined
+def _precedes(a, b):
+    """The order of two corners, by x, then y, then z."""
+    return a[0] < b[0] or (a[0] == b[0] and (a[1] < b[1] or (a[1] == b[1] and a[2] < b[2])))
+
+
+@inlined
+def _negative(a):
+    return (-a[0][0], -a[0][1]), (-a[1][0], -a[1][1]), (-a[2][0], -a[2][1])

@@ -1,0 +1,199 @@
+"""The face that is nearest to a point: a search through the tree, the nearest boxes first.
+
+The search keeps a bound of the distance and lists the faces that may be within it; only those are told apart by
+``distance_to_face``. So the answer is the least of those distances over all faces, whatever the tree and the order.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import (
+    at,
+    get,
+    load4,
+    local_doubles,
+    lowest_bit,
+    movemask,
+    pointer,
+    put,
+    select,
+    smaller,
+    splat4,
+    store,
+)
+from renderer.points.block_distance import bound_distances, bounds_of
+from renderer.points.face_distance import distance_to_face
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
+from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
+from renderer.trace.rays import hit_pointers
+from renderer.trace.sides import coordinate
+
+# Faces that may be the nearest are told apart at once when so many are listed.
+LISTED = 64
+# No distance is larger: points keep to 2^126 and meshes to 2^60, in the tree's units.
+_FARTHEST = 2.0**130
+# More than squares and their sum lose, and what a bound's square needs above it.
+_LESS, _MORE = 1.0 - 2.0**-48, 1.0 + 2.0**-48
+
+
+class Point(NamedTuple):
+    """A point in the tree's units, and where a block has each axis, as ``load_corners`` wants it."""
+
+    row_x: int
+    row_y: int
+    row_z: int
+    x: float
+    y: float
+    z: float
+
+
+class Search(NamedTuple):
+    """Memory of a search, as pointers.
+
+    children, near  the nodes and leaves that wait, and the squares of their boxes' distances
+    places, least   the listed faces' places in the blocks, and the least distances that they may have
+    squares         eight squares
+    parts           memory for an expansion
+    """
+
+    children: Any
+    near: Any
+    places: Any
+    least: Any
+    squares: Any
+    parts: Any
+
+
+@kernel
+def find_nearest(words, points, limits, out, integers, doubles, begin, end):
+    """Write distance, u, v and face of the points begin:end of ``points`` (n, 3) into the rows of ``out`` (4, n).
+
+    limits     (n,) or (1,), the largest distance that counts
+    integers   memory for ``singly.stack_size`` and LISTED int64; ``doubles``, for as many float64 and eight more
+    """
+    tree, parts, count = tree_pointers(words), local_doubles(), len(points)
+    found, size = hit_pointers(out, count), len(integers) - LISTED
+    children, near = pointer(integers), pointer(doubles)
+    search = Search(children, near, at(children, size), at(near, size), at(near, size + LISTED), parts)
+    for i in range(begin, end):
+        p, limit = at(pointer(points), 3 * i), limits[i if len(limits) > 1 else 0]
+        point = Point(0, 4, 8, tree.scale * get(p, 0), tree.scale * get(p, 1), tree.scale * get(p, 2))
+        distance, face, u, v = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), search)
+        distance /= tree.scale
+        hit = face != NO_FACE and distance <= limit
+        put(found.t, i, distance if hit else np.inf)
+        put(found.face, i, np.int64(face if hit else -1))
+        put(found.u, i, u if hit else np.nan)
+        put(found.v, i, v if hit else np.nan)
+
+
+@kernel
+def _search(tree, point, limit, search):
+    """The nearest face within ``limit``: distance, face (NO_FACE for none), u and v."""
+    best, listed = (np.inf, np.int32(NO_FACE), 0.0, 0.0), np.int64(0)
+    if not tree.has_nodes:
+        best, listed, limit = _search_blocks(tree, 0, tree.count, point, search, best, listed, limit)
+        return _settle(tree, point, search, best, listed, limit)
+    top = 1
+    put(search.children, 0, 0)
+    put(search.near, 0, 0.0)
+    while top > 0:
+        top -= 1
+        if get(search.near, top) > limit * limit * _MORE:
+            continue
+        child = get(search.children, top)
+        if child < 0:
+            first, count = blocks_of(child)
+            best, listed, limit = _search_blocks(tree, first, count, point, search, best, listed, limit)
+            continue
+        base = child * NODE_WORDS
+        bits = _bound_boxes(tree.nodes, base, point, splat4(limit * limit * _MORE), search.squares)
+        top = _push_sorted(tree.links, base, bits, search, top)
+    return _settle(tree, point, search, best, listed, limit)
+
+
+@inlined
+def _bound_boxes(nodes, base, point, limit, squares):
+    """Write lower bounds of the squared distances of eight boxes; returns the bits of those within the limit."""
+    low, high = _bound_four(nodes, base, point), _bound_four(nodes, base + 4, point)
+    store(squares, 0, low)
+    store(squares, 4, high)
+    return movemask(low <= limit) | (movemask(high <= limit) << 4)
+
+
+@inlined
+def _bound_four(nodes, base, point):
+    x, y, z = _gap(nodes, base, point.x), _gap(nodes, base + 16, point.y), _gap(nodes, base + 32, point.z)
+    return (x * x + y * y + z * z) * splat4(_LESS)
+
+
+@inlined
+def _gap(nodes, row, x):
+    """How far a coordinate lies outside of four intervals; inf for those of empty octants."""
+    zero, below, above = splat4(0.0), load4(nodes, row) - splat4(x), splat4(x) - load4(nodes, row + 8)
+    gap = select(below > above, below, above)
+    return select(gap > zero, gap, zero)
+
+
+@inlined
+def _push_sorted(links, base, bits, search, top):
+    """Let the children in the octants ``bits`` wait, the nearest on top; returns the new top."""
+    first = top
+    while bits != 0:
+        i = lowest_bit(bits)
+        bits &= bits - 1
+        square, k = get(search.squares, i), top
+        while k > first and get(search.near, k - 1) < square:
+            put(search.near, k, get(search.near, k - 1))
+            put(search.children, k, get(search.children, k - 1))
+            k -= 1
+        put(search.near, k, square)
+        put(search.children, k, np.int64(get(links, base + CHILDREN + i)))
+        top += 1
+    return top
+
+
+@kernel
+def _search_blocks(tree, first, count, point, search, best, listed, limit):
+    """List the faces of some blocks that may be within ``limit``, and lower that to what they bound."""
+    for block in range(first, first + count):
+        bits, least, square, error = bound_distances(tree, block * BLOCK_WORDS, point, limit)
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            low, high = bounds_of(least, square, error, i)
+            if low > limit:
+                continue
+            limit = smaller(limit, high)
+            put(search.places, listed, block * BLOCK_FACES + i)
+            put(search.least, listed, low)
+            listed += 1
+            if listed == LISTED:
+                best = _settle(tree, point, search, best, listed, limit)
+                limit, listed = smaller(limit, best[0] * _MORE), np.int64(0)
+    return best, listed, limit
+
+
+@kernel
+def _settle(tree, point, search, best, listed, limit):
+    """The better of ``best`` and the listed faces that are still within the limit: least distance, then lowest face."""
+    distance, face, u, v = best
+    p = point.x, point.y, point.z
+    for k in range(listed):
+        if get(search.least, k) > limit:
+            continue
+        place = get(search.places, k)
+        base = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
+        f = get(tree.faces, place)
+        d, du, dv = distance_to_face(_corner(tree, base), _corner(tree, base + 12), _corner(tree, base + 24), p,
+                                     search.parts)  # fmt: skip
+        if d < distance or (d == distance and f < face):
+            distance, face, u, v = d, f, du, dv
+    return distance, face, u, v
+
+
+@inlined
+def _corner(tree, base):
+    return coordinate(tree, base), coordinate(tree, base + 4), coordinate(tree, base + 8)

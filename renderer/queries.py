@@ -1,0 +1,259 @@
+"""The questions that rays and points ask of a mesh: what ``Octree`` and ``BruteForce`` have in common."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.mesh.mesh import Mesh, Repairs
+from renderer.points.closest import ClosestPoints, closest_point
+from renderer.points.contains import contains
+from renderer.points.signed import signed_distance
+from renderer.points.visible import visible
+from renderer.process.parallel import checked_threads
+from renderer.trace.all_hits import all_hits, count_hits
+from renderer.trace.batch import RayBatch, check_rays, moved_off
+from renderer.trace.hits import AllHits, Hits
+from renderer.trace.layout import Tree
+from renderer.trace.query import any_hits, closest_hits
+
+
+class Queries:
+    """Queries of one mesh; safe to call from many threads at once.
+
+    ``mesh`` is the mesh that was built over, to which a hit's ``face`` refers. ``repairs`` says what ``repair=True``
+    left out of the given arrays, and is None without it.
+    """
+
+    def __init__(self, mesh: Mesh, tree: Tree, threads: int | None) -> None:
+        # One reference, so that a refit on another thread changes both at once.
+        self._built = (mesh, tree)
+        self.repairs: Repairs | None = None
+        self.threads = checked_threads(threads)
+
+    @property
+    def mesh(self) -> Mesh:
+        return self._built[0]
+
+    @property
+    def tree(self) -> Tree:
+        """The arrays that rays are traced against."""
+        return self._built[1]
+
+    @tree.setter
+    def tree(self, tree: Tree) -> None:
+        self._built = (self.mesh, tree)
+
+    def closest_hit(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
+    ) -> Hits:
+        """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
+
+        origins, directions  (n, 3), finite, or one (3,) for all of the other; directions are not zero, of any length
+        t_min, t_max         >= 0, one number or (n,), in units of |direction|
+        leaving              faces that the rays start on, one or (n,), -1 for none: each start is moved off its face by
+                             more than rounding errors, to the side that the direction points to, so that the ray
+                             meets neither that face nor another in its plane. No epsilon is needed
+
+        No face is culled. A ray in a face's plane misses it, unless the rounding of its slopes lifts it out of the
+        plane. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.
+
+        >>> from renderer import Octree
+        >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> hits = octree.closest_hit([[0.1, 0.2, 3.0], [2, 2, 2]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.t, hits.face
+        (array([ 3., inf]), array([ 0, -1]))
+        >>> octree.closest_hit(hits.points[:1], [[0, 0, -1]], leaving=hits.face[:1]).hit
+        array([False])
+        """
+        mesh, tree = built = self._built
+        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return closest_hits(tree, rays, mesh, self.threads)
+
+    def any_hit(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
+    ) -> NDArray[np.bool_]:
+        """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above.
+
+        >>> from renderer import Octree
+        >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> octree.any_hit([[0.1, 0.2, 3.0]], [[0, 0, -1]], t_max=[2.5])
+        array([False])
+        """
+        built = self._built
+        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return any_hits(built[1], rays, self.threads)
+
+    def all_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
+        *,
+        contacts: bool = True,
+        max_hits: int | None = None,
+    ) -> AllHits:
+        """All hits of each ray in the closed interval [t_min, t_max], sorted by t, then face; arguments as above.
+
+        contacts  True: the hits of a ray at one edge or corner of the surface, told apart by position, are one contact,
+                  which is reported as the first of them. Thin walls and double faces stay two. False: each face that is
+                  hit has its row
+        max_hits  keep at most so many of each ray, the nearest
+
+        The first row of a ray is its ``closest_hit``, bit for bit, and a ray has rows where ``any_hit`` is true. The
+        tree is searched once, and no hit is told from another by its distance. Memory grows with what is found.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree.from_mesh(box())
+        >>> hits = octree.all_hits([[0.5, 0.5, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.t, hits.offsets
+        (array([2., 3.]), array([0, 2, 2]))
+        >>> octree.all_hits([[0.5, 0.5, 3]], [[0, 0, -1]], contacts=False).t
+        array([2., 2., 3., 3.])
+        """
+        mesh, tree = built = self._built
+        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return all_hits(tree, rays, mesh, contacts, max_hits, self.threads)
+
+    def count_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
+        *,
+        contacts: bool = True,
+    ) -> NDArray[np.int64]:
+        """The number of rows that ``all_hits`` has for each ray, (n,) int64.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> Octree.from_mesh(box()).count_hits([[0.5, 0.5, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        array([2, 0])
+        """
+        built = self._built
+        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return count_hits(built[1], rays, contacts, self.threads)
+
+    def _rays(
+        self,
+        built: tuple[Mesh, Tree],
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike,
+        t_max: ArrayLike,
+        leaving: ArrayLike | None,
+    ) -> RayBatch:
+        """The arguments of a query, checked, and moved off the faces that the rays leave."""
+        rays = check_rays(origins, directions, t_min, t_max)
+        if leaving is None:
+            return rays
+        return moved_off(rays, leaving, built[0], built[1].scale, self.threads)
+
+    def contains(
+        self, points: ArrayLike, boundary: bool = True, rule: Literal["nonzero", "even-odd"] = "nonzero"
+    ) -> NDArray[np.bool_]:
+        """Whether each point lies inside the closed mesh, (...,) bool, exactly: no votes and no tolerance.
+
+        points    (..., 3), finite
+        boundary  the answer for points on the surface itself, which is told exactly too
+        rule      "nonzero": inside where the surface winds around the point, so solids may overlap. "even-odd": inside
+                  where a way out crosses the surface an odd number of times, however its faces are turned
+
+        The mesh is closed where each edge is passed as often in one direction as in the other ("nonzero") or an even
+        number of faces has it ("even-odd"), vertices told apart by position. The answer is that of real arithmetic for
+        the float64 coordinates given, and the same bits for any number of threads. Raises ``ValueError`` for points
+        that are not finite, with the row, and for a mesh that is not closed, with its open edges.
+
+        Source: Shewchuk, Adaptive Precision Floating-Point Arithmetic, 1997, for the signs.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree.from_mesh(box())
+        >>> octree.contains([[0.5, 0.5, 0.5], [1, 0.5, 0.5], [2, 0, 0]])
+        array([ True,  True, False])
+        >>> octree.contains([[0.5, 0.5, 0.5], [1, 0.5, 0.5], [2, 0, 0]], boundary=False)
+        array([ True, False, False])
+        """
+        mesh, tree = self._built
+        return contains(tree, mesh, points, boundary, rule, self.threads)
+
+    def closest_point(self, points: ArrayLike, max_distance: ArrayLike = np.inf) -> ClosestPoints:
+        """The point of the surface that is nearest to each point; equal distances: the lowest face.
+
+        points        (..., 3), finite
+        max_distance  >= 0, one number or (...): nothing is found beyond it, and the search ends sooner
+
+        The distance is the exact one, rounded: within an ulp of it, or within 2^-90 of the distance to the face's
+        farthest corner if that is more. It is 0 on the surface, and else only nearer to it than 2^-900 of that. The
+        same bits for any number of threads. Raises ``ValueError`` naming argument and row, and for a mesh without
+        faces.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> near = Octree.from_mesh(box()).closest_point([[0.5, 0.5, 3], [0.5, 0.5, 0.75]])
+        >>> near.distance, near.points.tolist()
+        (array([2.  , 0.25]), [[0.5, 0.5, 1.0], [0.5, 0.5, 1.0]])
+        """
+        mesh, tree = self._built
+        return closest_point(tree, mesh, points, max_distance, self.threads)
+
+    def signed_distance(
+        self,
+        points: ArrayLike,
+        max_distance: ArrayLike = np.inf,
+        rule: Literal["nonzero", "even-odd"] = "nonzero",
+    ) -> NDArray[np.float64]:
+        """The distance of each point from the surface of the closed mesh, (...) float64: positive OUTSIDE, negative
+        inside, exactly 0 on it.
+
+        As Open3D and libigl have it; trimesh has the other sign. The distance is that of ``closest_point``, the sign
+        that of ``contains``, never that of the nearest normal. Arguments and errors as for these; beyond
+        ``max_distance`` it is inf or -inf.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> Octree.from_mesh(box()).signed_distance([[0.5, 0.5, 3], [0.5, 0.5, 0.75], [1, 1, 1]])
+        array([ 2.  , -0.25,  0.  ])
+        """
+        mesh, tree = self._built
+        return signed_distance(tree, mesh, points, max_distance, rule, self.threads)
+
+    def visible(
+        self,
+        points: ArrayLike,
+        targets: ArrayLike,
+        leaving: ArrayLike | None = None,
+        reaching: ArrayLike | None = None,
+    ) -> NDArray[np.bool_]:
+        """Whether nothing lies between each point and its target, (...) bool; the shapes of both are broadcast.
+
+        points, targets    (..., 3), finite
+        leaving, reaching  the faces that the points and the targets lie on, one or (...), -1 for none: these ends are
+                           moved off them as ``closest_hit`` does it, with no epsilon
+
+        An end itself hides nothing, nor does what is within 2^-40 of the end's largest coordinate from it, along the
+        way: the rounding of a point on a surface, seen at 0.02 degrees. Raises ``ValueError`` naming argument and row.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree.from_mesh(box())
+        >>> octree.visible([0.5, 0.5, 3], [[0.5, 0.5, 1], [0.5, 0.5, 0], [3, 0.5, 3]])
+        array([ True, False,  True])
+        """
+        mesh, tree = self._built
+        return visible(tree, mesh, (points, targets), (leaving, reaching), self.threads)

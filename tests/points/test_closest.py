@@ -1,0 +1,170 @@
+"""Nearest points of meshes: against exact arithmetic, and every answer the same however it is asked."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from meshes import make_mesh
+
+from renderer import BruteForce, Mesh, Octree
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.points.nearest import LISTED
+from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.stability.cases.inside import closed_solids
+
+SOLIDS = closed_solids()
+FIELDS = ("distance", "face", "u", "v")
+
+
+def points_about(mesh, rng, count):
+    """Points at faces, edges and corners, on them and from 1e-20 to 10 of the mesh's size away."""
+    shares = rng.dirichlet([1, 1, 1], count)
+    kind = rng.integers(0, 4, count)
+    shares[kind == 1] = np.eye(3)[rng.integers(0, 3, int((kind == 1).sum()))]
+    shares[kind == 2, 0] = 0.0
+    shares[kind == 3] = [0.5, 0.25, 0.25]
+    on = np.einsum("nk,nkd->nd", shares, mesh.triangles[rng.integers(0, len(mesh.faces), count)])
+    away = 10.0 ** rng.uniform(-20, 1, (count, 1)) * (rng.random((count, 1)) < 0.7)
+    return on + rng.normal(size=(count, 3)) * away * mesh.extent.max()
+
+
+def assert_nearest(mesh, points):
+    """Each distance is the exact one, rounded, and the face the first that is so near."""
+    found = Octree.from_mesh(mesh).closest_point(points)
+    triangles = [rational(triangle) for triangle in mesh.triangles]
+    for i, point in enumerate(rational(points)):
+        square, faces = nearest(point, triangles)
+        # Half an ulp for the last rounding, and as little as twice the digits leave.
+        assert ulps_from_root(found.distance[i], square) < 0.51
+        if found.face[i] != faces[0]:
+            # Another face is as near when rounded.
+            other = nearest(point, [triangles[found.face[i]]])[0]
+            assert ulps_from_root(found.distance[i], other) < 0.51 and found.face[i] < faces[0]
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_distances_are_the_exact_ones_rounded(name):
+    assert_nearest(SOLIDS[name], points_about(SOLIDS[name], np.random.default_rng(5), 25))
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 2**30), st.sampled_from([1e-80, 1e-6, np.pi, 1e200]), st.sampled_from([0.0, 1e6]))
+def test_at_any_size_and_place(seed, scale, offset):
+    rng = np.random.default_rng(seed)
+    solid = list(SOLIDS.values())[seed % len(SOLIDS)]
+    mesh = Mesh(solid.vertices * scale + offset * scale * rng.random(3), solid.faces[:40])
+    assert_nearest(mesh, points_about(mesh, rng, 8))
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 2**30), st.sampled_from([1.0, 0.25]))
+def test_faces_of_whole_numbers_with_lines_and_points_among_them(seed, step):
+    """Distances tie often here, and many points lie on faces, on lines of edges, and above corners."""
+    rng = np.random.default_rng(seed)
+    corners = rng.integers(-3, 4, (30, 3)).astype(float)
+    mesh = Mesh(corners, rng.integers(0, 30, (30, 3)))
+    points = rng.integers(-4, 5, (20, 3)) * step
+    assert_nearest(mesh, points)
+    found, triangles = Octree.from_mesh(mesh).closest_point(points), [rational(t) for t in mesh.triangles]
+    assert found.face.tolist() == [nearest(point, triangles)[1][0] for point in rational(points)]
+
+
+def test_needles_err_by_no_more_than_promised():
+    """Needles 1e-15 wide: 2^-90 of the reach, 1e-27, is what is left beside an edge."""
+    rng = np.random.default_rng(3)
+    mesh = Mesh(rng.normal(size=(60, 3)) * [1, 1e-15, 1e-15], rng.integers(0, 60, (60, 3)))
+    points = points_about(mesh, rng, 150)
+    found = Octree.from_mesh(mesh).closest_point(points)
+    triangles = [rational(triangle) for triangle in mesh.triangles]
+    reach = np.abs(points[:, None] - mesh.vertices).max(axis=(1, 2))
+    for i, point in enumerate(rational(points)):
+        square, _ = nearest(point, triangles)
+        exact = ulps_from_root(found.distance[i], square)
+        assert exact < 0.51 or abs(found.distance[i] - float(square) ** 0.5) < 2.0**-90 * reach[i]
+        assert (found.distance[i] == 0.0) == (square == 0)
+
+
+@pytest.mark.parametrize("mesh", [torus(), make_mesh("lattice", 3, 300)], ids=["torus", "lattice"])
+def test_trees_threads_batches_and_shapes_change_nothing(mesh):
+    mesh = mesh if isinstance(mesh, Mesh) else Mesh(*mesh)
+    points = points_about(mesh, np.random.default_rng(2), 3000)
+    expected = Octree.from_mesh(mesh, threads=1).closest_point(points)
+    order = np.random.default_rng(1).permutation(len(points))
+    for queries in (
+        Octree.from_mesh(mesh, split="sah"),
+        Octree.from_mesh(mesh, leaf_size=32),
+        BruteForce.from_mesh(mesh),
+    ):
+        found, shuffled = queries.closest_point(points), queries.closest_point(points[order])
+        for name in FIELDS:
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+            np.testing.assert_array_equal(getattr(shuffled, name), getattr(expected, name)[order])
+    shaped = Octree.from_mesh(mesh).closest_point(points.reshape(30, 100, 3))
+    np.testing.assert_array_equal(shaped.distance, expected.distance.reshape(30, 100))
+    np.testing.assert_array_equal(shaped.points, expected.points.reshape(30, 100, 3))
+    one = Octree.from_mesh(mesh).closest_point(points[0])
+    assert one.distance.shape == () and one.points.shape == (3,) and one.distance == expected.distance[0]
+    none = Octree.from_mesh(mesh).closest_point(np.empty((0, 3)))
+    assert none.distance.shape == (0,) and none.points.shape == (0, 3)
+
+
+def test_points_are_at_the_distance_and_on_the_surface():
+    mesh, rng = icosphere(3), np.random.default_rng(0)
+    points = rng.normal(size=(500, 3))
+    found = Octree.from_mesh(mesh).closest_point(points)
+    np.testing.assert_allclose(np.linalg.norm(points - found.points, axis=1), found.distance, rtol=1e-13, atol=1e-15)
+    assert Octree.from_mesh(mesh).closest_point(found.points).distance.max() < 1e-15
+    corners = Octree.from_mesh(mesh).closest_point(mesh.vertices)
+    assert (corners.distance == 0.0).all() and (corners.points == mesh.vertices).all()
+
+
+def test_the_centre_of_a_ball_is_as_near_to_more_faces_than_are_listed_at_once():
+    ball = icosphere(2)
+    mesh = Mesh(ball.vertices, ball.faces)
+    assert len(mesh.faces) > LISTED
+    assert_nearest(mesh, np.zeros((1, 3)))
+
+
+def test_max_distance_is_closed_and_finds_nothing_beyond():
+    octree, points = Octree.from_mesh(box()), np.array([[0.5, 0.5, 3.0], [0.5, 0.5, 1.25], [0.5, 0.5, 0.9]])
+    below = octree.closest_point(points, max_distance=[np.nextafter(2.0, 0.0), 0.25, 0.0])
+    assert below.found.tolist() == [False, True, False]
+    assert below.distance.tolist() == [np.inf, 0.25, np.inf] and below.face.tolist()[::2] == [-1, -1]
+    assert np.isnan(below.u[0]) and np.isnan(below.v[0]) and np.isnan(below.points[0]).all()
+    assert octree.closest_point(points, max_distance=2.0).found.all()
+    assert octree.closest_point(points[:1], max_distance=0.0).distance.tolist() == [np.inf]
+    on = octree.closest_point([[0.5, 0.25, 1.0]], max_distance=0.0)
+    assert on.distance.tolist() == [0.0]
+
+
+def test_a_refit_serves_it_too():
+    octree = Octree.from_mesh(box())
+    octree.refit(octree.mesh.vertices + 10.0)
+    assert octree.closest_point([[10.5, 10.5, 12.0]]).distance.tolist() == [1.0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"points": [[0.0, 0.0]]}, r"points: expected shape \(\.\.\., 3\), got shape \(1, 2\)"),
+        ({"points": [[0, 0, 0], [0, np.nan, 0]]}, r"points: expected finite .*, got \[0\.0, nan, 0\.0\] in row 1"),
+        ({"points": [[0, 0, 1e39]]}, r"points: expected finite numbers within 8\.51e\+37, got .* in row 0"),
+        ({"points": [[0, 0, 0]], "max_distance": -1.0}, r"max_distance: expected numbers from 0, got -1\.0 in row 0"),
+        ({"points": [[0, 0, 0]], "max_distance": [1.0, 2.0]}, r"max_distance: expected a number or shape \(1,\)"),
+        ({"points": [[0, 0, 0]], "max_distance": np.nan}, "max_distance: expected numbers from 0, got nan in row 0"),
+    ],
+)
+def test_bad_input_is_named(arguments, said):
+    with pytest.raises(ValueError, match=said):
+        Octree.from_mesh(box()).closest_point(**arguments)
+
+
+def test_an_empty_mesh_is_refused():
+    with pytest.raises(ValueError, match="mesh: expected faces, got none"):
+        Octree(np.empty((0, 3)), np.empty((0, 3), int)).closest_point([[0.0, 0.0, 0.0]])
+
+
+def test_far_points_of_tiny_and_huge_meshes():
+    for scale in (1e-200, 1e200):
+        octree = Octree.from_mesh(Mesh(box().vertices * scale, box().faces))
+        assert octree.closest_point([[0.5 * scale, 0.5 * scale, 3 * scale]]).distance.tolist() == [3 * scale - scale]

@@ -1,0 +1,48 @@
+"""Signed distances: positive outside, negative inside, 0 on the surface."""
+
+import numpy as np
+import pytest
+
+from renderer import Octree
+from renderer.mesh.shapes import box
+from validation.stability.cases.inside import closed_solids, points_at, winding_numbers
+
+SOLIDS = closed_solids()
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_the_sign_is_that_of_exact_arithmetic(name):
+    mesh = SOLIDS[name]
+    points = points_at(mesh, np.random.default_rng(2), 5)
+    # A distance of 5e-324 comes out as 0.
+    points[np.abs(points) < 1e-300] = 0.0
+    numbers = winding_numbers(mesh, points)
+    expected = [0 if number is None else (-1 if number else 1) for number in numbers]
+    octree = Octree.from_mesh(mesh)
+    distances = octree.signed_distance(points)
+    np.testing.assert_array_equal(np.sign(distances), expected)
+    np.testing.assert_array_equal(np.abs(distances), octree.closest_point(points).distance)
+    assert not np.signbit(distances[distances == 0.0]).any()
+
+
+def test_inside_a_box_analytically():
+    points = np.random.default_rng(0).uniform(-1, 2, (2000, 3))
+    outside = np.linalg.norm(np.maximum(np.maximum(-points, points - 1), 0), axis=1)
+    expected = np.where(outside > 0, outside, np.maximum(-points, points - 1).max(axis=1))
+    distances = Octree.from_mesh(box()).signed_distance(points.reshape(20, 100, 3))
+    np.testing.assert_allclose(distances, expected.reshape(20, 100), rtol=1e-14, atol=1e-16)
+
+
+def test_beyond_max_distance_the_sign_stays():
+    octree = Octree.from_mesh(box((-2, -2, -2), (2, 2, 2)))
+    assert octree.signed_distance([[0, 0, 0], [0, 0, 4], [0, 0, 1.5]], 1.0).tolist() == [-np.inf, np.inf, -0.5]
+
+
+def test_rules_and_open_meshes():
+    mesh = box((-1, -1, -1), (1, 1, 1))
+    faces = mesh.faces.copy()
+    faces[::2] = faces[::2, ::-1]
+    octree = Octree(mesh.vertices, faces)
+    assert octree.signed_distance([[0, 0, 0.5]], rule="even-odd").tolist() == [-0.5]
+    with pytest.raises(ValueError, match=r"mesh: expected a closed mesh, got .* open edges"):
+        octree.signed_distance([[0, 0, 0.5]])

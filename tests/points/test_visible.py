@@ -1,0 +1,82 @@
+"""Points that see each other: against closed forms and the query for any hit."""
+
+import numpy as np
+import pytest
+
+from renderer import BruteForce, Mesh, Octree
+from renderer.mesh.shapes import box, icosphere
+
+
+def test_a_convex_solid_hides_what_the_segment_passes():
+    rng, ball = np.random.default_rng(4), icosphere(3)
+    a, b = rng.normal(size=(2, 3000, 3))
+    a, b = 2 * a / np.linalg.norm(a, axis=1)[:, None], 1.5 * b / np.linalg.norm(b, axis=1)[:, None]
+    # How near the segment comes to the centre; the ball's faces are from 0.99 to 1 away.
+    share = np.clip(-(a * (b - a)).sum(1) / ((b - a) ** 2).sum(1), 0, 1)
+    nearest = np.linalg.norm(a + share[:, None] * (b - a), axis=1)
+    seen = Octree.from_mesh(ball).visible(a, b)
+    assert seen[nearest > 1.0].all() and not seen[nearest < 0.99].any() and 0.1 < seen.mean() < 0.9
+    np.testing.assert_array_equal(seen, BruteForce.from_mesh(ball).visible(a, b))
+    np.testing.assert_array_equal(seen, Octree.from_mesh(ball).visible(b, a))
+
+
+@pytest.mark.parametrize("offset", [0.0, 5e5])
+@pytest.mark.parametrize("given", [False, True])
+def test_corners_and_middles_of_faces_see_out_and_not_through(offset, given):
+    """Both ends lie on the surface, to rounding, on whichever side of it."""
+    ball = icosphere(3)
+    mesh = Mesh(ball.vertices + offset, ball.faces)
+    octree, eye = Octree.from_mesh(mesh), np.array([3.0, 0.5, 0.25]) + offset
+    centres, normals = mesh.triangles.mean(axis=1), mesh.face_normals()
+    slope = ((eye - centres) * normals).sum(1) / np.linalg.norm(eye - centres, axis=1)
+    faces = np.arange(len(mesh.faces)) if given else None
+    sure = np.abs(slope) > 1e-3
+    np.testing.assert_array_equal(octree.visible(eye, centres, reaching=faces)[sure], (slope > 0)[sure])
+    np.testing.assert_array_equal(octree.visible(centres, eye, leaving=faces)[sure], (slope > 0)[sure])
+
+
+def test_ends_hide_nothing_and_walls_between_do():
+    octree = Octree.from_mesh(box())
+    assert octree.visible([0.5, 0.5, 1.0], [0.5, 0.5, 3.0])
+    assert octree.visible([0.5, 0.5, 3.0], [0.5, 0.5, 1.0])
+    assert octree.visible([0.5, 0.5, 0.0], [0.5, 0.5, 1.0])
+    assert octree.visible([0.5, 0.5, 1.0], [0.25, 0.5, 1.0])
+    assert octree.visible([0.5, 0.5, 0.5], [0.5, 0.5, 0.5])
+    assert not octree.visible([0.5, 0.5, 0.5], [0.5, 0.5, 1.0 + 1e-9])
+    assert not octree.visible([0.5, 0.5, -1e-9], [0.5, 0.5, 1.0])
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e-3, 1e6, 1e250])
+def test_at_any_size(scale):
+    octree = Octree.from_mesh(Mesh(box().vertices * scale, box().faces))
+    points = np.array([[0.5, 0.5, 3], [0.5, 0.5, 3], [3, 0.4, 3]]) * scale
+    targets = np.array([[0.5, 0.5, 1], [0.4, 0.5, 0.5], [3, 0.4, -3]]) * scale
+    assert octree.visible(points, targets).tolist() == [True, False, True]
+
+
+def test_shapes_are_broadcast():
+    octree = Octree.from_mesh(box())
+    rng = np.random.default_rng(0)
+    points, targets = rng.uniform(-2, 2, (4, 3)), rng.uniform(-2, 2, (5, 3))
+    grid = octree.visible(points[:, None], targets)
+    assert grid.shape == (4, 5)
+    np.testing.assert_array_equal(grid[2], octree.visible(points[2], targets))
+    assert octree.visible(np.empty((0, 3)), targets[0]).shape == (0,)
+    assert octree.visible(points[0], targets[0]).shape == ()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"points": [[0, 0]]}, r"points: expected shape \(\.\.\., 3\)"),
+        ({"targets": [[0, 0, np.inf]]}, r"targets: expected finite numbers within .* in row 0"),
+        ({"targets": np.zeros((2, 3))}, r"targets: expected a shape that goes with that of points, \(3, 3\), got"),
+        ({"leaving": [0, 1]}, r"leaving: expected an integer or integers of shape \(3,\)"),
+        ({"leaving": 1.5}, "leaving: expected an integer"),
+        ({"reaching": 99}, r"reaching: expected faces from 0 to 11, or -1, got 99 in row 0"),
+    ],
+)
+def test_bad_input_is_named(arguments, said):
+    good = {"points": np.zeros((3, 3)), "targets": np.ones((3, 3))}
+    with pytest.raises(ValueError, match=said):
+        Octree.from_mesh(box()).visible(**{**good, **arguments})
