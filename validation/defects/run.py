@@ -44,6 +44,8 @@ KEPT = {
     "ssim": "others publish it, and it tells broken structure from wrong brightness; FLIP and the maximum see more",
     "asked a few at a time": "few rays go by a kernel of their own, which other gates ask by chance only",
     "references that judge it": "guards the others: without it a rung that nobody judges would pass",
+    "rays on which we are wrong": "judges all families by the thousand; extreme cases see the same faults on few rays",
+    "differ from a new build": "asks every mesh again after it moved, of which extreme cases have two",
     "rays within float64 rounding": "guards the count of wrong rays, which excuses what float64 cannot decide",
     "slope of log RMSE": _PATHS,
     "p-value of the largest z": _PATHS,
