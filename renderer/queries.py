@@ -5,13 +5,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.contacts.all_hits import all_hits, count_hits
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.points.closest import ClosestPoints, closest_point
 from renderer.points.contains import contains
 from renderer.points.signed import signed_distance
 from renderer.points.visible import visible
 from renderer.process.parallel import checked_threads
-from renderer.trace.all_hits import all_hits, count_hits
 from renderer.trace.batch import RayBatch, check_rays, moved_off
 from renderer.trace.hits import AllHits, Hits
 from renderer.trace.layout import Tree

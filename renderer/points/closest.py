@@ -1,5 +1,6 @@
 """Where closest points are asked: checks at the boundary, chunks on threads, and the answer."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
 from renderer.points.nearest import LISTED, find_nearest
+from renderer.points.order import CELLS, chunk_size, make_grid, order_points
 from renderer.process.parallel import for_chunks
 from renderer.trace.hits import points_on
 from renderer.trace.layout import Tree
@@ -17,8 +19,8 @@ from renderer.trace.query import rays_against_blocks
 from renderer.trace.rays import HIT_ROWS
 from renderer.trace.singly import stack_size
 
-# Some milliseconds of search.
-_CHUNK = 1024
+# Points between two looks at Ctrl-C: some milliseconds of search.
+_STEP = 1024
 
 
 @dataclass(eq=False, slots=True)
@@ -56,12 +58,20 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
     limits = _limits(max_distance, shape)
     out = np.empty((HIT_ROWS, len(rows)))
 
-    def find(begin: int, end: int) -> None:
+    lower, upper = mesh.bounds
+    grid = make_grid(lower, upper, along=None)
+
+    def find(begin: int, end: int) -> Iterator[None]:
         size = stack_size(tree.depth) + LISTED
         integers, doubles = np.empty(size, np.int64), np.empty(size + 8)
-        find_nearest(tree.words, rows, limits, out, integers, doubles, begin, end)
+        order, starts = np.empty(end - begin, np.int64), np.empty(CELLS + 1, np.int64)
+        order_points(rows, grid, order, starts, begin, end)
+        for some in range(0, len(order), step):
+            find_nearest(tree.words, rows, order[some : some + step], limits, out, integers, doubles)
+            yield
 
-    for_chunks(find, len(rows), _CHUNK if tree.has_nodes else min(_CHUNK, rays_against_blocks(tree)), threads)
+    step = _STEP if tree.has_nodes else min(_STEP, rays_against_blocks(tree))
+    for_chunks(find, len(rows), chunk_size(len(rows), step, threads), threads)
     distance, u, v, face = (row.reshape(shape) for row in out)
     return ClosestPoints(distance, face.view(np.int64), u, v, mesh)
 

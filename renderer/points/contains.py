@@ -8,13 +8,15 @@ from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points
 from renderer.points.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_crossings
+from renderer.points.order import CELLS, chunk_size, make_grid, order_points
 from renderer.points.rational import crossings_of
 from renderer.points.signs import UNDECIDED
 from renderer.process.parallel import for_chunks
 from renderer.trace.layout import Tree
 from renderer.trace.singly import stack_size
 
-_CHUNK = 4096
+# The fewest points of a chunk: a millisecond of work.
+_LEAST = 4096
 RULES = ("nonzero", "even-odd")
 
 
@@ -47,12 +49,16 @@ def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) 
     axis = int(np.argmin(upper - lower))
     middle = tree.scale * (lower[axis] / 2 + upper[axis] / 2)
 
+    grid = make_grid(lower, upper, along=axis)
+
     def count(begin: int, end: int) -> None:
         # Memory for the deepest tree: a kernel's own frame holds the stack of most trees, not of all.
         stack = np.empty(stack_size(tree.depth), np.int64)
-        count_crossings(tree.words, points, axis, middle, counts, stack, begin, end)
+        order, starts = np.empty(end - begin, np.int64), np.empty(CELLS + 1, np.int64)
+        order_points(points, grid, order, starts, begin, end)
+        count_crossings(tree.words, points, order, axis, middle, counts, stack)
 
-    for_chunks(count, len(points), _CHUNK, threads)
+    for_chunks(count, len(points), chunk_size(len(points), _LEAST, threads), threads)
     triangles = None
     for row in np.flatnonzero(counts[:, ON] >= UNDECIDED):
         triangles = mesh.triangles if triangles is None else triangles

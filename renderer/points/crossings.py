@@ -58,15 +58,15 @@ class Column(NamedTuple):
 
 
 @kernel
-def count_crossings(words, points, axis, middle, out, stack, begin, end):
-    """Fill rows begin:end of ``out`` (n, COLUMNS) int64 for ``points`` (n, 3) float64.
+def count_crossings(words, points, order, axis, middle, out, stack):
+    """Fill the rows ``order`` of ``out`` (n, COLUMNS) int64 for ``points`` (n, 3) float64.
 
     The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
     ``stack`` is memory for ``singly.stack_size`` int64.
     """
     tree, parts = tree_pointers(words), local_doubles()
     scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
-    for i in range(begin, end):
+    for i in order:
         row = at(pointer(points), 3 * i)
         x, y, z = scale * get(row, axis_x), scale * get(row, axis_y), scale * get(row, axis)
         column = Column(4 * axis_x, 4 * axis_y, 4 * axis, x, y, z, z >= middle)

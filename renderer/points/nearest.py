@@ -67,8 +67,8 @@ class Search(NamedTuple):
 
 
 @kernel
-def find_nearest(words, points, limits, out, integers, doubles, begin, end):
-    """Write distance, u, v and face of the points begin:end of ``points`` (n, 3) into the rows of ``out`` (4, n).
+def find_nearest(words, points, order, limits, out, integers, doubles):
+    """Write distance, u, v and face of the points ``order`` of ``points`` (n, 3) into the rows of ``out`` (4, n).
 
     limits     (n,) or (1,), the largest distance that counts
     integers   memory for ``singly.stack_size`` and LISTED int64; ``doubles``, for as many float64 and eight more
@@ -77,7 +77,7 @@ def find_nearest(words, points, limits, out, integers, doubles, begin, end):
     found, size = hit_pointers(out, count), len(integers) - LISTED
     children, near = pointer(integers), pointer(doubles)
     search = Search(children, near, at(children, size), at(near, size), at(near, size + LISTED), parts)
-    for i in range(begin, end):
+    for i in order:
         p, limit = at(pointer(points), 3 * i), limits[i if len(limits) > 1 else 0]
         point = Point(0, 4, 8, tree.scale * get(p, 0), tree.scale * get(p, 1), tree.scale * get(p, 2))
         distance, face, u, v = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), search)

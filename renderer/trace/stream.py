@@ -228,3 +228,11 @@ def leave_leaf(tree, rays, lanes, r):
         put(lanes.child, r, child)
         return child
     return resume(tree, rays, lanes, r)
+
+
+@inlined
+def list_lane(lanes, r, child, nodes, leaves):
+    """Put lane ``r`` into the list of nodes or of leaves, as its next child is. Returns the lengths of both lists."""
+    put(lanes.at_node, nodes, r)
+    put(lanes.at_leaf, leaves, r)
+    return nodes + np.int64(child >= 0), leaves + np.int64(child < 0)

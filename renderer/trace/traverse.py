@@ -22,6 +22,7 @@ from renderer.trace.stream import (
     begin_ray,
     leave_leaf,
     leave_node,
+    list_lane,
     make_lanes,
     meet_leaves,
     meet_nodes,
@@ -123,14 +124,6 @@ def _load(rays, scratch, r, i):
     put(scratch.doubtful, r, 0)
 
 
-@inlined
-def _list_lane(lanes, r, child, nodes, leaves):
-    """Put lane ``r`` into the list of nodes or of leaves, as its next child is. Returns the lengths of both lists."""
-    put(lanes.at_node, nodes, r)
-    put(lanes.at_leaf, leaves, r)
-    return nodes + np.int64(child >= 0), leaves + np.int64(child < 0)
-
-
 @kernel
 def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_hit):
     """Run the listed lanes to their ends; the rays in ``scratch.waiting`` from ``following`` to ``count`` take the
@@ -144,7 +137,7 @@ def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_
         for k in range(entered):
             r = get(lanes.at_node, k)
             child = leave_node(tree, prepared, lanes, r, any_hit)
-            nodes, leaves = _list_lane(lanes, r, child, nodes, leaves)
+            nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
         # Take the lanes at leaves one block on; a lane whose ray ends loads the next ray.
         meet_leaves(tree, prepared, lanes, leaves)
         entered, leaves = leaves, 0
@@ -163,7 +156,7 @@ def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_
                 _load(rays, scratch, r, get(waiting, following))
                 following += 1
                 child = 0
-            nodes, leaves = _list_lane(lanes, r, child, nodes, leaves)
+            nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
 
 
 @inlined
@@ -196,7 +189,7 @@ def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
         if any_hit and best_of(prepared, r)[1] != NO_FACE:
             _finish(tree, rays, found, first + r, scratch, r, False, any_hit)
         else:
-            nodes, leaves = _list_lane(lanes, r, resume(tree, prepared, lanes, r), nodes, leaves)
+            nodes, leaves = list_lane(lanes, r, resume(tree, prepared, lanes, r), nodes, leaves)
     _run_lanes(tree, rays, found, scratch, nodes, leaves, 0, 0, any_hit)
 
 

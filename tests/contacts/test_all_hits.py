@@ -11,7 +11,7 @@ from meshes import meshes, options, rays_at
 from renderer import Mesh
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.octree import BruteForce, Octree
-from renderer.trace import all_hits as module
+from renderer.contacts import all_hits as module
 from validation.oracle.contacts import contacts, hits
 from validation.stability.cases.judgement import both, soup_of
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from renderer.contacts.candidates import LISTED, TOGETHER, find_blocks, make_candidates
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, extract, get, lowest_bit, pointer, put, smaller, splat8
 from renderer.trace.doubt import settled
@@ -24,6 +25,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
 from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.sides import coordinate, exact_sides
+from renderer.trace.traverse import make_scratch
 
 # Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
 # place of the face in its block, the edges passed as bits, and the order as int64. Of the hits of the rays before it:
@@ -47,13 +49,13 @@ def _row(found, row, i):
 
 
 @kernel
-def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, stack):
+def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, memory):
     """Gather the hits of the rays from bounds[0] to bounds[1]; what they have goes to ``counts``, one int64 a ray.
 
     choice    (merge, most, keep): whether hits become contacts, the most of them of a ray, whether they are kept or
               counted only
     doubles   (DOUBLE_ROWS, capacity) float64, integers (INTEGER_ROWS, capacity) int64: memory, and what is kept
-    stack     memory for ``singly.stack_size`` int64
+    memory    a ``traverse.Memory`` for CANDIDATE_WORDS rays
 
     Returns the ray before which it ended because the memory was full, or bounds[1]; and the row of a ray out of range,
     for which nothing is gathered, or -1.
@@ -64,25 +66,42 @@ def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, stack):
     if bad >= 0:
         return bounds[0], bad
     merge, most, keep = choice
-    for i in range(bounds[0], bounds[1]):
-        ray, t_max = ray_at(source, i)
-        count = _search(tree, ray, t_max, found, pointer(stack))
-        if kept + count > found.capacity:
-            return i, -1
-        counts[i] = smaller(_ordered(tree, found, count, merge, keep), most)
-        if keep:
-            _keep(found, kept, counts[i], tree.scale)
-        # Where hits are counted only, so that a chunk ends after some work, and Ctrl-C need not wait for long.
-        kept += count if not keep else counts[i]
+    scratch = make_scratch(memory)
+    candidates = make_candidates(scratch.waiting)
+    for begin in range(bounds[0], bounds[1], TOGETHER):
+        end = smaller(begin + TOGETHER, bounds[1])
+        if tree.has_nodes:
+            find_blocks(tree, source, begin, end, scratch, candidates)
+        for i in range(begin, end):
+            count = _list_all(tree, source, i, candidates, i - begin, found, scratch.packet_stack)
+            if kept + count > found.capacity:
+                return i, -1
+            counts[i] = smaller(_ordered(tree, found, count, merge, keep), most)
+            if keep:
+                _keep(found, kept, counts[i], tree.scale)
+            # Where hits are counted only, so that a chunk ends after some work, and Ctrl-C need not wait for long.
+            kept += count if not keep else counts[i]
     return bounds[1], -1
 
 
 @kernel
-def _search(tree, ray, t_max, found, stack):
-    """List all hits of one ray; returns their number, of which the capacity is listed."""
-    shear = make_shear(ray)
+def _list_all(tree, rays, i, candidates, k, found, stack):
+    """List all hits of ray ``i``, the k-th candidate; returns their number, of which the capacity is listed."""
+    ray, t_max = ray_at(rays, i)
+    shear, count = make_shear(ray), np.int64(0)
     if not tree.has_nodes:
-        return _list_hits(tree, (0, tree.count), ray, shear, t_max, found, 0)
+        return _list_hits(tree, (0, tree.count), ray, shear, t_max, found, count)
+    listed = get(candidates.counts, k)
+    if listed > LISTED:
+        return _search(tree, ray, shear, t_max, found, stack)
+    for place in range(k * LISTED, k * LISTED + listed):
+        count = _list_hits(tree, (get(candidates.blocks, place), 1), ray, shear, t_max, found, count)
+    return count
+
+
+@kernel
+def _search(tree, ray, shear, t_max, found, stack):
+    """``_list_all`` by a search for the ray alone."""
     largest = largest_of(ray)
     slabs = make_slabs(ray, largest)
     lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))

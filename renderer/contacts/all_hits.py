@@ -7,11 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.arrays import flag_argument
-from renderer.errors import expect
-from renderer.mesh.mesh import Mesh
-from renderer.process.parallel import for_chunks
-from renderer.trace.batch import CHUNK, RayBatch, reject
-from renderer.trace.gather import (
+from renderer.contacts.candidates import CANDIDATE_WORDS
+from renderer.contacts.gather import (
     DOUBLE_ROWS,
     INTEGER_ROWS,
     OUT_FACE,
@@ -20,10 +17,14 @@ from renderer.trace.gather import (
     OUT_V,
     gather_chunk,
 )
+from renderer.errors import expect
+from renderer.mesh.mesh import Mesh
+from renderer.process.parallel import for_chunks
+from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.hits import AllHits
 from renderer.trace.layout import Tree
 from renderer.trace.query import rays_against_blocks
-from renderer.trace.singly import stack_size
+from renderer.trace.traverse import make_memory
 
 # Hits that a thread gathers before it hands them over, unless one ray has more: 3.5 MB.
 _CAPACITY = 1 << 15
@@ -77,9 +78,9 @@ def _gathered(tree: Tree, rays: RayBatch, choice: Choice, threads: int) -> tuple
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
         if bad and bad[0] < begin:
             return
-        memory, stack = _memory(_CAPACITY), np.empty(stack_size(tree.depth), np.int64)
+        memory, scratch = _memory(_CAPACITY), make_memory(tree.depth, CANDIDATE_WORDS)
         while begin < end:
-            reached, row = gather_chunk(tree.words, rays, (begin, end), choice, counts, *memory, stack)
+            reached, row = gather_chunk(tree.words, rays, (begin, end), choice, counts, *memory, scratch)
             if row >= 0:
                 bad.append(row)
                 return

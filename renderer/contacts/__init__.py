@@ -1,0 +1,1 @@
+"""All hits of rays, and the contacts that they make at shared edges and corners."""

@@ -1,0 +1,97 @@
+"""The blocks that rays may hit, found sixteen rays at a time.
+
+A block is listed where the ray passes some face's edges on the same side; where the hit lies is left to ``gather``.
+"""
+
+from typing import Any, NamedTuple
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, get, movemask, put, smaller
+from renderer.trace.intersect import see_triangles
+from renderer.trace.layout import BLOCK_WORDS, LEAF_BITS
+from renderer.trace.ray_lanes import WIDTH, prepare_ray, shear_of
+from renderer.trace.rays import ray_at
+from renderer.trace.stream import END, begin_ray, leave_leaf, leave_node, list_lane, meet_nodes
+
+# Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
+# meshes meet. A ray that meets more is searched for alone.
+TOGETHER, LISTED = 256, 32
+CANDIDATE_WORDS = TOGETHER * (LISTED + 1)
+
+
+class Candidates(NamedTuple):
+    """Pointers to int64: LISTED blocks for each ray, and how many were met, which may be more."""
+
+    blocks: Any
+    counts: Any
+
+
+@inlined
+def make_candidates(words):
+    """``Candidates`` in memory for CANDIDATE_WORDS int64."""
+    return Candidates(words, at(words, TOGETHER * LISTED))
+
+
+@kernel
+def find_blocks(tree, rays, begin, end, scratch, found):
+    """List the blocks that the rays begin:end may hit, at most TOGETHER rays."""
+    prepared, lanes = scratch.prepared, scratch.lanes
+    for k in range(end - begin):
+        put(found.counts, k, 0)
+    nodes, leaves = smaller(end - begin, WIDTH), 0
+    following = begin + nodes
+    for r in range(nodes):
+        _load(rays, scratch, r, begin + r)
+        put(lanes.at_node, r, r)
+    while nodes + leaves > 0:
+        meet_nodes(tree, prepared, lanes, nodes)
+        entered, nodes = nodes, 0
+        for k in range(entered):
+            r = get(lanes.at_node, k)
+            nodes, leaves = list_lane(lanes, r, leave_node(tree, prepared, lanes, r, True), nodes, leaves)
+        _see_leaves(tree, prepared, lanes, leaves)
+        entered, leaves = leaves, 0
+        for k in range(entered):
+            r = get(lanes.at_leaf, k)
+            child = get(lanes.child, r)
+            if child != END:
+                if get(lanes.bits, r) != 0:
+                    _list_block(found, get(scratch.number, r) - begin, ~child >> LEAF_BITS)
+                child = leave_leaf(tree, prepared, lanes, r)
+            if child == END:
+                if following == end:
+                    continue
+                _load(rays, scratch, r, following)
+                following, child = following + 1, 0
+            nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
+
+
+@inlined
+def _load(rays, scratch, r, i):
+    """Let ray ``i`` begin in lane ``r``."""
+    ray, t_max = ray_at(rays, i)
+    prepare_ray(scratch.prepared, r, ray, t_max)
+    begin_ray(scratch.lanes, r)
+    put(scratch.number, r, i)
+
+
+@inlined
+def _see_leaves(tree, rays, lanes, count):
+    """Compute of each of ``count`` rays which faces it passes within, in the first block of its leaf.
+
+    A ray at END is tested against block 0, and the result is ignored.
+    """
+    for k in range(count):
+        r = get(lanes.at_leaf, k)
+        child = get(lanes.child, r)
+        block = (~child >> LEAF_BITS) if child != END else 0
+        _, seen = see_triangles(tree, block * BLOCK_WORDS, shear_of(rays, r))
+        put(lanes.bits, r, movemask(seen))
+
+
+@inlined
+def _list_block(found, k, block):
+    count = get(found.counts, k)
+    put(found.counts, k, count + 1)
+    if count < LISTED:
+        put(found.blocks, k * LISTED + count, block)
