@@ -56,13 +56,19 @@ def _is_number(value: object) -> bool:
 
 
 def plain_array(values: Any) -> NDArray[Any]:
-    """``values`` as an array of any dtype. Raises ``ValueError`` for ragged lists and masked values."""
+    """``values`` as an array of any dtype, without a copy where NumPy or DLPack can do without one.
+
+    Raises ``ValueError`` for ragged lists, masked values and memory that NumPy cannot reach.
+    """
     if isinstance(values, MaskedArray):
         masked = int(getmaskarray(values).sum())
         if masked:
             raise ValueError(f"expected no masked values, got {masked}")
         return np.asarray(values.data)
     try:
+        if hasattr(values, "__dlpack__") and not hasattr(values, "__array__"):
+            return np.from_dlpack(values)
         return np.asarray(values)
-    except ValueError as error:  # a ragged list
+    # A ragged list; memory of another device, or a tensor whose gradient is wanted.
+    except (ValueError, TypeError, RuntimeError, BufferError) as error:
         raise ValueError(f"expected an array, got {error}") from None

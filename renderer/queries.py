@@ -12,7 +12,7 @@ from renderer.points.contains import contains
 from renderer.points.signed import signed_distance
 from renderer.points.visible import visible
 from renderer.process.parallel import checked_threads
-from renderer.trace.batch import RayBatch, check_rays, moved_off
+from renderer.trace.batch import RayBatch, check_faces, check_rays, moved_off
 from renderer.trace.hits import AllHits, Hits
 from renderer.trace.layout import Tree
 from renderer.trace.query import any_hits, closest_hits
@@ -54,10 +54,11 @@ class Queries:
     ) -> Hits:
         """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
 
-        origins, directions  (n, 3), finite, or one (3,) for all of the other; directions are not zero, of any length
-        t_min, t_max         >= 0, one number or (n,), in units of |direction|
-        leaving              faces that the rays start on, one or (n,), -1 for none: each start is moved off its face by
-                             more than rounding errors, to the side that the direction points to, so that the ray
+        origins, directions  (..., 3), finite; their leading dimensions are broadcast, and the answers have these;
+                             directions are not zero, of any length
+        t_min, t_max         >= 0, one number or (...), in units of |direction|
+        leaving              faces that the rays start on, one or (...), -1 for none: each start is moved off its face
+                             by more than rounding errors, to the side that the direction points to, so that the ray
                              meets neither that face nor another in its plane. No epsilon is needed
 
         No face is culled. A ray in a face's plane misses it, unless the rounding of its slopes lifts it out of the
@@ -72,8 +73,8 @@ class Queries:
         array([False])
         """
         mesh, tree = built = self._built
-        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
-        return closest_hits(tree, rays, mesh, self.threads)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return closest_hits(tree, rays, mesh, self.threads).shaped(shape)
 
     def any_hit(
         self,
@@ -83,7 +84,7 @@ class Queries:
         t_max: ArrayLike = np.inf,
         leaving: ArrayLike | None = None,
     ) -> NDArray[np.bool_]:
-        """Whether each ray hits anything in the closed interval [t_min, t_max], (n,) bool; arguments as above.
+        """Whether each ray hits anything in the closed interval [t_min, t_max], (...) bool; arguments as above.
 
         >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -91,8 +92,8 @@ class Queries:
         array([False])
         """
         built = self._built
-        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
-        return any_hits(built[1], rays, self.threads)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return any_hits(built[1], rays, self.threads).reshape(shape)
 
     def all_hits(
         self,
@@ -125,8 +126,8 @@ class Queries:
         array([2., 2., 3., 3.])
         """
         mesh, tree = built = self._built
-        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
-        return all_hits(tree, rays, mesh, contacts, max_hits, self.threads)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return all_hits(tree, rays, mesh, (contacts, max_hits), shape, self.threads)
 
     def count_hits(
         self,
@@ -138,7 +139,7 @@ class Queries:
         *,
         contacts: bool = True,
     ) -> NDArray[np.int64]:
-        """The number of rows that ``all_hits`` has for each ray, (n,) int64.
+        """The number of rows that ``all_hits`` has for each ray, (...) int64.
 
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
@@ -146,8 +147,8 @@ class Queries:
         array([2, 0])
         """
         built = self._built
-        rays = self._rays(built, origins, directions, t_min, t_max, leaving)
-        return count_hits(built[1], rays, contacts, self.threads)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return count_hits(built[1], rays, contacts, self.threads).reshape(shape)
 
     def _rays(
         self,
@@ -157,12 +158,14 @@ class Queries:
         t_min: ArrayLike,
         t_max: ArrayLike,
         leaving: ArrayLike | None,
-    ) -> RayBatch:
-        """The arguments of a query, checked, and moved off the faces that the rays leave."""
-        rays = check_rays(origins, directions, t_min, t_max)
+    ) -> tuple[RayBatch, tuple[int, ...]]:
+        """The arguments of a query, checked, and moved off the faces that the rays leave; and their dimensions."""
+        mesh, tree = built
+        rays, shape = check_rays(origins, directions, t_min, t_max)
         if leaving is None:
-            return rays
-        return moved_off(rays, leaving, built[0], built[1].scale, self.threads)
+            return rays, shape
+        faces = check_faces("leaving", leaving, shape, len(mesh.faces))
+        return moved_off(rays, faces, mesh, tree.scale, self.threads), shape
 
     def contains(
         self, points: ArrayLike, boundary: bool = True, rule: Literal["nonzero", "even-odd"] = "nonzero"

@@ -46,14 +46,17 @@ class _Part(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def all_hits(tree: Tree, rays: RayBatch, mesh: Mesh, contacts: bool, max_hits: int | None, threads: int) -> AllHits:
-    """All hits of a batch, see ``Octree.all_hits``."""
-    counts, parts = _gathered(tree, rays, Choice(flag_argument("contacts", contacts), _most(max_hits), True), threads)
+def all_hits(
+    tree: Tree, rays: RayBatch, mesh: Mesh, kept: tuple[bool, int | None], shape: tuple[int, ...], threads: int
+) -> AllHits:
+    """All hits of a batch of some dimensions, with ``kept`` = (contacts, max_hits); see ``Octree.all_hits``."""
+    choice = Choice(flag_argument("contacts", kept[0]), _most(kept[1]), True)
+    counts, parts = _gathered(tree, rays, choice, threads)
     offsets = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])
     t, u, v = np.concatenate([np.empty((3, 0)), *(part.doubles for part in parts)], axis=1)
     face = np.concatenate([np.empty(0, np.int64), *(part.faces for part in parts)])
-    return AllHits(offsets, t, face, u, v, mesh)
+    return AllHits(offsets, t, face, u, v, mesh, shape)
 
 
 def count_hits(tree: Tree, rays: RayBatch, contacts: bool, threads: int) -> NDArray[np.int64]:
@@ -71,7 +74,7 @@ def _most(max_hits: int | None) -> int:
 
 def _gathered(tree: Tree, rays: RayBatch, choice: Choice, threads: int) -> tuple[NDArray[np.int64], list[_Part]]:
     """How many hits each ray has, and the hits in the order of the rays."""
-    count = len(rays.directions)
+    count = rays.number
     counts, parts, bad = np.zeros(count, np.int64), dict[int, _Part](), list[int]()
 
     def gather(begin: int, end: int) -> Iterator[None]:

@@ -74,7 +74,7 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
     traced alone; a packet of rays may open some together that not all of them need. A ray that misses the root opens
     nothing. Raises ``ValueError`` naming the argument.
     """
-    rays = check_rays(np.asarray(origin)[None], np.asarray(direction)[None], 0.0, t_max)
+    rays, _ = check_rays(np.asarray(origin)[None], np.asarray(direction)[None], 0.0, t_max)
     octree.any_hit(rays.origins, rays.directions)  # raises for rays out of bounds
     tree, scale = octree.tree, octree.tree.scale
     (ox, oy, oz), (dx, dy, dz) = (scale * rays.origins[0]).tolist(), rays.directions[0].tolist()

@@ -5,11 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_argument
-from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
-from renderer.trace.batch import RayBatch, moved_off
+from renderer.trace.batch import RayBatch, broadcast_shape, check_faces, moved_off
 from renderer.trace.layout import Tree
 from renderer.trace.query import any_hits
 
@@ -21,11 +19,10 @@ _ZERO, _INFINITY = np.zeros(1), np.full(1, np.inf)
 
 
 class _End(NamedTuple):
-    """One end of n segments: its points (n, 3), the faces (n,) they lie on or None, and the argument that has these."""
+    """One end of n segments: its points (n, 3), and the faces (n,) they lie on or None."""
 
     points: Floats
     faces: NDArray[np.int64] | None
-    argument: str
 
     def room(self) -> Floats:
         """How near a hit may be to the end without hiding it, (n,)."""
@@ -42,31 +39,22 @@ def visible(
     """Whether segments meet nothing between their ends, which lie on ``faces``; see ``Octree.visible``."""
     farthest = farthest_of(tree.scale)
     (a, shape_a), (b, shape_b) = check_points("points", ends[0], farthest), check_points("targets", ends[1], farthest)
-    try:
-        shape = np.broadcast_shapes(shape_a, shape_b)
-    except ValueError:
-        expect(False, "targets", f"a shape that goes with that of points, {(*shape_a, 3)}", f"shape {(*shape_b, 3)}")
-    a = np.broadcast_to(a.reshape(*shape_a, 3), (*shape, 3)).reshape(-1, 3)
-    b = np.broadcast_to(b.reshape(*shape_b, 3), (*shape, 3)).reshape(-1, 3)
-    apart = (a != b).any(axis=1)
-    start = _End(a[apart], _faces("leaving", faces[0], shape, apart), "leaving")
-    stop = _End(b[apart], _faces("reaching", faces[1], shape, apart), "reaching")
+    a, b = a.reshape(*shape_a, 3), b.reshape(*shape_b, 3)
+    shape = broadcast_shape("targets", b, "points", a)
+    a, b = np.broadcast_to(a, (*shape, 3)).reshape(-1, 3), np.broadcast_to(b, (*shape, 3)).reshape(-1, 3)
+    apart, most = (a != b).any(axis=1), len(mesh.faces)
+    start = _End(a[apart], _faces("leaving", faces[0], shape, most, apart))
+    stop = _End(b[apart], _faces("reaching", faces[1], shape, most, apart))
     seen = np.ones(len(a), np.bool_)
     seen[apart] = ~any_hits(tree, _between(tree, mesh, start, stop, threads), threads)
     return seen.reshape(shape)
 
 
 def _faces(
-    argument: str, faces: ArrayLike | None, shape: tuple[int, ...], chosen: NDArray[np.bool_]
+    argument: str, faces: ArrayLike | None, shape: tuple[int, ...], most: int, chosen: NDArray[np.bool_]
 ) -> NDArray[np.int64] | None:
     """The faces of the chosen segments."""
-    if faces is None:
-        return None
-    given = real_argument(argument, faces)
-    whole = given.dtype.kind in "iu" and (given.ndim == 0 or given.shape == shape)
-    expect(whole, argument, f"an integer or integers of shape {shape}", f"{given.dtype} of shape {given.shape}")
-    rows: NDArray[np.int64] = np.broadcast_to(given, shape).reshape(-1)[chosen].astype(np.int64)
-    return rows
+    return None if faces is None else check_faces(argument, faces, shape, most)[chosen]
 
 
 def _between(tree: Tree, mesh: Mesh, start: _End, stop: _End, threads: int) -> RayBatch:
@@ -86,7 +74,7 @@ def _moved(tree: Tree, mesh: Mesh, end: _End, other: _End, threads: int) -> Floa
     """The points of one end, moved off their faces towards the other."""
     assert end.faces is not None
     rays = RayBatch(end.points, _way(end.points, other.points)[0], _ZERO, _INFINITY)
-    return moved_off(rays, end.faces, mesh, tree.scale, threads, end.argument).origins
+    return moved_off(rays, end.faces, mesh, tree.scale, threads).origins
 
 
 def _way(start: Floats, stop: Floats) -> tuple[Floats, Floats]:

@@ -83,7 +83,7 @@ def _add_light(scene, bundle, surface, i, towards, arriving):
 def _trace_shadows(tree, bundle, lit, aimed, work):
     """Find which of the ``aimed`` shadow rays hit anything, and count all of them in their pixels."""
     shadows = work.shadows
-    rays = RayPointers(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 0, 1, 1.0)
+    rays = RayPointers(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 3, 0, 1, 1.0)
     trace_rays(tree, rays, work.found, aimed, work.trace, np.bool_(True))
     for k in range(aimed):
         pixel = get(bundle.pixels, get(lit, SIZE + k))

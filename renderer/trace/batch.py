@@ -1,5 +1,6 @@
 """Batches of rays as queries get them: shapes and bounds are checked, and starts are moved off their faces."""
 
+import math
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
@@ -20,11 +21,9 @@ _MOST = float(np.finfo(np.float64).max)
 
 
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
-    """The values as an array (n, 3); one vector (3,) becomes one row."""
+    """The values as an array (..., 3)."""
     array = real_argument(argument, values)
-    if array.shape == (3,):
-        return array[None]
-    expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
+    expect(array.ndim >= 1 and array.shape[-1] == 3, argument, "shape (..., 3)", f"shape {array.shape}")
     return array
 
 
@@ -37,12 +36,12 @@ def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
         return np.require(array, np.float64, ("C_CONTIGUOUS", "WRITEABLE"))
 
 
-def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArray[np.float64]:
+def _bound(argument: str, value: ArrayLike, shape: tuple[int, ...], largest: float) -> NDArray[np.float64]:
     """One bound for all rays or one per ray, from 0 to ``largest``, as a (1,) or (n,) array."""
     array = real_argument(argument, value)
-    fits = array.ndim == 0 or array.shape == (count,)
-    expect(fits, argument, f"a number or shape ({count},)", f"shape {array.shape}")
-    array = _doubles(np.atleast_1d(array))
+    fits = array.ndim == 0 or array.shape == shape
+    expect(fits, argument, f"a number or shape {shape}", f"shape {array.shape}")
+    array = _doubles(array.reshape(-1))
     good = (array >= 0.0) & (array <= largest)
     if not good.all():
         row = int((~good).argmax())
@@ -51,9 +50,9 @@ def _bound(argument: str, value: ArrayLike, count: int, largest: float) -> NDArr
 
 
 class RayBatch(NamedTuple):
-    """Rays whose shapes and bounds passed the checks; build them with ``check_rays``.
+    """n rays whose shapes and bounds passed the checks; build them with ``check_rays``.
 
-    origins (n, 3) or (1, 3) for all, directions (n, 3), t_min and t_max (n,) or (1,) for all, all float64.
+    origins and directions (n, 3) or (1, 3) for all, t_min and t_max (n,) or (1,) for all, all float64.
     """
 
     origins: NDArray[np.float64]
@@ -61,69 +60,99 @@ class RayBatch(NamedTuple):
     t_min: NDArray[np.float64]
     t_max: NDArray[np.float64]
 
+    @property
+    def number(self) -> int:
+        """How many rays there are."""
+        return len(self.origins) if len(self.origins) != 1 else len(self.directions)
+
 
 _ZERO, _INFINITY = np.zeros(1), np.full(1, np.inf)
 
 
-def check_rays(origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike) -> RayBatch:
-    """Check shapes, types and bounds of a batch; whether each ray is in range is checked when it is traced.
+def check_rays(
+    origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike
+) -> tuple[RayBatch, tuple[int, ...]]:
+    """A batch whose shapes, types and bounds are checked, and the leading dimensions of origins and directions.
 
-    Raises ``ValueError`` naming the argument and, for a bad bound, its row.
+    Whether each ray is in range is checked when it is traced. Raises ``ValueError`` naming the argument and, for a bad
+    bound, its row.
     """
-    if not (_is_plain(origins) and _is_plain(directions)):
+    if _is_plain(origins) and _is_plain(directions) and len(origins) == len(directions):
+        shape: tuple[int, ...] = (len(origins),)
+    else:
         origins, directions = _vectors("origins", origins), _vectors("directions", directions)
-    if len(origins) != len(directions):
-        origins, directions = _paired(origins, directions)
-    count = len(directions)
+        shape = broadcast_shape("directions", directions, "origins", origins)
+        origins, directions = _rows(origins, shape), _rows(directions, shape)
+        if len(origins) == len(directions) == 1:
+            # One of them says how many rays there are.
+            directions = np.broadcast_to(directions, (math.prod(shape), 3))
     # The usual bounds share arrays.
-    low = _ZERO if type(t_min) is float and t_min == 0.0 else _bound("t_min", t_min, count, _MOST)
-    high = _INFINITY if type(t_max) is float and t_max == np.inf else _bound("t_max", t_max, count, np.inf)
-    # An eye broadcast to all rays, as of a camera, need not be copied for each.
-    shared = count > 1 and origins.strides[0] == 0
-    return RayBatch(_doubles(origins[:1] if shared else origins), _doubles(directions), low, high)
+    low = _ZERO if type(t_min) is float and t_min == 0.0 else _bound("t_min", t_min, shape, _MOST)
+    high = _INFINITY if type(t_max) is float and t_max == np.inf else _bound("t_max", t_max, shape, np.inf)
+    return RayBatch(_doubles(origins), _doubles(directions), low, high), shape
 
 
-def _paired(origins: NDArray[Any], directions: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Origins and directions row by row, where one of them may be a single row for all of the other."""
-    if len(origins) == 1:
-        return np.broadcast_to(origins, directions.shape), directions
-    one = len(directions) == 1
-    expect(one, "directions", f"{len(origins)} rows as in origins, or one for all", f"{len(directions)} rows")
-    return origins, np.broadcast_to(directions, origins.shape)
+def broadcast_shape(argument: str, values: NDArray[Any], other: str, others: NDArray[Any]) -> tuple[int, ...]:
+    """The leading dimensions of two arrays (..., 3) together."""
+    try:
+        return np.broadcast_shapes(values.shape[:-1], others.shape[:-1])
+    except ValueError:
+        expected = f"a shape that goes with that of {other}, {others.shape}"
+        expect(False, argument, expected, f"shape {values.shape}")
+        raise
+
+
+def _rows(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """Vectors for rays of the given dimensions as rows: one for each ray, or one for all."""
+    if array.size == 3 and 0 not in shape:
+        return array.reshape(1, 3)
+    if array.shape[:-1] != shape:
+        array = np.broadcast_to(array, (*shape, 3))
+    # A vector that was broadcast to all rays, as the eye of a camera, need not be copied for each.
+    if array.size > 3 and not any(array.strides[:-1]):
+        return array[(0,) * (array.ndim - 1)].reshape(1, 3)
+    return array.reshape(-1, 3)
 
 
 def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
     """Whether it is an (n, 3) array of float64, as most are; a quick check for calls with few rays."""
-    return type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2 and values.shape[1] == 3
+    if not (type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2):
+        return False
+    return values.shape[1] == 3 and values.strides[0] > 0
 
 
-def moved_off(
-    rays: RayBatch, leaving: ArrayLike, mesh: Mesh, scale: float, threads: int, argument: str = "leaving"
-) -> RayBatch:
-    """The rays with their starts moved off the faces ``leaving``, see ``spawn.leave_faces``.
+def check_faces(argument: str, faces: ArrayLike, shape: tuple[int, ...], most: int) -> NDArray[np.int64]:
+    """Faces, -1 for none, one for all of some rays or one for each, as an array (n,) of its own.
 
-    ``scale`` is the tree's, ``argument`` the name of ``leaving`` in errors.
-
-    Raises ``ValueError`` naming the argument and, for a face that is not there or an origin out of bounds, its row.
+    Raises ``ValueError`` naming the argument and, for a face beyond the last of ``most``, its row.
     """
-    count = len(rays.directions)
-    array = real_argument(argument, leaving)
-    whole = array.dtype.kind in "iu" and (array.ndim == 0 or array.shape == (count,))
-    expect(whole, argument, f"an integer or integers of shape ({count},)", f"{array.dtype} of shape {array.shape}")
+    array = real_argument(argument, faces)
+    whole = array.dtype.kind in "iu" and (array.ndim == 0 or array.shape == shape)
+    expect(whole, argument, f"an integer or integers of shape {shape}", f"{array.dtype} of shape {array.shape}")
     # A copy, which no other thread can change once it is checked.
-    faces = np.array(np.broadcast_to(array, (count,)), np.int64)
-    good = (faces >= -1) & (faces < len(mesh.faces))
+    rows: NDArray[np.int64] = np.array(np.broadcast_to(array, shape), np.int64).reshape(-1)
+    good = (rows >= -1) & (rows < most)
     if not good.all():
         row = int((~good).argmax())
-        expect(False, argument, f"faces from 0 to {len(mesh.faces) - 1}, or -1", f"{faces[row]} in row {row}")
-    sound = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(rays.directions).all(axis=1)
+        expect(False, argument, f"faces from 0 to {most - 1}, or -1", f"{rows[row]} in row {row}")
+    return rows
+
+
+def moved_off(rays: RayBatch, faces: NDArray[np.int64], mesh: Mesh, scale: float, threads: int) -> RayBatch:
+    """The rays with their starts moved off ``faces``, see ``spawn.leave_faces``; ``scale`` is the tree's.
+
+    Raises ``ValueError`` naming the argument and the row for an origin out of bounds.
+    """
+    count = rays.number
+    directions = np.ascontiguousarray(np.broadcast_to(rays.directions, (count, 3)))
+    sound = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(directions).all(axis=1)
     if not sound.all():
         # Rejected before it is moved, so that the message names the numbers as given.
         reject(rays, int((~sound).argmax()), scale)
     starts = np.empty((count, 3))
 
     def leave(begin: int, end: int) -> None:
-        leave_faces(mesh.vertices, mesh.faces, rays.origins, rays.directions, faces, starts, (begin, end, scale))
+        leave_faces(mesh.vertices, mesh.faces, rays.origins, directions, faces, starts, (begin, end, scale))
 
     for_chunks(leave, count, CHUNK, threads)
     return rays._replace(origins=starts)
@@ -138,4 +167,5 @@ def reject(rays: RayBatch, row: int, scale: float) -> None:
         expected = f"finite numbers within {FARTHEST / scale:.3g}"
         expect(False, "origins", expected, f"{origin.tolist()} in row {row}")
     expected = f"finite, non-zero vectors, the largest component from {SHORTEST:.3g} to {LONGEST:.3g}"
-    expect(False, "directions", expected, f"{rays.directions[row].tolist()} in row {row}")
+    direction = rays.directions[row if len(rays.directions) > 1 else 0]
+    expect(False, "directions", expected, f"{direction.tolist()} in row {row}")

@@ -11,11 +11,11 @@ from renderer.mesh.mesh import Mesh, face_normals
 # Slots and not frozen: a call with one ray spends a third of its time on making objects.
 @dataclass(eq=False, slots=True)
 class Hits:
-    """Closest hits, one row per ray.
+    """Closest hits; their dimensions are those of the rays.
 
-    t     (n,) float64, in units of |direction|; inf on a miss
-    face  (n,) int64; -1 on a miss
-    u, v  (n,) float64, P = (1 - u - v) p0 + u p1 + v p2; nan on a miss
+    t     (...) float64, in units of |direction|; inf on a miss
+    face  (...) int64; -1 on a miss
+    u, v  (...) float64, P = (1 - u - v) p0 + u p1 + v p2; nan on a miss
     """
 
     t: NDArray[np.float64]
@@ -24,23 +24,30 @@ class Hits:
     v: NDArray[np.float64]
     _mesh: Mesh = field(repr=False)
 
+    def shaped(self, shape: tuple[int, ...]) -> "Hits":
+        """The same hits in other dimensions."""
+        if self.t.shape == shape:
+            return self
+        t, u, v = (values.reshape(shape) for values in (self.t, self.u, self.v))
+        return Hits(t, self.face.reshape(shape), u, v, self._mesh)
+
     @property
     def hit(self) -> NDArray[np.bool_]:
-        """Whether each ray hit a face, (n,) bool."""
+        """Whether each ray hit a face, (...) bool."""
         return self.face >= 0
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Hit points from the barycentrics, (n, 3) float64; nan on a miss."""
-        points = np.full((len(self.t), 3), np.nan)
+        """Hit points from the barycentrics, (..., 3) float64; nan on a miss."""
+        points = np.full((*self.face.shape, 3), np.nan)
         hit = self.hit
         points[hit] = points_on(self._mesh, self.face[hit], self.u[hit], self.v[hit])
         return points
 
     @property
     def normals(self) -> NDArray[np.float64]:
-        """Unit geometric normals by the faces' winding, (n, 3) float64; nan on a miss."""
-        normals = np.full((len(self.t), 3), np.nan)
+        """Unit geometric normals by the faces' winding, (..., 3) float64; nan on a miss."""
+        normals = np.full((*self.face.shape, 3), np.nan)
         hit = self.hit
         normals[hit] = _normals(self._mesh, self.face[hit])
         return normals
@@ -64,16 +71,17 @@ class AllHits:
     u: NDArray[np.float64]
     v: NDArray[np.float64]
     _mesh: Mesh = field(repr=False)
+    _shape: tuple[int, ...] = field(repr=False)
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """The number of hits of each ray, (n,) int64."""
-        return np.diff(self.offsets)
+        """The number of hits of each ray, in the dimensions of the rays, (...) int64."""
+        return np.diff(self.offsets).reshape(self._shape)
 
     @property
     def ray(self) -> NDArray[np.int64]:
-        """The ray of each hit, (m,) int64."""
-        return np.repeat(np.arange(len(self.offsets) - 1), self.counts)
+        """The ray of each hit, (m,) int64: its row, where rays of several dimensions are counted in C order."""
+        return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
 
     @property
     def points(self) -> NDArray[np.float64]:

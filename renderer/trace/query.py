@@ -28,7 +28,7 @@ def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     if _are_few(tree, rays):
         out = _trace_few(tree, rays)
     else:
-        out = np.empty((HIT_ROWS, len(rays.directions)))
+        out = np.empty((HIT_ROWS, rays.number))
         _run(tree, rays, out, threads, any_hit=False)
     t, u, v, face = out
     return Hits(t, face.view(np.int64), u, v, mesh)
@@ -39,19 +39,19 @@ def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
     if _are_few(tree, rays):
         return _trace_few(tree, rays)[3].view(np.int64) >= 0
     # In whole words, so that kernels are compiled for one kind of output.
-    out = np.empty((1, -(-len(rays.directions) // 8)))
+    out = np.empty((1, -(-rays.number // 8)))
     _run(tree, rays, out, threads, any_hit=True)
-    return out.view(np.bool_)[0, : len(rays.directions)]
+    return out.view(np.bool_)[0, : rays.number]
 
 
 def _are_few(tree: Tree, rays: RayBatch) -> bool:
     """Whether the rays are traced one by one."""
-    return tree.has_nodes and len(rays.directions) <= FEW and tree.depth <= FEW_DEPTH
+    return tree.has_nodes and rays.number <= FEW and tree.depth <= FEW_DEPTH
 
 
 def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
     """Closest hits of a few rays on the caller's thread, as ``singly.trace_few`` writes them."""
-    out = np.empty((HIT_ROWS, len(rays.directions)))
+    out = np.empty((HIT_ROWS, rays.number))
     row = trace_few(tree.words, rays, out)
     if row >= 0:
         reject(rays, row, tree.scale)
@@ -66,7 +66,7 @@ def rays_against_blocks(tree: Tree) -> int:
 
 
 def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any_hit: bool) -> None:
-    count = len(rays.directions)
+    count = rays.number
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     if not tree.has_nodes:
         size = min(size, rays_against_blocks(tree))

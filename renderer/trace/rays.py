@@ -30,7 +30,7 @@ HIT_ROWS = 4
 class RayPointers(NamedTuple):
     """Pointers to rows of origins and directions, and to t_min and t_max.
 
-    All but the directions have a step from one ray to the next, 0 where all share one. ``scale`` is the tree's, a power
+    Each has a step from one ray to the next, 0 where all share one. ``scale`` is the tree's, a power
     of two, so t goes in and out of its units exactly.
     """
 
@@ -39,6 +39,7 @@ class RayPointers(NamedTuple):
     t_min: Any
     t_max: Any
     origin_step: int
+    direction_step: int
     min_step: int
     max_step: int
     scale: float
@@ -56,11 +57,12 @@ class HitPointers(NamedTuple):
 
 @inlined
 def ray_pointers(rays, scale):
-    """``RayPointers`` of a batch (origins, directions, t_min, t_max); all but directions may have one row for all."""
+    """``RayPointers`` of a batch (origins, directions, t_min, t_max), each of which may have one row for all."""
     origins, directions, t_min, t_max = rays
     return RayPointers(
         pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
-        3 * np.int64(len(origins) > 1), np.int64(len(t_min) > 1), np.int64(len(t_max) > 1), scale,
+        3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1), np.int64(len(t_min) > 1),
+        np.int64(len(t_max) > 1), scale,
     )  # fmt: skip
 
 
@@ -84,7 +86,7 @@ def first_bad_ray(rays, begin, end):
     for i in range(begin, end):
         far, largest, odd = 0.0, 0.0, 0.0
         for k in range(3):
-            o, d = get(rays.origins, i * rays.origin_step + k), get(rays.directions, 3 * i + k)
+            o, d = get(rays.origins, i * rays.origin_step + k), get(rays.directions, i * rays.direction_step + k)
             far, largest = larger(far, abs(o)), larger(largest, abs(d))
             # A NaN is never larger, but x - x is NaN for NaN and inf, and 0 otherwise.
             odd += (o - o) + (d - d)
@@ -96,7 +98,7 @@ def first_bad_ray(rays, begin, end):
 @inlined
 def ray_at(rays, i):
     """Ray ``i`` in the tree's units, and its t_max."""
-    o, d, s = at(rays.origins, i * rays.origin_step), at(rays.directions, 3 * i), rays.scale
+    o, d, s = at(rays.origins, i * rays.origin_step), at(rays.directions, i * rays.direction_step), rays.scale
     least = get(rays.t_min, i * rays.min_step)
     # A t_min above 0 stays above 0 in the tree's units too, so that a hit at the origin is still too near.
     t_min = larger(s * least, _TINIEST) if least > 0.0 else least

@@ -49,7 +49,7 @@ def trace_few(words, rays, out):
 
     Bounds and return value are those of ``trace_chunk``. The tree has at most FEW_DEPTH levels.
     """
-    tree, count = tree_pointers(words), len(rays[1])
+    tree, count = tree_pointers(words), out.shape[1]
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
     bad = first_bad_ray(source, 0, count)
     if bad >= 0:

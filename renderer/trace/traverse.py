@@ -87,14 +87,14 @@ def make_scratch(memory):
 @kernel
 def are_coherent(rays, begin):
     """Whether the sixteen rays from ``begin`` on share their dominant axis, its sign and nearly their slopes."""
-    d = at(rays.directions, 3 * begin)
+    d, step = at(rays.directions, begin * rays.direction_step), rays.direction_step
     ax, ay, az = abs(get(d, 0)), abs(get(d, 1)), abs(get(d, 2))
     w = 2 if az >= ax and az >= ay else (1 if ay >= ax else 0)
     u, v = (w + 1) % 3, (w + 2) % 3
     first = get(d, w)
     slope_u, slope_v = get(d, u) / first, get(d, v) / first
     for r in range(1, WIDTH):
-        dw, du, dv = get(d, 3 * r + w), get(d, 3 * r + u), get(d, 3 * r + v)
+        dw, du, dv = get(d, step * r + w), get(d, step * r + u), get(d, step * r + v)
         size = abs(dw)
         # Strictly larger: between equal components the choice of ``make_shear`` depends on which they are.
         dominant = size > abs(du) and size > abs(dv) and dw * first > 0.0
@@ -245,7 +245,7 @@ def trace_chunk(words, rays, out, begin, end, any_hit, memory):
     is traced, or -1.
     """
     tree = tree_pointers(words)
-    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
+    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])
     bad = first_bad_ray(source, begin, end)
     if bad < 0:
         trace(tree, source, found, begin, end, make_scratch(memory), any_hit)
@@ -256,7 +256,7 @@ def trace_chunk(words, rays, out, begin, end, any_hit, memory):
 def search_chunk(words, rays, out, begin, end, any_hit):
     """``trace_chunk`` for a tree without nodes."""
     tree = tree_pointers(words)
-    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
+    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])
     bad = first_bad_ray(source, begin, end)
     if bad < 0:
         search_blocks(tree, source, found, begin, end, any_hit)

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from meshes import meshes, options, rays_at
 
 from renderer import Mesh
+from renderer.contacts import all_hits as module
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.octree import BruteForce, Octree
-from renderer.contacts import all_hits as module
 from validation.oracle.contacts import contacts, hits
 from validation.stability.cases.judgement import both, soup_of
 

@@ -46,8 +46,11 @@ class TestRays:
         for direction in ([0, 0, -1], [[0, 0, -1]]):
             np.testing.assert_array_equal(BALL.closest_hit(MANY[:count], direction).t, expected.t)
 
-    def test_a_single_ray_is_a_batch_of_one(self) -> None:
-        assert BALL.closest_hit([0, 0, 3], [0, 0, -1]).t.tolist() == [2.0]
+    def test_a_single_ray_has_a_single_answer(self) -> None:
+        hits = BALL.closest_hit([0, 0, 3], [0, 0, -1])
+        assert hits.t.shape == hits.face.shape == hits.u.shape == () and hits.t == 2.0 and hits.hit
+        assert hits.points.tolist() == [0.0, 0.0, 1.0] and hits.normals.shape == (3,)
+        assert BALL.any_hit([0, 0, 3], [0, 0, -1]).shape == BALL.count_hits([0, 0, 3], [0, 0, -1]).shape == ()
 
     def test_no_origins_meet_one_direction(self) -> None:
         assert len(BALL.closest_hit(np.zeros((0, 3)), [0, 0, 1]).t) == 0
@@ -56,7 +59,7 @@ class TestRays:
     def test_other_counts_are_refused_with_both(self, counts: tuple[int, int]) -> None:
         o, d = counts
         with pytest.raises(
-            ValueError, match=rf"directions: expected {o} rows as in origins, or one for all, got {d} rows"
+            ValueError, match=rf"directions: expected a shape that goes .* origins, \({o}, 3\), got shape \({d}, 3\)"
         ):
             BALL.closest_hit(MANY[:o], MANY[:d])
 

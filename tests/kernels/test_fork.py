@@ -24,7 +24,7 @@ child = os.fork()
 if child == 0:
     signal.alarm(60)  # ends the child if it waits for ever
     hits = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).closest_hit([0.2, 0.2, 1.0], [0.0, 0.0, -1.0])
-    os._exit(0 if hits.t[0] == 1.0 else 1)
+    os._exit(0 if hits.t == 1.0 else 1)
 print(os.waitpid(child, 0)[1])
 """
 

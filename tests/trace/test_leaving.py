@@ -106,7 +106,7 @@ def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_dis
         face, points, directions = on_faces(vertices, ball.faces, 5, 300)
         # Some lie off the plane, on either side, by more than rounding.
         points[::3] += 1e-6 * ball.face_normals()[face[::3]] * np.random.default_rng(0).choice([-1, 1], (100, 1))
-        rays = moved_off(check_rays(points, directions, 0.0, np.inf), face, octree.mesh, 1.0, 1)
+        rays = moved_off(check_rays(points, directions, 0.0, np.inf)[0], face, octree.mesh, 1.0, 1)
         normals = ball.face_normals()[face]
         for k in range(len(face)):
             side = 1 if directions[k] @ normals[k] >= 0 else -1

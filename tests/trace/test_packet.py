@@ -88,7 +88,7 @@ def test_a_packet_that_gives_up_is_traced_all_the_same():
 @kernel
 def _are_coherent(origins, directions, bound):
     return are_coherent(
-        RayPointers(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 0, 0, 1.0), 0
+        RayPointers(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 3, 0, 0, 1.0), 0
     )
 
 

@@ -82,10 +82,10 @@ def _edge_on(quick: bool) -> Outcome:
         corners = thin_face(rng)
         origin, direction = ray_at(rng, corners)
         octree = Octree(corners, [[0, 1, 2]])
-        t = octree.closest_hit(origin, direction).t[0]
+        t = octree.closest_hit(origin, direction).t
         off, missing = judged(corners, origin, direction, float(t))
         beside, lost, hit = beside + off, lost + missing, hit + bool(np.isfinite(t))
-        again += bool(np.isfinite(t) and octree.closest_hit(origin, direction, t, t).t[0] != t)
+        again += bool(np.isfinite(t) and octree.closest_hit(origin, direction, t, t).t != t)
     for _ in range(50):
         corners = rng.normal(size=(3, 3))
         octree, rays = Octree(corners, [[0, 1, 2]]), rays_beside(rng, corners, 2000)

@@ -1,0 +1,113 @@
+"""Leading dimensions of rays: kept, broadcast, and not copied where one vector serves all."""
+
+import numpy as np
+import pytest
+
+from renderer import BruteForce, Octree
+from renderer.mesh.shapes import icosphere
+from renderer.trace.batch import check_rays
+
+BALL = icosphere(2)
+QUERIES = [Octree.from_mesh(BALL), BruteForce.from_mesh(BALL)]
+RNG = np.random.default_rng(6)
+ORIGINS, DIRECTIONS = 2 * RNG.normal(size=(24, 3)), RNG.normal(size=(24, 3))
+
+
+@pytest.mark.parametrize("queries", QUERIES, ids=["octree", "brute"])
+@pytest.mark.parametrize("shape", [(24,), (4, 6), (2, 3, 4), (24, 1), (1, 24)])
+def test_answers_have_the_dimensions_of_the_rays(queries, shape):
+    flat = queries.closest_hit(ORIGINS, DIRECTIONS)
+    o, d = ORIGINS.reshape(*shape, 3), DIRECTIONS.reshape(*shape, 3)
+    hits = queries.closest_hit(o, d)
+    for name in ("t", "face", "u", "v", "hit"):
+        np.testing.assert_array_equal(getattr(hits, name), getattr(flat, name).reshape(shape))
+    for name in ("points", "normals"):
+        np.testing.assert_array_equal(getattr(hits, name), getattr(flat, name).reshape(*shape, 3))
+    np.testing.assert_array_equal(queries.any_hit(o, d), hits.hit)
+    found = queries.all_hits(o, d)
+    np.testing.assert_array_equal(found.counts, queries.count_hits(o, d))
+    assert found.counts.shape == shape
+    np.testing.assert_array_equal(found.t, queries.all_hits(ORIGINS, DIRECTIONS).t)
+    ends = RNG.uniform(0.5, 3.0, shape)
+    np.testing.assert_array_equal(
+        queries.closest_hit(o, d, t_max=ends).t.ravel(), queries.closest_hit(ORIGINS, DIRECTIONS, 0.0, ends.ravel()).t
+    )
+    left = queries.closest_hit(hits.points.reshape(-1, 3)[flat.hit], DIRECTIONS[flat.hit], leaving=flat.face[flat.hit])
+    again = queries.closest_hit(np.nan_to_num(hits.points), d, leaving=hits.face)
+    np.testing.assert_array_equal(again.t[hits.hit], left.t)
+
+
+@pytest.mark.parametrize("queries", QUERIES, ids=["octree", "brute"])
+def test_origins_and_directions_are_broadcast(queries):
+    grid = queries.closest_hit(ORIGINS[:5, None], DIRECTIONS[None, :7])
+    assert grid.t.shape == (5, 7)
+    for i in range(5):
+        # One origin for many directions, and one direction for many origins.
+        np.testing.assert_array_equal(queries.closest_hit(ORIGINS[i], DIRECTIONS[:7]).t, grid.t[i])
+    for k in range(7):
+        np.testing.assert_array_equal(queries.closest_hit(ORIGINS[:5], DIRECTIONS[k]).t, grid.t[:, k])
+        np.testing.assert_array_equal(queries.any_hit(ORIGINS[:5], DIRECTIONS[k]), grid.hit[:, k])
+        np.testing.assert_array_equal(
+            queries.count_hits(ORIGINS[:5], DIRECTIONS[k])[:, None] > 0, grid.hit[:, k : k + 1]
+        )
+    assert queries.closest_hit(np.empty((0, 4, 3)), DIRECTIONS[0]).t.shape == (0, 4)
+    both = np.broadcast_to(ORIGINS[0], (40, 3)), np.broadcast_to(DIRECTIONS[0], (40, 3))
+    np.testing.assert_array_equal(
+        queries.closest_hit(*both).t, np.full(40, queries.closest_hit(ORIGINS[0], DIRECTIONS[0]).t)
+    )
+
+
+@pytest.mark.parametrize("count", [20, 5000])
+def test_one_direction_for_many_has_the_bits_of_its_copies(count):
+    origins = [*RNG.uniform(-1.5, 1.5, (count, 3)), 0, 0, 3]
+    for direction in ([0.0, 0.0, -1.0], [0.1, -0.2, -1.0]):
+        copies = QUERIES[0].closest_hit(origins, np.tile(direction, (count, 1)))
+        np.testing.assert_array_equal(QUERIES[0].closest_hit(origins, direction).t, copies.t)
+        np.testing.assert_array_equal(QUERIES[0].any_hit(origins, direction), copies.hit)
+
+
+def test_what_serves_all_is_not_copied():
+    eye, one = np.array([0.0, 0.0, 3.0]), np.array([0.0, 0.0, -1.0])
+    many = RNG.normal(size=(4, 6, 3))
+    for origins, directions, place, shape in (
+        (eye, many, 0, (4, 6)),
+        (many, one, 1, (4, 6)),
+        (np.broadcast_to(eye, (4, 6, 3)), many, 0, (4, 6)),
+        (many, np.broadcast_to(one, (4, 6, 3)), 1, (4, 6)),
+    ):
+        rays, kept = check_rays(origins, directions, 0.0, np.inf)
+        assert kept == shape and len(rays[place]) == 1 and rays.number == 24
+        assert np.shares_memory(rays[1 - place], many)
+
+
+class _OnlyDLPack:
+    """An array of another library that knows the exchange of memory alone."""
+
+    def __init__(self, array):
+        self._array = array
+
+    def __dlpack__(self, **options):
+        return self._array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self._array.__dlpack_device__()
+
+
+def test_arrays_of_others_are_taken_without_a_copy():
+    rays, _ = check_rays(_OnlyDLPack(ORIGINS), _OnlyDLPack(DIRECTIONS), 0.0, np.inf)
+    assert np.shares_memory(rays.origins, ORIGINS) and np.shares_memory(rays.directions, DIRECTIONS)
+    hits = QUERIES[0].closest_hit(_OnlyDLPack(ORIGINS), _OnlyDLPack(DIRECTIONS))
+    np.testing.assert_array_equal(hits.t, QUERIES[0].closest_hit(ORIGINS, DIRECTIONS).t)
+    assert QUERIES[0].contains(_OnlyDLPack(ORIGINS)).tolist() == QUERIES[0].contains(ORIGINS).tolist()
+
+
+class _Elsewhere:
+    """A tensor on a graphics card, which says so when it is asked for its memory."""
+
+    def __array__(self, *_, **__):
+        raise TypeError("can't convert cuda:0 device type tensor to numpy")
+
+
+def test_memory_out_of_reach_is_named():
+    with pytest.raises(ValueError, match="origins: expected an array, got can't convert cuda:0"):
+        QUERIES[0].closest_hit(_Elsewhere(), DIRECTIONS)
