@@ -59,7 +59,7 @@ def test_origins_and_directions_are_broadcast(queries):
 
 @pytest.mark.parametrize("count", [20, 5000])
 def test_one_direction_for_many_has_the_bits_of_its_copies(count):
-    origins = [*RNG.uniform(-1.5, 1.5, (count, 3)), 0, 0, 3]
+    origins = RNG.uniform(-1.5, 1.5, (count, 3)) + np.array([0.0, 0.0, 3.0])
     for direction in ([0.0, 0.0, -1.0], [0.1, -0.2, -1.0]):
         copies = QUERIES[0].closest_hit(origins, np.tile(direction, (count, 1)))
         np.testing.assert_array_equal(QUERIES[0].closest_hit(origins, direction).t, copies.t)
