@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from renderer.scene.needs import Needs, needs_of
     from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
     from renderer.trace.hits import AllHits, Hits
+    from renderer.trace.steps import Steps
     from renderer.viewer.view import view
 
 __version__ = "0.1.0"
@@ -58,6 +59,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "SceneObject",
+    "Steps",
     "__version__",
     "load_mesh",
     "load_scene",
@@ -94,6 +96,7 @@ _HOMES = {
     "Scene": "scene.scene",
     "SceneError": "errors",
     "SceneObject": "scene.scene",
+    "Steps": "trace.steps",
     "load_mesh": "mesh.load",
     "load_scene": "scene.scene",
     "needs_of": "scene.needs",

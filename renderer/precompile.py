@@ -87,6 +87,10 @@ def _find_nearest() -> None:
         accelerator.closest_point([0.0, 0.0, 1.0])
 
 
+def _count_steps() -> None:
+    Octree.from_mesh(_TRIANGLE).count_steps([0.1, 0.1, 1.0], [0.0, 0.0, -1.0])
+
+
 def _search() -> None:
     BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
@@ -112,6 +116,7 @@ _QUERIES = (
     Part("all hits", _gather),
     Part("points inside", _contain),
     Part("closest points", _find_nearest),
+    Part("steps of a search", _count_steps),
     Part("concave polygons", _cut),
 )
 _PICTURES = (Part("pictures", _render), Part("the viewer", _view))

@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.arrays import flag_argument
 from renderer.contacts.all_hits import all_hits, count_hits
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.points.closest import ClosestPoints, closest_point
@@ -13,9 +14,11 @@ from renderer.points.signed import signed_distance
 from renderer.points.visible import visible
 from renderer.process.parallel import checked_threads
 from renderer.trace.batch import RayBatch, check_faces, check_rays, moved_off
+from renderer.trace.error import add_errors
 from renderer.trace.hits import AllHits, Hits
 from renderer.trace.layout import Tree
 from renderer.trace.query import any_hits, closest_hits
+from renderer.trace.steps import Steps, count_steps
 
 
 class Queries:
@@ -51,6 +54,8 @@ class Queries:
         t_min: ArrayLike = 0.0,
         t_max: ArrayLike = np.inf,
         leaving: ArrayLike | None = None,
+        *,
+        t_error: bool = False,
     ) -> Hits:
         """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
 
@@ -60,6 +65,8 @@ class Queries:
         leaving              faces that the rays start on, one or (...), -1 for none: each start is moved off its face
                              by more than rounding errors, to the side that the direction points to, so that the ray
                              meets neither that face nor another in its plane. No epsilon is needed
+        t_error              whether the hits have bounds of the errors of t: how far it may be from where the ray, as
+                             it was started, meets the face's plane
 
         No face is culled. A ray in a face's plane misses it, unless the rounding of its slopes lifts it out of the
         plane. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.
@@ -74,7 +81,10 @@ class Queries:
         """
         mesh, tree = built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
-        return closest_hits(tree, rays, mesh, self.threads).shaped(shape)
+        hits = closest_hits(tree, rays, mesh, self.threads)
+        if flag_argument("t_error", t_error):
+            add_errors(hits, rays, np.flatnonzero(hits.hit), tree.scale)
+        return hits.shaped(shape)
 
     def any_hit(
         self,
@@ -105,6 +115,7 @@ class Queries:
         *,
         contacts: bool = True,
         max_hits: int | None = None,
+        t_error: bool = False,
     ) -> AllHits:
         """All hits of each ray in the closed interval [t_min, t_max], sorted by t, then face; arguments as above.
 
@@ -127,7 +138,10 @@ class Queries:
         """
         mesh, tree = built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
-        return all_hits(tree, rays, mesh, (contacts, max_hits), shape, self.threads)
+        hits = all_hits(tree, rays, mesh, (contacts, max_hits), shape, self.threads)
+        if flag_argument("t_error", t_error):
+            add_errors(hits, rays, hits.ray, tree.scale)
+        return hits
 
     def count_hits(
         self,
@@ -149,6 +163,29 @@ class Queries:
         built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
         return count_hits(built[1], rays, contacts, self.threads).reshape(shape)
+
+    def count_steps(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        leaving: ArrayLike | None = None,
+    ) -> Steps:
+        """The nodes and triangles that the search for each ray's closest hit tests, for heat maps; arguments as above.
+
+        They are those of a ray that travels alone and goes to the nearest boxes first. Rays of one direction are traced
+        together and test some more, at less cost.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import icosphere
+        >>> steps = Octree.from_mesh(icosphere(4)).count_steps([[0, 0, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, 1]])
+        >>> steps.nodes > 1, steps.triangles > 0
+        (array([ True, False]), array([ True, False]))
+        """
+        built = self._built
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        return count_steps(built[1], rays, shape, self.threads)
 
     def _rays(
         self,

@@ -16,6 +16,8 @@ class Hits:
     t     (...) float64, in units of |direction|; inf on a miss
     face  (...) int64; -1 on a miss
     u, v  (...) float64, P = (1 - u - v) p0 + u p1 + v p2; nan on a miss
+
+    t_error  (...) float64, how far rounding may have moved t, nan on a miss; None unless it was asked for
     """
 
     t: NDArray[np.float64]
@@ -23,13 +25,15 @@ class Hits:
     u: NDArray[np.float64]
     v: NDArray[np.float64]
     _mesh: Mesh = field(repr=False)
+    t_error: NDArray[np.float64] | None = None
 
     def shaped(self, shape: tuple[int, ...]) -> "Hits":
         """The same hits in other dimensions."""
         if self.t.shape == shape:
             return self
         t, u, v = (values.reshape(shape) for values in (self.t, self.u, self.v))
-        return Hits(t, self.face.reshape(shape), u, v, self._mesh)
+        t_error = None if self.t_error is None else self.t_error.reshape(shape)
+        return Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error)
 
     @property
     def hit(self) -> NDArray[np.bool_]:
@@ -63,6 +67,7 @@ class AllHits:
     t        (m,) float64, in units of |direction|
     face     (m,) int64
     u, v     (m,) float64, P = (1 - u - v) p0 + u p1 + v p2
+    t_error  (m,) float64, how far rounding may have moved t; None unless it was asked for
     """
 
     offsets: NDArray[np.int64]
@@ -72,6 +77,7 @@ class AllHits:
     v: NDArray[np.float64]
     _mesh: Mesh = field(repr=False)
     _shape: tuple[int, ...] = field(repr=False)
+    t_error: NDArray[np.float64] | None = None
 
     @property
     def counts(self) -> NDArray[np.int64]:

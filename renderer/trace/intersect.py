@@ -37,7 +37,7 @@ DOUBT = 2.0**-27
 SLANT = 2.0**-16
 # The error of a numerator in doubt, as a share of A D Z: its own 11 u, and the determinant's share of 2^-27. Settling
 # moves t by no more, because the ray meets the plane itself within the face's box.
-_ERROR = 2.0**-48
+ERROR = 2.0**-48
 # The share of its width by which a face's box is wider than the face, on each side.
 ROOM = 2.0**-21
 
@@ -304,7 +304,7 @@ def meet_planes(edges, ray, t_min, t_max):
     numerator, product = e0 * z0 + e1 * z1 + e2 * z2, across * (across + along)
     denominator = determinant * splat4(ray.direction_z)
     t, height, base = numerator / denominator, magnitude(numerator), magnitude(denominator)
-    limit, error = product * along * splat4(DOUBT), product * along * splat4(_ERROR)
+    limit, error = product * along * splat4(DOUBT), product * along * splat4(ERROR)
     slant = product * (magnitude(z1 - z0) + magnitude(z2 - z0)) * splat4(SLANT)
     blurred = magnitude(determinant) * along <= select(slant > limit, slant, limit)
     doubt = blurred | _may_be_on_edge(edges) | (height <= limit)

@@ -26,6 +26,7 @@ from renderer import (
     Octree,
     Scene,
     SceneError,
+    Steps,
     load_mesh,
     load_scene,
     needs_of,
@@ -73,6 +74,7 @@ CALLS = {
     "Octree.closest_hit": Call(OCTREE.closest_hit, RAYS),
     "Octree.all_hits": Call(OCTREE.all_hits, RAYS),
     "Octree.count_hits": Call(OCTREE.count_hits, RAYS),
+    "Octree.count_steps": Call(OCTREE.count_steps, RAYS),
     "Octree.any_hit": Call(OCTREE.any_hit, RAYS),
     "BruteForce.closest_hit": Call(BRUTE.closest_hit, RAYS),
     "BruteForce.any_hit": Call(BRUTE.any_hit, RAYS),
@@ -288,6 +290,10 @@ def same(got: Any, expected: Any) -> None:
     elif isinstance(got, Octree | BruteForce):
         same_mesh(got.mesh, expected.mesh)
         assert got.stats == expected.stats
+    elif isinstance(got, Steps):
+        assert (
+            got.nodes.tobytes() == expected.nodes.tobytes() and got.triangles.tobytes() == expected.triangles.tobytes()
+        )
     elif isinstance(got, ClosestPoints):
         for name in ("distance", "face", "u", "v"):
             assert getattr(got, name).tobytes() == getattr(expected, name).tobytes()

@@ -189,7 +189,7 @@ def _bad_rays(quick: bool) -> Outcome:
             arrays[argument][row, 1] = value
         for query in (octree.closest_hit, octree.any_hit):
             try:
-                query(**arrays)
+                query(arrays["origins"], arrays["directions"])
                 caught.append(False)
             except ValueError as error:
                 caught.append(str(error).startswith(f"{argument}: ") and str(error).endswith(f"in row {row}"))

@@ -1,0 +1,47 @@
+"""Steps of the search for closest hits: against the visits that the picture of a ray's boxes draws."""
+
+import numpy as np
+import pytest
+from meshes import make_mesh, rays_at
+
+from renderer import BruteForce, Octree
+from renderer.inspect.tree_boxes import visited
+from renderer.mesh.shapes import icosphere
+from renderer.trace.layout import BLOCK_FACES
+
+
+@pytest.mark.parametrize("kind", ["lattice", "soup"])
+def test_each_ray_takes_the_steps_that_are_drawn(kind):
+    vertices, faces = make_mesh(kind, 5, 400)
+    octree = Octree(vertices, faces)
+    origins, directions = rays_at(vertices, faces, 7, 60)
+    steps = octree.count_steps(origins, directions)
+    for i, ray in enumerate(zip(origins, directions, strict=True)):
+        visits = visited(octree, *ray)
+        # The root is entered to see that none of its boxes is met; there the drawing has nothing.
+        assert steps.nodes[i] == max(1, sum(not visit.is_leaf for visit in visits))
+        leaves = sum(visit.is_leaf for visit in visits)
+        assert leaves <= steps.triangles[i] <= leaves * 32 and (steps.triangles[i] > 0) == (leaves > 0)
+    assert steps.triangles.max() > BLOCK_FACES
+
+
+def test_a_tree_of_one_leaf_tests_its_faces():
+    octree = Octree(*make_mesh("soup", 5, 3))
+    steps = octree.count_steps(octree.mesh.triangles.mean(axis=1) - [0, 0, 1e-3], [0.0, 0.0, 1.0])
+    assert set(steps.nodes.tolist()) == {1} and set(steps.triangles.tolist()) <= {1, 2, 3}
+
+
+def test_brute_force_tests_all_and_misses_nothing():
+    mesh = icosphere(2)
+    steps = BruteForce.from_mesh(mesh).count_steps(np.zeros((2, 5, 3)), [0.0, 0.0, 1.0])
+    assert steps.nodes.shape == (2, 5) and not steps.nodes.any() and (steps.triangles == len(mesh.faces)).all()
+
+
+def test_a_bound_spares_steps_and_bad_rays_are_named():
+    octree, rays = Octree.from_mesh(icosphere(4)), (np.tile([0.0, 0.1, 3.0], (3000, 1)), [0.01, 0.0, -1.0])
+    whole, none = octree.count_steps(*rays), octree.count_steps(*rays, t_max=0.5)
+    assert (whole.nodes > none.nodes).all() and (none.triangles == 0).all() and (whole.nodes == whole.nodes[0]).all()
+    origins = np.array(rays[0])
+    origins[2500, 1] = np.nan
+    with pytest.raises(ValueError, match=r"origins: expected finite numbers .* in row 2500"):
+        octree.count_steps(origins, rays[1])
