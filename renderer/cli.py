@@ -36,8 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # The reader of standard output, such as ``| head``, has closed it. The picture is written.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except (ValueError, OSError, ImportError) as error:
-        print(f"octree-render: {one_line(error)}", file=sys.stderr)
+    except (ValueError, OSError, ImportError, MemoryError) as error:
+        reason = one_line(error)
+        print(f"octree-render: {'not enough memory: ' * isinstance(error, MemoryError)}{reason}", file=sys.stderr)
         return 2
     return 0
 

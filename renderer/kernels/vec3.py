@@ -53,12 +53,18 @@ def largest_component(a):
     return larger(abs(a[0]), larger(abs(a[1]), abs(a[2])))
 
 
+# The reciprocal of a denormal number overflows.
+_SMALL, _RAISE = 2.0**-1000, 2.0**100
+
+
 @kernel
 def normalized(a):
     """a / |a|, scaled first so that no square overflows or vanishes; the zero vector stays."""
     largest = largest_component(a)
     if largest == 0.0:
         return a
+    if largest < _SMALL:
+        a, largest = scale(a, _RAISE), largest * _RAISE
     b = scale(a, 1.0 / largest)
     return scale(b, 1.0 / math.sqrt(dot(b, b)))
 
@@ -66,11 +72,13 @@ def normalized(a):
 @kernel
 def length(a):
     """|a|, scaled first so that no square overflows or vanishes."""
-    largest = largest_component(a)
+    largest, raised = largest_component(a), 1.0
     if largest == 0.0:
         return 0.0
+    if largest < _SMALL:
+        a, largest, raised = scale(a, _RAISE), largest * _RAISE, _RAISE
     b = scale(a, 1.0 / largest)
-    return largest * math.sqrt(dot(b, b))
+    return largest * math.sqrt(dot(b, b)) / raised
 
 
 @inlined

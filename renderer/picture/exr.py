@@ -20,17 +20,28 @@ def check_exr() -> None:
         ) from None
 
 
-def exr_bytes(channels: Mapping[str, NDArray[Any]]) -> bytes:
+def exr_bytes(channels: Mapping[str, NDArray[Any]], beside: Path) -> bytes:
     """A scanline file, ZIP compressed without loss. ``channels`` are float32 (h, w), or (h, w, 3) under the name "RGB".
 
-    Raises ``ValueError`` where the package is absent.
+    The package writes to paths only: to a temporary folder of the system, or where that is full to one in ``beside``.
+    Raises ``ValueError`` where the package is absent, ``OSError`` where there is no room.
     """
     check_exr()
+    try:
+        return _written(channels, None)
+    except OSError:
+        return _written(channels, beside)
+
+
+def _written(channels: Mapping[str, NDArray[Any]], place: Path | None) -> bytes:
+    """The bytes of a file that is written to a temporary folder in ``place``."""
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    # The package writes to paths only.
-    with tempfile.TemporaryDirectory(prefix="exr-") as folder:
+    with tempfile.TemporaryDirectory(prefix="exr-", dir=place) as folder:
         path = Path(folder) / "picture.exr"
-        OpenEXR.File(header, dict(channels)).write(str(path))
+        try:
+            OpenEXR.File(header, dict(channels)).write(str(path))
+        except RuntimeError as error:  # the package's only kind
+            raise OSError(str(error)) from None
         return path.read_bytes()

@@ -162,5 +162,5 @@ def write_exr(path: str | Path, radiance: ArrayLike, layers: Mapping[str, NDArra
     Whole or not at all. Raises ``ValueError`` where the package OpenEXR is absent.
     """
     channels = {"RGB": np.ascontiguousarray(radiance, np.float32), **(layers or {})}
-    content = exr_bytes(channels)
+    content = exr_bytes(channels, Path(path).resolve().parent)
     write_atomically(path, lambda file: file.write(content))

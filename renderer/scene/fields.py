@@ -123,3 +123,5 @@ def shown(value: object) -> str:
         return repr(value)
     except ValueError:
         return "an integer of more than 4300 digits"
+    except RecursionError:
+        return "tables within tables, too many to show"

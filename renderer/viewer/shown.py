@@ -32,13 +32,14 @@ class ShownScene:
 
     @property
     def name(self) -> str:
-        """The scene file's name."""
-        return self.path.name if self.path else "scene"
+        """The scene file's name; what is no text in it, as Linux allows it, is replaced."""
+        return self.path.name.encode(errors="replace").decode() if self.path else "scene"
 
     @property
     def files(self) -> list[str]:
-        """The scene files that may be opened: those beside this one."""
-        return sorted(path.name for path in self.path.parent.glob("*.toml")) if self.path else []
+        """The scene files that may be opened: those beside this one, but for names that are no text."""
+        names = [path.name for path in self.path.parent.glob("*.toml")] if self.path else []
+        return sorted(name for name in names if name.encode(errors="replace").decode() == name)
 
     def beside(self, file: str) -> Path:
         """The path of one of ``files``. Raises ``ValueError`` for any other."""

@@ -83,6 +83,28 @@ def test_exr_holds_the_radiance_and_its_layers(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["a.exr"]
 
 
+@pytest.mark.parametrize("full", ["the system's folder for temporary files", "all"])
+def test_exr_needs_room_in_one_place_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, full: str) -> None:
+    """OpenEXR raises RuntimeError on a full disk; the picture was lost though its own disk had room."""
+    import OpenEXR
+
+    write = OpenEXR.File.write
+
+    def written(file: object, path: str) -> None:
+        if full == "all" or not Path(path).is_relative_to(tmp_path / "pictures"):
+            raise RuntimeError("Failed to write pixel data: No space left on device")
+        write(file, path)
+
+    monkeypatch.setattr(OpenEXR.File, "write", written)
+    (tmp_path / "pictures").mkdir()
+    if full == "all":
+        with pytest.raises(OSError, match="No space left"):
+            image().save(tmp_path / "pictures" / "a.exr")
+    else:
+        image().save(tmp_path / "pictures" / "a.exr")
+    assert [p.name for p in (tmp_path / "pictures").iterdir()] == ["a.exr"] * (full != "all")
+
+
 def test_exr_without_its_package_is_refused_before_anything_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -617,3 +617,11 @@ def test_one_mesh_may_stand_in_many_places(folder: Path) -> None:
     entry = '[[objects]]\nmesh = "models/box.ply"\nmaterial = "clay"\n'
     scene = load(folder, CAMERA + MATERIAL + entry * 20)
     assert len(scene.instances) == 20 and len(pack(scene)[0].faces) == 240
+
+
+@pytest.mark.parametrize("head", ["x", "[[objects]]\nmaterial = 'm'\nmesh", "[materials.m]\ncolor"])
+def test_tables_too_deep_to_show_are_named(tmp_path: Path, head: str) -> None:
+    """``repr`` of a value so deep ended in a RecursionError."""
+    (tmp_path / "deep.toml").write_text(head + ".a" * 5000 + " = 1\n")
+    with pytest.raises(SceneError, match="deep.toml: "):
+        load_scene(tmp_path / "deep.toml")

@@ -731,3 +731,15 @@ def test_in_a_notebook_the_page_is_framed(folder: Path, monkeypatch: pytest.Monk
 def test_what_is_no_scene_is_refused() -> None:
     with pytest.raises(ValueError, match="scene: expected a Scene or a path, got int"):
         renderer.view(3)  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of files are bytes on Linux alone")
+def test_names_that_are_no_text_are_left_out(folder: Path, tmp_path: Path) -> None:
+    """The list of files could not be sent, so the page had no scene."""
+    try:
+        (tmp_path / os.fsdecode(b"caf\xe9.toml")).write_text(PLAIN)
+    except OSError:
+        pytest.skip("this file system takes text alone")
+    (tmp_path / "a.toml").write_text(PLAIN)
+    assert open_file(tmp_path / "a.toml").files == ["a.toml"]
+    assert open_file(tmp_path / os.fsdecode(b"caf\xe9.toml")).name == "caf?.toml"
