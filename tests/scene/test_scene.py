@@ -623,5 +623,5 @@ def test_one_mesh_may_stand_in_many_places(folder: Path) -> None:
 def test_tables_too_deep_to_show_are_named(tmp_path: Path, head: str) -> None:
     """``repr`` of a value so deep ended in a RecursionError."""
     (tmp_path / "deep.toml").write_text(head + ".a" * 5000 + " = 1\n")
-    with pytest.raises(SceneError, match="deep.toml: "):
+    with pytest.raises(SceneError, match=r"deep\.toml: "):
         load_scene(tmp_path / "deep.toml")
