@@ -283,11 +283,12 @@ class Queries:
         """Whether nothing lies between each point and its target, (...) bool; the shapes of both are broadcast.
 
         points, targets    (..., 3), finite
-        leaving, reaching  the faces that the points and the targets lie on, one or (...), -1 for none: these ends are
-                           moved off them as ``closest_hit`` does it, with no epsilon
+        leaving, reaching  the faces that the points and the targets lie on, one or (...), -1 for none. The ray starts
+                           at the end that has one (at the point, where both have), moved off it as by ``closest_hit``
 
-        An end itself hides nothing, nor does what is within 2^-40 of the end's largest coordinate from it, along the
-        way: the rounding of a point on a surface, seen at 0.02 degrees. Raises ``ValueError`` naming argument and row.
+        No end hides itself: what is nearer to it, along the way, than 2^-40 of the largest coordinate of both is not
+        looked at, but for an end whose face is left. A surface seen at less than 0.03 degrees may still hide its own
+        points. Raises ``ValueError`` naming argument and row.
 
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box

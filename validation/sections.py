@@ -20,6 +20,7 @@ class Section(NamedTuple):
 SECTIONS = (
     Section("images", "validation.pictures.section", "scene"),
     Section("hits", "validation.hits.section", "mesh"),
+    Section("queries", "validation.queries.section"),
     Section("stability", "validation.stability.section"),
     Section("efficiency", "validation.efficiency.section"),
 )

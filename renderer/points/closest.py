@@ -19,8 +19,8 @@ from renderer.trace.query import rays_against_blocks
 from renderer.trace.rays import HIT_ROWS
 from renderer.trace.singly import stack_size
 
-# Points between two looks at Ctrl-C: some milliseconds of search.
-_STEP = 1024
+# The fewest points of a chunk: some milliseconds of search.
+_LEAST = 1024
 
 
 @dataclass(eq=False, slots=True)
@@ -63,15 +63,16 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
 
     def find(begin: int, end: int) -> Iterator[None]:
         size = stack_size(tree.depth) + LISTED
-        integers, doubles = np.empty(size, np.int64), np.empty(size + 8)
+        integers, doubles = np.empty(size, np.int64), np.empty(size + 9)
         order, starts = np.empty(end - begin, np.int64), np.empty(CELLS + 1, np.int64)
         order_points(rows, grid, order, starts, begin, end)
-        for some in range(0, len(order), step):
-            find_nearest(tree.words, rows, order[some : some + step], limits, out, integers, doubles)
+        done = 0
+        while done < len(order):
+            done += find_nearest(tree.words, rows, order[done:], limits, out, integers, doubles)
             yield
 
-    step = _STEP if tree.has_nodes else min(_STEP, rays_against_blocks(tree))
-    for_chunks(find, len(rows), chunk_size(len(rows), step, threads), threads)
+    least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))
+    for_chunks(find, len(rows), chunk_size(len(rows), least, threads), threads)
     distance, u, v, face = (row.reshape(shape) for row in out)
     return ClosestPoints(distance, face.view(np.int64), u, v, mesh)
 

@@ -1,5 +1,7 @@
 """Points inside a closed mesh: checks at the boundary, chunks on threads."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -51,12 +53,15 @@ def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) 
 
     grid = make_grid(lower, upper, along=axis)
 
-    def count(begin: int, end: int) -> None:
+    def count(begin: int, end: int) -> Iterator[None]:
         # Memory for the deepest tree: a kernel's own frame holds the stack of most trees, not of all.
         stack = np.empty(stack_size(tree.depth), np.int64)
         order, starts = np.empty(end - begin, np.int64), np.empty(CELLS + 1, np.int64)
         order_points(points, grid, order, starts, begin, end)
-        count_crossings(tree.words, points, order, axis, middle, counts, stack)
+        done = 0
+        while done < len(order):
+            done += count_crossings(tree.words, points, order[done:], axis, middle, counts, stack)
+            yield
 
     for_chunks(count, len(points), chunk_size(len(points), _LEAST, threads), threads)
     triangles = None

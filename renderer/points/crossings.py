@@ -32,6 +32,10 @@ from renderer.trace.sides import coordinate
 WINDING, CROSSINGS, ON = range(3)
 COLUMNS = 3
 _ROUNDOFF = 2.0**-53
+# Exact tests of a call: some milliseconds.
+WORK = 4096
+# An expansion of a volume has at most 6 products of 2 x 2 x 2 parts, four numbers each.
+_PARTS = 192
 # Shewchuk's bounds of the rounding errors of both determinants, as shares of the sums of their terms without signs.
 _AREA_ERROR = (3.0 + 16.0 * _ROUNDOFF) * _ROUNDOFF
 _VOLUME_ERROR = (7.0 + 56.0 * _ROUNDOFF) * _ROUNDOFF
@@ -62,11 +66,16 @@ def count_crossings(words, points, order, axis, middle, out, stack):
     """Fill the rows ``order`` of ``out`` (n, COLUMNS) int64 for ``points`` (n, 3) float64.
 
     The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
-    ``stack`` is memory for ``singly.stack_size`` int64.
+    ``stack`` is memory for ``singly.stack_size`` int64. Returns how many points it has done: it ends early after WORK
+    exact tests, so that Ctrl-C need not wait for long.
     """
     tree, parts = tree_pointers(words), local_doubles()
     scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
-    for i in order:
+    # Behind the expansion's parts.
+    work = at(parts, _PARTS)
+    put(work, 0, 0.0)
+    for k in range(len(order)):
+        i = order[k]
         row = at(pointer(points), 3 * i)
         x, y, z = scale * get(row, axis_x), scale * get(row, axis_y), scale * get(row, axis)
         column = Column(4 * axis_x, 4 * axis_y, 4 * axis, x, y, z, z >= middle)
@@ -81,6 +90,9 @@ def count_crossings(words, points, order, axis, middle, out, stack):
         put(result, WINDING, winding)
         put(result, CROSSINGS, crossings)
         put(result, ON, on)
+        if get(work, 0) > WORK:
+            return k + 1
+    return len(order)
 
 
 @kernel
@@ -125,6 +137,7 @@ def _cross_blocks(tree, first, count, column, parts, found):
             i = lowest_bit(unsure)
             unsure &= unsure - 1
             if get(tree.faces, block * BLOCK_FACES + i) >= 0:
+                put(parts, _PARTS, get(parts, _PARTS) + 1.0)
                 step, touches = _cross_exactly(tree, base + i, column, parts)
                 winding, crossings, on = winding + step, crossings + abs(step), on | touches
     return winding, crossings, on

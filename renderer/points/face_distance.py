@@ -6,6 +6,8 @@ normal, and else on an edge. Two faces that share an edge compute the same bits 
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, dot_pairs, length_pair, power_below, quotient, scaled_difference
 from renderer.kernels.simd import larger
@@ -14,7 +16,8 @@ from renderer.points.signs import lies_within, volume_sign
 
 # Shares of the terms of a sum of products of pairs, which errs by 2^-98 of them. Below CANCELLED it loses so many
 # digits that it is computed as an expansion. Below LOST its sign is in doubt: a point so near an edge, as seen along
-# the normal, is taken as on it, which moves its distance from the face by LOST of its reach at most.
+# the normal, is taken as on it, which moves its distance from the face by LOST of its reach at most. And so near the
+# middle of two float64 a distance is taken as there.
 _CANCELLED, _LOST = 2.0**-40, 2.0**-90
 _TINIEST = 2.0**-1000
 
@@ -45,20 +48,21 @@ def distance_to_face(a, b, c, p, parts):
     wb = dot_pairs(seen.pc, cross_pairs(seen.ca, normal))[0]
     wc = dot_pairs(seen.pa, cross_pairs(seen.ab, normal))[0]
     limit = _LOST * _largest(normal)
-    if wa > limit and wb > limit and wc > limit:
+    on_a, on_b, on_c = limit * _largest(seen.bc), limit * _largest(seen.ca), limit * _largest(seen.ab)
+    if wa > on_a and wb > on_b and wc > on_c:
         height, total = _height(seen, normal, a, b, c, p, parts), wa + wb + wc
-        distance = quotient(height, length_pair(normal))[0]
+        distance = _rounded(quotient(height, length_pair(normal)))
         return distance / seen.to_reach, wb / total, wc / total
     distance, u, v = 2.0**1000, 0.0, 0.0
-    if wc <= limit:
+    if wc <= on_c:
         d, t = _distance_to_edge(a, b, p, seen, (seen.pa, seen.pb, seen.ab), parts)
         if d < distance:
             distance, u, v = d, t, 0.0
-    if wa <= limit:
+    if wa <= on_a:
         d, t = _distance_to_edge(b, c, p, seen, (seen.pb, seen.pc, seen.bc), parts)
         if d < distance:
             distance, u, v = d, 1.0 - t, t
-    if wb <= limit:
+    if wb <= on_b:
         d, t = _distance_to_edge(c, a, p, seen, (seen.pc, seen.pa, seen.ca), parts)
         if d < distance:
             distance, u, v = d, 0.0, 1.0 - t
@@ -141,13 +145,27 @@ def _distance_to_ordered(a, b, p, seen, edge, parts):
     pa, pb, ab = edge
     behind, ahead = -dot_pairs(pa, ab)[0], dot_pairs(pb, ab)[0]
     if behind <= 0.0:
-        return length_pair(pa)[0], 0.0
+        return _rounded(length_pair(pa)), 0.0
     if ahead <= 0.0:
-        return length_pair(pb)[0], 1.0
+        return _rounded(length_pair(pb)), 1.0
     area = cross_pairs(pa, ab)
     if _largest(area) < _CANCELLED * _largest(pa):
         area = _expanded(a, b, p, seen.to_reach, seen.to_side, area, parts)
-    return quotient(length_pair(area), length_pair(ab))[0], behind / (behind + ahead)
+    return _rounded(quotient(length_pair(area), length_pair(ab))), behind / (behind + ahead)
+
+
+@kernel
+def _rounded(pair):
+    """A pair >= 0 as one float64: halfway between two the even one, also where the last digits of the pair are lost.
+
+    So equal distances, which faces in one plane have, stay equal.
+    """
+    head, tail = pair
+    bits = np.int64(np.float64(head).view(np.int64))
+    other = np.int64(bits + (1 if tail > 0.0 else -1)).view(np.float64)
+    if tail != 0.0 and bits & 1 != 0 and abs(2.0 * abs(tail) - abs(other - head)) <= _LOST * head:
+        return other
+    return head
 
 
 @inlined

@@ -32,6 +32,8 @@ from renderer.trace.sides import coordinate
 
 # Faces that may be the nearest are told apart at once when so many are listed.
 LISTED = 64
+# The blocks that a call tests, some milliseconds, and how many of them one face costs that is told apart.
+WORK, _APART = 1 << 16, 16
 # No distance is larger: points keep to 2^126 and meshes to 2^60, in the tree's units.
 _FARTHEST = 2.0**130
 # More than squares and their sum lose, and what a bound's square needs above it.
@@ -55,6 +57,7 @@ class Search(NamedTuple):
     children, near  the nodes and leaves that wait, and the squares of their boxes' distances
     places, least   the listed faces' places in the blocks, and the least distances that they may have
     squares         eight squares
+    work            the blocks tested so far, and, as more of them, the faces told apart
     parts           memory for an expansion
     """
 
@@ -63,6 +66,7 @@ class Search(NamedTuple):
     places: Any
     least: Any
     squares: Any
+    work: Any
     parts: Any
 
 
@@ -71,13 +75,19 @@ def find_nearest(words, points, order, limits, out, integers, doubles):
     """Write distance, u, v and face of the points ``order`` of ``points`` (n, 3) into the rows of ``out`` (4, n).
 
     limits     (n,) or (1,), the largest distance that counts
-    integers   memory for ``singly.stack_size`` and LISTED int64; ``doubles``, for as many float64 and eight more
+    integers   memory for ``singly.stack_size`` and LISTED int64; ``doubles``, for as many float64 and nine more
+
+    Returns how many points it has done: it ends early after WORK, so that Ctrl-C need not wait for long.
     """
     tree, parts, count = tree_pointers(words), local_doubles(), len(points)
     found, size = hit_pointers(out, count), len(integers) - LISTED
     children, near = pointer(integers), pointer(doubles)
-    search = Search(children, near, at(children, size), at(near, size), at(near, size + LISTED), parts)
-    for i in order:
+    search = Search(
+        children, near, at(children, size), at(near, size), at(near, size + LISTED), at(near, size + LISTED + 8), parts
+    )
+    put(search.work, 0, 0.0)
+    for k in range(len(order)):
+        i = order[k]
         p, limit = at(pointer(points), 3 * i), limits[i if len(limits) > 1 else 0]
         point = Point(0, 4, 8, tree.scale * get(p, 0), tree.scale * get(p, 1), tree.scale * get(p, 2))
         distance, face, u, v = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), search)
@@ -87,6 +97,9 @@ def find_nearest(words, points, order, limits, out, integers, doubles):
         put(found.face, i, np.int64(face if hit else -1))
         put(found.u, i, u if hit else np.nan)
         put(found.v, i, v if hit else np.nan)
+        if get(search.work, 0) > WORK:
+            return k + 1
+    return len(order)
 
 
 @kernel
@@ -158,6 +171,7 @@ def _push_sorted(links, base, bits, search, top):
 @kernel
 def _search_blocks(tree, first, count, point, search, best, listed, limit):
     """List the faces of some blocks that may be within ``limit``, and lower that to what they bound."""
+    put(search.work, 0, get(search.work, 0) + count)
     for block in range(first, first + count):
         bits, least, square, error = bound_distances(tree, block * BLOCK_WORDS, point, limit)
         while bits != 0:
@@ -185,6 +199,7 @@ def _settle(tree, point, search, best, listed, limit):
         if get(search.least, k) > limit:
             continue
         place = get(search.places, k)
+        put(search.work, 0, get(search.work, 0) + _APART)
         base = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
         f = get(tree.faces, place)
         d, du, dv = distance_to_face(_corner(tree, base), _corner(tree, base + 12), _corner(tree, base + 24), p,

@@ -8,6 +8,8 @@ from meshes import make_mesh
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere, torus
+from renderer.points import closest
+from renderer.points import contains as inside
 from renderer.points.nearest import LISTED
 from validation.oracle.distance import nearest, rational, ulps_from_root
 from validation.stability.cases.inside import closed_solids
@@ -168,3 +170,53 @@ def test_far_points_of_tiny_and_huge_meshes():
     for scale in (1e-200, 1e200):
         octree = Octree.from_mesh(Mesh(box().vertices * scale, box().faces))
         assert octree.closest_point([[0.5 * scale, 0.5 * scale, 3 * scale]]).distance.tolist() == [3 * scale - scale]
+
+
+@pytest.mark.parametrize(
+    ("vertices", "point"),
+    [
+        ([[0, 0, 0], [-1, 0, 0], [0, 0, 2.0**-40]], [-(2.0**-52), 0, 2.0**-41]),
+        ([[0, 0, 0], [-1, 0, 0], [0, 0, 2.0**-40]], [-(2.0**-52), -(2.0**-80), 2.0**-41]),
+        ([[0, 0, 0], [-70368744177664.0, 0, 0], [0, 0, 2.0**-8]], [-(2.0**-14), 0, 2.0**-9]),
+    ],
+)
+def test_a_short_edge_takes_no_more_room_than_a_long_one(vertices, point):
+    """A point was taken as on an edge by a share of the edge's length, not of its distance from it."""
+    mesh = Mesh(vertices, [[0, 1, 2]])
+    square, _ = nearest(rational([point])[0], [rational(mesh.triangles[0])])
+    assert ulps_from_root(float(Octree.from_mesh(mesh).closest_point(point).distance), square) < 0.51
+
+
+def test_faces_in_one_plane_are_equally_far_in_the_middle_of_two_numbers():
+    vertices = [[4.7, -5.9, 1 / 3], [-8.1, 6.2, 1 / 3], [3.3, 7.6, 1 / 3],
+                [4.8, 4.3, 1 / 3], [3.8, -3.7, 1 / 3], [-8.2, 4.8, 1 / 3]]  # fmt: skip
+    point = [0.1046308468680315, 0.27339117115185557, 1.0000000000000002]
+    alone = [Octree(vertices, [face]).closest_point(point).distance for face in ([0, 1, 2], [3, 4, 5])]
+    assert alone[0] == alone[1]
+    assert Octree(vertices, [[0, 1, 2], [3, 4, 5]]).closest_point(point).face == 0
+
+
+@pytest.mark.parametrize("query", ["closest_point", "contains"])
+def test_work_without_end_is_cut_where_control_c_is_heard(query, monkeypatch):
+    """A chunk of points that each lie on thousands of faces had kept Ctrl-C waiting for a minute."""
+    copies = Octree(box().vertices, np.tile(box().faces, (500, 1)), threads=1)
+    points = np.random.default_rng(0).random((200, 1)) * np.ones(3)
+    module = closest if query == "closest_point" else inside
+    calls = []
+    name = "find_nearest" if query == "closest_point" else "count_crossings"
+    kernel = getattr(module, name)
+
+    def counted(*arguments):
+        calls.append(kernel(*arguments))
+        return calls[-1]
+
+    monkeypatch.setattr(module, name, counted)
+    found = getattr(copies, query)(points)
+    assert len(calls) > 5 and sum(calls) == len(points)
+    monkeypatch.undo()
+    one = getattr(Octree.from_mesh(box()), query)(points)
+    if query == "contains":
+        np.testing.assert_array_equal(found, one)
+    else:
+        np.testing.assert_array_equal(found.distance, one.distance)
+        np.testing.assert_array_equal(found.face, one.face)

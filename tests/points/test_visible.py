@@ -46,6 +46,37 @@ def test_ends_hide_nothing_and_walls_between_do():
     assert not octree.visible([0.5, 0.5, -1e-9], [0.5, 0.5, 1.0])
 
 
+@pytest.mark.parametrize("distance", [1.0, 30.0, 1000.0])
+@pytest.mark.parametrize("given", [False, True])
+def test_no_end_hides_itself_however_far_the_other_is(distance, given):
+    """The room at the far end had been that of its own coordinates; the ray's roundings are those of its length."""
+    ball, eye = icosphere(4), np.array([0.3, 0.8, 0.52]) * 3 * distance
+    octree, centres = Octree.from_mesh(ball), ball.triangles.mean(axis=1)
+    slope = ((eye - centres) * ball.face_normals()).sum(1) / np.linalg.norm(eye - centres, axis=1)
+    faces = np.arange(len(ball.faces)) if given else None
+    facing = slope > 1e-2
+    assert octree.visible(eye, centres, reaching=faces)[facing].all()
+    assert octree.visible(centres, eye, leaving=faces)[facing].all()
+    assert not octree.visible(eye, centres, reaching=faces)[slope < -1e-2].any()
+
+
+def test_a_small_face_at_the_origin_does_not_hide_its_point():
+    octree = Octree([[0, 0, 0], [2.0**-10, 0, 0], [0, 2.0**-10, 0]], [[0, 1, 2]])
+    target = [2.0**-12, 2.0**-12, 0.0]
+    for eye in ([1 / 3, 1 / 7, 1.0], [3.0, 8.0, 5.2]):
+        assert octree.visible(eye, target) and octree.visible(target, eye)
+        assert octree.visible(eye, target, reaching=0) and octree.visible(target, eye, leaving=0)
+
+
+def test_minus_one_stands_for_no_face():
+    octree = Octree.from_mesh(box())
+    one, other = [[0.25, 0.5, 1.0]] * 2, [[0.25, 0.7, 3.0]] * 2
+    top = int(octree.closest_hit([0.25, 0.5, 3.0], [0.0, 0.0, -1.0]).face)
+    for faces in (-1, [-1, top], [top, -1]):
+        assert octree.visible(one, other, leaving=faces).all() and octree.visible(other, one, reaching=faces).all()
+    assert octree.visible(one, one[::-1], leaving=top, reaching=top).all()
+
+
 @pytest.mark.parametrize("scale", [1e-200, 1e-3, 1e6, 1e250])
 def test_at_any_size(scale):
     octree = Octree.from_mesh(Mesh(box().vertices * scale, box().faces))

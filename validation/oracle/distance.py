@@ -60,12 +60,14 @@ def nearest(point: Vector, triangles: Sequence[Sequence[Vector]]) -> tuple[Fract
 
 
 def ulps_from_root(value: float, square: Fraction) -> float:
-    """How far a float64 is from the root of a rational number, in units of the root's last place; inf for a wrong 0.
+    """How far a float64 is from the root of a rational number, in units of the root's last place.
+
+    It is inf for a NaN, and where one of them is 0 and the other is not.
 
     >>> ulps_from_root(2.0, Fraction(4)), ulps_from_root(1.0, Fraction(1) + Fraction(2) ** -51)
     (0.0, 1.0)
     """
-    if square == 0 or value == 0.0:
+    if square == 0 or value == 0.0 or not math.isfinite(value):
         return 0.0 if square == 0 and value == 0.0 else math.inf
     # Some 64 bits of the root beyond those of float64.
     shift = max(0, 130 - (square.numerator.bit_length() - square.denominator.bit_length()) // 2)

@@ -42,3 +42,14 @@ class Igl:
         face, t, _ = self._tree.intersect_ray_first(self._vertices, self._faces, o, d)
         face = np.asarray(face, dtype=np.int64).reshape(-1)
         return np.where(face >= 0, np.asarray(t, dtype=np.float64).reshape(-1), np.inf), face
+
+    def winding_number(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Generalised winding numbers (n,) around ``points`` (n, 3), by libigl's hierarchy without approximation."""
+        p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+        return np.asarray(igl.winding_number(self._vertices, self._faces, p), np.float64).reshape(-1)
+
+    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Distances (n,) of ``points`` (n, 3) from the surface."""
+        p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+        squares, _, _ = self._tree.squared_distance(self._vertices, self._faces, p)
+        return np.sqrt(np.asarray(squares, np.float64).reshape(-1))

@@ -24,6 +24,7 @@ FIGURES: dict[str, Callable[..., Any]] = {
 PARTIALS = {
     "images": ("Pictures", "pictures.html"),
     "hits": ("Hits", "hits.html"),
+    "queries": ("Queries", "queries.html"),
     "stability": ("Stability", "stability.html"),
     "efficiency": ("Efficiency", "efficiency.html"),
 }

@@ -98,6 +98,7 @@ class Metrics(_Strict):
     environment: dict[str, Any]
     images: SectionRecord | None = None
     hits: SectionRecord | None = None
+    queries: SectionRecord | None = None
     stability: SectionRecord | None = None
     efficiency: SectionRecord | None = None
     defects: dict[str, Any] | None = None

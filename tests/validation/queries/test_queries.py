@@ -1,0 +1,95 @@
+"""The section on queries: ours passes, and each kind of wrong answer turns a gate red."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from renderer import Octree
+from validation.job import Job
+from validation.oracle.distance import rational
+from validation.oracle.inside import winding_number
+from validation.queries import section
+from validation.queries.contacts import check_contacts
+from validation.queries.distances import check_distances, meshes, points_about
+from validation.queries.inside import check_inside
+from validation.queries.solids import nasty_points, random_points, solids
+from validation.thresholds import Thresholds
+
+JOB = Job(True, Thresholds(), Path(), lambda name: None)
+
+
+def wrong(rows):
+    return {row["subject"]: row["wrong"] for row in rows if row["wrong"]}
+
+
+def test_the_section_counts_its_steps_and_passes(monkeypatch, tmp_path):
+    monkeypatch.setattr(section, "QUICK", section.QueryEffort(2400, 1200, 8, 4, 6))
+    taken = []
+    job = Job(True, Thresholds(), tmp_path, taken.append)
+    record, gates = section.run(job)
+    assert len(taken) == section.steps(job) and len(gates) == len(record["rows"]) == 24
+    assert all(gate.passed for gate in gates)
+    assert all(row["asked"] > 0 and row["beside"] > 0 for row in record["rows"])
+
+
+def test_the_solids_are_judged_as_rational_arithmetic_judges_them():
+    rng = np.random.default_rng(0)
+    for solid in solids():
+        points = np.concatenate([nasty_points(solid, rng, 12), random_points(solid, rng, 6)])
+        winding, on = solid.winding(points)
+        triangles = [rational(triangle) for triangle in solid.mesh().triangles]
+        numbers = [winding_number(point, triangles) for point in rational(points)]
+        assert on.tolist() == [number is None for number in numbers]
+        assert winding[~on].tolist() == [number for number in numbers if number is not None]
+
+
+def test_nasty_points_lie_where_they_should():
+    solid, rng = solids()[0], np.random.default_rng(0)
+    _, on = solid.winding(nasty_points(solid, rng, 2000))
+    assert 0.2 < on.mean() < 0.8
+
+
+@pytest.mark.parametrize("change", [lambda a: ~a, lambda a: np.append(a[:-1], not a[-1]), np.zeros_like])
+def test_wrong_answers_to_inside_are_counted(monkeypatch, change):
+    contains = Octree.contains
+    monkeypatch.setattr(Octree, "contains", lambda *a, **k: change(contains(*a, **k)))
+    assert len(wrong(check_inside(240, 240, 4, JOB))) == 12
+
+
+@pytest.mark.parametrize("name", ["distance", "face"])
+def test_wrong_distances_are_counted(monkeypatch, name):
+    closest_point = Octree.closest_point
+
+    def changed(*arguments):
+        found = closest_point(*arguments)
+        found.distance *= 1.0 + 2.0**-51 * (name == "distance")
+        found.face += name == "face"
+        return found
+
+    monkeypatch.setattr(Octree, "closest_point", changed)
+    assert len(wrong(check_distances(6, JOB))) == len(meshes())
+
+
+@pytest.mark.parametrize("query", ["all_hits", "count_hits", "closest_hit", "any_hit"])
+def test_wrong_contacts_are_counted(monkeypatch, query):
+    asked = getattr(Octree, query)
+
+    def changed(*arguments):
+        found = asked(*arguments)
+        if query == "all_hits":
+            found.t[:] = np.nextafter(found.t, np.inf)
+        elif query == "closest_hit":
+            found.face += 1
+        else:
+            found = found + 1 if query == "count_hits" else ~found
+        return found
+
+    monkeypatch.setattr(Octree, query, changed)
+    assert len(wrong(check_contacts(8, JOB))) == len(solids())
+
+
+def test_points_are_on_and_beside_the_surface():
+    mesh = meshes()["ball"]
+    distance = Octree.from_mesh(mesh).closest_point(points_about(mesh, np.random.default_rng(0), 400)).distance
+    assert (distance == 0.0).mean() > 0.05 and (distance < 1e-9).mean() > 0.3 and (distance > 0.1).any()

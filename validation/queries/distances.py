@@ -1,0 +1,111 @@
+"""Distances from solids: ours in ulp of the exact ones, and other libraries beside."""
+
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere, torus
+from renderer.octree import Octree
+from validation.job import Job
+from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.references.igl import Igl
+from validation.references.trimesh_queries import TrimeshQueries
+
+Floats = NDArray[np.float64]
+_SEED = 2042
+# The answer is the exact distance, rounded: half an ulp, and as little more as twice the digits leave.
+ULPS = 0.51
+# Others round each step: some ulp are no fault of theirs.
+_OTHERS_ULPS = 16.0
+# NumPy's distances by which faces are chosen for exact arithmetic err by less than this share of the mesh's reach.
+_MARGIN = 1e-9
+
+
+def meshes() -> dict[str, Mesh]:
+    """A ball and a ring where they stand, far away, tiny and flat."""
+    ball, ring = icosphere(2), torus(around=24, across=12)
+    return {
+        "ball": ball,
+        "ring": ring,
+        "ring at 1e6": Mesh(ring.vertices * np.pi + 1e6, ring.faces),
+        "ball of 1e-80": Mesh(ball.vertices * 1e-80, ball.faces),
+        "ball of 1e100": Mesh(ball.vertices * 1e100, ball.faces),
+        "flat ball": Mesh(ball.vertices * [1.0, 1.0, 1e-6], ball.faces),
+    }
+
+
+def points_about(mesh: Mesh, rng: Generator, count: int) -> Floats:
+    """Points on faces, edges and corners, and from 1e-20 to 10 of the mesh's size away from these."""
+    shares, kind = rng.dirichlet([1, 1, 1], count), rng.integers(0, 4, count)
+    shares[kind == 1] = np.eye(3)[rng.integers(0, 3, int((kind == 1).sum()))]
+    shares[kind == 2, 0] = 0.0
+    shares[kind == 3] = [0.5, 0.25, 0.25]
+    on = np.einsum("nk,nkd->nd", shares, mesh.triangles[rng.integers(0, len(mesh.faces), count)])
+    away = 10.0 ** rng.uniform(-20, 1, (count, 1)) * (rng.random((count, 1)) < 0.7)
+    points: Floats = on + rng.normal(size=(count, 3)) * away * mesh.extent.max()
+    return points
+
+
+def check_distances(count: int, job: Job) -> list[dict[str, Any]]:
+    """A row for each mesh: how many points were asked, our largest error in ulp, and the wrong answers of others."""
+    rows, rng = [], np.random.default_rng(_SEED)
+    for name, mesh in meshes().items():
+        job.step(f"queries: distance, {name}")
+        points = points_about(mesh, rng, count)
+        squares = [_least(mesh, point) for point in points]
+        ours = Octree.from_mesh(mesh).closest_point(points)
+        ulps = [ulps_from_root(d, square) for d, (square, _) in zip(ours.distance, squares, strict=True)]
+        # Another face is as near once the distance is rounded; of those the lowest.
+        faces = [face <= lowest for face, (_, lowest) in zip(ours.face, squares, strict=True)]
+        wrong = sum(not (ulp < ULPS and face) for ulp, face in zip(ulps, faces, strict=True))
+        rows.append({"subject": f"distance: {name}", "asked": count, "wrong": wrong, "ulps": max(ulps),
+                     "beside": count, "others": _others(mesh, points, squares)})  # fmt: skip
+    return rows
+
+
+def _least(mesh: Mesh, point: Floats) -> tuple[Any, int]:
+    """The exact least squared distance, and the lowest face that has it."""
+    # Relative to the point and of size 1, so that no square overflows.
+    corners = mesh.triangles - point
+    reach = float(np.abs(corners).max())
+    rough = _rough(corners / reach)
+    near = np.flatnonzero(rough <= rough.min() + _MARGIN)
+    square, lowest = nearest(
+        rational([point.tolist()])[0], [rational(triangle.tolist()) for triangle in mesh.triangles[near]]
+    )
+    return square, int(near[lowest[0]])
+
+
+def _rough(corners: Floats) -> Floats:
+    """Distances of triangles (F, 3 corners, 3) from the origin: the least over their edges, and their planes' feet."""
+    a, b, c = corners.transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    inside, least = np.ones(len(a), np.bool_), np.full(len(a), np.inf)
+    for p, q in ((a, b), (b, c), (c, a)):
+        side = q - p
+        share = np.clip(-_dot(p, side) / np.maximum(_dot(side, side), 1e-300), 0.0, 1.0)
+        least = np.minimum(least, np.linalg.norm(p + share[:, None] * side, axis=1))
+        inside &= _dot(np.cross(side, -p), normal) >= 0.0
+    square = _dot(normal, normal)
+    height = np.abs(_dot(a, normal)) / np.sqrt(np.maximum(square, 1e-300))
+    return np.where(inside & (square > 0.0), np.minimum(least, height), least)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    products: Floats = (a * b).sum(axis=1)
+    return products
+
+
+def _others(mesh: Mesh, points: Floats, squares: list[tuple[Any, int]]) -> dict[str, int]:
+    """How many distances of other libraries are off by more than some ulp."""
+    answers = {
+        "trimesh": TrimeshQueries(mesh.vertices, mesh.faces).distance(points),
+        "libigl": Igl(mesh.vertices, mesh.faces).distance(points),
+    }
+    return {
+        name: sum(not ulps_from_root(d, square) <= _OTHERS_ULPS for d, (square, _) in zip(found, squares, strict=True))
+        for name, found in answers.items()
+    }

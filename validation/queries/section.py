@@ -1,0 +1,48 @@
+"""The section on queries: inside, distance and all hits against exact arithmetic, with other libraries beside ours."""
+
+from typing import Any, NamedTuple
+
+from validation.gates import Gate
+from validation.job import Job
+from validation.queries.contacts import check_contacts
+from validation.queries.distances import ULPS, check_distances, meshes
+from validation.queries.inside import check_inside
+from validation.queries.solids import solids
+
+
+class QueryEffort(NamedTuple):
+    """Points asked whether they lie inside, random and nasty, and how many of each kind others are asked; points whose
+    distance is asked, for each mesh; and rays through each solid.
+    """
+
+    random: int
+    nasty: int
+    beside: int
+    distances: int
+    rays: int
+
+
+QUICK = QueryEffort(200_000, 60_000, 400, 60, 60)
+FULL = QueryEffort(10_080_000, 1_008_000, 4_000, 400, 500)
+_REASON = "exact: whole numbers, or rational arithmetic"
+
+
+def steps(job: Job) -> int:
+    """Number of calls of ``job.step``: two for each solid, and one for each mesh whose distance is asked."""
+    return 2 * len(solids()) + len(meshes())
+
+
+def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Ask all questions; returns a record for JSON, and for each row a gate that no answer of ours is wrong."""
+    effort = QUICK if job.quick else FULL
+    rows = [
+        *check_inside(effort.random, effort.nasty, effort.beside, job),
+        *check_distances(effort.distances, job),
+        *check_contacts(effort.rays, job),
+    ]
+    gates = [
+        Gate("queries", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0,
+             f"within {ULPS} ulp of the exact distance, and 0 on the surface only" if "ulps" in row else _REASON)
+        for row in rows
+    ]  # fmt: skip
+    return {"rows": rows, "costs": dict.fromkeys(("exact arithmetic", "trimesh", "libigl"))}, gates
