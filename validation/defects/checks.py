@@ -20,6 +20,7 @@ from validation.hits.refit import check_refit
 from validation.hits.section import HitEffort, check_leaks, check_mesh
 from validation.job import Job
 from validation.pictures.section import PictureEffort, check_scene
+from validation.queries import section
 from validation.references.table import REFERENCES
 from validation.scenes import SCENES
 from validation.stability import sweeps
@@ -34,6 +35,8 @@ _SCENES = {"glass": PictureEffort(size=128, lower=64), "stairs": PictureEffort(s
 # reference is enough to raise a disagreement; exact arithmetic decides which side is wrong.
 _EMBREE = tuple(reference for reference in REFERENCES if reference.key == "embree_robust")
 _HITS = HitEffort(rays=3_000, exact=40, leaks=20_000, references=_EMBREE)
+# Other libraries are not asked: they judge nothing here.
+_QUERIES = section.QueryEffort(random=3_000, nasty=12_000, beside=0, distances=24, rays=40)
 # Leak rays of each kind in each placement: the rarest of these defects leaks one in 20,000.
 _LEAKS = 200_000
 # The extreme case of a million triangles; no defect here affects what it tests about size.
@@ -94,8 +97,15 @@ def hits(job: Job) -> Iterator[Gate]:
     yield from check_refit(job)[1]
 
 
+def queries(job: Job) -> list[Gate]:
+    """Inside, distances and all hits of some solids."""
+    found: list[Gate] = section.judge(_QUERIES, job)[1]
+    return found
+
+
 # A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
     "hits": (hits, extreme(1, 32), extreme(46, 46), extreme(49, 52), sweep, curves),
+    "queries": (queries, extreme(51, 52)),
     "pictures": (pictures, extreme(33, 45), extreme(47, 48)),
 }

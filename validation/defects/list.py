@@ -5,7 +5,7 @@ from typing import Literal
 
 from validation.defects.inject import Replacement
 
-Group = Literal["hits", "pictures"]
+Group = Literal["hits", "queries", "pictures"]
 
 
 @dataclass(frozen=True)
@@ -79,32 +79,10 @@ HITS = (
             "blurred | (doubt & (t >= zero) & within)", "doubt & (t >= zero) & within"),
     _kernel("hits", "determinants that blow roundings up are not in doubt", "SLANT",
             "SLANT = 2.0**-16", "SLANT = 2.0**-40"),
-    _kernel("hits", "points on an edge are not moved off it", "_cross_exactly",
-            "s0 if s0 != 0 else _moved_sign(b, c)", "s0"),
-    _kernel("hits", "signs of areas are believed however small", "crossings._AREA_ERROR",
-            "_AREA_ERROR = (3.0 + 16.0 * _ROUNDOFF) * _ROUNDOFF", "_AREA_ERROR = 0.0"),
-    _kernel("hits", "signs of volumes are believed however small", "crossings._VOLUME_ERROR",
-            "_VOLUME_ERROR = (7.0 + 56.0 * _ROUNDOFF) * _ROUNDOFF", "_VOLUME_ERROR = 0.0"),
-    _kernel("hits", "points on upright faces are not seen", "_cross_exactly",
-            "_on_upright(a, b, c, p, parts)", "0"),
-    _kernel("hits", "expansions forget what products round off", "_add_pair",
-            "_add(parts, _add(parts, count, pair[1]), pair[0])", "_add(parts, count, pair[0])"),
-    _kernel("hits", "exact signs forget what products round off", "products_sign",
-            "one[1] - other[1]", "0.0"),
     _kernel("hits", "edges as rounded are believed", "_may_be_on_edge",
             "(e0 == zero) & ((x2 & y1) | (y2 & x1))", "(e0 != e0) & x1"),
-    _kernel("hits", "hits at one edge are contacts of their own", "_merge",
-            "_compare_places(tree, found, get(order, k - 1), get(order, k)) == 0", "False"),
-    _kernel("hits", "a corner is taken for one of its edges", "_ends",
-            "edges & (edges - 1) != 0", "False"),
-    _kernel("hits", "of hits at one t the highest face comes first", "gather._precedes",
-            "get(found.integers, _row(found, _FACE, i)) < get(found.integers, _row(found, _FACE, j))",
-            "get(found.integers, _row(found, _FACE, i)) > get(found.integers, _row(found, _FACE, j))"),
     _kernel("hits", "hits of scaled meshes keep the tree's t", "write_hit",
             "t / scale + 0.0", "t + 0.0"),
-    _kernel("hits", "max_hits keeps one more", "gather_chunk",
-            "smaller(_ordered(tree, found, count, merge, keep), most)",
-            "smaller(_ordered(tree, found, count, merge, keep), most + 1)"),
     _kernel("hits", "hits are in doubt too late", "DOUBT",
             "DOUBT = 2.0**-27", "DOUBT = 2.0**-40"),
     _kernel("hits", "stale boxes of inner nodes after a refit", "refit_tree",
@@ -129,6 +107,59 @@ HITS = (
             "    reject(rays, min(bad), tree.scale)",
             "if False:\n"
             "    reject(rays, min(bad), tree.scale)"),
+)  # fmt: skip
+
+QUERIES = (
+    _kernel("queries", "points on an edge are not moved off it", "_cross_exactly",
+            "s0 if s0 != 0 else _moved_sign(b, c)", "s0"),
+    _kernel("queries", "signs of areas are believed however small", "crossings._AREA_ERROR",
+            "_AREA_ERROR = (3.0 + 16.0 * _ROUNDOFF) * _ROUNDOFF", "_AREA_ERROR = 0.0"),
+    _kernel("queries", "signs of volumes are believed however small", "crossings._VOLUME_ERROR",
+            "_VOLUME_ERROR = (7.0 + 56.0 * _ROUNDOFF) * _ROUNDOFF", "_VOLUME_ERROR = 0.0"),
+    _kernel("queries", "points on upright faces are not seen", "_cross_exactly",
+            "lies_within(a, b, c, p, parts)", "0"),
+    _kernel("queries", "expansions forget what products round off", "_add_pair",
+            "_add(parts, _add(parts, count, pair[1]), pair[0])", "_add(parts, count, pair[0])"),
+    _kernel("queries", "exact signs forget what products round off", "products_sign",
+            "one[1] - other[1]", "0.0"),
+    _kernel("queries", "hits at one edge are contacts of their own", "_merge",
+            "_compare_places(tree, found, get(order, k - 1), get(order, k)) == 0", "False"),
+    _kernel("queries", "a corner is taken for one of its edges", "_ends",
+            "edges & (edges - 1) != 0", "False"),
+    _kernel("queries", "of hits at one t the highest face comes first", "gather._precedes",
+            "get(found.integers, _row(found, _FACE, i)) < get(found.integers, _row(found, _FACE, j))",
+            "get(found.integers, _row(found, _FACE, i)) > get(found.integers, _row(found, _FACE, j))"),
+    _kernel("queries", "max_hits keeps one more", "gather_chunk",
+            "smaller(_ordered(tree, found, count, merge, keep), most)",
+            "smaller(_ordered(tree, found, count, merge, keep), most + 1)"),
+    _kernel("queries", "blocks of which a ray sees the first face alone are left out", "find_blocks",
+            "get(lanes.bits, r) != 0", "get(lanes.bits, r) > 1"),
+    _kernel("queries", "the nearest point is never a corner", "_distance_to_ordered",
+            "behind <= 0.0", "behind != behind"),
+    _kernel("queries", "points beside an edge are taken as over the face", "distance_to_face",
+            "wa > on_a and wb > on_b and wc > on_c", "wa > on_a and wb > on_b"),
+    _kernel("queries", "points near a plane lose their digits", "_height",
+            "abs(height[0]) < _CANCELLED * _largest(normal)", "height[0] != height[0]"),
+    _kernel("queries", "points near an edge lose their digits", "_distance_to_ordered",
+            "_largest(area) < _CANCELLED * _largest(pa)", "behind != behind"),
+    _kernel("queries", "of faces equally near any may come", "_settle",
+            "d < distance or (d == distance and f < face)", "d <= distance"),
+    _kernel("queries", "boxes are taken as a hundredth farther", "_bound_four",
+            "splat4(_LESS)", "splat4(1.02)"),
+    _kernel("queries", "a face's least distance bounds the search", "_search_blocks",
+            "smaller(limit, high)", "smaller(limit, low * 0.999)"),
+    _kernel("queries", "a distance is reached only short of it", "find_nearest",
+            "face != NO_FACE and distance <= limit", "face != NO_FACE and distance < limit"),
+    _kernel("queries", "distances of scaled meshes keep the tree's units", "find_nearest",
+            "tree.scale * get(p, 0)", "get(p, 0)"),
+    _python("queries", "distances are negative outside", "signed.signed_distance",
+            "inside & (distance > 0.0)", "~inside & (distance > 0.0)"),
+    _python("queries", "an end hides itself", "_between",
+            "np.maximum(reach - room, 0.0)", "reach"),
+    _python("queries", "a way is seen to its middle", "_between",
+            "np.maximum(reach - room, 0.0)", "reach * 0.5"),
+    _python("queries", "points on the surface are inside without it", "contains.contains",
+            "np.where(on == 1, boundary, inside)", "np.where(on == 1, True, inside)"),
 )  # fmt: skip
 
 PICTURES = (
@@ -269,4 +300,4 @@ PICTURES = (
             "scale(k_t, 1.0 - f)", "scale((k_t[0], k_t[0], k_t[0]), 1.0 - f)"),
 )  # fmt: skip
 
-DEFECTS = HITS + PICTURES
+DEFECTS = HITS + QUERIES + PICTURES

@@ -22,19 +22,23 @@ def check_contacts(count: int, job: Job) -> list[dict[str, Any]]:
     rows, rng = [], np.random.default_rng(_SEED)
     for solid in solids():
         job.step(f"queries: all hits, {solid.name}")
-        origins, directions = _rays(solid, rng, count)
+        origins, directions, targets = _rays(solid, rng, count)
         mesh = solid.mesh()
         expected = [contacts(mesh.vertices, mesh.faces, *ray) for ray in zip(origins, directions, strict=True)]
         numbers = np.array([len(found) for found in expected])
         theirs = TrimeshQueries(mesh.vertices, mesh.faces).count_hits(origins, directions)
         rows.append({"subject": f"all hits: {solid.name}", "asked": count,
-                     "wrong": _wrong(mesh, origins, directions, expected), "beside": count,
+                     "wrong": int((_wrong(mesh, origins, directions, expected)
+                                   | _unseen(mesh, origins, directions, targets, expected)).sum()), "beside": count,
                      "others": {"trimesh + embreex": int((theirs != numbers).sum())}})  # fmt: skip
     return rows
 
 
-def _rays(solid: Solid, rng: Generator, count: int) -> tuple[Floats, Floats]:
-    """Rays from whole points through corners, middles of edges and faces, with slopes that float64 holds exactly."""
+def _rays(solid: Solid, rng: Generator, count: int) -> tuple[Floats, Floats, Floats]:
+    """Rays from whole points through corners, middles of edges and faces, with slopes that float64 holds exactly.
+
+    Returns origins, directions, and those places.
+    """
     corners = solid.mesh().triangles[rng.integers(0, len(solid.mesh().faces), count)]
     kind = rng.integers(0, 3, (count, 1))
     targets = np.where(kind == 0, corners[:, 0], (corners[:, 0] + corners[:, 1]) / 2)
@@ -42,10 +46,23 @@ def _rays(solid: Solid, rng: Generator, count: int) -> tuple[Floats, Floats]:
     directions = rng.integers(-4, 5, (count, 3)).astype(np.float64)
     directions[rng.random((count, 3)) < 0.3] = 0.0
     directions[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-4.0, 4.0], count)
-    return targets - directions * rng.integers(0, 9000, (count, 1)), directions
+    return targets - directions * rng.integers(0, 9000, (count, 1)), directions, targets
 
 
-def _wrong(mesh: Mesh, origins: Floats, directions: Floats, expected: list[list[Contact]]) -> int:
+def _unseen(
+    mesh: Mesh, origins: Floats, directions: Floats, targets: Floats, expected: list[list[Contact]]
+) -> NDArray[np.bool_]:
+    """Whether the answer is wrong to whether origin and target see each other: nothing lies strictly between."""
+    axis = np.abs(directions).argmax(axis=1)
+    rows = np.arange(len(axis))
+    ends = (targets - origins)[rows, axis] / directions[rows, axis]
+    seen = np.array([not any(0 < contact.t < end for contact in found)
+                     for found, end in zip(expected, ends.tolist(), strict=True)])  # fmt: skip
+    octree = Octree.from_mesh(mesh)
+    return (octree.visible(origins, targets) != seen) | (octree.visible(targets, origins) != seen)
+
+
+def _wrong(mesh: Mesh, origins: Floats, directions: Floats, expected: list[list[Contact]]) -> NDArray[np.bool_]:
     """Rays of which the contacts' faces and t, or their number, are not the exact ones; or another query differs."""
     octree = Octree.from_mesh(mesh)
     met, closest = octree.all_hits(origins, directions), octree.closest_hit(origins, directions)
@@ -56,4 +73,4 @@ def _wrong(mesh: Mesh, origins: Floats, directions: Floats, expected: list[list[
         wrong[i] |= met.t[rows].tolist() != [float(contact.t) for contact in found]
         wrong[i] |= met.face[rows].tolist() != [contact.faces[0] for contact in found]
         wrong[i] |= bool(found) and (closest.t[i], closest.face[i]) != (float(found[0].t), found[0].faces[0])
-    return int(wrong.sum())
+    return wrong

@@ -60,10 +60,19 @@ def check_distances(count: int, job: Job) -> list[dict[str, Any]]:
         ulps = [ulps_from_root(d, square) for d, (square, _) in zip(ours.distance, squares, strict=True)]
         # Another face is as near once the distance is rounded; of those the lowest.
         faces = [face <= lowest for face, (_, lowest) in zip(ours.face, squares, strict=True)]
-        wrong = sum(not (ulp < ULPS and face) for ulp, face in zip(ulps, faces, strict=True))
+        right = np.array([ulp < ULPS and face for ulp, face in zip(ulps, faces, strict=True)])
+        wrong = int((~(right & _is_closed(mesh, points, ours.distance))).sum())
         rows.append({"subject": f"distance: {name}", "asked": count, "wrong": wrong, "ulps": max(ulps),
                      "beside": count, "others": _others(mesh, points, squares)})  # fmt: skip
     return rows
+
+
+def _is_closed(mesh: Mesh, points: Floats, distance: Floats) -> NDArray[np.bool_]:
+    """Whether each point finds the surface within its own distance, and nothing within less."""
+    octree = Octree.from_mesh(mesh)
+    within = octree.closest_point(points, max_distance=distance).distance
+    less = octree.closest_point(points, max_distance=np.nextafter(distance, 0.0)).found
+    return (within == distance) & ~(less & (distance > 0.0))
 
 
 def _least(mesh: Mesh, point: Floats) -> tuple[Any, int]:

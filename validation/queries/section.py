@@ -34,7 +34,11 @@ def steps(job: Job) -> int:
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask all questions; returns a record for JSON, and for each row a gate that no answer of ours is wrong."""
-    effort = QUICK if job.quick else FULL
+    return judge(QUICK if job.quick else FULL, job)
+
+
+def judge(effort: QueryEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """``run`` with so much effort."""
     rows = [
         *check_inside(effort.random, effort.nasty, effort.beside, job),
         *check_distances(effort.distances, job),

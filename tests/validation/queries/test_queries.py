@@ -61,8 +61,8 @@ def test_wrong_answers_to_inside_are_counted(monkeypatch, change):
 def test_wrong_distances_are_counted(monkeypatch, name):
     closest_point = Octree.closest_point
 
-    def changed(*arguments):
-        found = closest_point(*arguments)
+    def changed(*arguments, **options):
+        found = closest_point(*arguments, **options)
         found.distance *= 1.0 + 2.0**-51 * (name == "distance")
         found.face += name == "face"
         return found
