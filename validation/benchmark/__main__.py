@@ -18,7 +18,7 @@ from renderer.process.interrupt import interruptible
 from renderer.process.terminal import one_line
 from validation.output import add_output, check_output
 
-# Rays of a family, in full and in quick runs.
+# Rays or points of a family, in full and in quick runs.
 RAYS, QUICK_RAYS = 1_000_000, 200_000
 
 
@@ -86,14 +86,17 @@ def measure(
     names = {system.name for system in systems}
     series: list[str] = []
     rows: dict[str, list[Any]] = {"queries": [], "builds": [], "memory": []}
+    open_edges: dict[str, int] = {}
     for mesh, generated in meshes.chosen(quick, huge, paths):
         series += [mesh.name] if generated else []
         _measure_mesh(mesh, systems, QUICK_RAYS if quick else RAYS, rows, step)
+        open_edges |= {mesh.name: len(mesh.open_edges)} if len(mesh.open_edges) else {}
     llvm = "mitsuba_llvm" in names
     found: dict[str, Any] = {
         "schema": record.SCHEMA, "command": command, "date": date.isoformat(timespec="seconds"),
         "commit": record.commit(), "quick": quick, "environment": record.describe(_libllvm(llvm), load),
-        "systems": record.described(systems), "missing": missing, "series": series, **rows,
+        "systems": record.described(systems), "missing": missing, "series": series,
+        "open_edges": open_edges, **rows,
         "fits": fits(rows["queries"], series),
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),

@@ -3,10 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from validation.report.plots import Panel, Series, draw
+from validation.report.plots import PLAIN, Panel, Series, draw
 
-# The grey, dotted look, because a front is not a contender.
-_FRONT = 8
 # Roundoff of float32, in which pictures are stored: a smaller error is meaningless beside errors of a percent.
 _ROUNDOFF = 2.0**-24
 _QUANTITIES = {"rmse": "RMSE, linear", "flip": "FLIP", "dissimilarity": "1 - SSIM"}
@@ -49,7 +47,7 @@ def _contenders(
     """A marker for each contender, and the front as a line through its markers."""
     speeds = {p["name"]: p["mrays"] for p in points}
     series = [Series(p["label"], [p["mrays"]], [errors[p["name"]]], look) for look, p in enumerate(points)]
-    return [*series, Series("Pareto front", [speeds[n] for n in names], [errors[n] for n in names], _FRONT)]
+    return [*series, Series("Pareto front", [speeds[n] for n in names], [errors[n] for n in names], PLAIN)]
 
 
 def _samples_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
@@ -62,7 +60,7 @@ def _samples_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
             _curve(f"{c['who']}, RMSE ~ N^{c['slope_value']['rmse']:.2f}", c, quantity, look)
             for look, c in enumerate(curves)
         ]
-        front = Series("Pareto front", [p["seconds"] for p in best], [p[quantity] for p in best], _FRONT)
+        front = Series("Pareto front", [p["seconds"] for p in best], [p[quantity] for p in best], PLAIN)
         panels.append(Panel([*series, front], label))
     size = pictures["size"]
     fitted = "; ".join(f"{c['who']} {c['slope_seconds']['rmse']:.2f}" for c in curves)

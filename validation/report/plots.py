@@ -22,8 +22,10 @@ FLOOR = 1e-17
 _LOOKS = (
     ("#2f86c9", "o", "-"), ("#dd6b20", "s", "-"), ("#169b74", "^", "--"), ("#b86fa0", "D", "-."),
     ("#3fa7b5", "v", ":"), ("#b59a1b", "P", "--"), ("#8c6bd1", "X", "-."), ("#c2554d", "h", "--"),
-    ("#808790", "", ":"),
+    ("#5f9a3c", "<", ":"), ("#808790", "", ":"),
 )  # fmt: skip
+# The last of them, grey, dotted and without markers, for what is no measurement.
+PLAIN = -1
 _GREY = "#808790"
 # Text takes the page's own colour: it is drawn in this unique one, which is then replaced.
 _INK = "#010203"

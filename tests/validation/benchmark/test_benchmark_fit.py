@@ -72,8 +72,18 @@ def test_targets_take_the_worst_of_the_meshes_that_count() -> None:
     def rows(name: str, faces: int, embree: float) -> dict[str, Any]:
         return {"mesh": name, "faces": faces, "family": "camera", "query": "closest", "ratios": {"embree": embree}}
 
+    def of_points(name: str, faces: int, **ratios: float) -> dict[str, Any]:
+        return {"mesh": name, "faces": faces, "family": "near", "query": "nearest", "ratios": ratios}
+
     record = {
-        "queries": [rows("small", 1_000, 0.1), rows("middle", 100_000, 3.0), rows("large", 1_000_000, 2.5)],
+        "queries": [
+            rows("small", 1_000, 0.1),
+            rows("middle", 100_000, 3.0),
+            rows("large", 1_000_000, 2.5),
+            of_points("small", 1_000, open3d=0.5),
+            of_points("middle", 100_000, open3d=1.5, libigl=2.5),
+            of_points("large", 5_000_000, open3d=2.5, libigl=7.0),
+        ],
         "builds": [
             {"mesh": "middle", "faces": 100_000, "ratios": {"open3d": 4.0}},
             {"mesh": "large", "faces": 1_000_000, "ratios": {"open3d": 1.25}},
@@ -90,6 +100,15 @@ def test_targets_take_the_worst_of_the_meshes_that_count() -> None:
     camera = found["camera rays, closest hit, against embree"]
     assert (camera["measured"], camera["where"], camera["met"], camera["aimed"]) == (2.5, "large", True, False)
     assert found["camera rays, closest hit, against open3d"]["met"] is None
+    near = found["near points, closest point, against open3d"]
+    assert (near["measured"], near["where"], near["met"], near["aimed"]) == (1.5, "middle", True, False)
+    assert found["near points, closest point, against libigl"]["met"] is False
+    asked = {("random rays, all hits", "open3d"): 1.5, ("random rays, all hits", "trimesh_embreex"): 5.0,
+             ("wide points, inside", "open3d"): 2.0, ("wide points, inside", "trimesh_embreex"): 10.0,
+             ("box points, closest point", "open3d"): 1.0, ("box points, closest point", "libigl"): 3.0}  # fmt: skip
+    for (what, peer), least in asked.items():
+        target = found[f"{what}, against {peer}"]
+        assert (target["at_least"], target["aim"], target["met"]) == (least, 2 * least, None)
     build = found["build, of Embree's time (Open3D's first query)"]
     assert (build["measured"], build["where"]) == (0.8, "large")
     assert found["memory at rest, of Embree's (Open3D)"]["measured"] == 0.75

@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from renderer.mesh.load import save_ply
+from renderer.mesh.mesh import Mesh
+from validation import timing
 from validation.benchmark import __main__ as command
 from validation.benchmark.measures import ablation, first_answers, frames, memory, meshes, processes
 from validation.benchmark.page import page, record
@@ -44,10 +46,12 @@ def _ablation(*_: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run on three tiny meshes and one by path; what takes long is replaced by records of the same form."""
+    """A run on three tiny meshes and an open one by path; what takes long is replaced by records of the same form."""
     folder = tmp_path_factory.mktemp("benchmark")
-    save_ply(meshes.displaced_spheres(500), folder / "own.ply")
+    spheres = meshes.displaced_spheres(500)
+    save_ply(Mesh(spheres.vertices, spheres.faces[1:]), folder / "own.ply")
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(timing, "REST", 0.0)
         patch.setattr(meshes, "QUICK", (100, 400, 1_000))
         patch.setattr(command, "QUICK_RAYS", 300)
         patch.setattr(frames, "measure", _frames)
@@ -69,7 +73,10 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
     assert found["missing"]["nobody"] == "pip install nobody"
     assert found["environment"]["packages"]["numba"] and found["environment"]["threads"] >= 1
     assert len(found["series"]) == 3 and "own" not in found["series"]
-    assert len(found["queries"]) == 4 * 4 * 2
+    asked = [(row["mesh"], row["query"]) for row in found["queries"]]
+    # Four families of rays for two queries, one for two more; one of points for one query, two for two more.
+    assert len(asked) == 4 * (4 * 2 + 2 + 1 + 2 * 2) - 3 and found["open_edges"] == {"own": 3}
+    assert ("own", "nearest") in asked and not {("own", "contains"), ("own", "signed")} & set(asked)
     for row in found["queries"]:
         ours = row["contenders"][OURS]
         assert row["agree"] and len(ours["seconds"]) == 5 and min(ours["seconds"]) <= ours["median"]
@@ -89,7 +96,12 @@ def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: py
     text = (folder / "benchmark.html").read_text()
     assert "12.34" in text and "A &lt;made-up&gt; processor" in text and "pip install nobody" in text
     # Memory is not drawn for meshes as small as these.
-    assert text.count("<svg") == 8 + 1
+    assert text.count("<svg") == 8 + 7 + 1
+    assert "own has 3 open edges" in text and "2<sup>−20</sup>" in text
+    first, second = text.split("<h2>All hits and points</h2>")
+    assert "libigl<br>" in second and "libigl<br>" not in first
+    for said in ("all hits", "number of hits", "inside", "closest point", "signed distance"):
+        assert f'<td class="name">{said}</td>' in second and f'<td class="name">{said}</td>' not in first
     assert "0.9987654" in text and "First answers" in text and "--level x86-64-v3" in text
     assert "12.34" in capsys.readouterr().out
     for outside in ("http://", "https://", "<script", "<link"):
@@ -102,14 +114,21 @@ def test_the_terminal_shows_ratios_and_what_is_missing(folder: Path) -> None:
     assert any("target import renderer: 0.25 s (below 0.5) met" in line for line in lines)
     assert any("target first hit: 4.00 CPU s (below 8) met" in line for line in lines)
     assert any("target first picture: - not measured" in line for line in lines)
+    assert "own: 3 open edges, so nothing is inside: not asked for contains and signed" in lines
+    heads = [line.split() for line in lines if line.startswith("mesh ")]
+    assert "mitsuba_scalar" in heads[0] and "libigl" not in heads[0]
+    assert "mitsuba_scalar" not in heads[1] and "libigl" in heads[1]
+    assert any(line.split()[1:3] == ["near", "signed"] for line in lines)
     assert "not measured: nobody; pip install nobody" in lines
 
 
 def test_a_disagreement_is_shown(folder: Path) -> None:
     stored = record.read(folder / "benchmark.json")
-    assert "contenders disagree on hits" not in page.ratios(stored)
-    stored["queries"][3]["agree"] = False
-    assert "contenders disagree on hits" in page.ratios(stored)
+    assert "contenders disagree" not in page.ratios(stored)
+    for row in (3, next(i for i, r in enumerate(stored["queries"]) if r["query"] == "contains")):
+        stored["queries"][row]["agree"] = False
+        assert "contenders disagree" in page.ratios(stored)
+        stored["queries"][row]["agree"] = True
 
 
 def test_a_record_goes_through_json_unchanged(folder: Path, tmp_path: Path) -> None:
@@ -122,7 +141,7 @@ def test_other_records_are_refused(folder: Path, tmp_path: Path) -> None:
     stored = record.read(folder / "benchmark.json")
     path = tmp_path / "benchmark.json"
     path.write_text(json.dumps(stored | {"schema": 99}))
-    with pytest.raises(ValueError, match="schema 2, got 99"):
+    with pytest.raises(ValueError, match="schema 3, got 99"):
         record.read(path)
     path.write_text(json.dumps({k: v for k, v in stored.items() if k != "fits"}))
     with pytest.raises(ValueError, match="expected the keys"):

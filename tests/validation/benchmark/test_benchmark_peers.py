@@ -1,18 +1,25 @@
-"""Every contender answers like ours on a small mesh; families hit something; what is not installed is named."""
+"""Every contender answers like ours on a small mesh; families hit something; what is not installed is named.
+
+Which answers count as differing is tested in ``test_benchmark_kinds``.
+"""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box
 from renderer.octree import Octree
+from validation import timing
 from validation.benchmark.measures import queries
-from validation.benchmark.measures.families import cosine_distributed, families
+from validation.benchmark.measures.families import cosine_distributed, families, points
+from validation.benchmark.measures.kinds import KINDS
 from validation.benchmark.measures.meshes import displaced_spheres
 from validation.benchmark.peers import systems
-from validation.benchmark.peers.contender import Family, System
+from validation.benchmark.peers.contender import Family, HitLists, Points, System
 from validation.benchmark.peers.ours import OURS, OURS_ONE
 
 
@@ -47,6 +54,7 @@ def test_a_contender_agrees_with_ours(name: str, mesh: Mesh, octree: Octree, ray
     for family in rays:
         ours = octree.closest_hit(family.origins, family.directions, t_max=family.t_max)
         query = peer.closest(family)
+        assert query is not None
         t = query.read(query.trace())
         assert np.array_equal(np.isfinite(t), ours.hit), family.name
         # Embree's float32 error of a point is some 2^-24 of the coordinates, 2 here, and t is a share of the ray; the
@@ -58,6 +66,75 @@ def test_a_contender_agrees_with_ours(name: str, mesh: Mesh, octree: Octree, ray
         else:
             expected = octree.any_hit(family.origins, family.directions, t_max=family.t_max)
             assert np.array_equal(asked.read(asked.trace()), expected), family.name
+
+
+_MORE = {
+    OURS_ONE: {"all", "count", "contains", "nearest", "signed"},
+    "open3d": {"all", "count", "contains", "nearest", "signed"},
+    "trimesh_embreex": {"all", "contains"},
+    "libigl": {"contains", "nearest", "signed"},
+    "trimesh": {"nearest"},
+    "embree": set[str](),
+}
+
+
+@pytest.mark.parametrize("name", _MORE)
+def test_a_contender_agrees_with_ours_on_all_hits_and_points(
+    name: str, mesh: Mesh, octree: Octree, rays: tuple[Family, ...]
+) -> None:
+    ours, peer = (_system(n).loaded(mesh.vertices, mesh.faces) for n in (OURS, name))
+    found = set()
+    for kind in KINDS.values():
+        for asked in (*rays, *points(mesh, 600)):
+            query = kind.ask(peer, asked) if asked.name in kind.families else None
+            if query is not None and kind.name not in ("closest", "any"):
+                expected = kind.ask(ours, asked)
+                assert expected is not None
+                known, answer = expected.read(expected.trace()), query.read(query.trace())
+                assert len(kind.hit(answer)) == 600 and kind.hit(known).sum() > 100
+                assert not kind.differing(octree, asked, known, answer).any(), (kind.name, asked.name)
+                found.add(kind.name)
+    assert found == _MORE[name]
+
+
+@pytest.mark.parametrize("name", [OURS, "open3d", "trimesh_embreex", "trimesh", "libigl"])
+def test_a_contender_answers_for_a_box_as_geometry_says(name: str) -> None:
+    mesh = box()
+    peer = _system(name).loaded(mesh.vertices, mesh.faces)
+    o, d = np.array([[0.25, 0.5, 2.0], [0.25, 0.5, 0.5], [3.0, 3.0, 3.0]]), np.array([[0.0, 0.0, -2.0]] * 3)
+    lists, count = peer.all(Family("some", o, d)), peer.count(Family("some", o, d))
+    if lists is not None:
+        hits = lists.read(lists.trace())
+        assert isinstance(hits, HitLists) and hits.counts.tolist() == [2, 1, 0]
+        assert hits.t == pytest.approx([0.5, 1.0, 0.25], abs=1e-6)
+        assert set(mesh.vertices[mesh.faces[hits.face]][:, :, 2].mean(axis=1)) == {0.0, 1.0}
+    assert count is None or count.read(count.trace()).tolist() == [2, 1, 0]
+    at = Points("some", np.array([[0.25, 0.5, 0.625], [0.25, 0.5, 3.0], [-3.0, 0.5, 5.0]]))
+    for query, expected in ((peer.contains(at), [True, False, False]), (peer.nearest(at), [0.25, 2.0, 5.0]),
+                            (peer.signed(at), [-0.25, 2.0, 5.0])):  # fmt: skip
+        assert query is None or query.read(query.trace()).tolist() == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["open3d", "trimesh_embreex"])
+def test_all_hits_of_rays_with_an_end_are_not_asked_where_there_is_no_argument_for_it(name: str, mesh: Mesh) -> None:
+    peer = _system(name).loaded(mesh.vertices, mesh.faces)
+    ended = Family("one", np.zeros((1, 3)), np.ones((1, 3)), 1.0)
+    assert peer.all(ended) is None and peer.count(ended) is None
+
+
+def test_a_ray_with_an_end_has_fewer_hits_of_ours() -> None:
+    peer = _system(OURS).loaded(box().vertices, box().faces)
+    ended = Family("one", np.array([[0.25, 0.5, 2.0]]), np.array([[0.0, 0.0, -2.0]]), 0.75)
+    lists, count = peer.all(ended), peer.count(ended)
+    assert lists is not None and count is not None
+    assert lists.read(lists.trace()).t.tolist() == [0.5] and count.read(count.trace()).tolist() == [1]
+
+
+def test_lists_of_hits_are_sorted_by_ray_then_t_then_face() -> None:
+    ray, t, face = np.array([2, 0, 2, 2, 0]), np.array([3.0, 1.0, 0.5, 3.0, 0.25]), np.array([7, 1, 2, 6, 0])
+    hits = HitLists.sorted(4, ray, t, face)
+    assert hits.counts.tolist() == [2, 0, 3, 0]
+    assert hits.t.tolist() == [0.25, 1.0, 0.5, 3.0, 3.0] and hits.face.tolist() == [0, 1, 2, 6, 7]
 
 
 @pytest.mark.parametrize("name", [OURS, "embree", "open3d", "mitsuba_scalar", "mitsuba_llvm"])
@@ -85,6 +162,22 @@ def test_every_family_hits_and_shadow_rays_end_at_one_light(octree: Octree, rays
     assert shadow.t_max == 1.0
 
 
+def test_points_are_where_their_names_say(mesh: Mesh, octree: Octree) -> None:
+    wide, inner, near = points(mesh, 3_000)
+    lower, upper = mesh.bounds
+    assert [p.name for p in (wide, inner, near)] == ["wide", "box", "near"]
+    for family in (wide, inner, near):
+        assert family.points.shape == (3_000, 3)
+        assert np.array_equal(family.points, family.points.astype(np.float32))
+        assert 0.05 < octree.contains(family.points).mean() < 0.95, family.name
+    reach = np.abs(wide.points - (lower + upper) / 2).max(axis=0) / (upper - lower) * 2
+    # The largest of 3,000 uniform numbers is 1/3,000 below the end in the mean, and 0.3 % below it once in e^9.
+    assert (reach < 1.2000001).all() and (reach > 1.19).all()
+    assert (inner.points >= lower - 1e-6).all() and (inner.points <= upper + 1e-6).all()
+    share = octree.closest_point(near.points).distance / np.linalg.norm(upper - lower)
+    assert 0.009 < share.max() < 0.0100001 and np.quantile(share, 0.5) > 0.003
+
+
 def test_bounce_rays_follow_the_cosine() -> None:
     normals = np.tile([0.0, 0.0, 1.0], (20_000, 1))
     d = cosine_distributed(normals, np.random.default_rng(0))
@@ -101,6 +194,8 @@ def test_fewer_rays_are_spread_over_the_family() -> None:
     assert few.origins[:, 0].tolist() == [0.0, 9.0, 18.0, 27.0]
     assert few.t_max == 1.0
     assert family.at_most(10) is family
+    at = Points("p", np.arange(30.0).reshape(10, 3))
+    assert at.at_most(4).points[:, 0].tolist() == [0.0, 9.0, 18.0, 27.0] and at.at_most(10) is at
 
 
 def test_the_meshes_have_the_size_that_was_asked_for_and_their_hills_do_not_depend_on_it() -> None:
@@ -111,11 +206,13 @@ def test_the_meshes_have_the_size_that_was_asked_for_and_their_hills_do_not_depe
     centres = 1.05 * np.sign(small.triangles.mean(axis=1))
     outward = np.einsum("ij,ij->i", small.face_normals(), small.triangles.mean(axis=1) - centres)
     assert (outward > 0).all()
+    assert not len(small.open_edges) and not len(large.open_edges)
 
 
 def test_measured_rows_say_who_hit_what(mesh: Mesh) -> None:
     chosen = [_system(name) for name in (OURS, OURS_ONE, "embree", "mitsuba_scalar")]
-    rows = queries.measure(mesh, chosen, 30_000, lambda _: None)
+    kinds = [KINDS["closest"], KINDS["any"]]
+    rows = queries.measure(mesh, chosen, 30_000, lambda _: None, kinds)
     assert [(r["family"], r["query"]) for r in rows] == [
         (f, q) for f in ("camera", "shadow", "random", "bounce") for q in ("closest", "any")
     ]
@@ -127,13 +224,59 @@ def test_measured_rows_say_who_hit_what(mesh: Mesh) -> None:
         assert row["contenders"][OURS]["hits"] == pytest.approx(row["hit_share"] * 30_000)
 
 
-def test_a_contender_that_sees_another_scene_is_found(mesh: Mesh) -> None:
-    def elsewhere(vertices: Any, faces: Any) -> Callable[[], Any]:
-        return _system("embree").load(vertices + 0.1, faces)
+def test_measured_rows_of_all_hits_and_points(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "REST", 0.0)
+    kinds = [KINDS[name] for name in ("all", "count", "contains", "nearest", "signed")]
+    chosen = [_system(name) for name in (OURS, OURS_ONE, "trimesh_embreex", "libigl")]
+    few = [replace(chosen[-1], most_rays=150)]
+    rows = queries.measure(mesh, chosen[:-1] + few, 4_000, lambda _: None, kinds)
+    assert [(r["family"], r["query"], r["rays"], set(r["ratios"])) for r in rows] == [
+        ("random", "all", 4_000, {OURS_ONE, "trimesh_embreex"}),
+        ("random", "count", 4_000, {OURS_ONE}),
+        ("wide", "contains", 4_000, {OURS_ONE, "trimesh_embreex", "libigl"}),
+        ("box", "nearest", 400, {OURS_ONE, "libigl"}),
+        ("box", "signed", 400, {OURS_ONE, "libigl"}),
+        ("near", "nearest", 400, {OURS_ONE, "libigl"}),
+        ("near", "signed", 400, {OURS_ONE, "libigl"}),
+    ]
+    octree = Octree.from_mesh(mesh)
+    wide = points(mesh, 4_000)[0].points
+    assert rows[2]["contenders"][OURS]["hits"] == octree.contains(wide).sum() == round(rows[2]["hit_share"] * 4_000)
+    for row in rows:
+        assert row["agree"] and row["contenders"][OURS]["differing"] == 0
+        igl = row["contenders"].get("libigl")
+        assert igl is None or (igl["rays"] == 150 and igl["ns"] == pytest.approx(1e9 * igl["median"] / 150))
+        assert row["query"] != "nearest" or row["hit_share"] == 1.0
 
+
+@pytest.mark.parametrize("name", ["embree", "trimesh_embreex", "libigl", "trimesh", "open3d"])
+def test_a_contender_that_sees_another_scene_is_found(name: str, mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    def elsewhere(vertices: Any, faces: Any) -> Callable[[], Any]:
+        return _system(name).load(vertices + 0.1, faces)
+
+    monkeypatch.setattr(timing, "REST", 0.0)
     wrong = System("wrong", "wrong", 1, "float32", elsewhere)
-    rows = queries.measure(mesh, [_system(OURS), wrong], 500, lambda _: None)
-    assert not any(row["agree"] for row in rows)
+    rows = [r for r in queries.measure(mesh, [_system(OURS), wrong], 500, lambda _: None) if "wrong" in r["contenders"]]
+    assert rows and not any(row["agree"] for row in rows)
+
+
+def test_a_mesh_that_is_open_is_not_asked_what_is_inside(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "REST", 0.0)
+    opened = Mesh(mesh.vertices, mesh.faces[1:])
+    rows = queries.measure(opened, [_system(OURS)], 300, lambda _: None)
+    assert {row["query"] for row in rows} == set(KINDS) - {"contains", "signed"}
+
+
+def test_the_queries_of_one_mesh_alone(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "REST", 0.0)
+    monkeypatch.setattr(queries, "available", lambda: ([_system(OURS), _system("libigl")], {"nobody": "find them"}))
+    assert queries.main(["1000", "--rays", "300", "--only", "contains"]) == 0
+    first, ours, theirs, missing = capsys.readouterr().out.splitlines()
+    assert first == "spheres_1k: wide points, inside, all agree" and ours.split()[0] == OURS
+    assert theirs.split()[0] == "libigl" and "0 of 300 differ" in theirs and "times as fast" in theirs
+    assert missing == "not measured: nobody; find them"
+    with pytest.raises(SystemExit):
+        queries.main(["1000", "--rays", "0"])
 
 
 def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,5 +286,5 @@ def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(systems, "import_module", absent)
     found, missing = systems.available()
     assert [system.name for system in found] == [OURS, OURS_ONE]
-    assert set(missing) == {"embree", "open3d", "trimesh", "mitsuba", "mitsuba_llvm"}
+    assert set(missing) == set(systems._PEERS) | {"mitsuba_llvm"}
     assert "pip install open3d" in missing["open3d"] and "libllvm19" in missing["mitsuba_llvm"]

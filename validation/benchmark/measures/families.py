@@ -1,15 +1,20 @@
-"""The benchmark's ray families, seeded and exact in float32: camera, shadow, random and bounce."""
+"""The benchmark's rays (camera, shadow, random, bounce) and points (wide, box, near), seeded and exact in float32."""
 
 import numpy as np
 
+from renderer.mesh.mesh import Mesh, face_normals
 from renderer.octree import Octree
-from validation.benchmark.peers.contender import Family, Floats
+from validation.benchmark.peers.contender import Family, Floats, Points
 from validation.hits.rays import camera_rays, float32_exact, random_rays
 
 _SEED = 11
 # Spawned rays start at this share of the mesh's size off their surface: a thousand times float32's rounding, so that
 # all contenders agree, and less than a tenth of an edge at 10 million faces.
 _OFFSET = 5e-5
+# Wide points fill a box of this many times the mesh's size, so that some are outside of the mesh's own.
+_WIDE = 1.2
+# Near points are within this share of the mesh's size from its surface.
+_NEAR = 0.01
 
 
 def families(octree: Octree, count: int) -> tuple[Family, ...]:
@@ -36,6 +41,19 @@ def families(octree: Octree, count: int) -> tuple[Family, ...]:
         Family("random", through.origins, through.directions),
         Family("bounce", origins, float32_exact(cosine_distributed(normals, rng))),
     )
+
+
+def points(mesh: Mesh, count: int) -> tuple[Points, ...]:
+    """``count`` points of each family: uniform in a wide box and in the mesh's own, and beside points of its faces."""
+    rng = np.random.default_rng(_SEED)
+    lower, upper = mesh.bounds
+    centre, half = (lower + upper) / 2, (upper - lower) / 2
+    wide = centre + _WIDE * half * rng.uniform(-1.0, 1.0, (count, 3))
+    box = rng.uniform(lower, upper, (count, 3))
+    corners = mesh.vertices[mesh.faces[rng.integers(0, len(mesh.faces), count)]]
+    away = rng.uniform(-1.0, 1.0, (count, 1)) * _NEAR * np.linalg.norm(upper - lower) * face_normals(corners)
+    near = np.einsum("nk,nkj->nj", rng.dirichlet(np.ones(3), count), corners) + away
+    return Points("wide", float32_exact(wide)), Points("box", float32_exact(box)), Points("near", float32_exact(near))
 
 
 def cosine_distributed(normals: Floats, rng: np.random.Generator) -> Floats:

@@ -179,13 +179,13 @@ def _calls(installed: set[str]) -> dict[str, list[float]]:
              if s.name in ({ours.OURS, "embree", "open3d"} & {ours.OURS, *installed})}  # fmt: skip
     for count in (1, 10, 100):
         rays = Family("few", np.tile([0.1, 0.2, 3.0], (count, 1)), np.tile([0.0, 0.0, -1.0], (count, 1)))
-        queries = {name: peer.closest(rays).trace for name, peer in peers.items()}
+        queries = {name: query for name, peer in peers.items() if (query := peer.closest(rays)) is not None}
         for _ in range(_RUNS):
             for name, query in queries.items():
-                query()
+                query.trace()
                 began = time.perf_counter()
                 for _ in range(_CALLS):
-                    query()
+                    query.trace()
                 micros = 1e6 * (time.perf_counter() - began) / _CALLS
                 found.setdefault(f"call_of_{count}_{name}_us", []).append(micros)
     return found

@@ -4,18 +4,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from validation.benchmark.measures.fit import Fit
+from validation.benchmark.measures.kinds import title as title_of
 from validation.benchmark.peers.ours import OURS
-from validation.report.plots import Panel, Series, draw
+from validation.report.plots import PLAIN, Panel, Series, draw
 
 Record = Mapping[str, Any]
-# The look of ``validation.report.plots`` without markers; seven contenders come before it.
-_FIT_LOOK = 7
 # The memory of smaller meshes is a few pages of 4 kB, or none where the allocator had free ones.
 _FEWEST_FACES = 5_000
 
 
 def query_figures(record: Record) -> list[dict[str, str]]:
-    """For each family and kind: rays a second, and nanoseconds a ray with the fit through ours."""
+    """For each family and kind: rays or points a second, and nanoseconds for one with the fit through ours."""
     keys = dict.fromkeys((r["family"], r["query"]) for r in record["queries"])
     return [figure for key in keys if (figure := _query_figure(record, *key)) is not None]
 
@@ -30,12 +29,12 @@ def _query_figure(record: Record, family: str, kind: str) -> dict[str, str] | No
     if fit is not None:
         x = [r["faces"] for r in rows]
         curve = Fit(fit["a"], fit["b"], fit["residual"])
-        ns.append(Series("fit to ours", x, [curve.at(n) for n in x], _FIT_LOOK))
+        ns.append(Series("fit to ours", x, [curve.at(n) for n in x], PLAIN))
         said = f" Ours: {curve.a:.1f} log2 N {curve.b:+.0f} ns, residual {curve.residual:.1f} ns."
-    panels = [Panel(_curves(record, rows, lambda c: c["mrays"], slow=True), "million rays a second"),
-              Panel(ns, "ns a ray", linear=True)]  # fmt: skip
-    name = f"{family} rays, {kind} hit"
-    title = f"{name}: million rays a second, and below nanoseconds a ray of the fast ones, against faces.{said}"
+    panels = [Panel(_curves(record, rows, lambda c: c["mrays"], slow=True), "million a second"),
+              Panel(ns, "ns for one", linear=True)]  # fmt: skip
+    name = title_of(family, kind)
+    title = f"{name}: million a second, and below nanoseconds for one by the fast contenders, against faces.{said}"
     return {"title": title, "svg": draw(panels, x_label="faces", title=name)}
 
 

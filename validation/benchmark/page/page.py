@@ -6,6 +6,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from validation.benchmark.measures.kinds import DIGITS, KINDS, title
 from validation.benchmark.page import figures, pareto
 from validation.benchmark.peers.ours import OURS
 from validation.report.page import number
@@ -13,6 +14,8 @@ from validation.report.page import number
 # Other processes on half a processor slow a two-thread contender by a quarter, more than most ratios here differ from
 # 1.
 BUSY = 0.5
+# The kinds of queries that each ray system answers; the others have a table of their own.
+_FIRST = ("closest", "any")
 _TEMPLATES = Path(__file__).resolve().parents[2] / "report" / "templates"
 
 
@@ -27,7 +30,9 @@ def html(record: Mapping[str, Any]) -> str:
         "build_figures": figures.build_figures(record),
         "parameter_figures": pareto.figures(record["knobs"]) if record["knobs"] else [],
     }
-    return environment.get_template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **plots)
+    shown: dict[str, Any] = dict(zip(("rays", "others"), _tables(record), strict=True))
+    shown |= {"said": {name: kind.said for name, kind in KINDS.items()}, "digits": DIGITS}
+    return environment.get_template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **shown, **plots)
 
 
 def ratios(record: Mapping[str, Any]) -> str:
@@ -35,16 +40,29 @@ def ratios(record: Mapping[str, Any]) -> str:
     return "\n".join(_lines(record))
 
 
+def _tables(record: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The rows of closest and any hits, and all others; each with the contenders that answer some of them."""
+    tables = []
+    for first in (True, False):
+        rows = [r for r in record["queries"] if (r["query"] in _FIRST) == first]
+        answered = {name for r in rows for name in r["contenders"]}
+        tables.append({"rows": rows, "systems": [name for name in record["systems"] if name in answered]})
+    return tables
+
+
 def _lines(record: Mapping[str, Any]) -> Iterator[str]:
-    peers = [name for name in record["systems"] if name != OURS]
     load = record["environment"]["load"]
     if load is not None and load > BUSY:
         yield f"the machine was busy with other things (load {load:.2f}): no fair run"
     yield "times as fast as the peer, ours with all threads (median of rounds)"
-    yield _row("mesh", "rays", "query", *peers)
-    for r in record["queries"]:
-        flag = "" if r["agree"] else "  contenders disagree on hits"
-        yield _row(r["mesh"], r["family"], r["query"], *(_times(r["ratios"].get(p)) for p in peers)) + flag
+    for table in _tables(record):
+        peers = [name for name in table["systems"] if name != OURS]
+        yield _row("mesh", "asked by", "query", *peers)
+        for r in table["rows"]:
+            flag = "" if r["agree"] else "  contenders disagree"
+            yield _row(r["mesh"], r["family"], r["query"], *(_times(r["ratios"].get(p)) for p in peers)) + flag
+    for name, count in record["open_edges"].items():
+        yield f"{name}: {count} open edges, so nothing is inside: not asked for contains and signed"
     for r in record["builds"]:
         found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in r["ratios"].items())
         yield f"build of {r['mesh']}, peer's seconds over ours: {found}"
@@ -53,7 +71,7 @@ def _lines(record: Mapping[str, Any]) -> Iterator[str]:
     yield f"frame {frame['size']} x {frame['size']}, peer's seconds over ours: {found}"
     for fit in record["fits"]:
         if fit["contender"] == OURS:
-            yield (f"{fit['family']} {fit['query']}: {fit['a']:.2f} log2 N {fit['b']:+.1f} ns a ray, "
+            yield (f"{title(fit['family'], fit['query'])}: {fit['a']:.2f} log2 N {fit['b']:+.1f} ns, "
                    f"residual {fit['residual']:.2f} ns")  # fmt: skip
     for t in record["targets"]:
         verdict = {None: "not measured", True: "met", False: "NOT met"}[t["met"]]

@@ -7,11 +7,14 @@ environment       processor, processors, threads, python, platform, packages (ve
 systems           by name: label, threads, precision, most_rays (null: no limit)
 missing           by name: how to install a peer that is absent
 series            names of the generated meshes, which differ in size only
+open_edges        by mesh that is not closed: how many. Nothing is inside, so it has no rows of contains and signed
 queries[]         one a mesh, family and kind of query
-  mesh, faces, family, query     family: camera, shadow, random, bounce; query: closest, any
-  rays, hit_share, agree         agree: some rays hit, and all contenders hit the same ones except at silhouettes
-  contenders        by name: rays, hits, differing (hit flags unlike ours), seconds (all runs), median, mrays, ns
-  ratios            by peer: the median over the rounds of its time a ray over ours
+  mesh, faces, family, query     family: camera, shadow, random, bounce; of points: wide, box, near
+                                 query: closest, any, all, count; of points: contains, nearest, signed
+  rays, hit_share, agree         rays or points; those that hit, are inside or are found; agree: some do, and but for
+                                 one in a thousand no contender differs from ours by more than rounding
+  contenders        by name: rays, hits, differing (see ``kinds``), seconds (all runs), median, mrays, ns
+  ratios            by peer: the median over the rounds of its time a ray or point over ours
 fits[]            family, query, contender, and a, b, residual of ns = a log2 N + b
 builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint
 memory[]          mesh, faces, systems: rest, peak (bytes by which a process grows), own (our own count or null)
@@ -35,10 +38,11 @@ from renderer.process.files import write_atomically
 from validation import environment
 from validation.benchmark.peers.contender import System
 
-SCHEMA = 2
+SCHEMA = 3
 KEYS = (
-    "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series", "queries",
-    "fits", "builds", "memory", "frames", "processes", "first_answers", "ablation", "knobs", "targets",
+    "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series",
+    "open_edges", "queries", "fits", "builds", "memory", "frames", "processes", "first_answers", "ablation", "knobs",
+    "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 

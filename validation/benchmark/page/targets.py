@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from validation.benchmark.measures import frames, processes
+from validation.benchmark.measures.kinds import title
 from validation.benchmark.peers.ours import OURS
 
 # Sizes of the meshes on which rays and builds are judged: smaller ones fit into the caches and time the loop around
@@ -39,30 +40,42 @@ class Target:
         return asdict(self) | {"met": self.reaches(self.at_least), "aimed": self.reaches(self.aim)}
 
 
-# Rays a second as a ratio to a peer on the same rays: at least, aim, and why.
+# Rays or points a second as a ratio to a peer on the same ones: family, query, peer, at least, aim, and why.
 _EXPERIMENT = "an experiment with these kernels reached the lower bound, in float64, against the peer's float32"
-_RAYS = (
-    ("camera", "embree", 2.2, 4.0, f"{_EXPERIMENT}; embreex has one thread only, ours all"),
-    ("camera", "open3d", 1.15, 2.0, f"{_EXPERIMENT}; both use all threads"),
-    ("camera", "mitsuba_llvm", 0.9, 1.5, "Mitsuba compiles the whole query: within a tenth of it is level"),
-    ("random", "embree", 2.5, 4.0, f"{_EXPERIMENT}, with the rays sorted; embreex has one thread only, ours all"),
-    ("random", "open3d", 1.2, 2.0, f"{_EXPERIMENT}, with the rays sorted; both use all threads"),
-    ("random", "mitsuba_llvm", 1.0, 1.5, "level with the fastest peer known"),
-)
+_ONCE = "the tree is searched once for all hits of a ray"
+_BOTH = "both use all threads, ours in float64, theirs in float32"
+_FOURS = "its tree has two boxes a node and one face a leaf, ours eight, and four faces at a time; both use all threads"
+_QUERIES = (
+    ("camera", "closest", "embree", 2.2, 4.0, f"{_EXPERIMENT}; embreex has one thread only, ours all"),
+    ("camera", "closest", "open3d", 1.15, 2.0, f"{_EXPERIMENT}; both use all threads"),
+    ("camera", "closest", "mitsuba_llvm", 0.9, 1.5, "Mitsuba compiles the whole query: within a tenth of it is level"),
+    ("random", "closest", "embree", 2.5, 4.0,
+     f"{_EXPERIMENT}, with the rays sorted; embreex has one thread only, ours all"),
+    ("random", "closest", "open3d", 1.2, 2.0, f"{_EXPERIMENT}, with the rays sorted; both use all threads"),
+    ("random", "closest", "mitsuba_llvm", 1.0, 1.5, "level with the fastest peer known"),
+    ("random", "all", "open3d", 1.5, 3.0, f"{_ONCE}, by Open3D once to count and once to list; {_BOTH}"),
+    ("random", "all", "trimesh_embreex", 5.0, 10.0, f"{_ONCE}, by trimesh anew behind each hit, on one thread"),
+    ("wide", "contains", "open3d", 2.0, 4.0, f"a half-line along an axis is less than a ray through the box; {_BOTH}"),
+    ("wide", "contains", "trimesh_embreex", 10.0, 20.0, "a half-line, not two rays with all their hits on one thread"),
+    ("box", "nearest", "open3d", 1.0, 2.0, f"no slower for being exact; {_BOTH}"),
+    ("box", "nearest", "libigl", 3.0, 6.0, _FOURS),
+    ("near", "nearest", "open3d", 1.0, 2.0, f"no slower for being exact; {_BOTH}"),
+    ("near", "nearest", "libigl", 3.0, 6.0, _FOURS),
+)  # fmt: skip
 
 
 def judged(record: Mapping[str, Any]) -> list[dict[str, Any]]:
     """All targets with their values in ``record``."""
     makers: tuple[Callable[[Mapping[str, Any]], Iterator[Target]], ...]
-    makers = (_rays, _builds, _memory, _frames, _processes, _first_answers)
+    makers = (_queries, _builds, _memory, _frames, _processes, _first_answers)
     return [target.record() for make in makers for target in make(record)]
 
 
-def _rays(record: Mapping[str, Any]) -> Iterator[Target]:
-    for family, peer, least, aim, reason in _RAYS:
-        of = [r for r in _counting(record["queries"]) if (r["family"], r["query"]) == (family, "closest")]
+def _queries(record: Mapping[str, Any]) -> Iterator[Target]:
+    for family, kind, peer, least, aim, reason in _QUERIES:
+        of = [r for r in _counting(record["queries"]) if (r["family"], r["query"]) == (family, kind)]
         worst, where = _worst([(r["ratios"][peer], r["mesh"]) for r in of if peer in r["ratios"]], min)
-        yield Target(f"{family} rays, closest hit, against {peer}", "times", "above", least, aim, worst, where, reason)
+        yield Target(f"{title(family, kind)}, against {peer}", "times", "above", least, aim, worst, where, reason)
 
 
 def _builds(record: Mapping[str, Any]) -> Iterator[Target]:

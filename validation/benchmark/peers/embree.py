@@ -11,13 +11,13 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
+from validation.benchmark.peers.contender import Faces, Family, Floats, Peer, Query, System
 
 # Where nothing is hit, Embree leaves the input value in t; the face distinguishes hits from misses.
 _NO_FACE = -1
 
 
-class EmbreePeer:
+class EmbreePeer(Peer):
     """A scene of one mesh, robust as ours is; its first query builds it."""
 
     def __init__(self, vertices: NDArray[np.float32], faces: Faces) -> None:

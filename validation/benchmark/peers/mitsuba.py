@@ -12,11 +12,11 @@ import mitsuba as mi
 import numpy as np
 
 from renderer.process.parallel import available_threads
-from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
+from validation.benchmark.peers.contender import Faces, Family, Floats, Peer, Query, System
 from validation.benchmark.peers.mitsuba_variant import LLVM, SCALAR, libllvm_path, using
 
 
-class ScalarPeer:
+class ScalarPeer(Peer):
     """One ``Ray3f`` for each ray, made beforehand; the Python loop over them is this variant's cost."""
 
     def __init__(self, scene: Any, ray: Any) -> None:
@@ -37,7 +37,7 @@ class ScalarPeer:
         self._scene.ray_test(self._ray)
 
 
-class LLVMPeer:
+class LLVMPeer(Peer):
     """Rays as Dr.Jit arrays; the clock includes the evaluation of every result."""
 
     def __init__(self, scene: Any, ray: Any) -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import open3d as o3d
 
 from renderer.process.parallel import available_threads
-from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
+from validation.benchmark.peers.contender import Faces, Family, Floats, HitLists, Peer, Points, Query, System
 
 
-class Open3DPeer:
+class Open3DPeer(Peer):
     """A scene of one mesh; its first query builds it."""
 
     def __init__(self, vertices: Any, faces: Any) -> None:
@@ -27,6 +27,47 @@ class Open3DPeer:
         tensor, far = _native(rays), float(rays.t_max)
         return Query(lambda: self._scene.test_occlusions(tensor, tfar=far), lambda found: found.numpy())
 
+    def all(self, rays: Family) -> Query | None:
+        """t, u, v, ray and face of all hits; None for rays with an end, which Open3D has no argument for."""
+        if np.isfinite(rays.t_max):
+            return None
+        tensor = _native(rays)
+
+        def read(found: Any) -> HitLists:
+            ray, t, face = (found[name].numpy() for name in ("ray_ids", "t_hit", "primitive_ids"))
+            return HitLists.sorted(len(rays), ray, t, face)
+
+        return Query(lambda: self._scene.list_intersections(tensor), read)
+
+    def count(self, rays: Family) -> Query | None:
+        """The number of hits; None for rays with an end."""
+        if np.isfinite(rays.t_max):
+            return None
+        tensor = _native(rays)
+        return Query(lambda: self._scene.count_intersections(tensor), lambda n: n.numpy().astype(np.int64))
+
+    def contains(self, points: Points) -> Query:
+        """Open3D's occupancy: the parity of the hits of one ray a point."""
+        tensor = _tensor(points.points)
+        return Query(lambda: self._scene.compute_occupancy(tensor, nsamples=1), lambda found: found.numpy() > 0.5)
+
+    def nearest(self, points: Points) -> Query:
+        """Closest point, face, u, v and normal; ``read`` computes the distance from the point."""
+        tensor = _tensor(points.points)
+
+        def read(found: Any) -> Floats:
+            distance: Floats = np.linalg.norm(found["points"].numpy().astype(np.float64) - points.points, axis=1)
+            return distance
+
+        return Query(lambda: self._scene.compute_closest_points(tensor), read)
+
+    def signed(self, points: Points) -> Query:
+        """Open3D's signed distance, with one ray a point for the sign."""
+        tensor = _tensor(points.points)
+        return Query(
+            lambda: self._scene.compute_signed_distance(tensor, nsamples=1), lambda found: found.numpy().astype(float)
+        )
+
     def touch(self) -> None:
         """Trace one ray."""
         self._scene.test_occlusions(self._ray)
@@ -38,10 +79,14 @@ def systems() -> list[System]:
 
 
 def _builder(vertices: Floats, faces: Faces) -> Any:
-    points = o3d.core.Tensor(vertices.astype(np.float32))
+    points = _tensor(vertices)
     triangles = o3d.core.Tensor(faces.astype(np.uint32))
     return lambda: Open3DPeer(points, triangles)
 
 
 def _native(rays: Family) -> Any:
-    return o3d.core.Tensor(np.hstack([rays.origins, rays.directions]).astype(np.float32))
+    return _tensor(np.hstack([rays.origins, rays.directions]))
+
+
+def _tensor(rows: Floats) -> Any:
+    return o3d.core.Tensor(rows.astype(np.float32))

@@ -9,12 +9,12 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.process.parallel import available_threads
 from renderer.tree.build import SPLITS
-from validation.benchmark.peers.contender import Faces, Family, Floats, Query, System
+from validation.benchmark.peers.contender import Faces, Family, Floats, HitLists, Peer, Points, Query, System
 
 OURS, OURS_ONE = "ours", "ours_one_thread"
 
 
-class Ours:
+class Ours(Peer):
     """Queries of an octree."""
 
     def __init__(self, octree: Octree) -> None:
@@ -28,6 +28,34 @@ class Ours:
     def any(self, rays: Family) -> Query:
         """Through ``Octree.any_hit``."""
         return Query(lambda: self.octree.any_hit(rays.origins, rays.directions, t_max=rays.t_max), lambda hit: hit)
+
+    def all(self, rays: Family) -> Query:
+        """Through ``Octree.all_hits``, which also tells contacts from hits."""
+        return Query(
+            lambda: self.octree.all_hits(rays.origins, rays.directions, t_max=rays.t_max),
+            lambda hits: HitLists(hits.counts, hits.t, hits.face),
+        )
+
+    def count(self, rays: Family) -> Query:
+        """Through ``Octree.count_hits``."""
+        return Query(lambda: self.octree.count_hits(rays.origins, rays.directions, t_max=rays.t_max), lambda n: n)
+
+    def contains(self, points: Points) -> Query:
+        """Through ``Octree.contains``."""
+        return Query(lambda: self.octree.contains(points.points), lambda inside: inside)
+
+    def nearest(self, points: Points) -> Query:
+        """Through ``Octree.closest_point``; the points themselves too, because all peers return them."""
+
+        def trace() -> Any:
+            found = self.octree.closest_point(points.points)
+            return found, found.points
+
+        return Query(trace, lambda found: found[0].distance)
+
+    def signed(self, points: Points) -> Query:
+        """Through ``Octree.signed_distance``."""
+        return Query(lambda: self.octree.signed_distance(points.points), lambda distance: distance)
 
     def touch(self) -> None:
         """Trace one ray."""

@@ -11,6 +11,8 @@ _PEERS = {
     "open3d": ("open3d", "pip install open3d"),
     "trimesh": ("trimesh_rays", "pip install trimesh rtree"),
     "mitsuba": ("mitsuba", "pip install mitsuba"),
+    "trimesh_embreex": ("trimesh_embreex", "pip install trimesh embreex"),
+    "libigl": ("libigl", "pip install libigl"),
 }
 
 
