@@ -1,4 +1,4 @@
-"""libigl's ``AABB`` as a reference for hits. The only file that imports ``igl``.
+"""libigl's ``AABB`` as a reference for hits, and its sum of solid angles. The only file that imports ``igl``.
 
 It takes float64 vertices and rays, but returns t as float32: hit or miss and the face compare in float64, t to 2**-24.
 """
@@ -42,3 +42,13 @@ class Igl:
         face, t, _ = self._tree.intersect_ray_first(self._vertices, self._faces, o, d)
         face = np.asarray(face, dtype=np.int64).reshape(-1)
         return np.where(face >= 0, np.asarray(t, dtype=np.float64).reshape(-1), np.inf), face
+
+
+def winding_number(vertices: ArrayLike, faces: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
+    """The winding numbers of a mesh around ``points`` (n, 3), (n,), in float64 from all faces.
+
+    >>> winding_number([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[1, 2, 3]], [[0, 0, 0]])
+    array([0.125])
+    """
+    v, p = np.array(vertices, np.float64, order="C"), np.array(points, np.float64, order="C")
+    return np.asarray(igl.winding_number(v, np.array(faces, np.int64, order="C"), p))
