@@ -265,7 +265,8 @@ class Queries:
         >>> lidless.winding_number([[0, 0, 0], [0, 0, 3]], tolerance=1e-9).round(4)
         array([0.8333, 0.0641])
         """
-        return winding_number(self.tree, points, tolerance, self.threads)
+        mesh, tree = self._built
+        return winding_number(tree, mesh, points, tolerance, self.threads)
 
     def closest_point(self, points: ArrayLike, max_distance: ArrayLike = np.inf) -> ClosestPoints:
         """The point of the surface that is nearest to each point; equal distances: the lowest face.

@@ -37,7 +37,7 @@ def contains(
     if winding:
         # A point on a flat part of the surface has 1/2 exactly, which costs most to tell and is not asked for.
         inside = np.zeros(len(rows), np.bool_)
-        inside[~on] = exceeds_half(tree, rows[~on], threads)
+        inside[~on] = exceeds_half(tree, mesh, rows[~on], threads)
     else:
         inside = counts[:, WINDING] != 0 if rule == "nonzero" else counts[:, CROSSINGS] % 2 == 1
     return np.where(on, boundary, inside).reshape(shape)
