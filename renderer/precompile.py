@@ -91,6 +91,12 @@ def _count_steps() -> None:
     Octree.from_mesh(_TRIANGLE).count_steps([0.1, 0.1, 1.0], [0.0, 0.0, -1.0])
 
 
+def _wind() -> None:
+    for accelerator in (Octree.from_mesh(_TRIANGLE), BruteForce.from_mesh(_TRIANGLE)):
+        accelerator.winding_number([0.0, 0.0, 1.0])
+        accelerator.contains([0.0, 0.0, 1.0], winding=True)
+
+
 def _search() -> None:
     BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
@@ -117,6 +123,7 @@ _QUERIES = (
     Part("points inside", _contain),
     Part("closest points", _find_nearest),
     Part("steps of a search", _count_steps),
+    Part("winding numbers", _wind),
     Part("concave polygons", _cut),
 )
 _PICTURES = (Part("pictures", _render), Part("the viewer", _view))

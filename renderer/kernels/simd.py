@@ -339,6 +339,19 @@ def magnitude(typingctx, vector):
 
 
 @intrinsic
+def square_root(typingctx, vector):
+    """Square roots, lane by lane, rounded as IEEE 754 has it; NaN of what is below 0."""
+
+    def codegen(context, builder, sig, args):
+        kind, lanes = args[0].type, sig.args[0]
+        name = f"llvm.sqrt.v{lanes.lanes}{lanes.scalar}"
+        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
+        return builder.call(function, [args[0]])
+
+    return vector(vector), codegen
+
+
+@intrinsic
 def extract(typingctx, vector, index):
     """The value in one lane; the index may vary at run time."""
     result = types.float32 if vector.scalar == "f32" else types.float64

@@ -1,4 +1,4 @@
-"""Points inside a closed mesh: checks at the boundary, chunks on threads."""
+"""Points inside a mesh: checks at the boundary, chunks on threads."""
 
 from collections.abc import Iterator
 
@@ -13,6 +13,7 @@ from renderer.points.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_cro
 from renderer.points.order import CELLS, chunk_size, make_grid, order_points
 from renderer.points.rational import crossings_of
 from renderer.points.signs import UNDECIDED
+from renderer.points.winding import exceeds_half
 from renderer.process.parallel import for_chunks
 from renderer.trace.layout import Tree
 from renderer.trace.singly import stack_size
@@ -22,17 +23,26 @@ _LEAST = 4096
 RULES = ("nonzero", "even-odd")
 
 
-def contains(tree: Tree, mesh: Mesh, points: ArrayLike, boundary: bool, rule: str, threads: int) -> NDArray[np.bool_]:
+def contains(
+    tree: Tree, mesh: Mesh, points: ArrayLike, boundary: bool, rule: str, winding: bool, threads: int
+) -> NDArray[np.bool_]:
     """Whether each point lies inside, see ``Octree.contains``."""
-    boundary = flag_argument("boundary", boundary)
+    boundary, winding = flag_argument("boundary", boundary), flag_argument("winding", winding)
     expect(isinstance(rule, str) and rule in RULES, "rule", f"one of {RULES}", repr(rule))
+    expect(not winding or rule == RULES[0], "rule", f"the default with winding=True, {RULES[0]!r}", repr(rule))
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
-    _check_closed(mesh, rule)
+    if not winding:
+        _check_closed(mesh, rule)
     rows, shape = check_points("points", points)
     counts = _counted(tree, mesh, rows, threads)
-    on = counts[:, ON]
-    inside = counts[:, WINDING] != 0 if rule == "nonzero" else counts[:, CROSSINGS] % 2 == 1
-    return np.where(on == 1, boundary, inside).reshape(shape)
+    on = counts[:, ON] == 1
+    if winding:
+        # A point on a flat part of the surface has 1/2 exactly, which costs most to tell and is not asked for.
+        inside = np.zeros(len(rows), np.bool_)
+        inside[~on] = exceeds_half(tree, mesh, rows[~on], threads)
+    else:
+        inside = counts[:, WINDING] != 0 if rule == "nonzero" else counts[:, CROSSINGS] % 2 == 1
+    return np.where(on, boundary, inside).reshape(shape)
 
 
 def _check_closed(mesh: Mesh, rule: str) -> None:

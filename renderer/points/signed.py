@@ -10,10 +10,10 @@ from renderer.trace.layout import Tree
 
 
 def signed_distance(
-    tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: ArrayLike, rule: str, threads: int
+    tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: ArrayLike, rule: str, winding: bool, threads: int
 ) -> NDArray[np.float64]:
     """Distances, negative inside, see ``Octree.signed_distance``."""
     # First, as it is the quicker of the two to refuse a mesh.
-    inside = contains(tree, mesh, points, True, rule, threads)
+    inside = contains(tree, mesh, points, True, rule, winding, threads)
     distance = closest_point(tree, mesh, points, max_distance, threads).distance
     return np.where(inside & (distance > 0.0), -distance, distance)

@@ -131,7 +131,7 @@ Octree.from_mesh(box(), threads=2).contains(np.asfortranarray(vertices.astype(np
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(script).splitlines()[-1].split(maxsplit=1)
-    assert int(count) == 38 and not new
+    assert int(count) == 42 and not new
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
@@ -234,6 +234,6 @@ sys.stderr = Terminal()
 assert main(["compile", "--queries"]) == 0
 shown = sys.stderr.getvalue()
 sys.stderr = sys.__stderr__
-print("brute force" in shown, "/11 " in shown)
+print("brute force" in shown, "/12 " in shown)
 """
     assert output(script).split()[-2:] == ["True", "True"]

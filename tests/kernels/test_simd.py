@@ -23,6 +23,7 @@ from renderer.kernels.simd import (
     smaller,
     splat4,
     splat8,
+    square_root,
     store,
 )
 
@@ -99,6 +100,22 @@ def test_products_and_differences_are_not_fused():
         out, masks = np.empty(8 * lanes, kind), np.zeros(8, np.int64)
         operation(a, b, kind(1), out, masks)
         assert (out[6 * lanes : 7 * lanes] == 0).all()
+
+
+@njit
+def roots_of(a8, a4, out8, out4):
+    store(out8, 0, square_root(load8(a8, 0)))
+    store(out4, 0, square_root(load4(a4, 0)))
+
+
+def test_square_roots_are_rounded_as_numpy_rounds_them():
+    a8 = np.array([0.0, -0.0, 2.0, 1e-45, 3.4e38, np.inf, -1.0, np.nan], np.float32)
+    for a4 in ([2.0, 0.1, 5e-324, 1.7e308], [0.0, -1.0, np.inf, np.nan]):
+        out8, out4 = np.zeros(8, np.float32), np.zeros(4)
+        roots_of(a8, np.array(a4), out8, out4)
+        with np.errstate(invalid="ignore"):
+            np.testing.assert_array_equal(out8, np.sqrt(a8))
+            np.testing.assert_array_equal(out4, np.sqrt(a4))
 
 
 @njit

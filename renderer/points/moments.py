@@ -1,0 +1,297 @@
+"""The series of all octants of a tree, made once: those of leaves from their faces, then those of nodes from below."""
+
+import math
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import extract, get, larger, pointer, put, select, splat4, square_root
+from renderer.points.multipoles import (
+    MOMENT_WORDS,
+    ORDER,
+    RADIUS,
+    SIZE,
+    SPREAD,
+    X,
+    Y,
+    Z,
+    add_face,
+    add_shifted,
+    get_series,
+    put_series,
+)
+from renderer.process.parallel import for_chunks
+from renderer.trace.intersect import load_corners
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree, cache_aligned
+from renderer.trace.leaf import blocks_of, tree_pointers
+from renderer.trace.sides import coordinate
+from renderer.trace.singly import stack_size
+
+# Nodes per chunk: some milliseconds, but for the first chunk, whose nodes hold all faces.
+_NODES = 256
+# An empty octant is so far away that no point ever comes near it, and its numbers are 0.
+_FAR = 2.0**200
+# The least radius, that of an octant whose corners coincide.
+_LEAST = 2.0**-400
+# More than rounding takes from a radius and from a spread.
+_MORE = 1.0 + 2.0**-30
+# More than an area errs by, as a share of half the product of two sides.
+_AREA_ERROR = 2.0**-48
+
+
+class Room(NamedTuple):
+    """Memory of one thread.
+
+    total, other, work  (ORDER + 1, ORDER + 2) complex, series
+    stack, leaves       int64: the nodes that wait, and the leaves below an octant
+    """
+
+    total: NDArray[np.complex128]
+    other: NDArray[np.complex128]
+    work: NDArray[np.complex128]
+    stack: NDArray[np.int64]
+    leaves: NDArray[np.int64]
+
+
+class _Axes(NamedTuple):
+    """Where a block has each axis, as ``load_corners`` wants it."""
+
+    row_x: int
+    row_y: int
+    row_z: int
+
+
+def moments_of(tree: Tree, threads: int) -> NDArray[np.float64]:
+    """(nodes * MOMENT_WORDS,) float64: the rows of ``multipoles`` of each node, kept as long as the tree is."""
+    kept = _KEPT.get(tree)
+    return kept if kept is not None else _KEPT.setdefault(tree, _computed(tree, threads))
+
+
+_KEPT: WeakKeyDictionary[Tree, NDArray[np.float64]] = WeakKeyDictionary()
+
+
+def _computed(tree: Tree, threads: int) -> NDArray[np.float64]:
+    count = len(tree.nodes) // NODE_WORDS
+    rows = cache_aligned(count * MOMENT_WORDS, np.float64)
+
+    def measure(begin: int, end: int) -> None:
+        _measure_octants(tree.words, rows, _room(tree), begin, end)
+
+    for_chunks(measure, count, _NODES, threads)
+    if count:
+        _join_octants(tree.words, rows, _room(tree), count)
+    return rows
+
+
+def _room(tree: Tree) -> Room:
+    total, other, work = np.zeros((3, ORDER + 1, ORDER + 2), np.complex128)
+    # A leaf has at least one block.
+    leaves = np.empty(len(tree.faces) // BLOCK_FACES, np.int64)
+    return Room(total, other, work, np.empty(stack_size(tree.depth), np.int64), leaves)
+
+
+@kernel
+def _measure_octants(words, rows, room, begin, end):
+    """Write the centres, radii, sizes and spreads of the octants of some nodes, and the coefficients of leaves."""
+    tree, rows = tree_pointers(words), pointer(rows)
+    for node in range(begin, end):
+        for place in range(8):
+            base, link = node * MOMENT_WORDS + place, np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + place))
+            room.total[:] = 0.0
+            if not _is_used(tree, node, place):
+                put(rows, base + 8 * X, _FAR)
+                put(rows, base + 8 * Y, _FAR)
+                put(rows, base + 8 * Z, _FAR)
+                put(rows, base + 8 * RADIUS, 0.0)
+                put(rows, base + 8 * SIZE, 0.0)
+                put(rows, base + 8 * SPREAD, 0.0)
+                put_series(rows, base, room.total)
+                continue
+            count = _list_leaves(tree, link, room)
+            centre, radius = _measure(tree, room, count, rows, base)
+            if link < 0:
+                _add_faces(tree, link, centre, radius, room)
+                put_series(rows, base, room.total)
+
+
+@inlined
+def _is_used(tree, node, place):
+    """Whether an octant is not empty, told by its box."""
+    return get(tree.nodes, node * NODE_WORDS + place) <= get(tree.nodes, node * NODE_WORDS + place + 8)
+
+
+@kernel
+def _list_leaves(tree, link, room):
+    """List the leaves behind a link; returns their number."""
+    top, count = 1, 0
+    room.stack[0] = link
+    while top > 0:
+        top -= 1
+        child = room.stack[top]
+        if child < 0:
+            room.leaves[count] = child
+            count += 1
+            continue
+        for place in range(8):
+            if _is_used(tree, child, place):
+                room.stack[top] = get(tree.links, child * NODE_WORDS + CHILDREN + place)
+                top += 1
+    return count
+
+
+@kernel
+def _measure(tree, room, count, rows, base):
+    """Write what an octant's faces are like; returns their centre and radius."""
+    first, _ = blocks_of(room.leaves[0])
+    centre, size = _centre(tree, room, count, _corner(tree, first * BLOCK_WORDS))
+    radius = larger(np.sqrt(_farthest(tree, room, count, centre)) * _MORE, _LEAST)
+    spread = _spread(tree, room, count, centre, 1.0 / (radius * radius))
+    put(rows, base + 8 * X, centre[0])
+    put(rows, base + 8 * Y, centre[1])
+    put(rows, base + 8 * Z, centre[2])
+    put(rows, base + 8 * RADIUS, radius)
+    put(rows, base + 8 * SIZE, size / (radius * radius) / (4.0 * math.pi))
+    put(rows, base + 8 * SPREAD, spread / size * _MORE if size > 0.0 else 0.0)
+    return centre, radius
+
+
+@kernel
+def _centre(tree, room, count, near):
+    """The mean of the faces by size, and their size; ``near`` is one of their corners."""
+    zero = splat4(0.0)
+    x, y, z, total = zero, zero, zero, zero
+    for k in range(count):
+        first, blocks = blocks_of(room.leaves[k])
+        for block in range(first, first + blocks):
+            a, b, c = _faces(tree, block, near)
+            size, _ = _sizes(a, b, c)
+            x, y, z = x + size * (a[0] + b[0] + c[0]), y + size * (a[1] + b[1] + c[1]), z + size * (a[2] + b[2] + c[2])
+            total = total + size
+    size = _sum(total)
+    share = 1.0 / (3.0 * size) if size > 0.0 else 0.0
+    return (near[0] + share * _sum(x), near[1] + share * _sum(y), near[2] + share * _sum(z)), size
+
+
+@kernel
+def _farthest(tree, room, count, centre):
+    """The largest squared distance of a corner from the centre."""
+    most = splat4(0.0)
+    for k in range(count):
+        first, blocks = blocks_of(room.leaves[k])
+        for block in range(first, first + blocks):
+            for corner in _faces(tree, block, centre):
+                square = _square(corner)
+                most = select(square > most, square, most)
+    return larger(larger(extract(most, 0), extract(most, 1)), larger(extract(most, 2), extract(most, 3)))
+
+
+@kernel
+def _spread(tree, room, count, centre, unit):
+    """The integral over the faces of their distance from the centre to the power ORDER; ``unit`` times its square is 1
+    at the radius.
+
+    That power is convex, so its mean over a face is at most that of its corners.
+    """
+    total = splat4(0.0)
+    for k in range(count):
+        first, blocks = blocks_of(room.leaves[k])
+        for block in range(first, first + blocks):
+            a, b, c = _faces(tree, block, centre)
+            _, area = _sizes(a, b, c)
+            for corner in (a, b, c):
+                power, square = area, _square(corner) * splat4(unit)
+                for _ in range(ORDER // 2):
+                    power = power * square
+                total = total + power
+    return _sum(total) / 3.0
+
+
+@inlined
+def _faces(tree, block, centre):
+    """The corners of a block's faces less the centre, 0 in unused places."""
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, block * BLOCK_WORDS, _Axes(0, 4, 8))
+    # Unused places hold NaN, which equals nothing.
+    zero, used = splat4(0.0), x0 == x0
+    x, y, z = splat4(centre[0]), splat4(centre[1]), splat4(centre[2])
+    return (
+        (select(used, x0 - x, zero), select(used, y0 - y, zero), select(used, z0 - z, zero)),
+        (select(used, x1 - x, zero), select(used, y1 - y, zero), select(used, z1 - z, zero)),
+        (select(used, x2 - x, zero), select(used, y2 - y, zero), select(used, z2 - z, zero)),
+    )
+
+
+@inlined
+def _sizes(a, b, c):
+    """Half the products of two sides of four faces, and their areas, not less than they are."""
+    zero, one = splat4(0.0), splat4(1.0)
+    b, c = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - a[0], c[1] - a[1], c[2] - a[2])
+    long_b, long_c = square_root(_square(b)), square_root(_square(c))
+    size = splat4(0.5) * long_b * long_c
+    # By the sine of their angle from directions, because the square of a product may vanish.
+    share_b, share_c = one / long_b, one / long_c
+    bx, by, bz, cx, cy, cz = (
+        b[0] * share_b, b[1] * share_b, b[2] * share_b, c[0] * share_c, c[1] * share_c, c[2] * share_c
+    )  # fmt: skip
+    sine = square_root(_square((by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx)))
+    return size, select(size > zero, size * (sine + splat4(_AREA_ERROR)), zero)
+
+
+@inlined
+def _square(a):
+    return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+
+
+@inlined
+def _sum(four):
+    return (extract(four, 0) + extract(four, 1)) + (extract(four, 2) + extract(four, 3))
+
+
+@inlined
+def _corner(tree, place):
+    return coordinate(tree, place), coordinate(tree, place + 4), coordinate(tree, place + 8)
+
+
+@kernel
+def _add_faces(tree, link, centre, radius, room):
+    """Add the series of a leaf's faces to ``room.total``."""
+    first, count = blocks_of(link)
+    unit = 1.0 / radius
+    for place in range(first * BLOCK_FACES, (first + count) * BLOCK_FACES):
+        if get(tree.faces, place) >= 0:
+            at = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
+            a, b, c = _corner(tree, at), _corner(tree, at + 12), _corner(tree, at + 24)
+            d, e = _scaled(b, a, unit), _scaled(c, a, unit)
+            area = (
+                0.5 * (d[1] * e[2] - d[2] * e[1]), 0.5 * (d[2] * e[0] - d[0] * e[2]), 0.5 * (d[0] * e[1] - d[1] * e[0])
+            )  # fmt: skip
+            corners = _scaled(a, centre, unit), _scaled(b, centre, unit), _scaled(c, centre, unit)
+            add_face(room.total, corners, area, room.work)
+
+
+@inlined
+def _scaled(a, b, unit):
+    return (a[0] - b[0]) * unit, (a[1] - b[1]) * unit, (a[2] - b[2]) * unit
+
+
+@kernel
+def _join_octants(words, rows, room, count):
+    """Write the coefficients of all octants that are nodes, from below: a child comes after its parent in memory."""
+    tree, rows = tree_pointers(words), pointer(rows)
+    for node in range(count - 1, -1, -1):
+        for place in range(8):
+            child = np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + place))
+            if child < 0:
+                continue
+            base = node * MOMENT_WORDS + place
+            centre, radius = (get(rows, base), get(rows, base + 8), get(rows, base + 16)), get(rows, base + 8 * RADIUS)
+            room.total[:] = 0.0
+            for k in range(8):
+                if _is_used(tree, child, k):
+                    at = child * MOMENT_WORDS + k
+                    get_series(rows, at, get(rows, at + 8 * RADIUS) / radius, room.other)
+                    shift = _scaled((get(rows, at), get(rows, at + 8), get(rows, at + 16)), centre, 1.0 / radius)
+                    add_shifted(room.total, room.other, shift, room.work)
+            put_series(rows, base, room.total)

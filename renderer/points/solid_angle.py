@@ -1,0 +1,166 @@
+"""Solid angles of faces, four at a time, summed as the angle of a product.
+
+Half the solid angle of a face is the angle of one complex number (van Oosterom and Strackee, The Solid Angle of a Plane
+Triangle, IEEE Transactions on Biomedical Engineering 30, 1983). So the product of these numbers has the sum of the
+angles, but for whole turns, which are counted where a product passes the negative axis: one arctangent a lane for all
+faces.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import (
+    cross_pairs,
+    dot_pairs,
+    length_pair,
+    plus,
+    power_below,
+    product,
+    scaled_difference,
+)
+from renderer.kernels.simd import (
+    extract,
+    get,
+    larger,
+    lowest_bit,
+    magnitude,
+    movemask,
+    select,
+    splat4,
+    square_root,
+)
+from renderer.points.signs import UNDECIDED, volume_sign
+from renderer.trace.intersect import load_corners
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
+from renderer.trace.sides import coordinate
+
+# Both parts of a face's number, at most 4 in size, err by 2^-47: corners, lengths and directions by 2^-53 of themselves
+# each, then six products of three. Its angle errs by the share of that in its size: by 2^-44 of a turn at most where
+# the square of its size is at least LEAST_SQUARE. Nearer than 2^-5 of its length to an edge it may be less.
+_LEAST_SQUARE = 2.0**-10
+# A volume above it has its true sign, which tells both sides of the face apart.
+_LEAST_VOLUME = 2.0**-46
+# Of the volume with twice the digits, which errs by 2^-96.
+_LEAST_CAREFUL = 2.0**-90
+_TINIEST = 2.0**-1000
+_TURN = 2.0 * math.pi
+
+
+class Turned(NamedTuple):
+    """A sum of half solid angles: the product of four lanes of numbers, their whole turns, and angles added apart."""
+
+    real: Any
+    imaginary: Any
+    turns: Any
+    apart: float
+
+
+@inlined
+def no_turn():
+    """The sum of no angles."""
+    return Turned(splat4(1.0), splat4(0.0), splat4(0.0), 0.0)
+
+
+@kernel
+def add_blocks(tree, first, count, point, total, parts):
+    """``total`` and the angles of the faces of some blocks, seen from ``point``; ``parts`` is memory for an expansion.
+
+    A face that the point lies on, or is nearer to than 2^-900 of its size, counts 0: the mean of its two sides.
+    """
+    real, imaginary, turns, apart = total
+    for block in range(first, first + count):
+        base = block * BLOCK_WORDS
+        rest, volume, sure = _see_block(tree, base, point)
+        bits = 15 & ~movemask(sure)
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            if get(tree.faces, block * BLOCK_FACES + i) >= 0:
+                apart += _careful_angle(tree, base + i, point, parts)
+        rest, volume = select(sure, rest, splat4(1.0)), select(sure, volume, splat4(0.0))
+        real, imaginary, turns = _times(real, imaginary, turns, rest, volume)
+    return Turned(real, imaginary, turns, apart)
+
+
+@kernel
+def turns_of(total):
+    """A sum of half solid angles in whole turns: the winding number of its faces."""
+    angle, turns = total.apart, 0.0
+    for i in range(4):
+        # + 0.0 turns -0.0, whose angle would be the other half turn, into 0.0.
+        angle += math.atan2(extract(total.imaginary, i) + 0.0, extract(total.real, i))
+        turns += extract(total.turns, i)
+    return angle / _TURN + turns
+
+
+@inlined
+def _see_block(tree, base, point):
+    """The real and imaginary parts of four faces' numbers, and the mask of those that are sure."""
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, point)
+    px, py, pz = splat4(point.x), splat4(point.y), splat4(point.z)
+    x0, y0, z0 = _direction(x0 - px, y0 - py, z0 - pz)
+    x1, y1, z1 = _direction(x1 - px, y1 - py, z1 - pz)
+    x2, y2, z2 = _direction(x2 - px, y2 - py, z2 - pz)
+    volume = x0 * (y1 * z2 - z1 * y2) + y0 * (z1 * x2 - x1 * z2) + z0 * (x1 * y2 - y1 * x2)
+    rest = (splat4(1.0) + (x0 * x1 + y0 * y1 + z0 * z1)) + (
+        (x1 * x2 + y1 * y2 + z1 * z2) + (x2 * x0 + y2 * y0 + z2 * z0)
+    )
+    # Of an unused place all is NaN, and of a corner at the point, so neither is sure.
+    away = volume * volume + rest * rest >= splat4(_LEAST_SQUARE)
+    return rest, volume, away & ((rest > splat4(0.0)) | (magnitude(volume) > splat4(_LEAST_VOLUME)))
+
+
+@inlined
+def _direction(x, y, z):
+    share = splat4(1.0) / square_root(x * x + y * y + z * z)
+    return x * share, y * share, z * share
+
+
+@inlined
+def _times(real, imaginary, turns, a, b):
+    """The product of numbers and a + b i, made of size one, and its turns; no a + b i lies on the negative axis."""
+    zero, one = splat4(0.0), splat4(1.0)
+    x, y = real * a - imaginary * b, real * b + imaginary * a
+    # Angles go from -pi, without it, to pi. Two of one sign pass pi where the sign of their sum is the other.
+    over = (imaginary >= zero) & (b >= zero) & (y < zero)
+    under = (imaginary < zero) & (b < zero) & (y >= zero)
+    turns = turns + select(over, one, zero) - select(under, one, zero)
+    share = one / (magnitude(x) + magnitude(y))
+    return x * share, y * share, turns
+
+
+@kernel
+def _careful_angle(tree, place, point, parts):
+    """Half the solid angle of one face with twice the digits, on the side that the exact sign of its volume says."""
+    p = point.x, point.y, point.z
+    a, b, c = _corner(tree, place), _corner(tree, place + 12), _corner(tree, place + 24)
+    if _farthest(a, p) == 0.0 or _farthest(b, p) == 0.0 or _farthest(c, p) == 0.0:
+        return 0.0
+    x, y, z = _near_one(a, p), _near_one(b, p), _near_one(c, p)
+    volume = dot_pairs(x, cross_pairs(y, z))[0]
+    if abs(volume) < _LEAST_CAREFUL:
+        side = volume_sign(a, b, c, p, parts)
+        if side == 0 or side == UNDECIDED:
+            return 0.0
+        volume = side * abs(volume)
+    i, j, k = length_pair(x), length_pair(y), length_pair(z)
+    rest = plus(product(product(i, j), k), product(dot_pairs(x, y), k))
+    rest = plus(rest, plus(product(dot_pairs(y, z), i), product(dot_pairs(z, x), j)))
+    return math.atan2(volume, rest[0])
+
+
+@inlined
+def _corner(tree, place):
+    return coordinate(tree, place), coordinate(tree, place + 4), coordinate(tree, place + 8)
+
+
+@inlined
+def _farthest(a, p):
+    return larger(larger(abs(a[0] - p[0]), abs(a[1] - p[1])), abs(a[2] - p[2]))
+
+
+@inlined
+def _near_one(a, p):
+    """a - p times a power of two that brings its largest component near 1, which changes no angle."""
+    return scaled_difference(a, p, 1.0 / power_below(larger(_farthest(a, p), _TINIEST)))

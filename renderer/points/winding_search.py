@@ -1,0 +1,102 @@
+"""Winding numbers by a search through the tree: series of octants that are far enough, and single faces near by."""
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, extract, get, larger, local_doubles, pointer, put, smaller, splat4
+from renderer.limits import FARTHEST
+from renderer.points.multipoles import MOMENT_WORDS, ROUNDING, see_octants
+from renderer.points.nearest import Point
+from renderer.points.solid_angle import add_blocks, no_turn, turns_of
+from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+
+# Blocks whose sum takes a tenth of a millisecond, beside which a return to Python costs nothing.
+_MANY = 1 << 12
+# The share with which a search for a tolerance begins: the bounds add up to about the tolerance around a closed mesh.
+_FIRST = 2.0
+# The next share aims at so much of the tolerance, and is at most half of the last.
+_AIM, _LESS = 0.8, 0.5
+# The share with which the question on which side of 1/2 begins, and what the next is of the last.
+_FIRST_SIDE, _NEXT_SIDE = 1.0, 2.0**-4
+
+
+@kernel
+def sum_windings(words, rows, points, order, tolerance, out, stack):
+    """Write the winding numbers around the points ``order`` of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``.
+
+    ``rows`` is what ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns how many
+    are done: it stops early where a sum over all of many faces took long.
+    """
+    tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
+    for k in range(len(order)):
+        i = order[k]
+        point = _point_at(tree, at(pointer(points), 3 * i))
+        number, bound, share = 0.0, np.inf, _FIRST * tolerance
+        while bound > tolerance and share > ROUNDING and tree.has_nodes:
+            number, bound = _search(tree, rows, point, share, stack, parts)
+            share *= smaller(_LESS, _AIM * tolerance / bound)
+        out[i] = number
+        if bound > tolerance:
+            out[i] = _all_faces(tree, point, parts)
+            if tree.count > _MANY:
+                return k + 1
+    return len(order)
+
+
+@kernel
+def exceed_half(words, rows, points, order, out, stack):
+    """Write whether winding numbers exceed 1/2 to ``out`` (n,) bool; arguments and return value as above."""
+    tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
+    for k in range(len(order)):
+        i = order[k]
+        point = _point_at(tree, at(pointer(points), 3 * i))
+        number, bound, share = 0.5, 0.0, _FIRST_SIDE
+        while abs(number - 0.5) <= bound and share > ROUNDING and tree.has_nodes:
+            number, bound = _search(tree, rows, point, share, stack, parts)
+            share *= _NEXT_SIDE
+        out[i] = number > 0.5
+        if abs(number - 0.5) <= bound:
+            out[i] = _all_faces(tree, point, parts) > 0.5
+            if tree.count > _MANY:
+                return k + 1
+    return len(order)
+
+
+@inlined
+def _point_at(tree, row):
+    x, y, z = tree.scale * get(row, 0), tree.scale * get(row, 1), tree.scale * get(row, 2)
+    return Point(0, 4, 8, _within(x), _within(y), _within(z))
+
+
+@inlined
+def _within(x):
+    """No farther than products allow: so far away all winding numbers are 0 to 2^-100."""
+    return larger(-FARTHEST, smaller(FARTHEST, x))
+
+
+@kernel
+def _search(tree, rows, point, share, stack, parts):
+    """The winding number and a bound of its error, where ``share`` says how near a series is asked."""
+    total, values, bounds, top = no_turn(), splat4(0.0), splat4(0.0), 1
+    put(stack, 0, 0)
+    while top > 0:
+        top -= 1
+        child = get(stack, top)
+        if child < 0:
+            first, count = blocks_of(child)
+            total = add_blocks(tree, first, count, point, total, parts)
+            continue
+        bits, value, bound = see_octants(rows, child * MOMENT_WORDS, point, share)
+        values, bounds = values + value, bounds + bound
+        top = push_children(tree, child, bits, stack, top)
+    return _sum(values) + turns_of(total), _sum(bounds)
+
+
+@kernel
+def _all_faces(tree, point, parts):
+    return turns_of(add_blocks(tree, 0, tree.count, point, no_turn(), parts))
+
+
+@inlined
+def _sum(four):
+    return (extract(four, 0) + extract(four, 1)) + (extract(four, 2) + extract(four, 3))
