@@ -14,6 +14,7 @@ from renderer.kernels import loaded as _loaded  # noqa: F401  # before all other
 if TYPE_CHECKING:
     from typing import Any
 
+    from renderer.distance.closest import ClosestPoints
     from renderer.errors import MeshError, SceneError
     from renderer.mesh.load import load_mesh
     from renderer.mesh.mesh import Mesh, Repairs, RepairWarning
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from renderer.picture.image import CutWarning, Image, srgb
     from renderer.picture.prepare import PreparedScene
     from renderer.picture.render import prepare, render
-    from renderer.points.closest import ClosestPoints
     from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
     from renderer.scene.light import DirectionalLight, PointLight
     from renderer.scene.material import Dielectric, Mirror, Phong
@@ -73,7 +73,7 @@ __all__ = [
 _HOMES = {
     "AllHits": "trace.hits",
     "BruteForce": "octree",
-    "ClosestPoints": "points.closest",
+    "ClosestPoints": "distance.closest",
     "CutWarning": "picture.image",
     "Dielectric": "scene.material",
     "DirectionalLight": "scene.light",

@@ -1,1 +1,1 @@
-"""Questions that points ask of a mesh."""
+"""Points that ask something of a mesh: how they are checked and ordered, exact signs, and who sees whom."""

@@ -11,6 +11,7 @@ from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from validation.job import Job
 from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.queries.solids import solids
 from validation.references.igl import Igl
 from validation.references.trimesh_queries import TrimeshQueries
 
@@ -25,11 +26,12 @@ _MARGIN = 1e-9
 
 
 def meshes() -> dict[str, Mesh]:
-    """A ball and a ring where they stand, far away, tiny and flat."""
+    """A ball and a ring where they stand, far away, tiny and flat, and a star, whose edges and corners are sharp."""
     ball, ring = icosphere(2), torus(around=24, across=12)
     return {
         "ball": ball,
         "ring": ring,
+        "star": Mesh(solids()[0].mesh().vertices * (np.pi * 1e-4), solids()[0].mesh().faces),
         "ring at 1e6": Mesh(ring.vertices * np.pi + 1e6, ring.faces),
         "ball of 1e-80": Mesh(ball.vertices * 1e-80, ball.faces),
         "ball of 1e100": Mesh(ball.vertices * 1e100, ball.faces),
@@ -38,11 +40,11 @@ def meshes() -> dict[str, Mesh]:
 
 
 def points_about(mesh: Mesh, rng: Generator, count: int) -> Floats:
-    """Points on faces, edges and corners, and from 1e-20 to 10 of the mesh's size away from these."""
+    """Points on faces, edges, their middles and corners, and from 1e-20 to 10 of the mesh's size away from these."""
     shares, kind = rng.dirichlet([1, 1, 1], count), rng.integers(0, 4, count)
     shares[kind == 1] = np.eye(3)[rng.integers(0, 3, int((kind == 1).sum()))]
     shares[kind == 2, 0] = 0.0
-    shares[kind == 3] = [0.5, 0.25, 0.25]
+    shares[kind == 3] = [0.5, 0.5, 0.0]
     on = np.einsum("nk,nkd->nd", shares, mesh.triangles[rng.integers(0, len(mesh.faces), count)])
     away = 10.0 ** rng.uniform(-20, 1, (count, 1)) * (rng.random((count, 1)) < 0.7)
     points: Floats = on + rng.normal(size=(count, 3)) * away * mesh.extent.max()

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import real_argument
+from renderer.distance.nearest import LISTED, find_nearest
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
-from renderer.points.nearest import LISTED, find_nearest
 from renderer.points.order import CELLS, chunk_size, make_grid, order_points
 from renderer.process.parallel import for_chunks
 from renderer.trace.hits import points_on

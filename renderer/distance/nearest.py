@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from renderer.distance.block_distance import bound_distances, bounds_of
+from renderer.distance.face_distance import distance_to_face
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import (
     at,
@@ -23,8 +25,7 @@ from renderer.kernels.simd import (
     splat4,
     store,
 )
-from renderer.points.block_distance import bound_distances, bounds_of
-from renderer.points.face_distance import distance_to_face
+from renderer.points.point import Point
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
 from renderer.trace.rays import hit_pointers
@@ -38,17 +39,6 @@ WORK, _APART = 1 << 16, 16
 _FARTHEST = 2.0**130
 # More than squares and their sum lose, and what a bound's square needs above it.
 _LESS, _MORE = 1.0 - 2.0**-48, 1.0 + 2.0**-48
-
-
-class Point(NamedTuple):
-    """A point in the tree's units, and where a block has each axis, as ``load_corners`` wants it."""
-
-    row_x: int
-    row_y: int
-    row_z: int
-    x: float
-    y: float
-    z: float
 
 
 class Search(NamedTuple):

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from renderer import BruteForce, Mesh, Octree
+from renderer.inside.crossings import COLUMNS, count_crossings
 from renderer.mesh.shapes import box, torus
-from renderer.points.crossings import COLUMNS, count_crossings
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
 from renderer.trace.singly import stack_size
 from validation.oracle.distance import rational

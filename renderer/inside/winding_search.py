@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from renderer.inside.multipoles import MOMENT_WORDS, ROUNDING, see_octants
+from renderer.inside.solid_angle import add_blocks, no_turn, turns_of
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, extract, get, larger, local_doubles, pointer, put, smaller, splat4
 from renderer.limits import FARTHEST
-from renderer.points.multipoles import MOMENT_WORDS, ROUNDING, see_octants
-from renderer.points.nearest import Point
-from renderer.points.solid_angle import add_blocks, no_turn, turns_of
+from renderer.points.point import Point
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
 
 # Blocks whose sum takes a tenth of a millisecond, beside which a return to Python costs nothing.

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from meshes import make_mesh
 
 from renderer import BruteForce, Mesh, Octree
+from renderer.distance import closest
+from renderer.distance.nearest import LISTED
+from renderer.inside import contains as inside
 from renderer.mesh.shapes import box, icosphere, torus
-from renderer.points import closest
-from renderer.points import contains as inside
-from renderer.points.nearest import LISTED
 from validation.oracle.distance import nearest, rational, ulps_from_root
 from validation.stability.cases.inside import closed_solids
 

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.distance.closest import closest_point
+from renderer.inside.contains import contains
 from renderer.mesh.mesh import Mesh
-from renderer.points.closest import closest_point
-from renderer.points.contains import contains
 from renderer.trace.layout import Tree
 
 

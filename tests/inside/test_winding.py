@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from meshes import KINDS, make_mesh
 
 from renderer import BruteForce, Mesh, Octree
+from renderer.inside.moments import moments_of
+from renderer.inside.winding_search import _point_at, _search
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import at, local_doubles, pointer
 from renderer.mesh.shapes import box, icosphere, torus
-from renderer.points.moments import moments_of
-from renderer.points.winding_search import _point_at, _search
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.singly import stack_size
 from validation.references.igl import Igl

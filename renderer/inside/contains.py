@@ -7,13 +7,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import flag_argument
 from renderer.errors import expect
+from renderer.inside.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_crossings
+from renderer.inside.rational import crossings_of
+from renderer.inside.winding import exceeds_half
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points
-from renderer.points.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_crossings
 from renderer.points.order import CELLS, chunk_size, make_grid, order_points
-from renderer.points.rational import crossings_of
 from renderer.points.signs import UNDECIDED
-from renderer.points.winding import exceeds_half
 from renderer.process.parallel import for_chunks
 from renderer.trace.layout import Tree
 from renderer.trace.singly import stack_size

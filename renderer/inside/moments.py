@@ -7,9 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import extract, get, larger, pointer, put, select, splat4, square_root
-from renderer.points.multipoles import (
+from renderer.inside.multipoles import (
     MOMENT_WORDS,
     ORDER,
     RADIUS,
@@ -23,6 +21,8 @@ from renderer.points.multipoles import (
     get_series,
     put_series,
 )
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import extract, get, larger, pointer, put, select, splat4, square_root
 from renderer.process.parallel import for_chunks
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree, cache_aligned

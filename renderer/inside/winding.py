@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import real_argument
 from renderer.errors import expect
+from renderer.inside.moments import moments_of
+from renderer.inside.winding_search import exceed_half, sum_windings
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points
-from renderer.points.moments import moments_of
 from renderer.points.order import CELLS, chunk_size, make_grid, order_points
-from renderer.points.winding_search import exceed_half, sum_windings
 from renderer.process.parallel import for_chunks
 from renderer.trace.layout import Tree
 from renderer.trace.query import rays_against_blocks

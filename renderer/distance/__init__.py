@@ -1,0 +1,1 @@
+"""How far points are from a mesh."""
