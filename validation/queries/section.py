@@ -25,6 +25,7 @@ class QueryEffort(NamedTuple):
 QUICK = QueryEffort(200_000, 60_000, 400, 60, 60)
 FULL = QueryEffort(10_080_000, 1_008_000, 4_000, 400, 500)
 _REASON = "exact: whole numbers, or rational arithmetic"
+_DISTANCE = f"within {ULPS} ulp of the exact distance, or 2^-90 of the reach; 0 on the surface only"
 
 
 def steps(job: Job) -> int:
@@ -46,7 +47,7 @@ def judge(effort: QueryEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
     ]
     gates = [
         Gate("queries", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0,
-             f"within {ULPS} ulp of the exact distance, and 0 on the surface only" if "ulps" in row else _REASON)
+             _DISTANCE if "ulps" in row else _REASON)
         for row in rows
     ]  # fmt: skip
     return {"rows": rows, "costs": dict.fromkeys(("exact arithmetic", "trimesh", "libigl"))}, gates
