@@ -222,6 +222,42 @@ def test_by_fork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 # --- other threads ----------------------------------------------------------------------------------------------
 
 
+class Refitting:
+    """Points that refit an octree while a query reads them, as another thread might."""
+
+    def __init__(self, target: Octree | BruteForce, vertices: Any, points: Any) -> None:
+        self.target, self.vertices, self.points = target, vertices, points
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
+        self.target.refit(self.vertices)
+        return np.array(self.points, dtype)
+
+
+QUERIES: dict[str, Callable[[Any, Any], Any]] = {
+    "closest_hit": lambda target, points: fields(target.closest_hit(points, DIRECTIONS)),
+    "leaving": lambda target, points: fields(target.closest_hit(points, DIRECTIONS, leaving=3)),
+    "few": lambda target, points: fields(target.closest_hit(points, DIRECTIONS[:5])),
+    "any_hit": lambda target, points: target.any_hit(points, DIRECTIONS).tobytes(),
+    "all_hits": lambda target, points: fields(target.all_hits(points, DIRECTIONS, leaving=3)),
+    "count_hits": lambda target, points: target.count_hits(points, DIRECTIONS, leaving=3).tobytes(),
+    "contains": lambda target, points: target.contains(points).tobytes(),
+    "closest_point": lambda target, points: fields(target.closest_point(points)),
+    "signed_distance": lambda target, points: target.signed_distance(points).tobytes(),
+    "visible": lambda target, points: target.visible(points, ORIGINS[0], leaving=3, reaching=5).tobytes(),
+}
+
+
+@pytest.mark.parametrize("query", QUERIES)
+@pytest.mark.parametrize("kind", ["octree", "brute force", "mapped"])
+def test_a_refit_in_the_midst_of_a_query_changes_nothing_of_it(kind: str, query: str, tmp_path: Path) -> None:
+    target, ask = TARGETS[kind](tmp_path), QUERIES[query]
+    points = ORIGINS[:5] if query == "few" else ORIGINS / 2.0
+    before, moved = ask(target, points), target.mesh.vertices * [3.0, 0.5, 1.0]
+    assert ask(target, Refitting(target, moved, points)) == before
+    after = ask(target, points)
+    assert np.array_equal(target.mesh.vertices, moved) and after != before
+
+
 def test_callers_on_other_threads_see_the_mesh_before_or_after_a_refit(tmp_path: Path) -> None:
     """Every query, every copy and every file, until each has seen both, while another thread refits."""
     ball = icosphere(4)
