@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from renderer.octree import BruteForce, Octree
 from renderer.trace.hits import Hits
 
 Floats = NDArray[np.float64]
@@ -122,6 +123,29 @@ def rays_at(vertices: Floats, faces: NDArray[np.int32], seed: int, count: int = 
 def arrays(tree):
     """The arrays of a tree."""
     return tree.nodes, tree.blocks, tree.faces
+
+
+def answers(target: Octree | BruteForce, origins: Floats, directions: Floats) -> dict[str, bytes]:
+    """The bits that each query answers, by its name; those that need a closed mesh only where it is one."""
+    faces = np.arange(len(origins)) % max(1, len(target.mesh.faces)) if len(target.mesh.faces) else -1
+    few, hits = target.closest_hit(origins[:5], directions[:5]), target.closest_hit(origins, directions)
+    every, left = target.all_hits(origins, directions), target.closest_hit(origins, directions, leaving=faces)
+    found = {
+        "few": (few.t, few.face, few.u, few.v, few.points, few.normals),
+        "closest_hit": (hits.t, hits.face, hits.u, hits.v, hits.points, hits.normals),
+        "leaving": (left.t, left.face, left.u, left.v, left.points, left.normals),
+        "any_hit": (target.any_hit(origins, directions, t_max=2.0),),
+        "all_hits": (every.offsets, every.t, every.face, every.u, every.v, every.points, every.normals),
+        "count_hits": (target.count_hits(origins, directions, contacts=False),),
+        "visible": (target.visible(origins, origins[::-1]),),
+    }
+    if len(target.mesh.faces):
+        near = target.closest_point(origins)
+        found["closest_point"] = (near.distance, near.face, near.u, near.v, near.points)
+    if len(target.mesh.faces) and not len(target.mesh.open_edges):
+        found["contains"] = (target.contains(origins, boundary=False),)
+        found["signed_distance"] = (target.signed_distance(origins),)
+    return {name: b"".join(array.tobytes() for array in arrays) for name, arrays in found.items()}
 
 
 def assert_same_hits(got: Hits, expected: Hits) -> None:

@@ -113,12 +113,12 @@ def _above(tree: Tree, box: NDArray[np.float64]) -> Tree:
 
 def _met_octants(tree: Tree, node: int, level: int, ray: Ray, t_max: float) -> list[_Waiting]:
     """The octants of ``node`` that the ray meets up to ``t_max``, nearest last; equal ones in the kernel's order."""
-    distances = np.empty(8, np.float32)
-    bits = _meet(tree.nodes, node, ray, t_max, distances)
-    words = tree.nodes[node * NODE_WORDS : node * NODE_WORDS + CHILDREN].reshape(3, 2, 8).astype(np.float64)
-    children = tree.links[node * NODE_WORDS + CHILDREN : node * NODE_WORDS + CHILDREN + 8]
+    # A copy, which can be written, as the node of ``_above`` can: the kernel is compiled for such arrays alone.
+    words, distances = tree.nodes[node * NODE_WORDS : (node + 1) * NODE_WORDS].copy(), np.empty(8, np.float32)
+    bits = _meet(words, ray, t_max, distances)
+    boxes, children = words[:CHILDREN].reshape(3, 2, 8).astype(np.float64), words.view(np.int32)[CHILDREN:]
     met = [
-        _Waiting(float(distances[i]), int(children[i]), level + 1, words[:, :, i].T.ravel())
+        _Waiting(float(distances[i]), int(children[i]), level + 1, boxes[:, :, i].T.ravel())
         for i in range(8)
         if bits >> i & 1
     ]
@@ -126,11 +126,11 @@ def _met_octants(tree: Tree, node: int, level: int, ray: Ray, t_max: float) -> l
 
 
 @kernel
-def _meet(nodes: NDArray[np.float32], node: int, ray: Ray, t_max: float, distances: NDArray[np.float32]) -> int:
-    """``enter_boxes`` for Python: fills ``distances`` (8,) float32 and returns the bits of the octants met."""
+def _meet(words: NDArray[np.float32], ray: Ray, t_max: float, distances: NDArray[np.float32]) -> int:
+    """``enter_boxes`` of a node for Python: fills ``distances`` (8,) float32 and returns bits of the octants met."""
     largest = largest_of(ray)
     lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
-    t0, bits = enter_boxes(nodes, node, make_slabs(ray, largest), lower, upper)
+    t0, bits = enter_boxes(words, 0, make_slabs(ray, largest), lower, upper)
     store(distances, 0, t0)
     return bits
 

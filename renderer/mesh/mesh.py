@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -103,24 +103,48 @@ class Mesh:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise MeshError(f"name: expected a string, got {type(self.name).__name__}")
-        vertices = self._floats("vertices", 3, np.float64)
+        vertices = _real_rows(self.name, "vertices", self.vertices, 3, np.float64)
+        self._expect_finite("vertices", vertices)
         faces = self._checked_faces(len(vertices))
         object.__setattr__(self, "vertices", _read_only(vertices))
         object.__setattr__(self, "faces", _read_only(faces))
         for attribute, width, dtype in _VERTEX_ATTRIBUTES:
-            if getattr(self, attribute) is None:
-                continue
-            array = self._floats(attribute, width, dtype)
-            if len(array) != len(vertices):
-                raise self._error(f"{attribute}: expected a row a vertex, {len(vertices)}, got {len(array)}")
-            object.__setattr__(self, attribute, _read_only(array))
-        if self.colors is not None:
-            outside = (self.colors < 0) | (self.colors > 1)
-            self._reject_rows("colors", self.colors, outside, "values in [0, 1]")
+            values = getattr(self, attribute)
+            if values is not None:
+                object.__setattr__(self, attribute, _read_only(_real_rows(self.name, attribute, values, width, dtype)))
+        self._check_attributes()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made by the constructor, which checks the arrays and makes them read-only."""
         return Mesh, (self.vertices, self.faces, self.normals, self.colors, self.texcoords, self.name)
+
+    @classmethod
+    def viewing(cls, arrays: Mapping[str, NDArray[Any]], name: str) -> Mesh:
+        """A mesh over ``arrays`` themselves, which have its names, types and shapes: they are not copied.
+
+        Values are checked as by the constructor. Nobody may write to their memory from then on.
+        """
+        mesh = object.__new__(cls)
+        for attribute in ("vertices", "faces", *(attribute for attribute, _, _ in _VERTEX_ATTRIBUTES)):
+            array = arrays.get(attribute)
+            object.__setattr__(mesh, attribute, None if array is None else _read_only(array))
+        object.__setattr__(mesh, "name", name)
+        mesh._expect_finite("vertices", mesh.vertices)
+        mesh._expect_indices(mesh.faces, len(mesh.vertices))
+        mesh._check_attributes()
+        return mesh
+
+    def _check_attributes(self) -> None:
+        """Raise ``MeshError`` for what the vertices carry and is no row a vertex, not finite, or no colour."""
+        for attribute, _, _ in _VERTEX_ATTRIBUTES:
+            array = getattr(self, attribute)
+            if array is not None:
+                self._expect_finite(attribute, array)
+                if len(array) != len(self.vertices):
+                    raise self._error(f"{attribute}: expected a row a vertex, {len(self.vertices)}, got {len(array)}")
+        if self.colors is not None:
+            outside = (self.colors < 0) | (self.colors > 1)
+            self._reject_rows("colors", self.colors, outside, "values in [0, 1]")
 
     def _error(self, message: str) -> MeshError:
         return _error(self.name, message)
@@ -130,23 +154,24 @@ class Mesh:
             row = int(bad.any(axis=1).argmax())
             raise self._error(f"{argument}: expected {expected}, got {array[row].tolist()} in row {row}")
 
-    def _floats(self, argument: str, width: int, dtype: type[np.floating]) -> NDArray[Any]:
-        floats = _real_rows(self.name, argument, getattr(self, argument), width, dtype)
+    def _expect_finite(self, argument: str, floats: NDArray[Any]) -> None:
         finite = np.isfinite(floats)
         if not finite.all():
             self._reject_rows(argument, floats, ~finite, "finite values")
-        return floats
 
     def _checked_faces(self, vertex_count: int) -> Int32Array:
         # A copy, which no other thread can change once it is checked.
         faces = np.array(_index_rows(self.name, self.faces), order="C")
+        self._expect_indices(faces, vertex_count)
+        return faces.astype(np.int32, copy=False)
+
+    def _expect_indices(self, faces: NDArray[Any], vertex_count: int) -> None:
         if vertex_count > MAX_VERTICES:
             raise self._error(f"vertices: expected at most {MAX_VERTICES} rows, got {vertex_count}")
         if faces.size and (faces.min() < 0 or faces.max() >= vertex_count):
             row, corner = np.argwhere((faces < 0) | (faces >= vertex_count))[0]
             there = f"indices from 0 to {vertex_count - 1}" if vertex_count else "no faces, as there are no vertices"
             raise self._error(f"faces: expected {there}, got {faces[row, corner]} in row {row}")
-        return faces.astype(np.int32, copy=False)
 
     @lazy
     def bounds(self) -> tuple[Float64Array, Float64Array]:

@@ -1,12 +1,14 @@
 """The layout in memory of nodes and of blocks of triangles, which the kernels and the builder share."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.lazy import lazy
+
+T = TypeVar("T", bound=np.generic)
 
 CACHE_LINE = 64
 
@@ -95,3 +97,12 @@ def cache_aligned(count: int, dtype: type[np.generic]) -> NDArray[Any]:
     memory = np.empty(size + CACHE_LINE, np.uint8)
     start = -memory.ctypes.data % CACHE_LINE
     return memory[start : start + size].view(dtype)
+
+
+def locked(array: NDArray[T]) -> NDArray[T]:
+    """A view that cannot be written. Kernels are compiled anew for such a type, so each gets an array always or never
+    as this: some are of a file that is mapped, which nobody can write.
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view

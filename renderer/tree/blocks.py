@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import float32_pointer, float64_pointer, put
 from renderer.process.parallel import for_chunks
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, cache_aligned
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, cache_aligned, locked
 
 # Vertices and blocks per chunk: a tenth of a millisecond, beside which taking a chunk costs nothing.
 _VERTICES, _BLOCKS = 1 << 16, 1 << 12
@@ -49,7 +49,7 @@ def fill_blocks(
     for_chunks(check, len(vertices), _VERTICES, threads)
     count = len(block_faces) // BLOCK_FACES
     blocks = cache_aligned(count * BLOCK_WORDS, np.float64 if inexact else np.float32)
-    address, wide = blocks.ctypes.data, blocks.dtype == np.float64
+    address, wide, block_faces = blocks.ctypes.data, blocks.dtype == np.float64, locked(block_faces)
 
     # The default argument keeps the blocks alive as long as ``fill``, which their address does not.
     def fill(begin: int, end: int, _held: NDArray[Any] = blocks) -> None:

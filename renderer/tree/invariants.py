@@ -1,8 +1,11 @@
-"""A check of everything that a traversal takes for granted about a tree. Slow and plain, for tests and reports."""
+"""Checks of what a traversal takes for granted about a tree: all of it, slow and plain, for tests and reports; and, for
+trees from files, what it could crash at.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.trace.intersect import ROOM
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
@@ -91,3 +94,45 @@ def _block_faults(tree: Tree, mesh: Mesh) -> list[str]:
     empty = np.isnan(idle).all(axis=(1, 2))
     found += [f"place {p}: unused but not NaN" for p in np.flatnonzero(~used)[~empty]]
     return found
+
+
+def check_safe(tree: Tree, face_count: int) -> None:
+    """Raise ``ValueError`` for what leads a traversal out of the arrays, round in circles or beyond its stack.
+
+    Quick, for trees from files. Whether boxes and blocks are those of the mesh is not checked: wrong ones lead to wrong
+    hits, and to nothing worse.
+    """
+    blocks = len(tree.faces) // BLOCK_FACES
+    stored = len(tree.blocks) // BLOCK_WORDS
+    expect(stored == blocks, "blocks", f"{blocks}, as block_faces has", stored)
+    used = tree.faces[tree.faces != -1]
+    least, last = int(used.min(initial=0)), int(used.max(initial=-1))
+    expect(least >= 0 and last < face_count, "block_faces", f"faces of {face_count}, or -1", f"{least} to {last}")
+    once = len(used) == face_count and bool((np.bincount(used, minlength=face_count) == 1).all())
+    expect(once, "block_faces", f"each of {face_count} faces once", f"{len(used)} places with other faces")
+    links = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
+    expect((len(links) > 0) == (face_count > 0), "nodes", "some where there are faces, else none", len(links))
+    codes = ~links[links < 0]
+    ends = (codes >> LEAF_BITS) + (codes & (MAX_LEAF_BLOCKS - 1))
+    beyond = int(ends.max(initial=-1))
+    expect(beyond < blocks, "nodes", f"leaves within {blocks} blocks", f"one up to block {beyond}")
+    _check_levels(links, tree.depth)
+
+
+def _check_levels(links: NDArray[np.int32], depth: int) -> None:
+    """Raise ``ValueError`` unless the nodes are a tree of ``depth`` levels, each after its parent in memory."""
+    count = len(links)
+    parents, places = np.nonzero(links >= 0)
+    children = links[parents, places]
+    last = int(children.max(initial=-1))
+    expect(last < count, "nodes", f"links to {count} nodes", f"one to node {last}")
+    before = int((children <= parents).sum())
+    expect(before == 0, "nodes", "children after their parents", f"{before} before")
+    once = int((np.bincount(children, minlength=count)[1:] == 1).sum())
+    expect(once == max(count - 1, 0), "nodes", "one link to each but the first", f"that for {once} of {count}")
+    levels, current = 0, np.zeros(min(count, 1), np.int32)
+    while len(current) and levels <= depth:
+        below = links[current]
+        levels, current = levels + 1, below[below >= 0]
+    more = " or more" if len(current) else ""
+    expect(levels == depth, "depth", f"the levels of nodes, {levels}{more}", depth)

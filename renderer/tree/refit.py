@@ -7,7 +7,16 @@ from renderer.kernels.jit import kernel
 from renderer.kernels.simd import larger, smaller
 from renderer.process.parallel import for_chunks
 from renderer.trace.intersect import face_range
-from renderer.trace.layout import BLOCK_FACES, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, cache_aligned
+from renderer.trace.layout import (
+    BLOCK_FACES,
+    CHILDREN,
+    LEAF_BITS,
+    MAX_LEAF_BLOCKS,
+    NODE_WORDS,
+    Tree,
+    cache_aligned,
+    locked,
+)
 from renderer.tree.blocks import fill_blocks
 
 # Nodes per chunk when leaves are fitted: some tenths of a millisecond.
@@ -64,8 +73,9 @@ def refit_tree(tree: Tree, vertices: NDArray[np.float64], faces: NDArray[np.int3
     links = nodes.view(np.int32)
     # Copied as integers, because the bits of a link may be a NaN as a float.
     links[:] = tree.links
+    block_faces = locked(tree.faces)
     for_chunks(
-        lambda begin, end: _fit_leaves(vertices, faces, tree.faces, nodes, links, begin, end),
+        lambda begin, end: _fit_leaves(vertices, faces, block_faces, nodes, links, begin, end),
         len(nodes) // NODE_WORDS,
         _NODES,
         threads,

@@ -426,6 +426,9 @@ def test_paths_are_strings_or_paths(bad: Any) -> None:
         load_mesh(bad)
     with pytest.raises((ValueError, TypeError), match=r"expected|should be a str"):
         load_scene(bad)
+    for call in (Octree.load, OCTREE.save):
+        with pytest.raises(ValueError, match=r"^path: expected a string or path, got "):
+            call(bad)
 
 
 @pytest.mark.parametrize(
@@ -436,6 +439,11 @@ def test_paths_that_lead_nowhere(bad: str) -> None:
         load_mesh(bad)
     with pytest.raises(SceneError):
         load_scene(bad)
+    for mmap in (False, True):
+        with pytest.raises(ValueError, match=re.escape(f"{Path(bad)}: ")):
+            Octree.load(bad, mmap=mmap)
+    with pytest.raises((OSError, ValueError)):
+        OCTREE.save(bad)
 
 
 def test_colours_beyond_float32_are_refused_without_a_warning(tmp_path: Path) -> None:

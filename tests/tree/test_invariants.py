@@ -12,7 +12,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, Tree
-from renderer.tree.invariants import faults
+from renderer.tree.invariants import check_safe, faults
 
 
 @settings(max_examples=200)
@@ -20,6 +20,7 @@ from renderer.tree.invariants import faults
 def test_every_tree_is_sound(mesh, chosen):
     octree = Octree(*mesh, **chosen)
     assert faults(octree.tree, octree.mesh) == []
+    check_safe(octree.tree, len(octree.mesh.faces))
 
 
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
@@ -27,6 +28,21 @@ def test_every_tree_is_sound(mesh, chosen):
 def test_larger_trees_are_sound(kind, split):
     octree = Octree(*make_mesh(kind, 1, 2000), split=split)
     assert faults(octree.tree, octree.mesh) == []
+    check_safe(octree.tree, len(octree.mesh.faces))
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_what_a_traversal_could_crash_at_is_a_fault_too(seed):
+    """Links and faces are changed by little, so that some of it is found by both checks, and some by the slow one."""
+    rng, broken = np.random.default_rng(seed), Broken()
+    words, places = ((broken.links, broken.used), (broken.tree.faces, broken.tree.faces >= -1))[seed % 2]
+    for at in rng.permutation(np.argwhere(places))[: 1 + seed // 4]:
+        words[tuple(at)] += rng.integers(-9, 9)
+    try:
+        check_safe(broken.tree, len(broken.mesh.faces))
+    except ValueError:
+        with np.errstate(invalid="ignore"):
+            assert broken.found()
 
 
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
