@@ -29,7 +29,7 @@ from renderer.points.point import Point
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
 from renderer.trace.rays import hit_pointers
-from renderer.trace.sides import coordinate
+from renderer.trace.sides import corner
 
 # Faces that may be the nearest are told apart at once when so many are listed.
 LISTED = 64
@@ -192,13 +192,8 @@ def _settle(tree, point, search, best, listed, limit):
         put(search.work, 0, get(search.work, 0) + _APART)
         base = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
         f = get(tree.faces, place)
-        d, du, dv = distance_to_face(_corner(tree, base), _corner(tree, base + 12), _corner(tree, base + 24), p,
+        d, du, dv = distance_to_face(corner(tree, base), corner(tree, base + 12), corner(tree, base + 24), p,
                                      search.parts)  # fmt: skip
         if d < distance or (d == distance and f < face):
             distance, face, u, v = d, f, du, dv
     return distance, face, u, v
-
-
-@inlined
-def _corner(tree, base):
-    return coordinate(tree, base), coordinate(tree, base + 4), coordinate(tree, base + 8)

@@ -20,6 +20,7 @@ from renderer.inside.multipoles import (
     add_shifted,
     get_series,
     put_series,
+    sum_lanes,
 )
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import extract, get, larger, pointer, put, select, splat4, square_root
@@ -27,7 +28,7 @@ from renderer.process.parallel import for_chunks
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree, cache_aligned
 from renderer.trace.leaf import blocks_of, tree_pointers
-from renderer.trace.sides import coordinate
+from renderer.trace.sides import corner
 from renderer.trace.singly import stack_size
 
 # Nodes per chunk: some milliseconds, but for the first chunk, whose nodes hold all faces.
@@ -81,8 +82,9 @@ def _computed(tree: Tree, threads: int) -> NDArray[np.float64]:
         _measure_octants(tree.words, rows, _room(tree), begin, end)
 
     for_chunks(measure, count, _NODES, threads)
-    if count:
-        _join_octants(tree.words, rows, _room(tree), count)
+    room = _room(tree)
+    for end in range(count, 0, -_NODES):
+        _join_octants(tree.words, rows, room, max(0, end - _NODES), end)
     return rows
 
 
@@ -146,7 +148,7 @@ def _list_leaves(tree, link, room):
 def _measure(tree, room, count, rows, base):
     """Write what an octant's faces are like; returns their centre and radius."""
     first, _ = blocks_of(room.leaves[0])
-    centre, size = _centre(tree, room, count, _corner(tree, first * BLOCK_WORDS))
+    centre, size = _centre(tree, room, count, corner(tree, first * BLOCK_WORDS))
     radius = larger(np.sqrt(_farthest(tree, room, count, centre)) * _MORE, _LEAST)
     spread = _spread(tree, room, count, centre, 1.0 / (radius * radius))
     put(rows, base + 8 * X, centre[0])
@@ -170,9 +172,9 @@ def _centre(tree, room, count, near):
             size, _ = _sizes(a, b, c)
             x, y, z = x + size * (a[0] + b[0] + c[0]), y + size * (a[1] + b[1] + c[1]), z + size * (a[2] + b[2] + c[2])
             total = total + size
-    size = _sum(total)
+    size = sum_lanes(total)
     share = 1.0 / (3.0 * size) if size > 0.0 else 0.0
-    return (near[0] + share * _sum(x), near[1] + share * _sum(y), near[2] + share * _sum(z)), size
+    return (near[0] + share * sum_lanes(x), near[1] + share * sum_lanes(y), near[2] + share * sum_lanes(z)), size
 
 
 @kernel
@@ -182,8 +184,8 @@ def _farthest(tree, room, count, centre):
     for k in range(count):
         first, blocks = blocks_of(room.leaves[k])
         for block in range(first, first + blocks):
-            for corner in _faces(tree, block, centre):
-                square = _square(corner)
+            for vertex in _faces(tree, block, centre):
+                square = _square(vertex)
                 most = select(square > most, square, most)
     return larger(larger(extract(most, 0), extract(most, 1)), larger(extract(most, 2), extract(most, 3)))
 
@@ -201,12 +203,12 @@ def _spread(tree, room, count, centre, unit):
         for block in range(first, first + blocks):
             a, b, c = _faces(tree, block, centre)
             _, area = _sizes(a, b, c)
-            for corner in (a, b, c):
-                power, square = area, _square(corner) * splat4(unit)
+            for vertex in (a, b, c):
+                power, square = area, _square(vertex) * splat4(unit)
                 for _ in range(ORDER // 2):
                     power = power * square
                 total = total + power
-    return _sum(total) / 3.0
+    return sum_lanes(total) / 3.0
 
 
 @inlined
@@ -244,16 +246,6 @@ def _square(a):
     return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
 
 
-@inlined
-def _sum(four):
-    return (extract(four, 0) + extract(four, 1)) + (extract(four, 2) + extract(four, 3))
-
-
-@inlined
-def _corner(tree, place):
-    return coordinate(tree, place), coordinate(tree, place + 4), coordinate(tree, place + 8)
-
-
 @kernel
 def _add_faces(tree, link, centre, radius, room):
     """Add the series of a leaf's faces to ``room.total``."""
@@ -262,7 +254,7 @@ def _add_faces(tree, link, centre, radius, room):
     for place in range(first * BLOCK_FACES, (first + count) * BLOCK_FACES):
         if get(tree.faces, place) >= 0:
             at = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
-            a, b, c = _corner(tree, at), _corner(tree, at + 12), _corner(tree, at + 24)
+            a, b, c = corner(tree, at), corner(tree, at + 12), corner(tree, at + 24)
             d, e = _scaled(b, a, unit), _scaled(c, a, unit)
             area = (
                 0.5 * (d[1] * e[2] - d[2] * e[1]), 0.5 * (d[2] * e[0] - d[0] * e[2]), 0.5 * (d[0] * e[1] - d[1] * e[0])
@@ -277,10 +269,10 @@ def _scaled(a, b, unit):
 
 
 @kernel
-def _join_octants(words, rows, room, count):
-    """Write the coefficients of all octants that are nodes, from below: a child comes after its parent in memory."""
+def _join_octants(words, rows, room, begin, end):
+    """Write the coefficients of octants that are nodes themselves, last to first: a child comes after its parent."""
     tree, rows = tree_pointers(words), pointer(rows)
-    for node in range(count - 1, -1, -1):
+    for node in range(end - 1, begin - 1, -1):
         for place in range(8):
             child = np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + place))
             if child < 0:

@@ -33,7 +33,7 @@ from renderer.kernels.simd import (
 from renderer.points.signs import UNDECIDED, volume_sign
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.sides import coordinate
+from renderer.trace.sides import corner
 
 # Both parts of a face's number, at most 4 in size, err by 2^-47: corners, lengths and directions by 2^-53 of themselves
 # each, then six products of three. Its angle errs by the share of that in its size: by 2^-44 of a turn at most where
@@ -134,7 +134,7 @@ def _times(real, imaginary, turns, a, b):
 def _careful_angle(tree, place, point, parts):
     """Half the solid angle of one face with twice the digits, on the side that the exact sign of its volume says."""
     p = point.x, point.y, point.z
-    a, b, c = _corner(tree, place), _corner(tree, place + 12), _corner(tree, place + 24)
+    a, b, c = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
     if _farthest(a, p) == 0.0 or _farthest(b, p) == 0.0 or _farthest(c, p) == 0.0:
         return 0.0
     x, y, z = _near_one(a, p), _near_one(b, p), _near_one(c, p)
@@ -148,11 +148,6 @@ def _careful_angle(tree, place, point, parts):
     rest = plus(product(product(i, j), k), product(dot_pairs(x, y), k))
     rest = plus(rest, plus(product(dot_pairs(y, z), i), product(dot_pairs(z, x), j)))
     return math.atan2(volume, rest[0])
-
-
-@inlined
-def _corner(tree, place):
-    return coordinate(tree, place), coordinate(tree, place + 4), coordinate(tree, place + 8)
 
 
 @inlined

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from renderer.inside.multipoles import MOMENT_WORDS, ROUNDING, see_octants
+from renderer.inside.multipoles import MOMENT_WORDS, ROUNDING, see_octants, sum_lanes
 from renderer.inside.solid_angle import add_blocks, no_turn, turns_of
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, extract, get, larger, local_doubles, pointer, put, smaller, splat4
+from renderer.kernels.simd import at, get, larger, local_doubles, pointer, put, smaller, splat4
 from renderer.limits import FARTHEST
 from renderer.points.point import Point
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
@@ -89,14 +89,9 @@ def _search(tree, rows, point, share, stack, parts):
         bits, value, bound = see_octants(rows, child * MOMENT_WORDS, point, share)
         values, bounds = values + value, bounds + bound
         top = push_children(tree, child, bits, stack, top)
-    return _sum(values) + turns_of(total), _sum(bounds)
+    return sum_lanes(values) + turns_of(total), sum_lanes(bounds)
 
 
 @kernel
 def _all_faces(tree, point, parts):
     return turns_of(add_blocks(tree, 0, tree.count, point, no_turn(), parts))
-
-
-@inlined
-def _sum(four):
-    return (extract(four, 0) + extract(four, 1)) + (extract(four, 2) + extract(four, 3))

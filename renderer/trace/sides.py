@@ -22,6 +22,12 @@ def coordinate(tree, at):
     return get(tree.wide_blocks, at) if tree.wide != 0 else np.float64(get(tree.blocks, at))
 
 
+@inlined
+def corner(tree, at):
+    """A corner (x, y, z) of a face, exactly."""
+    return coordinate(tree, at), coordinate(tree, at + 4), coordinate(tree, at + 8)
+
+
 @kernel
 def exact_sides(tree, at, shear):
     """The signs, -1, 0 or 1, of the three edge functions of the face at ``at``, for its sheared corners as rounded."""

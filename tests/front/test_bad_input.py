@@ -70,6 +70,8 @@ CALLS = {
     "Octree.contains": Call(Octree.from_mesh(BOX).contains, {"points": POINTS}),
     "Octree.closest_point": Call(OCTREE.closest_point, {"points": POINTS}),
     "Octree.signed_distance": Call(Octree.from_mesh(BOX).signed_distance, {"points": POINTS}),
+    "Octree.winding_number": Call(OCTREE.winding_number, {"points": POINTS}),
+    "BruteForce.winding_number": Call(BRUTE.winding_number, {"points": POINTS}),
     "Octree.visible": Call(OCTREE.visible, {"points": POINTS, "targets": ORIGINS[::-1]}),
     "Octree.closest_hit": Call(OCTREE.closest_hit, RAYS),
     "Octree.all_hits": Call(OCTREE.all_hits, RAYS),
@@ -223,6 +225,24 @@ def test_an_interval_without_numbers_holds_no_hit(accelerator: Any) -> None:
         hits = accelerator.closest_hit(ORIGINS, DIRECTIONS, t_min, t_max)
         assert (hits.face == -1).all() and np.isinf(hits.t).all() and np.isnan(hits.u).all() and np.isnan(hits.v).all()
         assert not accelerator.any_hit(ORIGINS, DIRECTIONS, t_min, t_max).any()
+
+
+POINT_OPTIONS: dict[str, list[Any]] = {
+    "tolerance": [None, -1, np.nan, np.inf, "1e-3", [1e-3], True, 1j, 10**400],
+    "winding": [None, 0, 1.0, "true", [True], np.array([True, False])],
+    "boundary": [None, 0, 1.0, "true", [True]],
+    "rule": [None, "x", 0, ["nonzero"], b"nonzero", np.array(["nonzero"])],
+}
+
+
+@pytest.mark.parametrize(("name", "bad"), [(n, b) for n, values in POINT_OPTIONS.items() for b in values], ids=repr)
+def test_options_of_questions_of_points(name: str, bad: Any) -> None:
+    solid = Octree.from_mesh(BOX)
+    asked = {"tolerance": [solid.winding_number], "boundary": [solid.contains]}
+    for ask in asked.get(name, [solid.contains, solid.signed_distance]):
+        with pytest.raises(ValueError, match=rf"^{name}: expected .*, got ") as caught:
+            ask(POINTS, **{name: bad})
+        assert "ambiguous" not in str(caught.value)
 
 
 # --- what is unusual and right --------------------------------------------------------------------------------

@@ -12,10 +12,10 @@ from meshes import KINDS, make_mesh
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.inside.moments import moments_of
-from renderer.inside.winding_search import _point_at, _search
+from renderer.inside.winding_search import _FIRST, _point_at, _search
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import at, local_doubles, pointer
-from renderer.mesh.shapes import box, icosphere, torus
+from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.singly import stack_size
 from validation.references.igl import Igl
@@ -217,9 +217,9 @@ def test_the_bound_is_never_exceeded(share):
 
 @pytest.mark.parametrize("share", [1.0, 1e-2, 1e-4])
 def test_the_bound_is_not_absurdly_loose(share):
-    """Half of it comes true; where many faces help each other out, some hundredths: errors have signs, bounds none."""
+    """Nine tenths of it come true at best; where many faces help each other out, hundredths: errors have signs."""
     error, bound = errors_and_bounds(two_spots(), np.arange(2.0, 9.0)[:, None] * [0, 0, 1], 4.0)
-    assert (error >= 0.5 * bound).all() and (bound > 0).all()
+    assert (error >= 0.9 * bound).all() and (bound > 0).all()
     mesh = OPEN["half a ball"]
     error, bound = errors_and_bounds(mesh, around(mesh, np.random.default_rng(2), 300), share)
     told = bound > 0
@@ -228,9 +228,34 @@ def test_the_bound_is_not_absurdly_loose(share):
 
 
 def two_spots():
-    """Two tiny faces that look along the z axis from 1 and -1. As one series they have all at its radius."""
-    corners = 1e-3 * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
-    return Mesh(np.concatenate([corners + np.array([0, 0, 1]), corners - np.array([0, 0, 1])]), [[0, 1, 2], [3, 4, 5]])
+    """Two small faces that look along the z axis. The smaller one has almost all of their series' higher orders."""
+    corners = np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
+    return Mesh(np.concatenate([1e-2 * corners, 1e-4 * corners + np.array([0, 0, 1])]), [[0, 1, 2], [3, 4, 5]])
+
+
+def test_a_search_whose_bound_exceeds_the_tolerance_is_not_the_answer():
+    """Around eight balls in one place the bounds of as many faces add up."""
+    tolerance, mesh = 1e-2, Mesh(icosphere(3).vertices, icosphere(3).faces.repeat(8, axis=0))
+    points = around(mesh, np.random.default_rng(3), 300) * 3
+    tree, out = Octree.from_mesh(mesh).tree, np.empty((len(points), 2))
+    stack = np.empty(stack_size(tree.depth), np.int64)
+    search_all(tree.words, moments_of(tree, 1), points, _FIRST * tolerance, out, stack)
+    good = out[:, 1] <= tolerance
+    numbers = Octree.from_mesh(mesh).winding_number(points, tolerance)
+    assert good.any() and (~good).any()
+    np.testing.assert_array_equal(numbers[good], out[good, 0])
+    assert (numbers[~good] != out[~good, 0]).all()
+
+
+def test_a_side_of_one_half_is_not_told_within_the_bound():
+    """In the opening of a bowl with a flat rim, where the number is 1/2 but for the distance from the rim's plane."""
+    up, around_it = np.linspace(0, np.pi / 2, 13)[:, None], np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    bowl = [np.cos(up) * np.cos(around_it), np.cos(up) * np.sin(around_it), np.sin(up) * np.ones(48)]
+    mesh = Mesh(np.stack(bowl, axis=-1).reshape(-1, 3), lattice_faces(13, 48, wrap_columns=True))
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.uniform(-0.6, 0.6, (400, 2)), 10.0 ** rng.uniform(-9, -1, (400, 1))], axis=1)
+    points[:, 2] *= rng.choice([-1, 1], 400)
+    np.testing.assert_array_equal(Octree.from_mesh(mesh).contains(points, winding=True), points[:, 2] > 0)
 
 
 def test_a_tolerance_is_used_and_not_undercut_by_far():
