@@ -151,7 +151,7 @@ class Octree(_Accelerator):
         """Write mesh, tree and ``repairs`` to one file, whole or not at all, for ``load``.
 
         ``renderer/tree/store.py`` describes the file; no suffix is expected. A refit that runs meanwhile is in it or
-        not. Raises ``OSError`` where it cannot be written.
+        not. Raises ``OSError`` where it cannot be written, and ``ValueError`` for what is no path.
 
         >>> import tempfile
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -170,14 +170,14 @@ class Octree(_Accelerator):
 
         mmap     False: read all, and check each array against its checksum. True: the arrays (V, 3), (F, 3) and the
                  tree's are views of a read-only map of the file: nothing is copied, processes that map one file share
-                 its memory, and what no ray needs may not even be read. Checksums of the arrays are not checked then,
-                 and the file must not be written to as long as the octree is used; ``save`` over it is safe on POSIX,
-                 as it makes a new file
+                 its memory, and blocks of triangles, most of the file, are read when rays come to them. The checksums
+                 of arrays are not checked then, and the file must not be written to as long as the octree is used, or
+                 the process may crash; ``save`` over it is safe on POSIX, as it makes a new file
         threads  for queries, as in the class
 
-        With and without it the tree is checked so far that no file, forged or damaged, can crash a query; one that was
-        forged with the right checksums can give wrong hits. It can be refitted, pickled and saved again. Raises
-        ``ValueError`` that names the path: not there, not a file, no octree, of another version, truncated, damaged.
+        Either way the tree is checked so far that no content, damaged or forged, crashes a query; where no checksum
+        tells, it may give wrong hits. The octree can be refitted, pickled and saved again. Raises ``ValueError`` that
+        names the path: not there, not a file, no octree, of another version, truncated, damaged.
 
         >>> import tempfile
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])

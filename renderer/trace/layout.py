@@ -100,8 +100,9 @@ def cache_aligned(count: int, dtype: type[np.generic]) -> NDArray[Any]:
 
 
 def locked(array: NDArray[T]) -> NDArray[T]:
-    """A view that cannot be written. Kernels are compiled anew for such a type, so each gets an array always or never
-    as this: some are of a file that is mapped, which nobody can write.
+    """A view that cannot be written.
+
+    Kernels are compiled anew for arrays that cannot, as those of a mapped file. So a kernel gets all of a kind as such.
     """
     view = array.view()
     view.flags.writeable = False
