@@ -6,8 +6,7 @@ import os
 import pickle
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from multiprocessing.pool import Pool
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -187,24 +186,25 @@ def drawn(scene: Scene) -> Image:
     return render(scene, resolution=(24, 16))
 
 
-def check_in(pool: Pool, targets: list[Octree | BruteForce | str], scene: Scene) -> None:
+def check_in(pool: ProcessPoolExecutor, targets: list[Octree | BruteForce | str], scene: Scene) -> None:
     """What comes back from a child is what this process answers."""
-    waiting = [pool.apply_async(answered, (target,)) for target in targets]
+    waiting = [pool.submit(answered, target) for target in targets]
     for target, waited in zip(targets, waiting, strict=True):
-        hits, refitted, child = waited.get(120)
+        hits, refitted, child = waited.result(120)
         own = KEPT[target] if isinstance(target, str) else target
         assert child != os.getpid() and fields(hits) == fields(own.closest_hit(*RAYS))
         again = copy.copy(own)
         again.refit(own.mesh.vertices * 2.0)
         assert asked(refitted) == asked(again) != asked(own)
         assert all(a.tobytes() == b.tobytes() for a, b in zip(arrays(refitted.tree), arrays(again.tree), strict=True))
-    image = pool.apply_async(drawn, (scene,)).get(120)
+    image = pool.submit(drawn, scene).result(120)
     assert image.radiance.tobytes() == drawn(scene).radiance.tobytes()
 
 
 def test_by_spawn(tmp_path: Path) -> None:
     targets = [TARGETS[kind](tmp_path) for kind in ("octree", "mapped", "brute force")]
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
+    # Not a Pool: ending one kills its process, which may hold the lock that the end waits for.
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         check_in(pool, [*targets], from_file(tmp_path))
 
 
@@ -215,7 +215,7 @@ def test_by_fork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     many = np.ones((20_000, 3))
     for octree in KEPT.values():
         octree.any_hit(many, many)  # on threads, which the child does not have
-    with multiprocessing.get_context("fork").Pool(1) as pool:
+    with ProcessPoolExecutor(1, multiprocessing.get_context("fork")) as pool:
         check_in(pool, [*KEPT.values(), *KEPT], from_file(tmp_path))
 
 
