@@ -114,9 +114,9 @@ def test_a_copied_mesh_is_the_same_mesh_to_an_octree(way: str) -> None:
 
 def fields(answer: Any) -> list[bytes]:
     """All that an answer holds, and what it works out from its mesh."""
-    names = [name for name in type(answer).__slots__ if name != "_mesh"]
+    names = [name for name in type(answer).__slots__ if name != "_mesh" and getattr(answer, name) is not None]
     more = [name for name in ("hit", "found", "counts", "ray", "points", "normals") if hasattr(answer, name)]
-    return [getattr(answer, name).tobytes() for name in [*names, *more]]
+    return [np.asarray(getattr(answer, name)).tobytes() for name in [*names, *more]]
 
 
 @by_any_way
