@@ -144,7 +144,8 @@ def moved_off(rays: RayBatch, faces: NDArray[np.int64], mesh: Mesh, scale: float
     Raises ``ValueError`` naming the argument and the row for an origin out of bounds.
     """
     count = rays.number
-    directions = np.ascontiguousarray(np.broadcast_to(rays.directions, (count, 3)))
+    # Not by broadcasting, whose arrays cannot be written: Numba would compile the kernel again for these.
+    directions = rays.directions if len(rays.directions) == count else np.tile(rays.directions, (count, 1))
     sound = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(directions).all(axis=1)
     if not sound.all():
         # Rejected before it is moved, so that the message names the numbers as given.

@@ -38,11 +38,11 @@ def test_no_error_is_above_its_bound(kind, offset, scale):
     else:
         vertices, faces = make_mesh(kind, 3, 200)
     vertices = np.asarray(vertices) * scale + offset * scale
-    origins, directions = rays_at(vertices, faces, 5, 300)
+    origins, directions = rays_at(vertices, faces, 5, 120)
     octree = Octree(vertices, faces)
     hits = octree.closest_hit(origins, directions, t_error=True)
     got = shares(octree, origins, directions, hits, np.flatnonzero(hits.hit))
-    assert len(got) > 100 and got.max() <= 1.0
+    assert len(got) > 40 and got.max() <= 1.0
     assert np.isnan(hits.t_error[~hits.hit]).all()
     every = octree.all_hits(origins, directions, t_error=True)
     assert shares(octree, origins, directions, every, every.ray).max() <= 1.0

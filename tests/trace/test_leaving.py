@@ -10,6 +10,7 @@ from meshes import make_mesh
 
 from renderer import BruteForce, Octree
 from renderer.mesh.shapes import box, grid, icosphere, torus
+from renderer.trace import batch
 
 SCALES = (1e-12, 1.0, 1e12)
 OFFSETS = (0.0, 1e3, 1e8)
@@ -196,3 +197,19 @@ def test_a_ray_along_a_face_on_a_line_leaves_it(accelerator, toward):
     # Other directions so near to the side that their roundings are all that points across it.
     near = direction * (1.0 + 2.0**-52 * np.random.default_rng(0).integers(-2, 3, (500, 3)))
     assert not queries.any_hit(corners[2], near, leaving=0).any()
+
+
+def test_no_kernel_is_compiled_for_other_arrays(monkeypatch):
+    """Directions had come as an array that cannot be written, for which Numba compiles the kernel again."""
+    seen = []
+    kernel = batch.leave_faces
+
+    def noted(*arguments):
+        seen.append([array.flags.writeable for array in arguments[2:6]])
+        return kernel(*arguments)
+
+    monkeypatch.setattr(batch, "leave_faces", noted)
+    octree, directions = Octree.from_mesh(icosphere(1)), np.eye(3)
+    for given in (directions, directions[0], np.broadcast_to(directions[0], (3, 3))):
+        octree.any_hit(np.zeros((3, 3)), given, leaving=[0, 1, 2])
+    assert len(seen) == 3 and all(all(row) for row in seen)

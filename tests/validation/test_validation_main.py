@@ -64,11 +64,12 @@ def metrics(folder: Path) -> dict[str, Any]:
 def test_all_gates_hold(tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["--output", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line[:5] for line in lines[:-1]] == ["[1/8]", "[2/8]", "[3/8]", "[4/8]", "[5/8]", "[6/8]", "[7/8]", "[8/8]"]
-    assert lines[-1].startswith("validation: PASS, 4 of 4 gates in ")
-    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 4, "failed": 0}
+    # Two steps and one gate a section.
+    assert [line[:7] for line in lines[:-1]] == [f"[{k:2}/10]" for k in range(1, 11)]
+    assert lines[-1].startswith("validation: PASS, 5 of 5 gates in ")
+    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 5, "failed": 0}
     assert ET.parse(tmp_path / "junit.xml").getroot().get("failures") == "0"
-    assert "4 of 4 gates hold" in (tmp_path / "index.html").read_text()
+    assert "5 of 5 gates hold" in (tmp_path / "index.html").read_text()
 
 
 def test_a_failing_gate_is_exit_code_1_and_named_everywhere(

@@ -1,4 +1,4 @@
-"""Rows 1 to 32, 46 and 49 to 52 of the extreme cases hold, and each judgement fails when what it judges is broken."""
+"""Rows 1 to 32, 46 and 49 to 53 of the extreme cases hold, and each judgement fails when what it judges is broken."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,7 +16,7 @@ Break = Callable[[Hits], Hits]
 
 
 def test_the_table_has_every_row_once_and_in_order():
-    assert [case.number for case in CASES] == [*range(1, 33), 46, 49, 50, 51, 52]
+    assert [case.number for case in CASES] == [*range(1, 33), 46, 49, 50, 51, 52, 53]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: str(case.number))
@@ -129,3 +129,17 @@ def test_row_32_fails_on_a_wrong_hit_and_on_too_much_memory(monkeypatch):
     some = np.arange(10_000) % 1000 == 0
     broken(monkeypatch, lambda hits: replace(hits, t=np.where(some, hits.t * 1.001, hits.t)))
     assert not ROWS[32].run(True).holds
+
+
+@pytest.mark.parametrize("name", ["distance", "face"])
+def test_row_53_fails_on_a_wrong_distance_or_face(monkeypatch, name):
+    right = Octree.closest_point
+
+    def spoiled(*arguments):
+        found = right(*arguments)
+        found.distance *= 1.0 + 2.0**-51 * (name == "distance")
+        found.face += name == "face"
+        return found
+
+    monkeypatch.setattr(Octree, "closest_point", spoiled)
+    assert not ROWS[53].run(True).holds

@@ -1,6 +1,6 @@
-"""Extreme cases 1 to 32, 46 and 49 to 52: hits."""
+"""Extreme cases 1 to 32, 46 and 49 to 53: hits and queries."""
 
-from validation.stability.cases import builds, contacts, edge_on, inside, order, precision, rays, thin
+from validation.stability.cases import builds, contacts, edge_on, inside, nearest, order, precision, rays, thin
 from validation.stability.cases.case import ExtremeCase
 
 CASES: tuple[ExtremeCase, ...] = (
@@ -12,4 +12,5 @@ CASES: tuple[ExtremeCase, ...] = (
     *edge_on.CASES,
     *inside.CASES,
     *contacts.CASES,
+    *nearest.CASES,
 )

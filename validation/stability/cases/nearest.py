@@ -1,0 +1,79 @@
+"""Row 53 of the extreme cases: nearest points of meshes that are hard to search, judged by exact arithmetic."""
+
+import numpy as np
+
+from renderer import BruteForce, Mesh, Octree
+from renderer.mesh.shapes import box, icosphere
+from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.stability.cases.case import ExtremeCase, Outcome
+from validation.stability.cases.judgement import SEED, Floats, both
+
+# The exact distance, rounded: half an ulp, and as little more as twice the digits leave.
+_ULPS = 0.51
+
+
+def hard_meshes() -> dict[str, Mesh]:
+    """Faces that are lines, points or twice there, slivers, touching solids, and a tetrahedron far away."""
+    ball, cube = icosphere(1), box((-1, -1, -1), (1, 1, 1))
+    lines = Mesh([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], [[0, 1, 1], [2, 2, 2], [0, 3, 0], [0, 1, 2]])
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    return {
+        "lines and points": lines,
+        "twice": both(cube, cube),
+        "touching": both(cube, box((1, -1, -1), (3, 1, 1))),
+        "slivers": Mesh(ball.vertices * [1, 1e-4, 1e-8], ball.faces),
+        "far away": Mesh(corners + 1e9, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
+    }
+
+
+def fan(count: int) -> Mesh:
+    """``count`` faces around one corner, the last vertex."""
+    angle = 2 * np.pi * np.arange(count) / count
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
+    faces = np.stack([np.full(count, count), np.arange(count), (np.arange(count) + 1) % count], axis=1)
+    return Mesh(np.concatenate([rim, [[0.0, 0.0, 0.5]]]), faces)
+
+
+def wrong_distances(mesh: Mesh, points: Floats) -> int:
+    """The number of points whose distance or face is not that of exact arithmetic."""
+    triangles = [rational(triangle.tolist()) for triangle in mesh.triangles]
+    expected = [nearest(point, triangles) for point in rational(points.tolist())]
+    wrong = np.zeros(len(points), np.bool_)
+    for queries in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+        found = queries.closest_point(points)
+        for i, (square, faces) in enumerate(expected):
+            wrong[i] |= not ulps_from_root(float(found.distance[i]), square) < _ULPS or found.face[i] > faces[0]
+    return int(wrong.sum())
+
+
+def _is_refused() -> bool:
+    """Whether a point that is no number is refused by its row."""
+    try:
+        Octree.from_mesh(box()).closest_point([[0.0, 0.0, 0.0], [0.0, np.nan, 0.0]])
+    except ValueError as error:
+        return str(error).startswith("points: ") and str(error).endswith("in row 1")
+    return False
+
+
+def _nearest(quick: bool) -> Outcome:
+    rng, wrong, asked = np.random.default_rng(SEED), 0, 0
+    for mesh in hard_meshes().values():
+        count = 15 if quick else 100
+        on = mesh.triangles[rng.integers(0, len(mesh.faces), count), rng.integers(0, 3, count)]
+        away = mesh.extent.max() * rng.normal(size=(count, 3)) * rng.choice([0.0, 1e-3, 1.0], (count, 1))
+        wrong, asked = wrong + wrong_distances(mesh, on + away), asked + count
+    wheel = fan(1_000 if quick else 100_000)
+    # At the hub, straight above it and below: the hub is the nearest point of all faces, or its slope is.
+    hub = Octree.from_mesh(wheel).closest_point([[0, 0, 0.5], [0, 0, 0.75], [0, 0, 1e6]])
+    wrong += hub.distance.tolist() != [0.0, 0.25, 1e6 - 0.5] or hub.face.tolist() != [0, 0, 0]
+    wrong += not _is_refused()
+    return Outcome(f"{wrong} of {asked + 4:,} answers wrong", wrong == 0)
+
+
+CASES: tuple[ExtremeCase, ...] = (
+    ExtremeCase(
+        53, "nearest points of faces that are lines, points or twice there, slivers, touching solids, a fan; far away",
+        "the exact distance, rounded, and of equal ones the lowest face; NaN refused by its row", ("exact", "analytic"),
+        "half an ulp, as the answer is rounded once", _nearest,
+    ),
+)  # fmt: skip
