@@ -210,6 +210,6 @@ def test_no_kernel_is_compiled_for_other_arrays(monkeypatch):
 
     monkeypatch.setattr(batch, "leave_faces", noted)
     octree, directions = Octree.from_mesh(icosphere(1)), np.eye(3)
-    for given in (directions, directions[0], np.broadcast_to(directions[0], (3, 3))):
-        octree.any_hit(np.zeros((3, 3)), given, leaving=[0, 1, 2])
+    for ways in (directions, directions[0], np.broadcast_to(directions[0], (3, 3))):
+        octree.any_hit(np.zeros((3, 3)), ways, leaving=[0, 1, 2])
     assert len(seen) == 3 and all(all(row) for row in seen)
