@@ -63,7 +63,7 @@ def make_parser() -> argparse.ArgumentParser:
             f"--{name}", type=Path, action="append", default=[], metavar="FILE",
             help=f"judge this {name} and not the suite's own, in the section {section}; may be given again",
         )  # fmt: skip
-    parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about 13 minutes")
+    parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about half an hour")
     parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
     return parser
 
