@@ -81,6 +81,9 @@ class _Accelerator(Queries):
         _check_sides(moved, scaled, refitted)
         self._built = (moved, refitted)
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} over {len(self.mesh.faces):,} faces, {self.tree.depth} levels>"
+
     @property
     def stats(self) -> Stats:
         """Counts and bytes of the built arrays, those of the mesh left out."""

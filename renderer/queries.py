@@ -1,5 +1,7 @@
 """The questions that rays and points ask of a mesh: what ``Octree`` and ``BruteForce`` have in common."""
 
+from __future__ import annotations  # so that help() shows ArrayLike by its name
+
 from typing import Literal
 
 import numpy as np
@@ -95,7 +97,9 @@ class Queries:
         t_max: ArrayLike = np.inf,
         leaving: ArrayLike | None = None,
     ) -> NDArray[np.bool_]:
-        """Whether each ray hits anything in the closed interval [t_min, t_max], (...) bool; arguments as above.
+        """Whether each ray hits anything in the closed interval [t_min, t_max], (...) bool.
+
+        Arguments as for ``closest_hit``.
 
         >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -118,7 +122,9 @@ class Queries:
         max_hits: int | None = None,
         t_error: bool = False,
     ) -> AllHits:
-        """All hits of each ray in the closed interval [t_min, t_max], sorted by t, then face; arguments as above.
+        """All hits of each ray in the closed interval [t_min, t_max], sorted by t, then face.
+
+        Arguments as for ``closest_hit``, and:
 
         contacts  True: the hits of a ray at one edge or corner of the surface, told apart by position, are one contact,
                   which is reported as the first of them. Thin walls and double faces stay two. False: each face that is
@@ -173,10 +179,10 @@ class Queries:
         t_max: ArrayLike = np.inf,
         leaving: ArrayLike | None = None,
     ) -> Steps:
-        """The nodes and triangles that the search for each ray's closest hit tests, for heat maps; arguments as above.
+        """The nodes and triangles that the search for each ray's closest hit tests, for heat maps.
 
-        They are those of a ray that travels alone and goes to the nearest boxes first. Rays of one direction are traced
-        together and test some more, at less cost.
+        Arguments as for ``closest_hit``. The counts are those of a ray that travels alone and goes to the nearest boxes
+        first. Rays of one direction are traced together and test some more, at less cost.
 
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import icosphere
@@ -322,11 +328,13 @@ class Queries:
 
         points, targets    (..., 3), finite
         leaving, reaching  the faces that the points and the targets lie on, one or (...), -1 for none. The ray starts
-                           at the end that has one (at the point, where both have), moved off it as by ``closest_hit``
+                           at the end that has one (at the point, where both have), moved off it as by ``closest_hit``:
+                           so a face that is turned away from the other end hides it. A corner lies on many faces: leave
+                           them out there
 
         No end hides itself: what is nearer to it, along the way, than 2^-40 of the largest coordinate of both is not
-        looked at, but for an end whose face is left. A surface seen at less than 0.03 degrees may still hide its own
-        points. Raises ``ValueError`` naming argument and row.
+        looked at, but for an end whose face is left. A surface that the way only touches hides, and one seen at less
+        than 0.03 degrees may still hide its own points. Raises ``ValueError`` naming argument and row.
 
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box

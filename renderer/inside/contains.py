@@ -50,7 +50,9 @@ def _check_closed(mesh: Mesh, rule: str) -> None:
     edges = mesh.open_edges if rule == "nonzero" else mesh.odd_edges
     if len(edges):
         start, end = mesh.vertices[edges[0]].tolist()
-        expected = "a closed mesh" if rule == "nonzero" else "a mesh each of whose edges an even number of faces has"
+        expected = "a mesh each of whose edges an even number of faces has, or winding=True"
+        if rule == "nonzero":
+            expected = "a closed mesh whose faces are turned one way, or rule='even-odd' or winding=True"
         expect(False, "mesh", expected, f"{len(edges)} open edges, the first from {start} to {end}")
 
 
