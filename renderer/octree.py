@@ -82,7 +82,7 @@ class _Accelerator(Queries):
         self._built = (moved, refitted)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} over {len(self.mesh.faces):,} faces, {self.tree.depth} levels>"
+        return f"<{type(self).__name__} over {len(self.mesh.faces):,} faces, depth {self.tree.depth}>"
 
     @property
     def stats(self) -> Stats:
