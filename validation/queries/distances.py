@@ -20,9 +20,10 @@ Floats = NDArray[np.float64]
 _SEED = 2042
 # The answer is the exact distance, rounded: half an ulp, and as little more as twice the digits leave.
 ULPS = 0.51
-# Or as far off, as a share of the distance to the face's farthest corner: beside an edge, at some 1e-30, twice the
-# digits do not tell on which side of it a point lies.
-BESIDE = 2.0**-90
+# Or as far off, as a share of the distance to the face's farthest corner, where the distance itself is at most such a
+# share: twice the digits do not tell on which side of an edge a point lies that is nearer to it than 2^-90, and that
+# changes a distance of more than 2^-64 by less than its last digit.
+BESIDE, _NEAR = 2.0**-90, 2.0**-64
 # Others round each step: some ulp are no fault of theirs.
 _OTHERS_ULPS = 16.0
 # NumPy's distances by which faces are chosen for exact arithmetic err by less than this share of the mesh's reach.
@@ -69,11 +70,11 @@ def check_distances(count: int, job: Job) -> list[dict[str, Any]]:
         # Or as far off as two lost signs leave it.
         roots = np.array([math.sqrt(square) for square, _ in squares])
         reach = np.abs(mesh.triangles[ours.face] - points[:, None]).max(axis=(1, 2))
-        close = (np.array(ulps) < ULPS) | (np.abs(ours.distance - roots) <= BESIDE * reach)
+        beside = (ours.distance <= _NEAR * reach) & (np.abs(ours.distance - roots) <= BESIDE * reach)
+        close = (np.array(ulps) < ULPS) | beside
         right = close & np.array(faces) & ((ours.distance == 0.0) == [square == 0 for square, _ in squares])
         wrong = int((~(right & _is_closed(mesh, points, ours.distance))).sum())
-        # Where half an ulp is more than that.
-        told = np.array(ulps)[ours.distance > 2.0**54 * BESIDE * reach]
+        told = np.array(ulps)[ours.distance > _NEAR * reach]
         worst, others = float(told.max(initial=0.0)), _others(mesh, points, squares)
         rows.append({"subject": f"distance: {name}", "asked": count, "wrong": wrong, "ulps": worst, "beside": count,
                      "others": others})  # fmt: skip
