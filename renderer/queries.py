@@ -281,9 +281,9 @@ class Queries:
         max_distance  >= 0, one number or (...): nothing is found beyond it, and the search ends sooner
 
         The distance is the exact one, rounded: within an ulp of it. Nearer to the surface than 2^-64 of the distance to
-        the face's farthest corner it is within 2^-90 of that. It is 0 on the surface, and else only nearer to it than 2^-900 of that. The
-        same bits for any number of threads. Raises ``ValueError`` naming argument and row, and for a mesh without
-        faces.
+        the face's farthest corner it is within 2^-90 of that. It is 0 on the surface, and else only nearer to it than
+        2^-900 of that. The same bits for any number of threads. Raises ``ValueError`` naming argument and row, and for
+        a mesh without faces.
 
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box

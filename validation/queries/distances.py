@@ -31,7 +31,7 @@ _MARGIN = 1e-9
 
 
 def meshes() -> dict[str, Mesh]:
-    """A ball and a ring where they stand, far away, tiny and flat, and a star, whose edges and corners are sharp."""
+    """A ball and a ring where they stand, far away, tiny and flat; a star and loose faces, whose edges are sharp."""
     ball, ring = icosphere(2), torus(around=24, across=12)
     return {
         "ball": ball,
@@ -40,6 +40,7 @@ def meshes() -> dict[str, Mesh]:
         "ring at 1e6": Mesh(ring.vertices * np.pi + 1e6, ring.faces),
         "ball of 1e-80": Mesh(ball.vertices * 1e-80, ball.faces),
         "ball of 1e100": Mesh(ball.vertices * 1e100, ball.faces),
+        "loose faces": Mesh(np.random.default_rng(_SEED).normal(size=(36, 3)), np.arange(36).reshape(12, 3)),
         "flat ball": Mesh(ball.vertices * [1.0, 1.0, 1e-6], ball.faces),
     }
 

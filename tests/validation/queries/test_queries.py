@@ -28,7 +28,7 @@ def test_the_section_counts_its_steps_and_passes(monkeypatch, tmp_path):
     taken = []
     job = Job(True, Thresholds(), tmp_path, taken.append)
     record, gates = section.run(job)
-    assert len(taken) == section.steps(job) and len(gates) == len(record["rows"]) == 25
+    assert len(taken) == section.steps(job) and len(gates) == len(record["rows"]) == 26
     assert all(gate.passed for gate in gates)
     assert all(row["asked"] > 0 and row["beside"] > 0 for row in record["rows"])
 
