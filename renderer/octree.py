@@ -56,7 +56,7 @@ class Stats:
 
 
 class _Accelerator(Queries):
-    """What is built: it can be refitted and counted."""
+    """A built mesh, which can be refitted and counted."""
 
     def refit(self, vertices: ArrayLike) -> None:
         """Move the vertices and keep the faces: ``vertices`` is (V, 3), finite, V as built.

@@ -9,9 +9,9 @@ from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, get, movemask, put, smaller
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS, LEAF_BITS
-from renderer.trace.ray_lanes import WIDTH, prepare_ray, shear_of
-from renderer.trace.rays import ray_at
-from renderer.trace.stream import END, begin_ray, leave_leaf, leave_node, list_lane, meet_nodes
+from renderer.trace.ray_lanes import WIDTH, shear_of
+from renderer.trace.stream import END, leave_leaf, leave_node, list_lane, meet_nodes
+from renderer.trace.traverse import load_lane
 
 # Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
 # meshes meet. A ray that meets more is searched for alone.
@@ -41,7 +41,7 @@ def find_blocks(tree, rays, begin, end, scratch, found):
     nodes, leaves = smaller(end - begin, WIDTH), 0
     following = begin + nodes
     for r in range(nodes):
-        _load(rays, scratch, r, begin + r)
+        load_lane(rays, scratch, r, begin + r)
         put(lanes.at_node, r, r)
     while nodes + leaves > 0:
         meet_nodes(tree, prepared, lanes, nodes)
@@ -61,18 +61,9 @@ def find_blocks(tree, rays, begin, end, scratch, found):
             if child == END:
                 if following == end:
                     continue
-                _load(rays, scratch, r, following)
+                load_lane(rays, scratch, r, following)
                 following, child = following + 1, 0
             nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
-
-
-@inlined
-def _load(rays, scratch, r, i):
-    """Let ray ``i`` begin in lane ``r``."""
-    ray, t_max = ray_at(rays, i)
-    prepare_ray(scratch.prepared, r, ray, t_max)
-    begin_ray(scratch.lanes, r)
-    put(scratch.number, r, i)
 
 
 @inlined

@@ -1,1 +1,1 @@
-"""How far points are from a mesh."""
+"""Distances of points from a mesh."""

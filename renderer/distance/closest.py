@@ -1,4 +1,4 @@
-"""Where closest points are asked: checks at the boundary, chunks on threads, and the answer."""
+"""Closest points on a mesh: checks at the boundary, chunks on threads, and the answer."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,8 +11,7 @@ from renderer.distance.nearest import LISTED, find_nearest
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
-from renderer.points.order import CELLS, chunk_size, make_grid, order_points
-from renderer.process.parallel import for_chunks
+from renderer.points.order import ask_in_order
 from renderer.trace.hits import points_on
 from renderer.trace.layout import Tree
 from renderer.trace.query import rays_against_blocks
@@ -54,27 +53,24 @@ class ClosestPoints:
 def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: ArrayLike, threads: int) -> ClosestPoints:
     """The nearest point of the mesh to each point, see ``Octree.closest_point``."""
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
-    rows, shape = check_points("points", points, farthest_of(tree.scale))
+    given, shape = check_points("points", points, farthest_of(tree.scale))
     limits = _limits(max_distance, shape)
-    out = np.empty((HIT_ROWS, len(rows)))
+    # As integers, because a face's bits may be those of a NaN.
+    out = np.empty((HIT_ROWS, len(given)), np.int64)
 
-    lower, upper = mesh.bounds
-    grid = make_grid(lower, upper, along=None)
-
-    def find(begin: int, end: int) -> Iterator[None]:
+    def find(rows: NDArray[np.int64], some: NDArray[np.float64]) -> Iterator[None]:
         size = stack_size(tree.depth) + LISTED
         integers, doubles = np.empty(size, np.int64), np.empty(size + 9)
-        order, starts = np.empty(end - begin, np.int64), np.empty(CELLS + 1, np.int64)
-        order_points(rows, grid, order, starts, begin, end)
-        done = 0
-        while done < len(order):
-            done += find_nearest(tree.words, rows, order[done:], limits, out, integers, doubles)
+        within, found, done = limits[rows] if len(limits) > 1 else limits, np.empty((HIT_ROWS, len(some))), 0
+        while done < len(some):
+            done = find_nearest(tree.words, some, within, found, integers, doubles, done)
             yield
+        out[:, rows] = found.view(np.int64)
 
     least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))
-    for_chunks(find, len(rows), chunk_size(len(rows), least, threads), threads)
-    distance, u, v, face = (row.reshape(shape) for row in out)
-    return ClosestPoints(distance, face.view(np.int64), u, v, mesh)
+    ask_in_order(find, given, mesh, None, least, threads)
+    distance, u, v = (row.reshape(shape) for row in out[:3].view(np.float64))
+    return ClosestPoints(distance, out[3].reshape(shape), u, v, mesh)
 
 
 def _limits(max_distance: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -27,7 +27,7 @@ from renderer.kernels.simd import (
 )
 from renderer.points.point import Point
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
+from renderer.trace.leaf import NO_FACE, blocks_of, push_sorted, tree_pointers
 from renderer.trace.rays import hit_pointers
 from renderer.trace.sides import corner
 
@@ -61,13 +61,13 @@ class Search(NamedTuple):
 
 
 @kernel
-def find_nearest(words, points, order, limits, out, integers, doubles):
-    """Write distance, u, v and face of the points ``order`` of ``points`` (n, 3) into the rows of ``out`` (4, n).
+def find_nearest(words, points, limits, out, integers, doubles, begin):
+    """Write distance, u, v and face of ``points`` (n, 3), from row ``begin`` on, into the rows of ``out`` (4, n).
 
     limits     (n,) or (1,), the largest distance that counts
     integers   memory for ``singly.stack_size`` and LISTED int64; ``doubles``, for as many float64 and nine more
 
-    Returns how many points it has done: it ends early after WORK, so that Ctrl-C need not wait for long.
+    Returns the row before which it ended: early after WORK, so that Ctrl-C need not wait for long.
     """
     tree, parts, count = tree_pointers(words), local_doubles(), len(points)
     found, size = hit_pointers(out, count), len(integers) - LISTED
@@ -76,8 +76,7 @@ def find_nearest(words, points, order, limits, out, integers, doubles):
         children, near, at(children, size), at(near, size), at(near, size + LISTED), at(near, size + LISTED + 8), parts
     )
     put(search.work, 0, 0.0)
-    for k in range(len(order)):
-        i = order[k]
+    for i in range(begin, count):
         p, limit = at(pointer(points), 3 * i), limits[i if len(limits) > 1 else 0]
         point = Point(0, 4, 8, tree.scale * get(p, 0), tree.scale * get(p, 1), tree.scale * get(p, 2))
         distance, face, u, v = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), search)
@@ -88,8 +87,8 @@ def find_nearest(words, points, order, limits, out, integers, doubles):
         put(found.u, i, u if hit else np.nan)
         put(found.v, i, v if hit else np.nan)
         if get(search.work, 0) > WORK:
-            return k + 1
-    return len(order)
+            return i + 1
+    return count
 
 
 @kernel
@@ -113,7 +112,7 @@ def _search(tree, point, limit, search):
             continue
         base = child * NODE_WORDS
         bits = _bound_boxes(tree.nodes, base, point, splat4(limit * limit * _MORE), search.squares)
-        top = _push_sorted(tree.links, base, bits, search, top)
+        top = push_sorted(tree.links, base + CHILDREN, bits, search.children, search.near, search.squares, top)
     return _settle(tree, point, search, best, listed, limit)
 
 
@@ -138,24 +137,6 @@ def _gap(nodes, row, x):
     zero, below, above = splat4(0.0), load4(nodes, row) - splat4(x), splat4(x) - load4(nodes, row + 8)
     gap = select(below > above, below, above)
     return select(gap > zero, gap, zero)
-
-
-@inlined
-def _push_sorted(links, base, bits, search, top):
-    """Let the children in the octants ``bits`` wait, the nearest on top; returns the new top."""
-    first = top
-    while bits != 0:
-        i = lowest_bit(bits)
-        bits &= bits - 1
-        square, k = get(search.squares, i), top
-        while k > first and get(search.near, k - 1) < square:
-            put(search.near, k, get(search.near, k - 1))
-            put(search.children, k, get(search.children, k - 1))
-            k -= 1
-        put(search.near, k, square)
-        put(search.children, k, np.int64(get(links, base + CHILDREN + i)))
-        top += 1
-    return top
 
 
 @kernel

@@ -12,9 +12,8 @@ from renderer.inside.rational import crossings_of
 from renderer.inside.winding import exceeds_half
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points
-from renderer.points.order import CELLS, chunk_size, make_grid, order_points
+from renderer.points.order import ask_in_order
 from renderer.points.signs import UNDECIDED
-from renderer.process.parallel import for_chunks
 from renderer.trace.layout import Tree
 from renderer.trace.singly import stack_size
 
@@ -63,19 +62,15 @@ def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) 
     axis = int(np.argmin(upper - lower))
     middle = tree.scale * (lower[axis] / 2 + upper[axis] / 2)
 
-    grid = make_grid(lower, upper, along=axis)
-
-    def count(begin: int, end: int) -> Iterator[None]:
+    def count(rows: NDArray[np.int64], some: NDArray[np.float64]) -> Iterator[None]:
         # Memory for the deepest tree: a kernel's own frame holds the stack of most trees, not of all.
-        stack = np.empty(stack_size(tree.depth), np.int64)
-        order, starts = np.empty(end - begin, np.int64), np.empty(CELLS + 1, np.int64)
-        order_points(points, grid, order, starts, begin, end)
-        done = 0
-        while done < len(order):
-            done += count_crossings(tree.words, points, order[done:], axis, middle, counts, stack)
+        stack, found, done = np.empty(stack_size(tree.depth), np.int64), np.empty((len(some), COLUMNS), np.int64), 0
+        while done < len(some):
+            done = count_crossings(tree.words, some, axis, middle, found, stack, done)
             yield
+        counts[rows] = found
 
-    for_chunks(count, len(points), chunk_size(len(points), _LEAST, threads), threads)
+    ask_in_order(count, points, mesh, axis, _LEAST, threads)
     triangles = None
     for row in np.flatnonzero(counts[:, ON] >= UNDECIDED):
         triangles = mesh.triangles if triangles is None else triangles

@@ -62,20 +62,19 @@ class Column(NamedTuple):
 
 
 @kernel
-def count_crossings(words, points, order, axis, middle, out, stack):
-    """Fill the rows ``order`` of ``out`` (n, COLUMNS) int64 for ``points`` (n, 3) float64.
+def count_crossings(words, points, axis, middle, out, stack, begin):
+    """Fill ``out`` (n, COLUMNS) int64 for ``points`` (n, 3) float64, from row ``begin`` on.
 
     The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
-    ``stack`` is memory for ``singly.stack_size`` int64. Returns how many points it has done: it ends early after WORK
-    exact tests, so that Ctrl-C need not wait for long.
+    ``stack`` is memory for ``singly.stack_size`` int64. Returns the row before which it ended: early after WORK exact
+    tests, so that Ctrl-C need not wait for long.
     """
     tree, parts = tree_pointers(words), local_doubles()
     scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
     # Behind the expansion's parts.
     work = at(parts, _PARTS)
     put(work, 0, 0.0)
-    for k in range(len(order)):
-        i = order[k]
+    for i in range(begin, len(points)):
         row = at(pointer(points), 3 * i)
         x, y, z = scale * get(row, axis_x), scale * get(row, axis_y), scale * get(row, axis)
         column = Column(4 * axis_x, 4 * axis_y, 4 * axis, x, y, z, z >= middle)
@@ -91,8 +90,8 @@ def count_crossings(words, points, order, axis, middle, out, stack):
         put(result, CROSSINGS, crossings)
         put(result, ON, on)
         if get(work, 0) > WORK:
-            return k + 1
-    return len(order)
+            return i + 1
+    return len(points)
 
 
 @kernel

@@ -58,7 +58,7 @@ class Room(NamedTuple):
 
 
 class _Axes(NamedTuple):
-    """Where a block has each axis, as ``load_corners`` wants it."""
+    """The rows of a block that have each axis, as ``load_corners`` wants them."""
 
     row_x: int
     row_y: int

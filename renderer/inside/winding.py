@@ -1,6 +1,7 @@
 """Winding numbers of any mesh around points: checks at the boundary, chunks on threads."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,12 +12,12 @@ from renderer.inside.moments import moments_of
 from renderer.inside.winding_search import exceed_half, sum_windings
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points
-from renderer.points.order import CELLS, chunk_size, make_grid, order_points
-from renderer.process.parallel import for_chunks
+from renderer.points.order import ask_in_order
 from renderer.trace.layout import Tree
 from renderer.trace.query import rays_against_blocks
 from renderer.trace.singly import stack_size
 
+Floats = NDArray[np.float64]
 # Points between two looks at Ctrl-C: some milliseconds of search.
 _STEP = 512
 
@@ -32,10 +33,10 @@ def winding_number(
     expect(0.0 <= limit < np.inf, "tolerance", "a finite number from 0", limit)
     moments, numbers = moments_of(tree, threads), np.empty(len(rows))
 
-    def search(order: NDArray[np.int64], stack: NDArray[np.int64]) -> int:
-        return sum_windings(tree.words, moments, rows, order, limit, numbers, stack)
+    def search(some: Floats, out: NDArray[Any], stack: NDArray[np.int64], begin: int, end: int) -> int:
+        return int(sum_windings(tree.words, moments, some, limit, out, stack, begin, end))
 
-    _search_in_order(search, tree, mesh, rows, threads)
+    _search_in_order(search, tree, mesh, rows, numbers, threads)
     return numbers.reshape(shape)
 
 
@@ -43,31 +44,29 @@ def exceeds_half(tree: Tree, mesh: Mesh, rows: NDArray[np.float64], threads: int
     """Whether the winding numbers around points (n, 3) are above 1/2, (n,)."""
     moments, above = moments_of(tree, threads), np.empty(len(rows), np.bool_)
 
-    def search(order: NDArray[np.int64], stack: NDArray[np.int64]) -> int:
-        return exceed_half(tree.words, moments, rows, order, above, stack)
+    def search(some: Floats, out: NDArray[Any], stack: NDArray[np.int64], begin: int, end: int) -> int:
+        return int(exceed_half(tree.words, moments, some, out, stack, begin, end))
 
-    _search_in_order(search, tree, mesh, rows, threads)
+    _search_in_order(search, tree, mesh, rows, above, threads)
     return above
 
 
 def _search_in_order(
-    search: Callable[[NDArray[np.int64], NDArray[np.int64]], int],
+    search: Callable[[Floats, NDArray[Any], NDArray[np.int64], int, int], int],
     tree: Tree,
     mesh: Mesh,
-    rows: NDArray[np.float64],
+    points: Floats,
+    answers: NDArray[Any],
     threads: int,
 ) -> None:
-    """Call ``search(order, stack)`` for all points; it returns how many of ``order`` it has done."""
-    lower, upper = mesh.bounds
-    grid = make_grid(lower, upper, along=None)
-
-    def find(begin: int, end: int) -> Iterator[None]:
-        stack = np.empty(stack_size(tree.depth), np.int64)
-        order, starts, done = np.empty(end - begin, np.int64), np.empty(CELLS + 1, np.int64), 0
-        order_points(rows, grid, order, starts, begin, end)
-        while done < len(order):
-            done += search(order[done : done + step], stack)
-            yield
-
+    """Fill ``answers`` by ``search(some, out, stack, begin, end)``, which returns the row before which it ended."""
     step = _STEP if tree.has_nodes else min(_STEP, rays_against_blocks(tree))
-    for_chunks(find, len(rows), chunk_size(len(rows), step, threads), threads)
+
+    def find(rows: NDArray[np.int64], some: Floats) -> Iterator[None]:
+        stack, found, done = np.empty(stack_size(tree.depth), np.int64), np.empty(len(some), answers.dtype), 0
+        while done < len(some):
+            done = search(some, found, stack, done, min(done + step, len(some)))
+            yield
+        answers[rows] = found
+
+    ask_in_order(find, points, mesh, None, step, threads)

@@ -21,15 +21,14 @@ _FIRST_SIDE, _NEXT_SIDE = 1.0, 2.0**-4
 
 
 @kernel
-def sum_windings(words, rows, points, order, tolerance, out, stack):
-    """Write the winding numbers around the points ``order`` of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``.
+def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
+    """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``.
 
-    ``rows`` is what ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns how many
-    are done: it stops early where a sum over all of many faces took long.
+    ``rows`` is what ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns the row
+    before which it ended: early where a sum over all of many faces took long.
     """
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
-    for k in range(len(order)):
-        i = order[k]
+    for i in range(begin, end):
         point = _point_at(tree, at(pointer(points), 3 * i))
         number, bound, share = 0.0, np.inf, _FIRST * tolerance
         while bound > tolerance and share > ROUNDING and tree.has_nodes:
@@ -39,16 +38,15 @@ def sum_windings(words, rows, points, order, tolerance, out, stack):
         if bound > tolerance:
             out[i] = _all_faces(tree, point, parts)
             if tree.count > _MANY:
-                return k + 1
-    return len(order)
+                return i + 1
+    return end
 
 
 @kernel
-def exceed_half(words, rows, points, order, out, stack):
+def exceed_half(words, rows, points, out, stack, begin, end):
     """Write whether winding numbers exceed 1/2 to ``out`` (n,) bool; arguments and return value as above."""
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
-    for k in range(len(order)):
-        i = order[k]
+    for i in range(begin, end):
         point = _point_at(tree, at(pointer(points), 3 * i))
         number, bound, share = 0.5, 0.0, _FIRST_SIDE
         while abs(number - 0.5) <= bound and share > ROUNDING and tree.has_nodes:
@@ -58,8 +56,8 @@ def exceed_half(words, rows, points, order, out, stack):
         if abs(number - 0.5) <= bound:
             out[i] = _all_faces(tree, point, parts) > 0.5
             if tree.count > _MANY:
-                return k + 1
-    return len(order)
+                return i + 1
+    return end
 
 
 @inlined

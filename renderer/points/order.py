@@ -3,18 +3,44 @@
 A grid of cells over the mesh, and a counting sort by cell. Answers do not depend on the order.
 """
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import kernel
+from renderer.mesh.mesh import Mesh
+from renderer.process.parallel import for_chunks
+
+Ask = Callable[[NDArray[np.int64], NDArray[np.float64]], Iterator[None]]
 
 # Cells of the grid: some dozens of points in each, for as many points as are ordered together.
-CELLS = 4096
+_CELLS = 4096
 # So that Ctrl-C and other threads need not wait for long.
 _MOST = 1 << 17
 
 
-def make_grid(lower: NDArray[np.float64], upper: NDArray[np.float64], along: int | None) -> NDArray[np.float64]:
+def ask_in_order(
+    ask: Ask, points: NDArray[np.float64], mesh: Mesh, along: int | None, least: int, threads: int
+) -> None:
+    """Call ``ask(rows, some)`` on threads until all points (n, 3) are asked: ``some`` are the points in these rows.
+
+    Each time it yields, Ctrl-C is heard. The points come in the order of a grid's cells, of a grid across the axis
+    ``along`` if that is given; the fewest at a time are ``least``.
+    """
+    grid = _make_grid(*mesh.bounds, along)
+
+    def ask_some(begin: int, end: int) -> Iterator[None]:
+        rows, starts = np.empty(end - begin, np.int64), np.empty(_CELLS + 1, np.int64)
+        _order_points(points, grid, rows, starts, begin, end)
+        # Copied in that order, so that no search waits for its point to come from memory.
+        yield from ask(rows, points[rows])
+
+    # The more are ordered together the better, but each thread gets some chunks.
+    for_chunks(ask_some, len(points), max(least, min(_MOST, len(points) // (4 * threads))), threads)
+
+
+def _make_grid(lower: NDArray[np.float64], upper: NDArray[np.float64], along: int | None) -> NDArray[np.float64]:
     """A grid (3, 3) over a box: for each axis its start, its cells a unit, and the number of its cells.
 
     It has 16 cells along each axis, or 64 along two and one along the axis ``along``.
@@ -29,22 +55,17 @@ def make_grid(lower: NDArray[np.float64], upper: NDArray[np.float64], along: int
     return np.stack([lower, np.where(np.isfinite(rate), rate, 0.0), cells])
 
 
-def chunk_size(count: int, least: int, threads: int) -> int:
-    """Points that a thread orders together: the more the better, but each thread gets some chunks."""
-    return max(least, min(_MOST, count // (4 * threads)))
-
-
 @kernel
-def order_points(points, grid, order, starts, begin, end):
+def _order_points(points, grid, order, starts, begin, end):
     """Write the rows begin:end of ``points`` (n, 3) in the order of their cells to ``order``, (end - begin,) int64.
 
-    ``starts`` is memory for CELLS + 1 int64.
+    ``starts`` is memory for _CELLS + 1 int64.
     """
-    for k in range(CELLS + 1):
+    for k in range(_CELLS + 1):
         starts[k] = 0
     for i in range(begin, end):
         starts[_cell(points, grid, i) + 1] += 1
-    for k in range(CELLS):
+    for k in range(_CELLS):
         starts[k + 1] += starts[k]
     for i in range(begin, end):
         cell = _cell(points, grid, i)

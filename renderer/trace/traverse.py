@@ -115,7 +115,7 @@ def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
 
 
 @inlined
-def _load(rays, scratch, r, i):
+def load_lane(rays, scratch, r, i):
     """Let ray ``i`` begin in lane ``r``."""
     ray, t_max = ray_at(rays, i)
     prepare_ray(scratch.prepared, r, ray, t_max)
@@ -153,7 +153,7 @@ def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_
                 _finish(tree, rays, found, i, scratch, r, doubtful, any_hit)
                 if following == count:
                     continue
-                _load(rays, scratch, r, get(waiting, following))
+                load_lane(rays, scratch, r, get(waiting, following))
                 following += 1
                 child = 0
             nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
@@ -164,7 +164,7 @@ def _trace_stream(tree, rays, found, scratch, count, any_hit):
     """Trace the ``count`` rays in ``scratch.waiting``, sixteen at a time."""
     lanes, first = scratch.lanes, smaller(count, WIDTH)
     for r in range(first):
-        _load(rays, scratch, r, get(scratch.waiting, r))
+        load_lane(rays, scratch, r, get(scratch.waiting, r))
         put(lanes.at_node, r, r)
     _run_lanes(tree, rays, found, scratch, first, 0, first, count, any_hit)
 

@@ -121,7 +121,7 @@ def test_the_deepest_tree_has_a_stack_that_holds_its_column():
     tree = Tree(nodes.ravel(), flat.blocks, flat.faces, levels)
     counts = np.zeros((1, COLUMNS), np.int64)
     stack = np.full(stack_size(levels) + 8, -7, np.int64)
-    assert count_crossings(tree.words, np.zeros((1, 3)), np.zeros(1, np.int64), 2, -1.0, counts, stack) == 1
+    assert count_crossings(tree.words, np.zeros((1, 3)), 2, -1.0, counts, stack, 0) == 1
     assert counts[0].tolist() == [7 * levels + 1, 7 * levels + 1, 0]
     assert (stack[-8:] == -7).all() and (stack[500:-8] != -7).any()
 
