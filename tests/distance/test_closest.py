@@ -13,7 +13,7 @@ from renderer.inside import contains as inside
 from renderer.mesh.shapes import box, icosphere, torus
 from validation.oracle.distance import nearest, rational, ulps_from_root
 from validation.queries.distances import points_about
-from validation.stability.cases.inside import closed_solids
+from validation.stability.cases.queries.inside import closed_solids
 
 SOLIDS = closed_solids()
 FIELDS = ("distance", "face", "u", "v")

@@ -5,7 +5,7 @@ import pytest
 
 from renderer import Octree
 from renderer.mesh.shapes import box
-from validation.stability.cases.inside import closed_solids, points_at, winding_numbers
+from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
 SOLIDS = closed_solids()
 

@@ -14,7 +14,7 @@ from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
 from renderer.trace.singly import stack_size
 from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
-from validation.stability.cases.inside import closed_solids, points_at, winding_numbers
+from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
 MESHES = closed_solids()
 

@@ -19,7 +19,7 @@ from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.singly import stack_size
 from validation.references.igl import Igl
-from validation.stability.cases.inside import closed_solids, points_at, winding_numbers
+from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
 SOLIDS = closed_solids()
 TOLERANCES = (0.3, 1e-2, 1e-3, 1e-6, 1e-10, 0.0)

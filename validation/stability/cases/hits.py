@@ -1,7 +1,8 @@
 """Extreme cases 1 to 32, 46 and 49 to 53: hits and queries."""
 
-from validation.stability.cases import builds, contacts, edge_on, inside, nearest, order, precision, rays, thin
+from validation.stability.cases import builds, edge_on, order, precision, rays, thin
 from validation.stability.cases.case import ExtremeCase
+from validation.stability.cases.queries import contacts, inside, nearest
 
 CASES: tuple[ExtremeCase, ...] = (
     *rays.CASES,

@@ -9,8 +9,8 @@ from numpy.random import Generator
 from renderer import BruteForce, Mesh, Octree
 from validation.oracle.contacts import contacts, hits
 from validation.stability.cases.case import ExtremeCase, Outcome
-from validation.stability.cases.inside import closed_solids
 from validation.stability.cases.judgement import SEED, Floats, both, soup_of
+from validation.stability.cases.queries.inside import closed_solids
 
 # Powers of two and whole numbers, so that a mesh of whole numbers stays one that float64 holds exactly.
 PLACES = ((0.0, 1.0), (2.0**20, 1.0), (0.0, 2.0**-20), (2.0**20, 2.0**40))

@@ -1,0 +1,1 @@
+"""Extreme cases of queries about a mesh: what is inside, what is nearest, all that a ray meets."""
