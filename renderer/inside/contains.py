@@ -7,13 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import flag_argument
 from renderer.errors import expect
-from renderer.inside.crossings import COLUMNS, CROSSINGS, ON, WINDING, count_crossings
+from renderer.inside.crossings import ON_FACE, UNTOLD, count_crossings
 from renderer.inside.rational import crossings_of
 from renderer.inside.winding import exceeds_half
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points
 from renderer.points.order import ask_in_order
-from renderer.points.signs import UNDECIDED
 from renderer.trace.layout import Tree
 from renderer.trace.singly import stack_size
 
@@ -33,15 +32,15 @@ def contains(
     if not winding:
         _check_closed(mesh, rule)
     rows, shape = check_points("points", points)
-    counts = _counted(tree, mesh, rows, threads)
-    on = counts[:, ON] == 1
+    counted = _counted(tree, mesh, rows, threads)
+    on = counted == ON_FACE
     if winding:
         # A point on a flat part of the surface has 1/2 exactly, which costs most to tell and is not asked for.
         inside = np.zeros(len(rows), np.bool_)
         inside[~on] = exceeds_half(tree, mesh, rows[~on], threads)
     else:
-        inside = counts[:, WINDING] != 0 if rule == "nonzero" else counts[:, CROSSINGS] % 2 == 1
-    return np.where(on, boundary, inside).reshape(shape)
+        inside = counted != 0 if rule == "nonzero" else (counted & 1) == 1
+    return (inside | on if boundary else inside & ~on).reshape(shape)
 
 
 def _check_closed(mesh: Mesh, rule: str) -> None:
@@ -55,24 +54,24 @@ def _check_closed(mesh: Mesh, rule: str) -> None:
         expect(False, "mesh", expected, f"{len(edges)} open edges, the first from {start} to {end}")
 
 
-def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) -> NDArray[np.int64]:
-    """Crossings (n, COLUMNS) of points in the mesh's units."""
-    counts = np.zeros((len(points), COLUMNS), np.int64)
+def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) -> NDArray[np.int32]:
+    """Winding numbers (n,) around points in the mesh's units, or ON_FACE."""
+    counted = np.empty(len(points), np.int32)
     lower, upper = mesh.bounds
     axis = int(np.argmin(upper - lower))
     middle = tree.scale * (lower[axis] / 2 + upper[axis] / 2)
 
     def count(rows: NDArray[np.int64], some: NDArray[np.float64]) -> Iterator[None]:
         # Memory for the deepest tree: a kernel's own frame holds the stack of most trees, not of all.
-        stack, found, done = np.empty(stack_size(tree.depth), np.int64), np.empty((len(some), COLUMNS), np.int64), 0
+        stack, done = np.empty(stack_size(tree.depth), np.int64), 0
         while done < len(some):
-            done = count_crossings(tree.words, some, axis, middle, found, stack, done)
+            done = count_crossings(tree.words, some, axis, middle, rows, counted, stack, done)
             yield
-        counts[rows] = found
 
     ask_in_order(count, points, mesh, axis, _LEAST, threads)
-    triangles = None
-    for row in np.flatnonzero(counts[:, ON] >= UNDECIDED):
-        triangles = mesh.triangles if triangles is None else triangles
-        counts[row] = crossings_of(points[row], triangles, axis)
-    return counts
+    untold = np.flatnonzero(counted == UNTOLD)
+    triangles = mesh.triangles if len(untold) else np.empty((0, 3, 3))
+    for row in untold:
+        winding, on = crossings_of(points[row], triangles, axis)
+        counted[row] = ON_FACE if on else winding
+    return counted

@@ -1,5 +1,7 @@
 """Crossings of a ray from a point along an axis, counted exactly: the answer to what lies inside.
 
+Each crossing counts 1 or -1, so their sum, the winding number, is odd where their number is.
+
 Seen along the axis, the projected faces are a planar map. A point on an edge or corner of the map is moved by (e, e^2),
 e infinitely small, across the axis, so that it lies in exactly one face of each sheet. All signs are exact, by a bound
 of their rounding errors or by expansions, so the counts are those of real arithmetic, along whichever axis.
@@ -28,9 +30,8 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
 from renderer.trace.sides import coordinate
 
-# Columns of the answer: winding number, crossings, and whether the point lies on a face (or is UNDECIDED).
-WINDING, CROSSINGS, ON = range(3)
-COLUMNS = 3
+# In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot tell.
+ON_FACE, UNTOLD = -(2**31), -(2**31) + 1
 _ROUNDOFF = 2.0**-53
 # Exact tests of a call: some milliseconds.
 WORK = 4096
@@ -62,8 +63,8 @@ class Column(NamedTuple):
 
 
 @kernel
-def count_crossings(words, points, axis, middle, out, stack, begin):
-    """Fill ``out`` (n, COLUMNS) int64 for ``points`` (n, 3) float64, from row ``begin`` on.
+def count_crossings(words, points, axis, middle, rows, out, stack, begin):
+    """Winding numbers (or ON_FACE, or UNTOLD) for ``points`` (n, 3), from row ``begin`` on, to ``out[rows[i]]``, int32.
 
     The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
     ``stack`` is memory for ``singly.stack_size`` int64. Returns the row before which it ended: early after WORK exact
@@ -80,15 +81,12 @@ def count_crossings(words, points, axis, middle, out, stack, begin):
         column = Column(4 * axis_x, 4 * axis_y, 4 * axis, x, y, z, z >= middle)
         if x / scale != get(row, axis_x) or y / scale != get(row, axis_y) or z / scale != get(row, axis):
             # The tree's units cannot hold it exactly.
-            winding, crossings, on = 0, 0, UNDECIDED
+            winding, on = 0, UNDECIDED
         elif tree.has_nodes:
-            winding, crossings, on = _search_nodes(tree, column, pointer(stack), parts)
+            winding, on = _search_nodes(tree, column, pointer(stack), parts)
         else:
-            winding, crossings, on = _cross_blocks(tree, 0, tree.count, column, parts, (0, 0, 0))
-        result = at(pointer(out), COLUMNS * i)
-        put(result, WINDING, winding)
-        put(result, CROSSINGS, crossings)
-        put(result, ON, on)
+            winding, on = _cross_blocks(tree, 0, tree.count, column, parts, (0, 0))
+        out[rows[i]] = UNTOLD if on >= UNDECIDED else (ON_FACE if on else winding)
         if get(work, 0) > WORK:
             return i + 1
     return len(points)
@@ -96,8 +94,8 @@ def count_crossings(words, points, axis, middle, out, stack, begin):
 
 @kernel
 def _search_nodes(tree, column, stack, parts):
-    """Winding number, crossings and ``on`` of a column, through the nodes whose boxes it meets."""
-    found, top = (0, 0, 0), 1
+    """Winding number and ``on`` of a column, through the nodes whose boxes it meets."""
+    found, top = (0, 0), 1
     put(stack, 0, 0)
     while top > 0:
         top -= 1
@@ -126,11 +124,10 @@ def _meet_boxes(nodes, base, column):
 @kernel
 def _cross_blocks(tree, first, count, column, parts, found):
     """Add the crossings with the faces of some blocks to ``found``."""
-    winding, crossings, on = found
+    winding, on = found
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
         sure, unsure, turns = _cross_block(tree, base, column)
-        crossings += count_bits(sure)
         winding += 2 * count_bits(sure & turns) - count_bits(sure)
         while unsure != 0:
             i = lowest_bit(unsure)
@@ -138,8 +135,8 @@ def _cross_blocks(tree, first, count, column, parts, found):
             if get(tree.faces, block * BLOCK_FACES + i) >= 0:
                 put(parts, _PARTS, get(parts, _PARTS) + 1.0)
                 step, touches = _cross_exactly(tree, base + i, column, parts)
-                winding, crossings, on = winding + step, crossings + abs(step), on | touches
-    return winding, crossings, on
+                winding, on = winding + step, on | touches
+    return winding, on
 
 
 @inlined

@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 _Corner = list[Fraction]
 
 
-def crossings_of(point: NDArray[np.float64], triangles: NDArray[np.float64], axis: int) -> tuple[int, int, int]:
-    """Winding number, crossings, and 1 for a point on a face, of the half-line from a point up an axis."""
+def crossings_of(point: NDArray[np.float64], triangles: NDArray[np.float64], axis: int) -> tuple[int, int]:
+    """The winding number, and 1 for a point on a face, of the half-line from a point up an axis."""
     turned = np.roll(np.arange(3), -(axis + 1))
     point, triangles = point[turned], triangles[:, :, turned]
     # Only faces around the half-line, as seen along the axis, can matter.
     lower, upper = triangles[:, :, :2].min(axis=1), triangles[:, :, :2].max(axis=1)
     near = ((lower <= point[:2]) & (point[:2] <= upper)).all(axis=1)
     p = [Fraction(float(x)) for x in point]
-    winding, crossings, on = 0, 0, 0
+    winding, on = 0, 0
     for triangle in triangles[near]:
         corners = [[Fraction(float(x)) - o for x, o in zip(corner, p, strict=True)] for corner in triangle]
         step, touches = _crossing(*corners)
-        winding, crossings, on = winding + step, crossings + abs(step), on | touches
-    return winding, crossings, on
+        winding, on = winding + step, on | touches
+    return winding, on
 
 
 def _crossing(a: _Corner, b: _Corner, c: _Corner) -> tuple[int, int]:

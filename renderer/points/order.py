@@ -31,10 +31,9 @@ def ask_in_order(
     grid = _make_grid(*mesh.bounds, along)
 
     def ask_some(begin: int, end: int) -> Iterator[None]:
-        rows, starts = np.empty(end - begin, np.int64), np.empty(_CELLS + 1, np.int64)
-        _order_points(points, grid, rows, starts, begin, end)
-        # Copied in that order, so that no search waits for its point to come from memory.
-        yield from ask(rows, points[rows])
+        rows, some, starts = np.empty(end - begin, np.int64), np.empty((end - begin, 3)), np.empty(_CELLS + 1, np.int64)
+        _order_points(points, grid, rows, some, starts, begin, end)
+        yield from ask(rows, some)
 
     # The more are ordered together the better, but each thread gets some chunks.
     for_chunks(ask_some, len(points), max(least, min(_MOST, len(points) // (4 * threads))), threads)
@@ -56,10 +55,10 @@ def _make_grid(lower: NDArray[np.float64], upper: NDArray[np.float64], along: in
 
 
 @kernel
-def _order_points(points, grid, order, starts, begin, end):
-    """Write the rows begin:end of ``points`` (n, 3) in the order of their cells to ``order``, (end - begin,) int64.
+def _order_points(points, grid, rows, some, starts, begin, end):
+    """Write the rows begin:end of ``points`` (n, 3), in the order of their cells, to ``rows``; the points to ``some``.
 
-    ``starts`` is memory for _CELLS + 1 int64.
+    Copied, so that no search waits for its point to come from memory. ``starts`` is memory for _CELLS + 1 int64.
     """
     for k in range(_CELLS + 1):
         starts[k] = 0
@@ -69,8 +68,11 @@ def _order_points(points, grid, order, starts, begin, end):
         starts[k + 1] += starts[k]
     for i in range(begin, end):
         cell = _cell(points, grid, i)
-        order[starts[cell]] = i
+        place = starts[cell]
         starts[cell] += 1
+        rows[place] = i
+        for axis in range(3):
+            some[place, axis] = points[i, axis]
 
 
 @kernel

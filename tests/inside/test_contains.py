@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from renderer import BruteForce, Mesh, Octree
-from renderer.inside.crossings import COLUMNS, count_crossings
+from renderer.inside.crossings import count_crossings
 from renderer.mesh.shapes import box, torus
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
 from renderer.trace.singly import stack_size
@@ -119,10 +119,10 @@ def test_the_deepest_tree_has_a_stack_that_holds_its_column():
     corners = np.array([[-4.0, -4.0, 1.0], [4.0, -4.0, 1.0], [0.0, 4.0, 1.0]])
     flat = BruteForce(corners, [[0, 1, 2]]).tree
     tree = Tree(nodes.ravel(), flat.blocks, flat.faces, levels)
-    counts = np.zeros((1, COLUMNS), np.int64)
+    counted, rows = np.zeros(1, np.int32), np.zeros(1, np.int64)
     stack = np.full(stack_size(levels) + 8, -7, np.int64)
-    assert count_crossings(tree.words, np.zeros((1, 3)), 2, -1.0, counts, stack, 0) == 1
-    assert counts[0].tolist() == [7 * levels + 1, 7 * levels + 1, 0]
+    assert count_crossings(tree.words, np.zeros((1, 3)), 2, -1.0, rows, counted, stack, 0) == 1
+    assert counted.tolist() == [7 * levels + 1]
     assert (stack[-8:] == -7).all() and (stack[500:-8] != -7).any()
 
 

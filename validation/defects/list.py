@@ -159,7 +159,7 @@ QUERIES = (
     _python("queries", "a way is seen to its middle", "_between",
             "np.maximum(reach - room, 0.0)", "reach * 0.5"),
     _python("queries", "points on the surface are inside without it", "contains.contains",
-            "np.where(on, boundary, inside)", "np.where(on, True, inside)"),
+            "inside & ~on", "inside | on"),
 )  # fmt: skip
 
 PICTURES = (

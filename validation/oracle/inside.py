@@ -16,8 +16,10 @@ def winding_number(point: Vector, triangles: Sequence[Sequence[Vector]]) -> int 
     flat = [triangle for triangle in relative if dot(triangle[0], cross(triangle[1], triangle[2])) == 0]
     if any(squared_distance(origin, triangle) == 0 for triangle in flat):
         return None
+    # Without faces that are lines or points: a ray that meets no edge crosses none of them.
+    relative = [[a, b, c] for a, b, c in relative if any(cross(difference(b, a), difference(c, a)))]
     # Integers, which are many times as fast: times a power of two, which changes no sign.
-    unit = max(x.denominator for triangle in relative for corner in triangle for x in corner)
+    unit = max((x.denominator for triangle in relative for corner in triangle for x in corner), default=1)
     integers = [[[int(x * unit) for x in corner] for corner in triangle] for triangle in relative]
     for direction in _directions():
         crossings = [_crossing(triangle, direction) for triangle in integers]

@@ -1,4 +1,4 @@
-"""Rows 1 to 32, 46 and 49 to 53 of the extreme cases hold, and each judgement fails when what it judges is broken."""
+"""Rows 1 to 32, 46 and 49 to 54 of the extreme cases hold, and each judgement fails when what it judges is broken."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,13 +10,14 @@ from renderer import Hits, Mesh, Octree
 from validation.stability.cases import builds as extreme_builds
 from validation.stability.cases.case import ExtremeCase
 from validation.stability.cases.hits import CASES
+from validation.stability.cases.queries import crowded
 
 ROWS = {case.number: case for case in CASES}
 Break = Callable[[Hits], Hits]
 
 
 def test_the_table_has_every_row_once_and_in_order():
-    assert [case.number for case in CASES] == [*range(1, 33), 46, 49, 50, 51, 52, 53]
+    assert [case.number for case in CASES] == [*range(1, 33), 46, 49, 50, 51, 52, 53, 54]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: str(case.number))
@@ -143,3 +144,20 @@ def test_row_53_fails_on_a_wrong_distance_or_face(monkeypatch, name):
 
     monkeypatch.setattr(Octree, "closest_point", spoiled)
     assert not ROWS[53].run(True).holds
+
+
+@pytest.mark.parametrize("query", ["contains", "count_hits", "all_hits", "winding_number", "signed_distance"])
+def test_row_54_fails_on_a_wrong_answer_at_the_corner_of_many_faces(monkeypatch, query):
+    right = getattr(Octree, query)
+
+    def spoiled(*arguments, **options):
+        found = right(*arguments, **options)
+        if query == "contains":
+            return ~found
+        if query == "all_hits":
+            found.face[-1:] += 1
+            return found
+        return found + 1
+
+    monkeypatch.setattr(Octree, query, spoiled)
+    assert crowded.wrong_at_spindle(100) > 0

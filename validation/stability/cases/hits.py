@@ -1,8 +1,8 @@
-"""Extreme cases 1 to 32, 46 and 49 to 53: hits and queries."""
+"""Extreme cases 1 to 32, 46 and 49 to 54: hits and queries."""
 
 from validation.stability.cases import builds, edge_on, order, precision, rays, thin
 from validation.stability.cases.case import ExtremeCase
-from validation.stability.cases.queries import contacts, inside, nearest
+from validation.stability.cases.queries import contacts, crowded, inside, nearest
 
 CASES: tuple[ExtremeCase, ...] = (
     *rays.CASES,
@@ -14,4 +14,5 @@ CASES: tuple[ExtremeCase, ...] = (
     *inside.CASES,
     *contacts.CASES,
     *nearest.CASES,
+    *crowded.CASES,
 )
