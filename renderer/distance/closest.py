@@ -55,22 +55,19 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
     given, shape = check_points("points", points, farthest_of(tree.scale))
     limits = _limits(max_distance, shape)
-    # As integers, because a face's bits may be those of a NaN.
-    out = np.empty((HIT_ROWS, len(given)), np.int64)
+    out = np.empty((HIT_ROWS, len(given)))
 
     def find(rows: NDArray[np.int64], some: NDArray[np.float64]) -> Iterator[None]:
         size = stack_size(tree.depth) + LISTED
-        integers, doubles = np.empty(size, np.int64), np.empty(size + 9)
-        within, found, done = limits[rows] if len(limits) > 1 else limits, np.empty((HIT_ROWS, len(some))), 0
+        integers, doubles, done = np.empty(size, np.int64), np.empty(size + 9), 0
         while done < len(some):
-            done = find_nearest(tree.words, some, within, found, integers, doubles, done)
+            done = find_nearest(tree.words, some, rows, limits, out, integers, doubles, done)
             yield
-        out[:, rows] = found.view(np.int64)
 
     least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))
     ask_in_order(find, given, mesh, None, least, threads)
-    distance, u, v = (row.reshape(shape) for row in out[:3].view(np.float64))
-    return ClosestPoints(distance, out[3].reshape(shape), u, v, mesh)
+    distance, u, v = (row.reshape(shape) for row in out[:3])
+    return ClosestPoints(distance, out[3].view(np.int64).reshape(shape), u, v, mesh)
 
 
 def _limits(max_distance: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

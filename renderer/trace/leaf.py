@@ -87,36 +87,6 @@ def push_children(tree, node, bits, stack, top):
     return top
 
 
-_WORD = 0xFFFFFFFF
-
-
-@inlined
-def push_sorted(links, base, bits, stack, near, distances, top):
-    """``push_children`` with the nearest on top, as in streams; ``base`` is where a node's links begin.
-
-    ``near`` has the distances of what waits, ``distances`` those of the octants.
-    """
-    first = top
-    while bits != 0:
-        i = lowest_bit(bits)
-        bits &= bits - 1
-        distance, child, k = get(distances, i), np.int64(get(links, base + i)), top
-        while k > first and _precedes(get(near, k - 1), get(stack, k - 1), distance, child):
-            put(near, k, get(near, k - 1))
-            put(stack, k, get(stack, k - 1))
-            k -= 1
-        put(near, k, distance)
-        put(stack, k, child)
-        top += 1
-    return top
-
-
-@inlined
-def _precedes(distance, child, other_distance, other):
-    """Whether a box is nearer than another; of equal ones nodes come before leaves."""
-    return distance < other_distance or (distance == other_distance and (child & _WORD) < (other & _WORD))
-
-
 NO_FACE = np.iinfo(np.int32).max
 # After each run of so many blocks a search of all blocks for any hit checks whether it has one.
 _BLOCKS_AT_ONCE = 16

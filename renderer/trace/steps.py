@@ -5,15 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import at, get, pointer, put, splat8, store
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, get, lowest_bit, pointer, put, splat8, store
 from renderer.process.parallel import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, NODE_WORDS, Tree
-from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_sorted, tree_pointers
+from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, tree_pointers
 from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
 from renderer.trace.singly import stack_size
+
+_WORD = 0xFFFFFFFF
 
 
 @dataclass(eq=False, slots=True)
@@ -90,7 +92,7 @@ def _count(tree, ray, t_max, stack, near, distances):
         nodes += 1
         t0, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(limit))
         store(distances, 0, t0)
-        top = push_sorted(tree.links, child * NODE_WORDS + CHILDREN, bits, stack, near, distances, top)
+        top = _push_sorted(tree.links, child * NODE_WORDS + CHILDREN, bits, stack, near, distances, top)
     return nodes, triangles
 
 
@@ -100,3 +102,30 @@ def _faces_in(tree, first, count):
     for place in range(first * BLOCK_FACES, (first + count) * BLOCK_FACES):
         faces += np.int64(get(tree.faces, place) >= 0)
     return faces
+
+
+@inlined
+def _push_sorted(links, base, bits, stack, near, distances, top):
+    """``push_children`` with the nearest on top, as in streams; ``base`` is where a node's links begin.
+
+    ``near`` has the distances of what waits, ``distances`` those of the octants.
+    """
+    first = top
+    while bits != 0:
+        i = lowest_bit(bits)
+        bits &= bits - 1
+        distance, child, k = get(distances, i), np.int64(get(links, base + i)), top
+        while k > first and _precedes(get(near, k - 1), get(stack, k - 1), distance, child):
+            put(near, k, get(near, k - 1))
+            put(stack, k, get(stack, k - 1))
+            k -= 1
+        put(near, k, distance)
+        put(stack, k, child)
+        top += 1
+    return top
+
+
+@inlined
+def _precedes(distance, child, other_distance, other):
+    """Whether a box is nearer than another; of equal ones nodes come before leaves."""
+    return distance < other_distance or (distance == other_distance and (child & _WORD) < (other & _WORD))
