@@ -8,7 +8,7 @@ rounding; where rounding misses that point they are wider, and still bounds.
 import numpy as np
 
 from renderer.kernels.jit import inlined
-from renderer.kernels.simd import extract, magnitude, movemask, select, splat4
+from renderer.kernels.simd import least, magnitude, movemask, select, smaller, splat4, square_root
 from renderer.trace.intersect import load_corners
 
 # Corners less the point, u, v and the nearest point err by 2^-53 each, of a corner's reach; together by 20 such errors
@@ -19,7 +19,9 @@ _MORE = 1.0 + 2.0**-48
 
 @inlined
 def bound_distances(tree, base, point, limit):
-    """Of a block's four faces the bits of those that may be within ``limit``, and what ``bounds_of`` reads."""
+    """Of a block's four faces the bits of those that may be within ``limit``, the least distances that they may have,
+    and the limit, lowered to the greatest distance that one of them may have.
+    """
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, point)
     px, py, pz = splat4(point.x), splat4(point.y), splat4(point.z)
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = x0 - px, x1 - px, x2 - px, y0 - py, y1 - py, y2 - py, z0 - pz, z1 - pz, z2 - pz
@@ -30,21 +32,16 @@ def bound_distances(tree, base, point, limit):
     )  # fmt: skip
     x, y, z = x0 + u * bx + v * cx, y0 + u * by + v * cy, z0 + u * bz + v * cz
     square = _dot(x, y, z, x, y, z)
-    least = _smaller(
+    along = _smaller(
         _dot(x0, y0, z0, x, y, z), _smaller(_dot(x1, y1, z1, x, y, z), _dot(x2, y2, z2, x, y, z))
     )  # fmt: skip
     error = splat4(_ERROR) * _larger(_size(x0, y0, z0), _larger(_size(x1, y1, z1), _size(x2, y2, z2)))
-    reach = splat4(limit) + error
+    distance, zero = square_root(square), splat4(0.0)
+    low, high = select(distance <= zero, zero, along / distance - error), distance * splat4(_MORE) + error
     # Of an unused place all is NaN, which is not within any limit.
-    near = (least <= splat4(0.0)) | (least * least <= reach * reach * square * splat4(_MORE))
-    return movemask(near), least, square, error
-
-
-@inlined
-def bounds_of(least, square, error, i):
-    """The least and the greatest distance that face ``i`` may have."""
-    distance, e = np.sqrt(extract(square, i)), extract(error, i)
-    return (extract(least, i) / distance - e if distance > 0.0 else 0.0), distance * _MORE + e
+    within = low <= splat4(limit)
+    limit = smaller(limit, least(select(within, high, splat4(np.inf))))
+    return movemask(within & (low <= splat4(limit))), low, limit
 
 
 @inlined

@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.distance.block_distance import bound_distances, bounds_of
+from renderer.distance.block_distance import bound_distances
 from renderer.distance.face_distance import distance_to_face
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import (
     at,
+    extract,
     get,
     load4,
     local_doubles,
@@ -171,16 +172,12 @@ def _search_blocks(tree, first, count, point, search, best, listed, limit):
     """List the faces of some blocks that may be within ``limit``, and lower that to what they bound."""
     put(search.work, 0, get(search.work, 0) + count)
     for block in range(first, first + count):
-        bits, least, square, error = bound_distances(tree, block * BLOCK_WORDS, point, limit)
+        bits, low, limit = bound_distances(tree, block * BLOCK_WORDS, point, limit)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            low, high = bounds_of(least, square, error, i)
-            if low > limit:
-                continue
-            limit = smaller(limit, high)
             put(search.places, listed, block * BLOCK_FACES + i)
-            put(search.least, listed, low)
+            put(search.least, listed, extract(low, i))
             listed += 1
             if listed == LISTED:
                 best = _settle(tree, point, search, best, listed, limit)

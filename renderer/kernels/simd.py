@@ -354,12 +354,16 @@ def square_root(typingctx, vector):
 @intrinsic
 def extract(typingctx, vector, index):
     """The value in one lane; the index may vary at run time."""
-    result = types.float32 if vector.scalar == "f32" else types.float64
 
     def codegen(context, builder, sig, args):
         return builder.extract_element(args[0], builder.trunc(args[1], ir.IntType(32)))
 
-    return result(vector, types.intp), codegen
+    return _lane(vector)(vector, types.intp), codegen
+
+
+def _lane(vector: Vector) -> Any:
+    """The type of a vector's lanes."""
+    return types.float32 if vector.scalar == "f32" else types.float64
 
 
 def _fold(predicate: str) -> Any:
@@ -380,14 +384,14 @@ def _fold(predicate: str) -> Any:
 
 @intrinsic
 def least(typingctx, vector):
-    """The smallest lane of eight float32, none of them NaN."""
-    return types.float32(F32X8), _fold("<")
+    """The smallest lane, where none is NaN."""
+    return _lane(vector)(vector), _fold("<")
 
 
 @intrinsic
 def most(typingctx, vector):
-    """The largest lane of eight float32, none of them NaN."""
-    return types.float32(F32X8), _fold(">")
+    """The largest lane, where none is NaN."""
+    return _lane(vector)(vector), _fold(">")
 
 
 @intrinsic
