@@ -146,8 +146,8 @@ QUERIES = (
             "d < distance or (d == distance and f < face)", "d <= distance"),
     _kernel("queries", "boxes are taken as a hundredth farther", "_bound_four",
             "splat4(_LESS)", "splat4(1.02)"),
-    _kernel("queries", "a face's least distance bounds the search", "_search_blocks",
-            "smaller(limit, high)", "smaller(limit, low * 0.999)"),
+    _kernel("queries", "a face's least distance bounds the search", "bound_distances",
+            "select(within, high, splat4(np.inf))", "select(within, low * splat4(0.999), splat4(np.inf))"),
     _kernel("queries", "a distance is reached only short of it", "find_nearest",
             "face != NO_FACE and distance <= limit", "face != NO_FACE and distance < limit"),
     _kernel("queries", "distances of scaled meshes keep the tree's units", "find_nearest",
@@ -160,6 +160,8 @@ QUERIES = (
             "np.maximum(reach - room, 0.0)", "reach * 0.5"),
     _python("queries", "points on the surface are inside without it", "contains.contains",
             "inside & ~on", "inside | on"),
+    _python("queries", "parity is taken as winding", "contains.contains",
+            "(counted & 1) == 1", "counted != 0"),
 )  # fmt: skip
 
 PICTURES = (
