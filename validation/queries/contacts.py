@@ -10,8 +10,8 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.job import Job
 from validation.oracle.contacts import Contact, contacts
+from validation.queries.peers import peers
 from validation.queries.solids import Solid, solids
-from validation.references.trimesh_queries import TrimeshQueries
 
 Floats = NDArray[np.float64]
 _SEED = 2043
@@ -26,11 +26,12 @@ def check_contacts(count: int, job: Job) -> list[dict[str, Any]]:
         mesh = solid.mesh()
         expected = [contacts(mesh.vertices, mesh.faces, *ray) for ray in zip(origins, directions, strict=True)]
         numbers = np.array([len(found) for found in expected])
-        theirs = TrimeshQueries(mesh.vertices, mesh.faces).count_hits(origins, directions)
+        others = {name: int((peer(mesh.vertices, mesh.faces).count_hits(origins, directions) != numbers).sum())
+                  for name, peer in peers().items() if hasattr(peer, "count_hits")}  # fmt: skip
         rows.append({"subject": f"all hits: {solid.name}", "asked": count,
                      "wrong": int((_wrong(mesh, origins, directions, expected)
                                    | _unseen(mesh, origins, directions, targets, expected)).sum()), "beside": count,
-                     "others": {"trimesh + embreex": int((theirs != numbers).sum())}})  # fmt: skip
+                     "others": others})  # fmt: skip
     return rows
 
 

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from renderer.octree import Octree
 from validation.job import Job
+from validation.queries.peers import peers
 from validation.queries.solids import Solid, nasty_points, random_points, solids
-from validation.references.igl import Igl
-from validation.references.trimesh_queries import TrimeshQueries
 
 _SEED = 2041
 # Offsets and scales at which each solid is asked: far away, tiny and huge, all exact in float64.
@@ -61,7 +60,13 @@ def _others(solid: Solid, points: NDArray[np.float64], offset: float, scale: flo
     winding, on = solid.winding(points)
     clear, mesh = ~on & ((winding == 0) | (winding == 1)), solid.mesh(offset, scale)
     placed, expected = ((points + offset) * scale)[clear], winding[clear] != 0
-    return {
-        "trimesh + embreex": int((TrimeshQueries(mesh.vertices, mesh.faces).contains(placed) != expected).sum()),
-        "libigl": int(((Igl(mesh.vertices, mesh.faces).winding_number(placed) > 0.5) != expected).sum()),
-    }
+    found = {name: peer(mesh.vertices, mesh.faces) for name, peer in peers().items()}
+    return {name: int((_contained(peer, placed) != expected).sum()) for name, peer in found.items()}
+
+
+def _contained(peer: Any, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """What a library has for inside; of libigl its winding number."""
+    inside: NDArray[np.bool_] = (
+        peer.contains(points) if hasattr(peer, "contains") else peer.winding_number(points) > 0.5
+    )
+    return inside

@@ -7,6 +7,7 @@ from validation.job import Job
 from validation.queries.contacts import check_contacts
 from validation.queries.distances import ULPS, check_distances, meshes
 from validation.queries.inside import check_inside
+from validation.queries.peers import peers
 from validation.queries.solids import solids
 
 
@@ -52,4 +53,4 @@ def judge(effort: QueryEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
              _DISTANCE if "ulps" in row else _REASON)
         for row in rows
     ]  # fmt: skip
-    return {"rows": rows, "costs": dict.fromkeys(("exact arithmetic", "trimesh", "libigl"))}, gates
+    return {"rows": rows, "peers": list(peers()), "costs": dict.fromkeys(("exact arithmetic", *peers()))}, gates

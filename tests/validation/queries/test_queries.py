@@ -1,6 +1,8 @@
 """The section on queries: ours passes, and each kind of wrong answer turns a gate red."""
 
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +15,9 @@ from validation.queries import section
 from validation.queries.contacts import check_contacts
 from validation.queries.distances import check_distances, meshes, points_about
 from validation.queries.inside import check_inside
+from validation.queries.peers import LIBIGL, OPEN3D, TRIMESH, peers
 from validation.queries.solids import nasty_points, random_points, solids
+from validation.references.trimesh_queries import TrimeshQueries
 from validation.thresholds import Thresholds
 
 JOB = Job(True, Thresholds(), Path(), lambda name: None)
@@ -93,3 +97,12 @@ def test_points_are_on_and_beside_the_surface():
     mesh = meshes()["ball"]
     distance = Octree.from_mesh(mesh).closest_point(points_about(mesh, np.random.default_rng(0), 400)).distance
     assert (distance == 0.0).mean() > 0.05 and (distance < 1e-9).mean() > 0.3 and (distance > 0.1).any()
+
+
+@pytest.mark.parametrize("installed", [False, True])
+def test_open3d_is_asked_where_it_is_installed(monkeypatch, installed):
+    answers = SimpleNamespace(Open3dQueries=TrimeshQueries) if installed else None
+    monkeypatch.setitem(sys.modules, "validation.references.open3d_queries", answers)
+    monkeypatch.setattr("validation.queries.inside.peers", peers.__wrapped__)
+    (row, *_) = check_inside(240, 240, 4, JOB)
+    assert list(row["others"]) == [TRIMESH, LIBIGL, *([OPEN3D] if installed else [])]

@@ -1,4 +1,4 @@
-"""Open3D's ``RaycastingScene`` as a contender: Embree on all threads. The only file that imports open3d."""
+"""Open3D's ``RaycastingScene`` as a contender: Embree on all threads."""
 
 from typing import Any
 
