@@ -33,8 +33,8 @@ from renderer.trace.sides import coordinate
 # In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot tell.
 ON_FACE, UNTOLD = -(2**31), -(2**31) + 1
 _ROUNDOFF = 2.0**-53
-# Exact tests of a call: some milliseconds.
-WORK = 4096
+# The blocks that a call tests, some milliseconds, and how many of them one exact test costs.
+WORK, _EXACTLY = 1 << 16, 16.0
 # An expansion of a volume has at most 6 products of 2 x 2 x 2 parts, four numbers each.
 _PARTS = 192
 # Shewchuk's bounds of the rounding errors of both determinants, as shares of the sums of their terms without signs.
@@ -67,8 +67,8 @@ def count_crossings(words, points, axis, middle, rows, out, stack, begin):
     """Winding numbers (or ON_FACE, or UNTOLD) for ``points`` (n, 3), from row ``begin`` on, to ``out[rows[i]]``, int32.
 
     The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
-    ``stack`` is memory for ``singly.stack_size`` int64. Returns the row before which it ended: early after WORK exact
-    tests, so that Ctrl-C need not wait for long.
+    ``stack`` is memory for ``singly.stack_size`` int64. Returns the row before which it ended: early after WORK, so
+    that Ctrl-C need not wait for long.
     """
     tree, parts = tree_pointers(words), local_doubles()
     scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
@@ -124,6 +124,7 @@ def _meet_boxes(nodes, base, column):
 @kernel
 def _cross_blocks(tree, first, count, column, parts, found):
     """Add the crossings with the faces of some blocks to ``found``."""
+    put(parts, _PARTS, get(parts, _PARTS) + count)
     winding, on = found
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
@@ -133,7 +134,7 @@ def _cross_blocks(tree, first, count, column, parts, found):
             i = lowest_bit(unsure)
             unsure &= unsure - 1
             if get(tree.faces, block * BLOCK_FACES + i) >= 0:
-                put(parts, _PARTS, get(parts, _PARTS) + 1.0)
+                put(parts, _PARTS, get(parts, _PARTS) + _EXACTLY)
                 step, touches = _cross_exactly(tree, base + i, column, parts)
                 winding, on = winding + step, on | touches
     return winding, on

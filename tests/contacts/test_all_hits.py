@@ -10,6 +10,7 @@ from meshes import meshes, options, rays_at
 
 from renderer import Mesh
 from renderer.contacts import all_hits as module
+from renderer.contacts.candidates import LISTED
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.octree import BruteForce, Octree
 from validation.oracle.contacts import contacts, hits
@@ -249,3 +250,25 @@ def test_many_callers_while_one_refits():
     for asker in askers:
         asker.join()
     assert not wrong
+
+
+@pytest.mark.parametrize("count", [LISTED - 1, LISTED, LISTED + 1, LISTED + 2])
+def test_a_ray_may_meet_as_many_blocks_as_are_listed_and_one_more(count):
+    layers = np.tile([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], (count, 1))
+    layers[:, 2] = np.repeat(np.arange(count), 3)
+    octree = Octree(layers, np.arange(3 * count).reshape(-1, 3), leaf_size=1)
+    assert octree.stats.blocks == count
+    met = octree.all_hits([[0.5, 0.5, -1.0]] * 2, [0, 0, 1])
+    assert met.counts.tolist() == [count, count] and met.face.tolist() == [*range(count)] * 2
+
+
+@BOTH
+def test_the_nearest_contacts_are_kept(accelerator):
+    """What is kept are contacts, the nearest, in whatever order hits are found."""
+    found = accelerator.from_mesh(box()).all_hits([[0.5, 0.5, 3]], [[0, 0, -1]], max_hits=2)
+    assert found.t.tolist() == [2.0, 3.0]
+
+
+def test_normals_are_those_of_the_faces_windings():
+    found = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3.0]], [[0, 0, -1]])
+    assert found.normals.tolist() == [[0, 0, 1], [0, 0, -1]]

@@ -209,3 +209,8 @@ def test_work_without_end_is_cut_where_control_c_is_heard(query, monkeypatch):
     else:
         np.testing.assert_array_equal(found.distance, one.distance)
         np.testing.assert_array_equal(found.face, one.face)
+
+
+def test_on_the_face_beside_an_edge_the_distance_is_0():
+    octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    assert octree.closest_point([[0.25, 2.0**-95, 0.0], [0.25, -(2.0**-95), 0.0]]).distance.tolist() == [0.0, 2.0**-95]

@@ -164,3 +164,45 @@ def test_signs_whose_products_vanish_are_not_believed(vertices, point):
 def test_an_answer_for_the_boundary_that_is_none_is_refused(boundary):
     with pytest.raises(ValueError, match="boundary: expected True or False"):
         Octree.from_mesh(box()).contains([[0, 0, 0]], boundary=boundary)
+
+
+def test_points_on_faces_whose_products_vanish_are_on_them():
+    vertices = [
+        [2.24525504e-316, -2.7133658e-316, -2.58718795e-316],
+        [3.7686394e-316, 1.0113675e-316, 0.5],
+        [-5.2599764e-316, -1.0, 0.2],
+        [-1.0, -0.1, 0.3],
+    ]
+    for queries in (Octree(vertices, TETRAHEDRON), BruteForce(vertices, TETRAHEDRON)):
+        assert queries.contains(vertices).all() and not queries.contains(vertices, boundary=False).any()
+
+
+def test_a_face_that_is_a_line_ends_where_it_ends():
+    mesh = box()
+    a, b = int((mesh.vertices == 0).all(axis=1).argmax()), int((mesh.vertices == 1).all(axis=1).argmax())
+    for accelerator in (Octree, BruteForce):
+        queries = accelerator(mesh.vertices, [*mesh.faces, (a, b, a)])
+        assert queries.contains([[0.5] * 3, [2.0] * 3, [-1.0] * 3]).tolist() == [True, False, False]
+
+
+def test_coordinates_that_vanish_beside_a_huge_mesh_are_not_on_it():
+    points = np.full((3, 3), 0.5e100)
+    np.fill_diagonal(points, 5e-324)
+    for accelerator in (Octree, BruteForce):
+        assert accelerator(box().vertices * 1e100, box().faces).contains(points, boundary=False).all()
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+def test_points_amid_many_solids_keep_control_c_waiting_for_milliseconds(monkeypatch, accelerator):
+    """Only exact tests were counted as work: a million points amid 3,000 tetrahedra kept it waiting for 20 seconds."""
+    rng = np.random.default_rng(0)
+    faces = (np.array(TETRAHEDRON) + 4 * np.arange(1000)[:, None, None]).reshape(-1, 3)
+    solids, calls = accelerator(rng.normal(size=(4000, 3)), faces, threads=1), []
+
+    def counted(*arguments):
+        calls.append(count_crossings(*arguments))
+        return calls[-1]
+
+    monkeypatch.setattr("renderer.inside.contains.count_crossings", counted)
+    solids.contains(rng.uniform(-1.2, 1.2, (4000, 3)))
+    assert len(calls) > 5 and calls[-1] == 4000

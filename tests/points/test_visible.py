@@ -111,3 +111,23 @@ def test_bad_input_is_named(arguments, said):
     good = {"points": np.zeros((3, 3)), "targets": np.ones((3, 3))}
     with pytest.raises(ValueError, match=said):
         Octree.from_mesh(box()).visible(**{**good, **arguments})
+
+
+def test_near_the_origin_a_far_surface_does_not_hide_itself():
+    """The room at both ends is that of the larger coordinates."""
+    ball = icosphere(3)
+    mesh, eye = Mesh(ball.vertices + 1e6, ball.faces), np.array([0.3, 0.2, 0.1])
+    octree, centres = Octree.from_mesh(mesh), mesh.triangles.mean(axis=1)
+    slope = ((eye - centres) * mesh.face_normals()).sum(1) / np.linalg.norm(eye - centres, axis=1)
+    sure = np.abs(slope) > 1e-2
+    np.testing.assert_array_equal(octree.visible(eye, centres)[sure], (slope > 0)[sure])
+
+
+def test_beside_the_end_that_the_ray_starts_at_all_is_looked_at():
+    """A wall nearer than 2^-40 of 64 hides an end whose face is left: the point, where both have one."""
+    corners, heights = np.array([[-1, -1, 0], [3, -1, 0], [-1, 3, 0]]), (0.0, 2.0**-37, 64.0)
+    octree = Octree(np.concatenate([np.add(corners, [0, 0, z]) for z in heights]), np.arange(9).reshape(3, 3))
+    point, target = [0.25, 0.5, 0.0], [0.25, 0.5, 64.0]
+    assert octree.visible(point, target) and octree.visible(target, point)
+    assert not octree.visible(point, target, leaving=0) and not octree.visible(target, point, reaching=0)
+    assert not octree.visible(point, target, leaving=0, reaching=2)

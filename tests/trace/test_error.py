@@ -8,6 +8,7 @@ from meshes import make_mesh, rays_at
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
+from renderer.trace.batch import check_rays, moved_off
 from validation.oracle import exact
 
 
@@ -65,6 +66,7 @@ def test_rays_along_faces_have_bounds_as_long_as_the_face():
     hits = octree.closest_hit(origins, directions, t_error=True)
     got = shares(octree, origins, directions, hits, np.flatnonzero(hits.hit))
     assert len(got) and got.max() <= 1.0
+    assert (hits.t_error[hits.hit] < 1.001).all()
 
 
 def test_dimensions_scales_and_brute_force():
@@ -77,3 +79,22 @@ def test_dimensions_scales_and_brute_force():
     assert Octree.from_mesh(icosphere(1)).closest_hit([0, 0, 3], [0, 0, -1]).t_error is None
     with pytest.raises(ValueError, match="t_error: expected True or False, got 1"):
         Octree.from_mesh(icosphere(1)).closest_hit([0, 0, 3], [0, 0, -1], t_error=1)
+
+
+def test_the_first_of_all_hits_has_the_bound_of_the_closest():
+    octree, rng = Octree.from_mesh(icosphere(3)), np.random.default_rng(2)
+    rays = 3 * rng.normal(size=(300, 3)), rng.normal(size=(300, 3))
+    hits, every = octree.closest_hit(*rays, t_error=True), octree.all_hits(*rays, t_error=True)
+    np.testing.assert_array_equal(every.t_error[every.offsets[:-1][hits.hit]], hits.t_error[hits.hit])
+
+
+def test_of_rays_that_leave_faces_the_bound_is_that_of_the_moved_rays():
+    octree = Octree.from_mesh(icosphere(3))
+    starts, inward = octree.mesh.triangles.mean(axis=1), -octree.mesh.face_normals()
+    faces = np.arange(len(starts))
+    moved = moved_off(check_rays(starts, inward, 0.0, np.inf)[0], faces, octree.mesh, octree.tree.scale, 1)
+    hits = octree.closest_hit(starts, inward, leaving=faces, t_error=True)
+    again = octree.closest_hit(moved.origins, inward, t_error=True)
+    assert hits.hit.all()
+    np.testing.assert_array_equal(hits.t, again.t)
+    np.testing.assert_array_equal(hits.t_error, again.t_error)

@@ -507,6 +507,8 @@ def test_fewer_rows_of_repairs_than_faces_are_refused(mmap: bool, path: Path) ->
     assert it.repairs is not None
     path.write_bytes(forged(content, nothing, kept_faces=it.repairs.kept_faces[:-1]))
     assert refusal(path, mmap) == "kept_faces: expected a row a face, 59, got 58"
+    path.write_bytes(forged(content, nothing, kept_faces=np.append(it.repairs.kept_faces, 0)))
+    assert refusal(path, mmap) == "kept_faces: expected a row a face, 59, got 60"
 
 
 @MAPPED
