@@ -84,7 +84,8 @@ def _gather() -> None:
 
 def _find_nearest() -> None:
     for accelerator in (Octree.from_mesh(_TRIANGLE), BruteForce.from_mesh(_TRIANGLE)):
-        accelerator.closest_point([0.0, 0.0, 1.0])
+        # One point is told by float64, the other is not.
+        accelerator.closest_point([[0.0, 0.0, 1.0], [0.5, 0.5, 1e-300]])
 
 
 def _count_steps() -> None:

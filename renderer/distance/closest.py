@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import real_argument
-from renderer.distance.nearest import LISTED, find_nearest
+from renderer.distance.nearest import LISTED, UNTOLD_FACE, find_nearest
+from renderer.distance.rational import nearest_exactly
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
@@ -66,8 +67,16 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
 
     least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))
     ask_in_order(find, given, mesh, None, least, threads)
+    faces = out[3].view(np.int64)
+    untold = np.flatnonzero(faces == UNTOLD_FACE)
+    triangles = mesh.triangles if len(untold) else np.empty((0, 3, 3))
+    for row in untold:
+        distance, u, v, face = nearest_exactly(given[row], triangles, tree.scale)
+        hit = distance <= limits[row if len(limits) > 1 else 0]
+        out[:3, row] = (distance, u, v) if hit else (np.inf, np.nan, np.nan)
+        faces[row] = face if hit else -1
     distance, u, v = (row.reshape(shape) for row in out[:3])
-    return ClosestPoints(distance, out[3].view(np.int64).reshape(shape), u, v, mesh)
+    return ClosestPoints(distance, faces.reshape(shape), u, v, mesh)
 
 
 def _limits(max_distance: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

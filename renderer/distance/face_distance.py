@@ -10,9 +10,9 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, dot_pairs, length_pair, power_below, quotient, scaled_difference
-from renderer.kernels.simd import larger
+from renderer.kernels.simd import larger, put
 from renderer.points.expansions import OUT_OF_RANGE, expand_area, expand_volume, pair_of
-from renderer.points.signs import lies_within, volume_sign
+from renderer.points.signs import UNDECIDED, lies_within, volume_sign
 
 # Shares of the terms of a sum of products of pairs, which errs by 2^-98 of them. Below CANCELLED it loses so many
 # digits that it is computed as an expansion. Below LOST its sign is in doubt: a point so near an edge, as seen along
@@ -20,6 +20,8 @@ from renderer.points.signs import lies_within, volume_sign
 # middle of two float64 a distance is taken as there.
 _CANCELLED, _LOST = 2.0**-40, 2.0**-90
 _TINIEST = 2.0**-1000
+# Where ``parts`` has a number behind the expansion: not 0 once a distance was asked whose products vanish or overflow.
+UNTOLD = 192
 
 
 class _Seen(NamedTuple):
@@ -40,7 +42,7 @@ def distance_to_face(a, b, c, p, parts):
     """The distance of the point p from a face, and u and v of the face's nearest point.
 
     The distance errs by less than an ulp, or by 2^-90 of that of the farthest corner if that is more, and is 0 on the
-    face only. ``parts`` is memory for an expansion.
+    face only; else ``parts``, memory for an expansion, has a number at UNTOLD that is not 0.
     """
     seen = _see(a, b, c, p)
     normal = _normal(seen, a, b, c, parts)
@@ -66,9 +68,21 @@ def distance_to_face(a, b, c, p, parts):
         d, t = _distance_to_edge(c, a, p, seen, (seen.pc, seen.pa, seen.ca), parts)
         if d < distance:
             distance, u, v = d, 0.0, 1.0 - t
-    if 0.0 < distance < 2.0 * _LOST and volume_sign(a, b, c, p, parts) == 0 and lies_within(a, b, c, p, parts) == 1:
-        distance = 0.0
+    if distance < 2.0 * _LOST:
+        distance = _on_or_beside(a, b, c, p, distance, parts)
     return distance / seen.to_reach, u, v
+
+
+@kernel
+def _on_or_beside(a, b, c, p, distance, parts):
+    """``distance``, or 0 where the point lies on the face."""
+    side = volume_sign(a, b, c, p, parts)
+    on = lies_within(a, b, c, p, parts) if side == 0 else np.int64(side == UNDECIDED) * UNDECIDED
+    if on == 1:
+        return 0.0
+    if on == UNDECIDED or distance == 0.0:
+        put(parts, UNTOLD, 1.0)
+    return distance
 
 
 @kernel
@@ -115,6 +129,7 @@ def _expanded(a, b, p, first, second, otherwise, parts):
     z = expand_area((a[0], a[1]), (b[0], b[1]), (p[0], p[1]), parts)
     z_pair = pair_of(parts, z)
     if x == OUT_OF_RANGE or y == OUT_OF_RANGE or z == OUT_OF_RANGE:
+        put(parts, UNTOLD, 1.0)
         return otherwise
     return _scaled(x_pair, first, second), _scaled(y_pair, first, second), _scaled(z_pair, first, second)
 
@@ -125,7 +140,9 @@ def _height(seen, normal, a, b, c, p, parts):
     height = dot_pairs(seen.pa, normal)
     if abs(height[0]) < _CANCELLED * _largest(normal):
         count = expand_volume(a, b, c, p, parts)
-        if count != OUT_OF_RANGE:
+        if count == OUT_OF_RANGE:
+            put(parts, UNTOLD, 1.0)
+        else:
             height = _scaled(_scaled(pair_of(parts, count), seen.to_side, seen.to_reach), seen.to_side, 1.0)
     return height if height[0] >= 0.0 else (-height[0], -height[1])
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.distance.block_distance import bound_distances
-from renderer.distance.face_distance import distance_to_face
+from renderer.distance.face_distance import UNTOLD, distance_to_face
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import (
     at,
@@ -32,6 +32,8 @@ from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
 from renderer.trace.rays import hit_pointers
 from renderer.trace.sides import corner
 
+# In place of a face: float64 cannot tell.
+UNTOLD_FACE = -2
 # Faces that may be the nearest are told apart at once when so many are listed.
 LISTED = 64
 # The blocks that a call tests, some milliseconds, and how many of them one face costs that is told apart.
@@ -63,7 +65,7 @@ class Search(NamedTuple):
 
 @kernel
 def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
-    """Write distance, u, v and face of ``points``, from row ``begin`` on, to the columns ``rows`` of ``out`` (4, m).
+    """Write distance, u, v and face (or UNTOLD_FACE) of ``points``, from row ``begin`` on, to ``out[:, rows]``, (4, m).
 
     limits     (m,) or (1,), the largest distance that counts
     integers   memory for ``singly.stack_size`` and LISTED int64; ``doubles``, for as many float64 and nine more
@@ -81,16 +83,45 @@ def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
         p, row = at(pointer(points), 3 * i), rows[i]
         limit = limits[row if len(limits) > 1 else 0]
         point = Point(0, 4, 8, tree.scale * get(p, 0), tree.scale * get(p, 1), tree.scale * get(p, 2))
+        put(parts, UNTOLD, 0.0)
         distance, face, u, v = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), search)
         distance /= tree.scale
         hit = face != NO_FACE and distance <= limit
         put(found.t, row, distance if hit else np.inf)
-        put(found.face, row, np.int64(face if hit else -1))
+        told = get(parts, UNTOLD) == 0.0 and _is_scaled(point, p, tree.scale)
+        put(found.face, row, np.int64((face if hit else -1) if told else UNTOLD_FACE))
         put(found.u, row, u if hit else np.nan)
         put(found.v, row, v if hit else np.nan)
         if get(search.work, 0) > WORK:
             return i + 1
     return count
+
+
+@kernel
+def tell_faces(triangles, points, told):
+    """Write distance, u and v of each face (k, 3 corners, 3) seen from its point (k, 3), and 1 where they are told.
+
+    ``told`` has the shape (k, 4).
+    """
+    parts = local_doubles()
+    for i in range(len(triangles)):
+        put(parts, UNTOLD, 0.0)
+        base, p = at(pointer(triangles), 9 * i), at(pointer(points), 3 * i)
+        told[i, 0], told[i, 1], told[i, 2] = distance_to_face(
+            _three(base), _three(at(base, 3)), _three(at(base, 6)), _three(p), parts
+        )
+        told[i, 3] = 1.0 if get(parts, UNTOLD) == 0.0 else 0.0
+
+
+@inlined
+def _three(p):
+    return get(p, 0), get(p, 1), get(p, 2)
+
+
+@inlined
+def _is_scaled(point, p, scale):
+    """Whether the tree's units hold the coordinates at ``p`` exactly."""
+    return point.x / scale == get(p, 0) and point.y / scale == get(p, 1) and point.z / scale == get(p, 2)
 
 
 @kernel

@@ -9,6 +9,7 @@ from meshes import make_mesh
 from renderer import BruteForce, Mesh, Octree
 from renderer.distance import closest
 from renderer.distance.nearest import LISTED
+from renderer.distance.rational import nearest_exactly
 from renderer.inside import contains as inside
 from renderer.mesh.shapes import box, icosphere, torus
 from validation.oracle.distance import nearest, rational, ulps_from_root
@@ -214,3 +215,50 @@ def test_work_without_end_is_cut_where_control_c_is_heard(query, monkeypatch):
 def test_on_the_face_beside_an_edge_the_distance_is_0():
     octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     assert octree.closest_point([[0.25, 2.0**-95, 0.0], [0.25, -(2.0**-95), 0.0]]).distance.tolist() == [0.0, 2.0**-95]
+
+
+@pytest.mark.parametrize(
+    ("vertices", "point"),
+    [
+        (
+            [
+                [-0.8170003574125848, 0.34992861085809795, -1.1586510068862494],
+                [0.8700737035547846, -0.7334418831463413, 0.5136471791306236],
+                [0.2501666530005858, 0.39196964694146097, -0.042938596098457134],
+            ],
+            [0.35683093977876335, 1e-290, 0.03704459807587124],
+        ),
+        ([[0, 0, 0], [1, 0, 1], [0, 1, 0]], [0.5, 1e-300, 0.5]),
+        ([[0, -2e-29, 0], [0, 1, 1], [0, -2e-27, -2]], [0, 1e-305, -1e-35]),
+        ([[-1, -1e-32, 0], [-2e-40, 2, 2], [2, 2e-166, 0]], [1e-265, 2 / 3, 2 / 3]),
+        ([[2e-13, 0, 1e-6], [-1e-112, -2e-116, -1e-106], [2e-46, 2, 1e-98]], [5e-14, 0.5, 2.5e-7]),
+        ([[1, 1, -1], [1e-49, -1e-13, -1e-159], [1e-43, -2e-159, -2e-22]], [9.999999999999999e-18, -5e-14, -1e-22]),
+        ([[1e19, 0, -2e19], [-3e-56, -2e-56, 2e-56], [-3e72, -2e72, 3e72]], [1e-11, 0, 2e19]),
+        ([[0, 0, 0], [1e100, 0, 0], [0, 1e100, 0]], [5e-324, 5e-324, 5e-324]),
+    ],
+)
+def test_coordinates_of_all_sizes_are_told_apart_exactly(vertices, point):
+    """Where products vanished, distances were off by up to 2,037 ulp, 0 off the surface, and not 0 on it."""
+    square = nearest(rational([point])[0], [rational(vertices)])[0]
+    for accelerator in (Octree, BruteForce):
+        queries = accelerator(vertices, [[0, 1, 2]])
+        found = queries.closest_point(point)
+        assert ulps_from_root(float(found.distance), square) <= 0.5 and found.face == 0
+        assert queries.closest_point(point, max_distance=found.distance).found
+        if found.distance > 0.0:
+            less = queries.closest_point(point, max_distance=np.nextafter(found.distance, 0.0))
+            assert (less.distance, less.face) == (np.inf, -1) and np.isnan(less.u)
+
+
+def test_rational_arithmetic_says_what_float64_says():
+    """It is asked where float64 cannot tell, so here it is asked all: also where edges and corners are nearest."""
+    rng = np.random.default_rng(4)
+    for mesh in (SOLIDS["integers"], SOLIDS["nested boxes"], Mesh(*make_mesh("soup", 1, 30))):
+        points = np.concatenate([points_about(mesh, rng, 30), rng.integers(-3, 4, (30, 3))])
+        found = Octree.from_mesh(mesh).closest_point(points)
+        for i, point in enumerate(points):
+            # In units that hold no point nothing is told by float64.
+            scale = 2.0**-1060
+            distance, u, v, face = nearest_exactly(point, mesh.triangles, scale)
+            assert (distance, face) == (found.distance[i], found.face[i])
+            assert abs(u - found.u[i]) < 1e-9 and abs(v - found.v[i]) < 1e-9

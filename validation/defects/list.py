@@ -152,6 +152,8 @@ QUERIES = (
             "face != NO_FACE and distance <= limit", "face != NO_FACE and distance < limit"),
     _kernel("queries", "distances of scaled meshes keep the tree's units", "find_nearest",
             "tree.scale * get(p, 0)", "get(p, 0)"),
+    _kernel("queries", "distances whose products vanish are believed", "find_nearest",
+            "get(parts, UNTOLD) == 0.0", "True"),
     _python("queries", "distances are negative outside", "signed.signed_distance",
             "inside & (distance > 0.0)", "~inside & (distance > 0.0)"),
     _python("queries", "an end hides itself", "_between",

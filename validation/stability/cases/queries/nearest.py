@@ -26,6 +26,15 @@ def hard_meshes() -> dict[str, Mesh]:
     }
 
 
+# Faces and points of which products of coordinates vanish in float64: on the face, beside it, and where sizes differ.
+ALL_SIZES: tuple[tuple[list[list[float]], list[float]], ...] = (
+    ([[0, 0, 0], [1, 0, 1], [0, 1, 0]], [0.5, 1e-300, 0.5]),
+    ([[2e-13, 0, 1e-6], [-1e-112, -2e-116, -1e-106], [2e-46, 2, 1e-98]], [5e-14, 0.5, 2.5e-7]),
+    ([[1, 1, -1], [1e-49, -1e-13, -1e-159], [1e-43, -2e-159, -2e-22]], [9.999999999999999e-18, -5e-14, -1e-22]),
+    ([[1e19, 0, -2e19], [-3e-56, -2e-56, 2e-56], [-3e72, -2e72, 3e72]], [1e-11, 0, 2e19]),
+)
+
+
 def fan(count: int) -> Mesh:
     """``count`` faces around one corner, the last vertex."""
     angle = 2 * np.pi * np.arange(count) / count
@@ -62,6 +71,8 @@ def _nearest(quick: bool) -> Outcome:
         on = mesh.triangles[rng.integers(0, len(mesh.faces), count), rng.integers(0, 3, count)]
         away = mesh.extent.max() * rng.normal(size=(count, 3)) * rng.choice([0.0, 1e-3, 1.0], (count, 1))
         wrong, asked = wrong + wrong_distances(mesh, on + away), asked + count
+    for vertices, point in ALL_SIZES:
+        wrong, asked = wrong + wrong_distances(Mesh(vertices, [[0, 1, 2]]), np.array([point])), asked + 1
     wheel = fan(1_000 if quick else 100_000)
     # At the hub, straight above it and below: the hub is the nearest point of all faces, or its slope is.
     hub = Octree.from_mesh(wheel).closest_point([[0, 0, 0.5], [0, 0, 0.75], [0, 0, 1e6]])
@@ -72,7 +83,7 @@ def _nearest(quick: bool) -> Outcome:
 
 CASES: tuple[ExtremeCase, ...] = (
     ExtremeCase(
-        53, "nearest points of faces that are lines, points or twice there, slivers, touching solids, a fan; far away",
+        53, "nearest points of faces that are lines, points or twice there, slivers, a fan; far; all sizes at once",
         "the exact distance, rounded, and of equal ones the lowest face; NaN refused by its row", ("exact", "analytic"),
         "half an ulp, as the answer is rounded once", _nearest,
     ),

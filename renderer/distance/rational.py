@@ -1,0 +1,96 @@
+"""Nearest points in rational arithmetic, for the few points whose products float64 cannot hold."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.distance.nearest import tell_faces
+
+_Vector = tuple[Fraction, Fraction, Fraction]
+# What the few roundings of the bounds below may change.
+_MORE = 1.0 + 2.0**-48
+# Bits of a root beyond those of float64, so that what is cut off never makes a tie.
+_BITS = 130
+
+
+def nearest_exactly(
+    point: NDArray[np.float64], triangles: NDArray[np.float64], scale: float
+) -> tuple[float, float, float, int]:
+    """The distance of a point (3,) from triangles (F, 3 corners, 3), u, v and the face.
+
+    Faces that float64 can tell have the distances that a search gives them, with the tree's ``scale``, so that answers
+    do not depend on what a search meets; the others have theirs rounded once. Of equal distances the lowest face wins.
+    """
+    faces, found = _candidates(point, triangles), list[tuple[float, int, float, float]]()
+    told = np.zeros((len(faces), 4))
+    if (point * scale / scale == point).all():
+        tell_faces(triangles[faces] * scale, np.tile(point * scale, (len(faces), 1)), told)
+    for face, (distance, u, v, sure) in zip(faces.tolist(), told.tolist(), strict=True):
+        answer = (distance / scale, u, v) if sure else _exactly(point, triangles[face])
+        found.append((answer[0], face, *answer[1:]))
+    distance, face, u, v = min(found)
+    return distance, u, v, face
+
+
+def _exactly(point: NDArray[np.float64], triangle: NDArray[np.float64]) -> tuple[float, float, float]:
+    square, u, v = _nearest(_exact(point), *(_exact(corner) for corner in triangle))
+    return _root(square), float(u), float(v)
+
+
+def _candidates(point: NDArray[np.float64], triangles: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Faces that may be the nearest: by their boxes from below and by their corners from above, without any product."""
+    away = triangles - point
+    gap = np.maximum(away.min(axis=1), -away.max(axis=1)).max(axis=1)
+    corner = np.abs(away).sum(axis=2).min()
+    return np.flatnonzero(gap <= corner * _MORE)
+
+
+def _nearest(p: _Vector, a: _Vector, b: _Vector, c: _Vector) -> tuple[Fraction, Fraction, Fraction]:
+    """The squared distance of p from a face, and u and v of the face's nearest point."""
+    d, ab, ac = _less(p, a), _less(b, a), _less(c, a)
+    bb, bc, cc, x, y = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac), _dot(d, ab), _dot(d, ac)
+    area = bb * cc - bc * bc
+    if area > 0:
+        u, v = (cc * x - bc * y) / area, (bb * y - bc * x) / area
+        if u >= 0 and v >= 0 and u + v <= 1:
+            return _square(d, ab, ac, u, v), u, v
+    none, one = Fraction(0), Fraction(1)
+    s, t = _share(x, bb), _share(y, cc)
+    r = _share(_dot(_less(p, b), _less(c, b)), bb - 2 * bc + cc)
+    places = ((s, none), (none, t), (one - r, r))
+    return min((_square(d, ab, ac, u, v), u, v) for u, v in places)
+
+
+def _square(d: _Vector, ab: _Vector, ac: _Vector, u: Fraction, v: Fraction) -> Fraction:
+    """The square of d less u ab and v ac."""
+    return sum(((x - u * y - v * z) ** 2 for x, y, z in zip(d, ab, ac, strict=True)), Fraction(0))
+
+
+def _share(part: Fraction, whole: Fraction) -> Fraction:
+    """part / whole from 0 to 1; 0 of a side that is a point."""
+    return min(max(part / whole, Fraction(0)), Fraction(1)) if whole else Fraction(0)
+
+
+def _root(square: Fraction) -> float:
+    """The root of a rational number, rounded once."""
+    n, d = square.numerator, square.denominator
+    shift = max(0, _BITS - (n.bit_length() - d.bit_length()) // 2)
+    whole, rest = divmod(n << 2 * shift, d)
+    root = math.isqrt(whole)
+    cut = rest != 0 or root * root != whole
+    return (2 * root + cut) / (1 << (shift + 1))
+
+
+def _exact(point: NDArray[np.float64]) -> _Vector:
+    x, y, z = (Fraction(float(coordinate)) for coordinate in point)
+    return x, y, z
+
+
+def _less(a: _Vector, b: _Vector) -> _Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _dot(a: _Vector, b: _Vector) -> Fraction:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
