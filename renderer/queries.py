@@ -69,7 +69,7 @@ class Queries:
                              by more than rounding errors, to the side that the direction points to, so that the ray
                              meets neither that face nor another in its plane. No epsilon is needed
         t_error              whether the hits have bounds of the errors of t: how far it may be from where the ray, as
-                             it was started, meets the face's plane
+                             it was started, meets the face, or passes it, if only rounding makes it hit
 
         No face is culled. A ray in a face's plane misses it, unless the rounding of its slopes lifts it out of the
         plane. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.

@@ -98,3 +98,19 @@ def test_of_rays_that_leave_faces_the_bound_is_that_of_the_moved_rays():
     assert hits.hit.all()
     np.testing.assert_array_equal(hits.t, again.t)
     np.testing.assert_array_equal(hits.t_error, again.t_error)
+
+
+def test_rays_nearly_in_the_plane_of_a_face_that_they_meet_keep_their_bound():
+    """Others, which only rounding makes hit, may meet the plane anywhere: they are not asked."""
+    rng, met = np.random.default_rng(0), 0
+    for _ in range(4):
+        corners = rng.normal(size=(3, 3))
+        sides = rng.normal(size=(100, 2)) @ (corners[1:] - corners[0])
+        origins = rng.dirichlet([1, 1, 1], 100) @ corners - sides * rng.uniform(0.5, 3, (100, 1))
+        hits = Octree(corners, [[0, 1, 2]]).closest_hit(origins, sides, t_error=True)
+        for row in np.flatnonzero(hits.hit):
+            u, v, w, t = exact.determinants(corners, origins[row], sides[row])
+            if u + v + w and (min(u, v, w) >= 0 or max(u, v, w) <= 0):
+                met += 1
+                assert abs(Fraction(float(hits.t[row])) - t / (u + v + w)) <= hits.t_error[row]
+    assert met > 20
