@@ -20,7 +20,7 @@ _MORE, _BOX = 1.0 + 2.0**-20, 2.0**-18
 def add_errors(hits: Hits | AllHits, rays: RayBatch, rows: NDArray[np.int64], scale: float) -> None:
     """Set ``hits.t_error``: how far t may be from where each hit's ray meets its face.
 
-    A ray nearly in the face's plane may pass the face by and meet the plane elsewhere: then t lies within the face's box.
+    A ray nearly in its plane may pass it by and meet the plane elsewhere: then t lies within the face's box.
     ``rows`` are the rays that hit, one for each hit in order; ``scale`` is the tree's.
     """
     hit = hits.face >= 0

@@ -113,4 +113,4 @@ def test_rays_nearly_in_the_plane_of_a_face_that_they_meet_keep_their_bound():
             if u + v + w and (min(u, v, w) >= 0 or max(u, v, w) <= 0):
                 met += 1
                 assert abs(Fraction(float(hits.t[row])) - t / (u + v + w)) <= hits.t_error[row]
-    assert met > 20
+    assert met > 10
