@@ -81,11 +81,14 @@ def check_rays(
         shape: tuple[int, ...] = (len(origins),)
     else:
         origins, directions = _vectors("origins", origins), _vectors("directions", directions)
-        shape = broadcast_shape("directions", directions, "origins", origins)
-        origins, directions = _rows(origins, shape), _rows(directions, shape)
-        if len(origins) == len(directions) == 1:
-            # One of them says how many rays there are.
-            directions = np.broadcast_to(directions, (math.prod(shape), 3))
+        if origins.shape == directions.shape and origins.ndim == 2 and origins.strides[0] and directions.strides[0]:
+            shape = (len(origins),)
+        else:
+            shape = broadcast_shape("directions", directions, "origins", origins)
+            origins, directions = _rows(origins, shape), _rows(directions, shape)
+            if len(origins) == len(directions) == 1 != math.prod(shape):
+                # One of them says how many rays there are.
+                directions = np.broadcast_to(directions, (math.prod(shape), 3))
     # The usual bounds share arrays.
     low = _ZERO if type(t_min) is float and t_min == 0.0 else _bound("t_min", t_min, shape, _MOST)
     high = _INFINITY if type(t_max) is float and t_max == np.inf else _bound("t_max", t_max, shape, np.inf)
