@@ -11,7 +11,7 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, dot_pairs, length_pair, power_below, quotient, scaled_difference
 from renderer.kernels.simd import larger, put
-from renderer.points.expansions import OUT_OF_RANGE, expand_area, expand_volume, pair_of
+from renderer.points.expansions import OUT_OF_RANGE, PARTS, expand_area, expand_volume, pair_of
 from renderer.points.signs import UNDECIDED, lies_within, volume_sign
 
 # Shares of the terms of a sum of products of pairs, which errs by 2^-98 of them. Below CANCELLED it loses so many
@@ -21,7 +21,7 @@ from renderer.points.signs import UNDECIDED, lies_within, volume_sign
 _CANCELLED, _LOST = 2.0**-40, 2.0**-90
 _TINIEST = 2.0**-1000
 # Where ``parts`` has a number behind the expansion: not 0 once a distance was asked whose products vanish or overflow.
-UNTOLD = 192
+UNTOLD = PARTS
 
 
 class _Seen(NamedTuple):

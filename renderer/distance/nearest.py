@@ -98,17 +98,17 @@ def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
 
 
 @kernel
-def tell_faces(triangles, points, told):
-    """Write distance, u and v of each face (k, 3 corners, 3) seen from its point (k, 3), and 1 where they are told.
+def tell_faces(triangles, point, told):
+    """Write distance, u and v of each face (k, 3 corners, 3) seen from a point (3,), and 1 where they are told.
 
     ``told`` has the shape (k, 4).
     """
-    parts = local_doubles()
+    parts, p = local_doubles(), _three(pointer(point))
     for i in range(len(triangles)):
         put(parts, UNTOLD, 0.0)
-        base, p = at(pointer(triangles), 9 * i), at(pointer(points), 3 * i)
+        base = at(pointer(triangles), 9 * i)
         told[i, 0], told[i, 1], told[i, 2] = distance_to_face(
-            _three(base), _three(at(base, 3)), _three(at(base, 6)), _three(p), parts
+            _three(base), _three(at(base, 3)), _three(at(base, 6)), p, parts
         )
         told[i, 3] = 1.0 if get(parts, UNTOLD) == 0.0 else 0.0
 
@@ -192,7 +192,7 @@ def _bound_four(nodes, base, point):
 
 @inlined
 def _gap(nodes, row, x):
-    """How far a coordinate lies outside of four intervals; inf for those of empty octants."""
+    """The way of a coordinate to each of four intervals, 0 within; inf for those of empty octants."""
     zero, below, above = splat4(0.0), load4(nodes, row) - splat4(x), splat4(x) - load4(nodes, row + 8)
     gap = select(below > above, below, above)
     return select(gap > zero, gap, zero)

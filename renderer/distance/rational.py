@@ -26,7 +26,7 @@ def nearest_exactly(
     faces, found = _candidates(point, triangles), list[tuple[float, int, float, float]]()
     told = np.zeros((len(faces), 4))
     if (point * scale / scale == point).all():
-        tell_faces(triangles[faces] * scale, np.tile(point * scale, (len(faces), 1)), told)
+        tell_faces(triangles[faces] * scale, point * scale, told)
     for face, (distance, u, v, sure) in zip(faces.tolist(), told.tolist(), strict=True):
         answer = (distance / scale, u, v) if sure else _exactly(point, triangles[face])
         found.append((answer[0], face, *answer[1:]))

@@ -24,6 +24,7 @@ from renderer.kernels.simd import (
     splat4,
     splat8,
 )
+from renderer.points.expansions import PARTS
 from renderer.points.signs import UNDECIDED, area_sign, differ, lies_within, volume_sign
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
@@ -35,8 +36,6 @@ ON_FACE, UNTOLD = -(2**31), -(2**31) + 1
 _ROUNDOFF = 2.0**-53
 # The blocks that a call tests, some milliseconds, and how many of them one exact test costs.
 WORK, _EXACTLY = 1 << 16, 16.0
-# An expansion of a volume has at most 6 products of 2 x 2 x 2 parts, four numbers each.
-_PARTS = 192
 # Shewchuk's bounds of the rounding errors of both determinants, as shares of the sums of their terms without signs.
 _AREA_ERROR = (3.0 + 16.0 * _ROUNDOFF) * _ROUNDOFF
 _VOLUME_ERROR = (7.0 + 56.0 * _ROUNDOFF) * _ROUNDOFF
@@ -73,7 +72,7 @@ def count_crossings(words, points, axis, middle, rows, out, stack, begin):
     tree, parts = tree_pointers(words), local_doubles()
     scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
     # Behind the expansion's parts.
-    work = at(parts, _PARTS)
+    work = at(parts, PARTS)
     put(work, 0, 0.0)
     for i in range(begin, len(points)):
         row = at(pointer(points), 3 * i)
@@ -124,7 +123,7 @@ def _meet_boxes(nodes, base, column):
 @kernel
 def _cross_blocks(tree, first, count, column, parts, found):
     """Add the crossings with the faces of some blocks to ``found``."""
-    put(parts, _PARTS, get(parts, _PARTS) + count)
+    put(parts, PARTS, get(parts, PARTS) + count)
     winding, on = found
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
@@ -134,7 +133,7 @@ def _cross_blocks(tree, first, count, column, parts, found):
             i = lowest_bit(unsure)
             unsure &= unsure - 1
             if get(tree.faces, block * BLOCK_FACES + i) >= 0:
-                put(parts, _PARTS, get(parts, _PARTS) + _EXACTLY)
+                put(parts, PARTS, get(parts, PARTS) + _EXACTLY)
                 step, touches = _cross_exactly(tree, base + i, column, parts)
                 winding, on = winding + step, on | touches
     return winding, on

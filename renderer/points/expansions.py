@@ -11,6 +11,8 @@ from renderer.kernels.simd import get, larger, put, smaller
 
 # The number of parts where products would vanish or overflow.
 OUT_OF_RANGE = -1
+# The most parts: a volume has 6 products of 2 x 2 x 2 parts, four numbers each. Callers may use the memory behind them.
+PARTS = 192
 _SMALLEST, _LARGEST = 2.0**-960, 2.0**960
 
 

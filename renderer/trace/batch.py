@@ -22,6 +22,8 @@ _MOST = float(np.finfo(np.float64).max)
 
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
     """The values as an array (..., 3)."""
+    if _is_plain(values):
+        return values
     array = real_argument(argument, values)
     expect(array.ndim >= 1 and array.shape[-1] == 3, argument, "shape (..., 3)", f"shape {array.shape}")
     return array
@@ -77,18 +79,15 @@ def check_rays(
     Whether each ray is in range is checked when it is traced. Raises ``ValueError`` naming the argument and, for a bad
     bound, its row.
     """
-    if _is_plain(origins) and _is_plain(directions) and len(origins) == len(directions):
+    origins, directions = _vectors("origins", origins), _vectors("directions", directions)
+    if origins.shape == directions.shape and origins.ndim == 2 and origins.strides[0] and directions.strides[0]:
         shape: tuple[int, ...] = (len(origins),)
     else:
-        origins, directions = _vectors("origins", origins), _vectors("directions", directions)
-        if origins.shape == directions.shape and origins.ndim == 2 and origins.strides[0] and directions.strides[0]:
-            shape = (len(origins),)
-        else:
-            shape = broadcast_shape("directions", directions, "origins", origins)
-            origins, directions = _rows(origins, shape), _rows(directions, shape)
-            if len(origins) == len(directions) == 1 != math.prod(shape):
-                # One of them says how many rays there are.
-                directions = np.broadcast_to(directions, (math.prod(shape), 3))
+        shape = broadcast_shape("directions", directions, "origins", origins)
+        origins, directions = _rows(origins, shape), _rows(directions, shape)
+        if len(origins) == len(directions) == 1 != math.prod(shape):
+            # One of them says how many rays there are.
+            directions = np.broadcast_to(directions, (math.prod(shape), 3))
     # The usual bounds share arrays.
     low = _ZERO if type(t_min) is float and t_min == 0.0 else _bound("t_min", t_min, shape, _MOST)
     high = _INFINITY if type(t_max) is float and t_max == np.inf else _bound("t_max", t_max, shape, np.inf)
@@ -121,7 +120,7 @@ def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
     """Whether it is an (n, 3) array of float64, as most are; a quick check for calls with few rays."""
     if not (type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2):
         return False
-    return values.shape[1] == 3 and values.strides[0] > 0
+    return values.shape[1] == 3
 
 
 def check_faces(argument: str, faces: ArrayLike, shape: tuple[int, ...], most: int) -> NDArray[np.int64]:

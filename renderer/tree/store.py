@@ -69,7 +69,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 class Stored(NamedTuple):
-    """What a file keeps of an octree; ``repairs`` is None without ``repair=True``."""
+    """The parts of an octree that a file keeps; ``repairs`` is None without ``repair=True``."""
 
     mesh: Mesh
     tree: Tree

@@ -60,7 +60,7 @@ def nearest(point: Vector, triangles: Sequence[Sequence[Vector]]) -> tuple[Fract
 
 
 def ulps_from_root(value: float, square: Fraction) -> float:
-    """How far a float64 is from the root of a rational number, in units of the root's last place.
+    """The way from a float64 to the root of a rational number, in units of the root's last place.
 
     It is inf for a NaN, and where one of them is 0 and the other is not.
 

@@ -61,12 +61,4 @@ def _others(solid: Solid, points: NDArray[np.float64], offset: float, scale: flo
     clear, mesh = ~on & ((winding == 0) | (winding == 1)), solid.mesh(offset, scale)
     placed, expected = ((points + offset) * scale)[clear], winding[clear] != 0
     found = {name: peer(mesh.vertices, mesh.faces) for name, peer in peers().items()}
-    return {name: int((_contained(peer, placed) != expected).sum()) for name, peer in found.items()}
-
-
-def _contained(peer: Any, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """What a library has for inside; of libigl its winding number."""
-    inside: NDArray[np.bool_] = (
-        peer.contains(points) if hasattr(peer, "contains") else peer.winding_number(points) > 0.5
-    )
-    return inside
+    return {name: int((peer.contains(placed) != expected).sum()) for name, peer in found.items()}

@@ -48,6 +48,10 @@ class Igl:
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         return np.asarray(igl.winding_number(self._vertices, self._faces, p), np.float64).reshape(-1)
 
+    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether the winding number around each point (n, 3) is above 1/2, (n,)."""
+        return np.asarray(self.winding_number(points) > 0.5, np.bool_)
+
     def distance(self, points: ArrayLike) -> NDArray[np.float64]:
         """Distances (n,) of ``points`` (n, 3) from the surface."""
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)

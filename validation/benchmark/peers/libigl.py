@@ -31,7 +31,7 @@ class LibiglPeer(Peer):
         return tree
 
     def contains(self, points: Points) -> Query:
-        """Where the winding number, which is approximate, is nearer to another number than to 0."""
+        """Whether the winding number, which is approximate, is nearer to another number than to 0."""
         winding, p = self._winding, np.ascontiguousarray(points.points)
         return Query(lambda: winding.winding_number(p), lambda found: np.abs(found) > 0.5)
 
