@@ -16,7 +16,7 @@ from renderer import __version__
 from renderer.errors import expect
 from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS
 from renderer.process.interrupt import interruptible
-from renderer.process.terminal import on_terminal, one_line, spell_everything
+from renderer.process.terminal import flush_output, on_terminal, one_line, say, spell_everything
 
 
 @interruptible("octree-render: interrupted")
@@ -31,23 +31,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _hide_scipy_from_numba()
         with compile_notices(getattr(options, "quiet", False)):
             options.command(options)
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        flush_output()
     except BrokenPipeError:
         # The reader of standard output, such as ``| head``, has closed it. The picture is written.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (ValueError, OSError, ImportError, MemoryError) as error:
-        reason = one_line(error)
-        print(f"octree-render: {'not enough memory: ' * isinstance(error, MemoryError)}{reason}", file=sys.stderr)
+        kind = "not enough memory" if isinstance(error, MemoryError) else ""
+        print(": ".join(filter(None, ("octree-render", kind, one_line(error)))), file=sys.stderr)
         return 2
     return 0
 
 
 def _hide_scipy_from_numba() -> None:
-    """Spare the command's own process the time in which Numba imports SciPy, which no kernel calls."""
+    """Spare the command's own process SciPy, which Numba imports and no kernel calls.
+
+    It takes time, and where memory is scarce its OpenBLAS waits for memory without end, deaf to signals.
+    """
     if "scipy" not in sys.modules:
         sys.modules["scipy"] = None  # type: ignore[assignment]  # so the import statement finds none
-        import numba  # noqa: F401
+        # The second is imported with kernels that are loaded from disk.
+        import numba
+        import numba.np.arraymath  # noqa: F401
 
         del sys.modules["scipy"]
 
@@ -188,7 +192,7 @@ def _render(options: argparse.Namespace) -> None:
     if not options.quiet:
         height, width = image.rays.shape
         rays = int(image.rays.sum())
-        print(
+        say(
             f"{options.output}: {width} x {height}, {rays} rays in {image.render_seconds:.2f} s "
             f"({rays / image.render_seconds / 1e6:.1f} million a second), scene ready in "
             f"{image.build_seconds:.2f} s"
@@ -208,13 +212,16 @@ def _save(image: Any, path: Path) -> None:
     """Save a picture; where that fails after all its work, keep it elsewhere and raise an error that says where."""
     try:
         image.save(path)
-    except OSError as error:
+    except (OSError, MemoryError) as error:
+        # Its radiance is written as it is, where there is no memory to encode it.
+        name = path.name if isinstance(error, OSError) else f"{path.stem}.npy"
         try:
-            kept = Path(tempfile.mkdtemp(prefix="octree-render-")) / path.name
+            kept = Path(tempfile.mkdtemp(prefix="octree-render-")) / name
             image.save(kept)
         except OSError:
             raise error from None
-        raise OSError(f"{error}; the picture is kept as {kept}") from error
+        reason = str(error) if isinstance(error, OSError) else "there is not enough memory to encode the picture"
+        raise OSError(f"{reason}; the picture is kept as {kept}") from error
 
 
 def _compile(options: argparse.Namespace) -> None:
@@ -238,7 +245,7 @@ def _compile(options: argparse.Namespace) -> None:
         raise OSError(f"{lost()} kernels were compiled but could not be kept: {options.output or 'no cache folder'}")
     if not options.quiet:
         where = f"; {stored_in(options.output)} kernels in {options.output}" if options.output else ""
-        print(f"compiled in {compile_seconds():.1f} s{where}")
+        say(f"compiled in {compile_seconds():.1f} s{where}")
 
 
 def _choose_processor(level: str, output: Path | None) -> None:
@@ -256,7 +263,7 @@ def _view(options: argparse.Namespace) -> None:
 
     _scene_to_write(options)
     with view(options.scene, host=options.host, port=options.port, browser=False) as viewing:
-        print(f"{options.scene} is shown at {viewing.url} until Ctrl-C", flush=True)
+        say(f"{options.scene} is shown at {viewing.url} until Ctrl-C", flush=True)
         # The usual way to end it, so no failure.
         with suppress(KeyboardInterrupt):
             if not options.no_browser:
@@ -272,23 +279,23 @@ def _info(options: argparse.Namespace) -> None:
 
     scene = load_scene(options.scene)
     expect(bool(scene.instances), "scene", "at least one object or a floor", "none")
-    print(f"{options.scene}: {len(scene.instances)} meshes, {len(scene.lights)} lights, {scene.camera.type} camera")
+    say(f"{options.scene}: {len(scene.instances)} meshes, {len(scene.lights)} lights, {scene.camera.type} camera")
     for instance in scene.instances:
         material = scene.materials[instance.material]
         normals = "smooth" if instance.smooth else "flat"
-        print(
+        say(
             f"  {instance.mesh.name or 'mesh':<20} {len(instance.mesh.faces):>9} faces  {normals:<7} "
             f"{instance.material} ({material.type})"
         )
     if needs_of(scene).octree:
         stats = Octree.from_mesh(pack(scene)[0], split=options.split).stats
-        print(
+        say(
             f"octree ({options.split}): {stats.nodes} nodes, {stats.leaves} leaves, depth {stats.depth}, "
             f"{stats.references} references in {stats.blocks} blocks ({stats.fill:.0%} full), "
             f"{stats.bytes / 1e6:.1f} MB"
         )
     for feature, value, reason in examine(scene):
-        print(f"  {feature.replace('_', ' '):<16} {'needed' if value else 'left out'}: {reason}")
+        say(f"  {feature.replace('_', ' '):<16} {'needed' if value else 'left out'}: {reason}")
 
 
 if __name__ == "__main__":

@@ -69,21 +69,25 @@ class PreparedScene:
         clock = Stopwatch()
         width, height = chosen.resolution
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
-        settings, film = kernel_settings_of(self.needs, chosen, offset), _film(width, height, planes)
-        arrays = self.arrays
+        settings, arrays = kernel_settings_of(self.needs, chosen, offset), self.arrays
         if self.needs.refraction and camera is not self.scene.camera:
             arrays = arrays._replace(media=media_around(self.scene, camera))
         across, cut = -(-width // TILE), np.zeros(tiles(chosen.resolution), np.int64)
 
-        def render_one(first: int, _end: int) -> Iterator[None]:
+        def render_in(film: Film, first: int) -> Iterator[None]:
             x, y = first % across * TILE, first // across * TILE
-            tile = (x, y, min(x + TILE, width), min(y + TILE, height))
+            tall, wide = film.radiance.shape[:2]
+            tile = (x, y, min(x + TILE, wide), min(y + TILE, tall))
             memory = tile_memory(self.tree.depth, settings, _bundles_in_a_row(self.tree))
             while not render_tile(self.tree.words, arrays, settings, rows, samples, film, tile, memory):
                 yield
             cut[first] = memory.state[CUT]
 
-        for_chunks(render_one, len(cut), 1, threads, finished)
+        # The kernel is loaded before the picture takes its memory: without any left, LLVM ends the process.
+        for _ in render_in(_film(1, 0, planes), 0):
+            pass
+        film = _film(width, height, planes)
+        for_chunks(lambda first, _end: render_in(film, first), len(cut), 1, threads, finished)
         return Image(*film, build_seconds=self.build_seconds, render_seconds=clock.seconds(), cut=int(cut.sum()))
 
 

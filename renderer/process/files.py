@@ -56,6 +56,8 @@ def _temporary_beside(path: str | os.PathLike[str]) -> Iterator[tuple[Path, Path
         target = Path(os.path.realpath(path))
     except ValueError as error:  # a null byte
         raise ValueError(f"path: expected a name of a file, got {os.fspath(path)!r}: {error}") from None
+    except OSError as error:  # the current folder was removed
+        raise OSError(error.errno, error.strerror, f"the folder of {path}") from None
     if target.is_symlink():  # after all were followed
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     if target.is_file() and not os.access(target, os.W_OK):  # renaming would not ask
@@ -69,6 +71,6 @@ def _temporary_beside(path: str | os.PathLike[str]) -> Iterator[tuple[Path, Path
             temporary.unlink()
         if isinstance(error, OSError) and error.errno is not None:
             raise OSError(error.errno, error.strerror, str(path)) from error
-        if isinstance(error, OSError):  # NumPy's own words
-            raise type(error)(f"{path}: {error}") from error
+        if isinstance(error, OSError):  # of NumPy or OpenEXR, in their own words
+            raise type(error)(f"{path}: {error}; is there no space left?") from error
         raise

@@ -1,6 +1,9 @@
 """The standard streams of a command's own process: terminals, and characters that they cannot or should not print."""
 
+import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import TextIOWrapper
 
 
@@ -13,6 +16,31 @@ def spell_everything() -> None:
     """Let standard output escape characters that its encoding lacks, as an accent in a path, where it would raise."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def say(line: str, *, flush: bool = False) -> None:
+    """Print a line on standard output. Raises ``OSError`` naming it, as where it is a file on a full disk."""
+    with _naming_output():
+        print(line, flush=flush)
+
+
+def flush_output() -> None:
+    """Write out what was said; see ``say``."""
+    with _naming_output():
+        if sys.stdout is not None:
+            sys.stdout.flush()
+
+
+@contextmanager
+def _naming_output() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        # What could not be written would be tried again, and fail again, when the process ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise OSError(error.errno, error.strerror, "standard output") from None
 
 
 def one_line(error: Exception) -> str:

@@ -61,14 +61,31 @@ def test_an_import_brings_only_what_it_needs(script, needs):
     assert heavy_after(script) == needs
 
 
-def test_a_render_of_the_command_line_loads_no_scipy_and_leaves_it_importable():
-    script = """
+def test_a_render_of_the_command_line_loads_no_scipy_and_leaves_it_importable(tmp_path):
+    """Where memory is scarce its OpenBLAS would wait for memory without end."""
+    script = f"""
 import sys
 from renderer.cli import main
-sys.argv = ["octree-render", "render", "scenes/stairs.toml", "-o", "/dev/null/no.png"]
-assert main() == 2  # there is no such folder; by then all is imported
-assert "scipy" not in sys.modules and "numba" in sys.modules
+sys.argv = ["octree-render", "render", "scenes/stairs.toml", "-o", {str(tmp_path / "a.png")!r}, "--resolution", "8x8"]
+assert main() == 0
+assert not any(name.startswith("scipy") for name in sys.modules) and "numba" in sys.modules
 import scipy.linalg
+"""
+    output(script)
+
+
+def test_the_kernel_is_loaded_before_a_picture_takes_its_memory():
+    """Where there is none left to load it, LLVM ends the process."""
+    script = """
+import renderer.picture.prepare as prepare
+from renderer import load_scene, render
+make, loaded = prepare._film, []
+def make_film(width, height, planes):
+    loaded.append((height, bool(vars(prepare.render_tile).get("entry") and prepare.render_tile.entry.signatures)))
+    return make(width, height, planes)
+prepare._film = make_film
+render(load_scene("scenes/stairs.toml"), resolution=(8, 8))
+assert loaded[-1] == (8, True), loaded
 """
     output(script)
 

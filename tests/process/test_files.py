@@ -3,8 +3,10 @@
 import errno
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pytest
@@ -101,6 +103,66 @@ def test_a_picture_that_cannot_be_written_is_kept_elsewhere(
     said = capsys.readouterr().err
     assert f"No space left on device: '{full / 'a.npy'}'; the picture is kept as {kept}" in said
     np.testing.assert_array_equal(np.load(kept), render(load_scene(STAIRS), resolution=(8, 8)).radiance)
+
+
+def test_a_picture_that_no_memory_is_left_to_encode_is_kept_as_radiance(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    def write_png(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(Image, "_write_png", write_png)
+    assert main(["render", str(STAIRS), "-o", str(tmp_path / "a.png"), "--resolution", "8x8", "--quiet"]) == 2
+    (kept,) = tmp_path.rglob("a.npy")
+    said = capsys.readouterr().err
+    assert said == (f"octree-render: there is not enough memory to encode the picture; the picture is kept as {kept}\n")
+    np.testing.assert_array_equal(np.load(kept), render(load_scene(STAIRS), resolution=(8, 8)).radiance)
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_no_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    def load(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("renderer.scene.scene.load_scene", load)
+    assert main(["info", str(STAIRS)]) == 2
+    assert capsys.readouterr().err == "octree-render: not enough memory\n"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_standard_output_is_named(unbuffered: str) -> None:
+    command = [sys.executable, "-m", "renderer", "info", str(STAIRS)]
+    with open("/dev/full", "w") as full:
+        ended = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=STAIRS.parents[1], timeout=100,
+            env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        )  # fmt: skip
+    assert (ended.returncode, ended.stderr) == (
+        2,
+        "octree-render: [Errno 28] No space left on device: 'standard output'\n",
+    )
+
+
+def test_an_array_on_a_full_disk_is_named_with_the_likely_reason(tmp_path: Path) -> None:
+    def write(file: BinaryIO) -> None:
+        raise OSError("1228800 requested and 262112 written")  # of NumPy, which keeps no error number
+
+    with pytest.raises(
+        OSError, match=re.escape(f"{tmp_path / 'a.npy'}: 1228800 requested and 262112 written; is there")
+    ):
+        write_atomically(tmp_path / "a.npy", write)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="other systems keep the current folder")
+def test_a_relative_path_in_a_folder_that_was_removed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    with pytest.raises(FileNotFoundError, match=re.escape("'the folder of a.png'")):
+        check_writable("a.png")
 
 
 @pytest.mark.parametrize("planes", [(), ("rays",), ("depth", "face"), ("normal",), PLANES])
