@@ -286,7 +286,10 @@ class Mesh:
         Normals, colours and texture coordinates stay only where all the meshes have them. Raises ``MeshError``
         where ``meshes`` holds anything else.
         """
-        parts = list(meshes) if isinstance(meshes, Iterable) else [meshes]
+        try:
+            parts = list(meshes)
+        except TypeError:  # also of what claims to be iterable and is not, as an array without dimensions
+            raise _error(name, f"meshes: expected an iterable of Mesh, got {type(meshes).__name__}") from None
         for row, part in enumerate(parts):
             if not isinstance(part, Mesh):
                 raise _error(name, f"meshes: expected an iterable of Mesh, got {type(part).__name__} in row {row}")

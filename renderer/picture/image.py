@@ -10,6 +10,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.arrays import real_argument
 from renderer.errors import expect
 from renderer.picture.exr import check_exr, exr_bytes
 from renderer.process.files import check_writable, write_atomically
@@ -21,8 +22,11 @@ _ROWS = 64
 
 
 def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
-    """Linear radiance, clipped to [0, 1], as 8-bit sRGB (IEC 61966-2-1)."""
-    x = np.asarray(linear)
+    """Linear radiance, clipped to [0, 1], as 8-bit sRGB (IEC 61966-2-1).
+
+    Raises ``ValueError`` where it is no array of real numbers.
+    """
+    x = real_argument("linear", linear)
     if x.dtype != np.float32:
         return _encoded(x)
     # The same codes without a power for each value: a fifth of the time.

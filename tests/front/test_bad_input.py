@@ -431,7 +431,7 @@ class TestWhatIsNoMesh:
                 call(BOX.vertices, BOX.faces, name=bad)
 
 
-@pytest.mark.parametrize("bad", [None, 3, "x", BOX])
+@pytest.mark.parametrize("bad", [None, 3, "x", BOX, np.array(3)])
 def test_concatenate_takes_meshes_only(bad: Any) -> None:
     with pytest.raises(MeshError, match=r"^meshes: expected an iterable of Mesh, got"):
         Mesh.concatenate(bad if bad is not BOX else [BOX, None])
@@ -611,6 +611,12 @@ def test_a_prepared_scene_has_a_class_and_the_package_a_version() -> None:
     assert isinstance(PREPARED, renderer.PreparedScene)
     assert re.fullmatch(r"\d+\.\d+\.\d+", renderer.__version__)
     assert renderer.srgb(np.array([0.0, 1.0, np.inf])).tolist() == [0, 255, 255]
+
+
+@pytest.mark.parametrize("bad", [{}, "x", None, [[1.0], [2.0, 3.0]], [1j]], ids=repr)
+def test_srgb_takes_numbers_only(bad: Any) -> None:
+    with pytest.raises(ValueError, match=r"^linear: expected "):
+        renderer.srgb(bad)
 
 
 GOOD_SCENE: dict[str, Any] = {
