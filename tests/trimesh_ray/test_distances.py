@@ -1,0 +1,128 @@
+"""Nearest points, signed distances and thickness of trimesh by the octree: exact, and signed as trimesh signs."""
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from renderer.trimesh_ray import installed
+from renderer.trimesh_ray.distances import closest_point, signed_distance
+from validation.oracle.distance import nearest
+
+# A tetrahedron with an acute edge from (-1, 0.5, 0) to (1, 0.5, 0).
+ACUTE = trimesh.Trimesh(
+    [[-1, 0.5, 0], [1, 0.5, 0], [0, -1, -0.5], [0, -1, 0.5]], [[0, 1, 2], [0, 2, 3], [0, 3, 1], [3, 2, 1]]
+)
+
+
+@pytest.fixture
+def drop_in() -> Iterator[None]:
+    with installed(proximity=True):
+        yield
+
+
+def test_shapes_types_and_the_lists_that_trimesh_takes(drop_in: None) -> None:
+    mesh = trimesh.creation.box()
+    places, distances, faces = mesh.nearest.on_surface([[0, 0, 2], [3, 0, 0]])
+    assert places.tolist() == [[0, 0, 0.5], [0.5, 0, 0]] and distances.tolist() == [1.5, 2.5]
+    assert (places.dtype, distances.dtype, faces.dtype) == (np.float64, np.float64, np.int64)
+    assert mesh.nearest.signed_distance([[0, 0, 2], [0, 0, 0.25], [0.5, 0.5, 0.5]]).tolist() == [-1.5, 0.25, 0.0]
+    for call in (closest_point, signed_distance):
+        with pytest.raises(ValueError, match=r"^points: expected shape \(n, 3\), got"):
+            call(mesh, [0, 0, 2])
+
+
+def test_distances_are_the_exact_ones() -> None:
+    """At the scale of a hundredth of trimesh's tolerance too, where its own are off."""
+    rng = np.random.default_rng(15)
+    for scale in (1.0, 1e-10, 1e6):
+        mesh = trimesh.creation.icosphere(subdivisions=1, radius=scale)
+        points = rng.uniform(-2, 2, (20, 3)) * scale
+        _, distances, _ = closest_point(mesh, points)
+        triangles = [[tuple(map(Fraction, corner)) for corner in face] for face in np.asarray(mesh.triangles).tolist()]
+        for point, distance in zip(points.tolist(), distances.tolist(), strict=True):
+            square = nearest(tuple(map(Fraction, point)), triangles)[0]
+            assert abs(Fraction(distance) ** 2 / square - 1) < Fraction(1, 2**50)
+
+
+def test_of_faces_at_an_edge_the_one_that_faces_the_point_is_named() -> None:
+    points = np.transpose([np.zeros(20), np.ones(20), np.linspace(-1, 1, 20)])
+    places, _, faces = closest_point(ACUTE, points)
+    np.testing.assert_array_equal(places, np.tile([0.0, 0.5, 0.0], (20, 1)))
+    # The edge's two faces, in halves.
+    assert len(set(faces[:10])) == len(set(faces[10:])) == 1 and set(faces) == {0, 2}
+    normals = ACUTE.face_normals[[0, 2]]
+    np.testing.assert_array_equal(faces, np.array([0, 2])[((points - places) @ normals.T).argmax(axis=1)])
+
+
+def test_of_faces_at_a_corner_too_and_between_them_the_face_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, rng = trimesh.creation.icosphere(subdivisions=1), np.random.default_rng(3)
+    corners = mesh.vertices * 2 + rng.uniform(-1e-3, 1e-3, mesh.vertices.shape)
+    inner = mesh.triangles_center * 2
+    points = np.concatenate([corners, inner])
+    expected = [
+        max(ring[ring >= 0], key=lambda face: mesh.face_normals[face] @ (points[i] - mesh.vertices[i]))
+        for i, ring in enumerate(mesh.vertex_faces)
+    ]
+    for together in (1 << 20, 1):  # all at once, and point by point
+        monkeypatch.setattr("renderer.trimesh_ray.facing._TOGETHER", together)
+        faces = closest_point(mesh, points)[2]
+        assert faces[: len(corners)].tolist() == expected
+        assert faces[len(corners) :].tolist() == list(range(len(mesh.faces)))
+
+
+def test_the_sign_is_right_where_the_nearest_normal_is_not() -> None:
+    """Above the acute edge, in the plane of a face, and far from the surface."""
+    solid = ACUTE.copy()
+    points = [[0, 2, z] for z in np.linspace(-3, 3, 31)] + [[0, 0.5 + 1e-12, 0], [0, 0.4, 0], [100, -0.5, 0]]
+    signed = signed_distance(solid, points)
+    assert (signed[:-2] < 0).all() and signed[-2] > 0 > signed[-1]
+    assert signed_distance(trimesh.creation.box(), [[100.5, -0.5, -0.5]]).tolist() == [-100.0]
+
+
+def test_an_open_mesh_is_signed_by_its_winding_number() -> None:
+    open_box: Any = trimesh.creation.box()
+    open_box.update_faces(open_box.face_normals[:, 2] < 0.5)
+    signed = signed_distance(open_box, [[0, 0, -0.4], [0, 0, -3]])
+    assert signed[0] == pytest.approx(0.1, abs=1e-15) and signed[1] == -2.5
+
+
+def test_thickness_and_reach_of_a_box(drop_in: None) -> None:
+    mesh = trimesh.creation.box(extents=[1, 2, 3])
+    points, faces = mesh.sample(300, return_index=True, seed=1)
+    normals = mesh.face_normals[faces]
+    for method in ("ray", "max_sphere"):
+        assert np.isinf(trimesh.proximity.thickness(mesh, points, exterior=True, normals=normals, method=method)).all()
+        within = trimesh.proximity.thickness(mesh, points, normals=normals, method=method)
+        assert (within >= 0).all() and within.max() <= 3
+        assert trimesh.proximity.thickness(mesh, [[0.5, 0, 0]], method=method) == pytest.approx(1.0)
+    along = np.abs(normals).argmax(axis=1)
+    by_rays = trimesh.proximity.thickness(mesh, points, normals=normals, method="ray")
+    np.testing.assert_allclose(by_rays, np.array([1, 2, 3])[along])
+
+
+def test_samples_of_the_surface_have_no_distance_to_it(drop_in: None) -> None:
+    mesh = trimesh.creation.torus(2, 0.5)
+    points = mesh.sample(500, seed=4)
+    assert np.abs(mesh.nearest.signed_distance(points)).max() < 1e-15
+
+
+def test_a_vertex_that_no_face_has_is_not_near() -> None:
+    mesh = trimesh.Trimesh([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-0.5, -0.5, -0.5]], [[0, 1, 2]], process=False)
+    places, _, faces = closest_point(mesh, [[-1, -1, -1]])
+    np.testing.assert_allclose(places, [[1 / 3, 1 / 3, 1 / 3]])
+    assert faces.tolist() == [0]
+
+
+def test_voxels_by_rays_have_no_holes(drop_in: None) -> None:
+    mesh = trimesh.creation.icosphere(subdivisions=4)
+    voxels = trimesh.voxel.creation.voxelize_ray(mesh, 0.05)
+    # No ray that passes within its circle misses the sphere.
+    columns = np.round(voxels.points[:, :2] / 0.05)
+    centres = np.unique(columns, axis=0) * 0.05
+    grid = np.stack(np.meshgrid(np.arange(-17, 18), np.arange(-17, 18)), axis=-1).reshape(-1, 2) * 0.05
+    within = grid[np.hypot(*grid.T) < 0.9]
+    assert {tuple(np.round(c / 0.05)) for c in within} <= {tuple(np.round(c / 0.05)) for c in centres}

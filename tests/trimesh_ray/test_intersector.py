@@ -1,0 +1,245 @@
+"""The drop-in's contract with trimesh and its users: shapes, types, empty answers, edits, copies, laziness."""
+
+import copy
+import gc
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from trimesh.ray import ray_triangle
+
+import renderer.trimesh_ray
+from renderer.trimesh_ray import RayMeshIntersector, install, installed, trees, uninstall
+
+ROOT = Path(__file__).parents[2]
+DOWN = [[0.0, 0.0, -1.0]]
+
+
+def asked(mesh: Any) -> RayMeshIntersector:
+    return RayMeshIntersector(mesh)
+
+
+def test_shapes_and_types_are_trimeshs() -> None:
+    mesh = trimesh.creation.box()
+    ours, theirs = asked(mesh), ray_triangle.RayMeshIntersector(mesh)
+    rays = [[0.1, 0.2, 5.0], [9.0, 9.0, 9.0]], DOWN * 2
+    for several in (True, False):
+        for call in ("intersects_location", "intersects_id"):
+            found, expected = (getattr(ray, call)(*rays, multiple_hits=several) for ray in (ours, theirs))
+            assert [(a.dtype, a.shape) for a in found] == [(b.dtype, b.shape) for b in expected]
+    for call in ("intersects_first", "intersects_any"):
+        np.testing.assert_array_equal(getattr(ours, call)(*rays), getattr(theirs, call)(*rays))
+        assert getattr(ours, call)(*rays).dtype == getattr(theirs, call)(*rays).dtype
+    assert ours.contains_points([[0.0, 0.0, 0.0]]).tolist() == [True]
+    assert ours.mesh is mesh
+
+
+@pytest.mark.parametrize("mesh", [trimesh.creation.box(), trimesh.Trimesh()], ids=["box", "empty"])
+@pytest.mark.parametrize("rays", [([], []), (np.empty((0, 3)), np.empty((0, 3))), ([[0, 9, 9]], DOWN)])
+def test_nothing_found_is_empty_arrays_of_the_usual_kinds(mesh: Any, rays: Any) -> None:
+    places, which, faces = asked(mesh).intersects_location(*rays)
+    assert (places.shape, which.shape, faces.shape) == ((0, 3), (0,), (0,))
+    assert (places.dtype, which.dtype, faces.dtype) == (np.float64, np.int64, np.int64)
+    assert asked(mesh).intersects_first(*rays).tolist() == [-1] * len(rays[0])
+    assert asked(mesh).intersects_any(*rays).tolist() == [False] * len(rays[0])
+    assert asked(mesh).contains_points(rays[0]).tolist() == [False] * len(rays[0])
+
+
+def test_rays_that_are_none_miss_and_the_others_keep_their_numbers() -> None:
+    """Vertex normals of degenerate faces are 0 or NaN."""
+    origins = [[0, 0, 2], [0, 0, 2], [np.nan, 0, 2], [0, 0, 2], [0, np.inf, 2], [0.1, 0.2, 2]]
+    directions = [[0, 0, 0], [0, 0, -1], [0, 0, -1], [0, np.nan, -1], [0, 0, -1], [0, 0, -1]]
+    ray = asked(trimesh.creation.box())
+    assert ray.intersects_any(origins, directions).tolist() == [False, True, False, False, False, True]
+    assert (ray.intersects_first(origins, directions) >= 0).tolist() == [False, True, False, False, False, True]
+    places, rays, _ = ray.intersects_location(origins, directions)
+    assert rays.tolist() == [1, 1, 5, 5] and places[:, 2].tolist() == [0.5, -0.5, 0.5, -0.5]
+    assert ray.intersects_id(origins, directions, multiple_hits=False)[1].tolist() == [1, 5]
+    assert ray.contains_points([[0, 0, 0], [np.nan, 0, 0]]).tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("origins", "directions", "named"),
+    [
+        ([[0, 0, 1], [0, 0, 2]], [[0, 0, 1]], "ray_directions"),
+        ([[0, 0, 1]], [], "ray_origins|ray_directions"),
+        ([0, 0, 1], [0, 0, 1], "ray_origins"),
+        ([[0, 0]], [[0, 0]], "ray_origins"),
+    ],
+)
+def test_rays_of_other_shapes_are_refused(origins: Any, directions: Any, named: str) -> None:
+    for call in ("intersects_id", "intersects_location", "intersects_first", "intersects_any"):
+        with pytest.raises(ValueError, match=rf"^({named}): expected .*, got shape"):
+            getattr(asked(trimesh.creation.box()), call)(origins, directions)
+    with pytest.raises(ValueError, match=r"^points: expected shape \(n, 3\), got"):
+        asked(trimesh.creation.box()).contains_points([0, 0, 1])
+
+
+def test_the_nearest_max_hits_are_kept() -> None:
+    layers = trimesh.util.concatenate([trimesh.creation.box().apply_translation([0, 0, -2 * k]) for k in range(60)])
+    assert len(asked(layers).intersects_id([[0.1, 0.2, 9]], DOWN)[0]) == 100  # of 120, as trimesh's default is
+    places = asked(layers).intersects_id([[0.1, 0.2, 9]], DOWN, max_hits=3, return_locations=True)[2]
+    assert places[:, 2].tolist() == [0.5, -0.5, -1.5]
+
+
+def test_a_start_on_the_surface_counts() -> None:
+    assert asked(trimesh.creation.box()).intersects_location([[0, 0, 0.5]], DOWN)[0][:, 2].tolist() == [0.5, -0.5]
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1.0, 1e-3, 1e6]))
+def test_hits_are_those_of_trimesh_itself(seed: int, scale: float) -> None:
+    """In general position, where trimesh is right."""
+    rng = np.random.default_rng(seed)
+    mesh = trimesh.creation.icosphere(subdivisions=1, radius=scale)
+    origins, directions = rng.uniform(-2, 2, (20, 3)) * scale, trimesh.unitize(rng.normal(size=(20, 3)))
+    places, rays, faces = asked(mesh).intersects_location(origins, directions)
+    theirs, its_rays, its_faces = ray_triangle.RayMeshIntersector(mesh).intersects_location(origins, directions)
+    ours = sorted(zip(rays.tolist(), faces.tolist(), strict=True))
+    if scale == 1.0:  # its tolerances are in units
+        assert ours == sorted(zip(its_rays.tolist(), its_faces.tolist(), strict=True))
+        order, its_order = np.lexsort((faces, rays)), np.lexsort((its_faces, its_rays))
+        # trimesh divides by a product that may be small.
+        np.testing.assert_allclose(places[order], theirs[its_order], atol=1e-9)
+    assert sorted(rays.tolist()) == rays.tolist()
+    t = np.einsum("ij,ij->i", places - origins[rays], directions[rays])
+    assert (np.diff(t)[np.diff(rays) == 0] > 0).all()
+
+
+class TestContent:
+    """The tree follows the mesh's content."""
+
+    def test_an_edit_in_place_is_seen(self) -> None:
+        mesh = trimesh.creation.box()
+        ray = asked(mesh)
+        assert ray.intersects_location([[0, 0, 9]], DOWN)[0][:, 2].tolist() == [0.5, -0.5]
+        mesh.vertices[:, 2] += 1.0
+        assert ray.intersects_location([[0, 0, 9]], DOWN)[0][:, 2].tolist() == [1.5, 0.5]
+        mesh.update_faces(mesh.face_normals[:, 2] < 0.5)
+        assert ray.intersects_location([[0, 0, 9]], DOWN)[0][:, 2].tolist() == [0.5]
+
+    def test_a_primitive_that_is_moved_is_seen(self) -> None:
+        ball = trimesh.primitives.Sphere(radius=1.0)
+        assert asked(ball).contains_points([[0, 0, 0], [3, 0, 0]]).tolist() == [True, False]
+        ball.primitive.center = [3.0, 0.0, 0.0]
+        assert asked(ball).contains_points([[0, 0, 0], [3, 0, 0]]).tolist() == [False, True]
+
+    def test_an_edit_does_not_reach_the_tree_that_a_copy_has(self) -> None:
+        mesh = trimesh.creation.box()
+        twin = mesh.copy()
+        assert trees.octree_of(mesh) is trees.octree_of(twin)
+        mesh.vertices[:, 2] += 1.0
+        assert asked(twin).intersects_location([[0, 0, 9]], DOWN)[0][:, 2].tolist() == [0.5, -0.5]
+        assert asked(mesh).intersects_location([[0, 0, 9]], DOWN)[0][:, 2].tolist() == [1.5, 0.5]
+
+    def test_a_tree_is_built_once_for_a_content(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        built, shared = list[int](), trees._shared
+        monkeypatch.setattr(trees, "_shared", lambda mesh, digest: built.append(digest) or shared(mesh, digest))
+        mesh = trimesh.creation.box()
+        for _ in range(3):
+            asked(mesh).intersects_any([[0, 0, 9]], DOWN)
+        assert len(built) == 1
+
+    def test_a_tree_goes_with_its_mesh(self) -> None:
+        mesh = trimesh.creation.box(extents=[1, 2, 3.25])
+        asked(mesh).intersects_any([[0, 0, 9]], DOWN)
+        key, digest = id(mesh), hash(mesh)
+        assert key in trees._kept and digest in trees._by_digest
+        del mesh
+        gc.collect()
+        assert key not in trees._kept and digest not in trees._by_digest
+
+    def test_two_meshes_of_one_digest_have_their_own_trees(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        small, large = trimesh.creation.box(), trimesh.creation.box(extents=[4, 4, 4])
+        monkeypatch.setattr(trimesh.Trimesh, "__hash__", lambda self: 7)
+        assert asked(small).contains_points([[1, 1, 1]]).tolist() == [False]
+        assert asked(large).contains_points([[1, 1, 1]]).tolist() == [True]
+
+
+class TestCopies:
+    def test_pickles_and_copies_answer_and_carry_no_tree(self) -> None:
+        mesh = trimesh.creation.icosphere(subdivisions=4)
+        empty = len(pickle.dumps(mesh.copy()))
+        mesh.ray = RayMeshIntersector(mesh)
+        mesh.ray.intersects_any([[0, 0, 9]], DOWN)
+        pickled = pickle.dumps(mesh)
+        # 5,120 faces: the tree alone is larger than the mesh.
+        assert len(pickled) < 1.5 * empty
+        for again in (pickle.loads(pickled), copy.deepcopy(mesh), copy.copy(mesh), mesh.copy()):
+            assert again.ray.mesh is again
+            assert again.ray.intersects_any([[0, 0, 9]], DOWN).tolist() == [True]
+
+    def test_a_pickled_mesh_is_traced_by_its_own_intersector(self) -> None:
+        mesh = trimesh.creation.box()
+        mesh.ray = RayMeshIntersector(mesh)
+        again = pickle.loads(pickle.dumps(mesh))
+        again.vertices[:, 2] += 1.0
+        assert again.ray.intersects_location([[0, 0, 9]], DOWN)[0][:, 2].tolist() == [1.5, 0.5]
+
+
+class TestInstall:
+    def test_new_meshes_have_it_until_uninstalled(self) -> None:
+        before = type(trimesh.creation.box().ray), trimesh.proximity.closest_point, trimesh.ray.ray_pyembree
+        early = trimesh.creation.box()
+        install(proximity=True)
+        try:
+            assert type(trimesh.creation.box().ray) is RayMeshIntersector is not before[0]
+            assert type(trimesh.creation.box().copy().ray) is RayMeshIntersector
+            assert type(early.ray) is before[0]
+            from trimesh.ray.ray_pyembree import RayMeshIntersector as Imported
+
+            assert Imported is RayMeshIntersector
+            assert trimesh.proximity.closest_point is renderer.trimesh_ray.distances.closest_point
+        finally:
+            uninstall()
+        after = type(trimesh.creation.box().ray), trimesh.proximity.closest_point, trimesh.ray.ray_pyembree
+        assert after == before
+        uninstall()
+
+    def test_the_context_gives_back_what_was_there_before_it(self) -> None:
+        before = trimesh.proximity.signed_distance
+        with installed():
+            assert trimesh.proximity.signed_distance is before
+            with installed(proximity=True):
+                assert trimesh.proximity.signed_distance is not before
+            assert trimesh.proximity.signed_distance is before
+            assert type(trimesh.creation.box().ray) is RayMeshIntersector
+        assert type(trimesh.creation.box().ray) is not RayMeshIntersector
+
+    def test_without_embreex_too(self) -> None:
+        """trimesh then has no class to replace."""
+        script = """
+import sys
+sys.modules["embreex"] = None
+import trimesh
+assert not trimesh.ray.has_embree
+from renderer.trimesh_ray import RayMeshIntersector, installed
+with installed():
+    assert type(trimesh.creation.box().ray) is RayMeshIntersector
+    from trimesh.ray.ray_pyembree import RayMeshIntersector as there
+    assert there is RayMeshIntersector
+assert type(trimesh.creation.box().ray) is trimesh.ray.ray_triangle.RayMeshIntersector and not trimesh.ray.has_embree
+assert "trimesh.ray.ray_pyembree" not in sys.modules
+"""
+        done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=100)
+        assert done.returncode == 0, done.stderr
+
+
+def test_constructing_imports_no_compiler() -> None:
+    script = """
+import sys
+from renderer.trimesh_ray import install
+install(proximity=True)
+import trimesh
+for mesh in (trimesh.creation.box(), trimesh.Trimesh()):
+    mesh.copy()
+assert "numba" not in sys.modules and "renderer.octree" not in sys.modules
+"""
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr

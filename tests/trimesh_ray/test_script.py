@@ -1,0 +1,79 @@
+"""``python -m renderer.trimesh_ray``: a script that was not changed gives right answers, and is otherwise as before."""
+
+import json
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SCRIPT = Path(__file__).with_name("answers.py")
+DROP_IN = ("-m", "renderer.trimesh_ray")
+
+
+def ran(*command: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run([sys.executable, *command], cwd=ROOT, capture_output=True, text=True, timeout=200)
+
+
+@cache
+def answers(*command: str) -> dict[str, Any]:
+    done = ran(*command, str(SCRIPT), "a", "--b")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_script_runs_as_it_would_by_itself() -> None:
+    for command in ((), DROP_IN):
+        assert (answers(*command)["name"], answers(*command)["arguments"]) == ("__main__", ["a", "--b"])
+
+
+def faults(found: dict[str, Any]) -> dict[str, bool]:
+    """By the answer, whether it is wrong: the right ones are known without any computation."""
+    # The ball's corners are on the axes; between them its faces are flat.
+    near = np.array(found["near"]) / [-0.5e-9, 0.5e-9]
+    return {
+        "leaves": found["leaves"] != [False],
+        "passes": found["passes"] != [2] * 121,
+        "inside": any(found["inside"]),
+        "near": bool(np.abs(near - 1).max() > 0.02),
+    }
+
+
+def test_answers_that_were_wrong_are_right() -> None:
+    """After one line, or none."""
+    assert faults(answers()) == {"leaves": True, "passes": True, "inside": True, "near": True}
+    assert faults(answers(*DROP_IN)) == {"leaves": False, "passes": False, "inside": False, "near": True}
+    assert faults(answers(*DROP_IN, "--proximity")) == dict.fromkeys(("leaves", "passes", "inside", "near"), False)
+
+
+def test_one_added_line_does_the_same(tmp_path: Path) -> None:
+    script = tmp_path / "answers.py"
+    line = "import renderer.trimesh_ray; renderer.trimesh_ray.install(proximity=True)\n"
+    script.write_text(SCRIPT.read_text().replace("import trimesh\n", f"import trimesh\n{line}"))
+    done = ran(str(script), "a", "--b")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == answers(*DROP_IN, "--proximity")
+
+
+def test_a_script_that_fails_fails_as_by_itself(tmp_path: Path) -> None:
+    script = tmp_path / "fails.py"
+    script.write_text("import neighbour\nimport sys\nprint(neighbour.word)\nsys.exit(3)\n")
+    (tmp_path / "neighbour.py").write_text("word = 'beside the script'\n")
+    done = ran(*DROP_IN, str(script))
+    assert (done.returncode, done.stdout) == (3, "beside the script\n")
+    script.write_text("raise KeyError('mine')\n")
+    done = ran(*DROP_IN, str(script))
+    assert done.returncode == 1 and "KeyError: 'mine'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"), [((), "usage:"), (("nowhere.py",), "nowhere.py"), (("--help",), "script")]
+)
+def test_no_script_is_said(arguments: tuple[str, ...], said: str) -> None:
+    done = ran(*DROP_IN, *arguments)
+    assert said in done.stdout + done.stderr and "Traceback" not in done.stderr
+    assert (done.returncode == 0) == (arguments == ("--help",))
