@@ -36,7 +36,7 @@ _SCENES = {"glass": PictureEffort(size=128, lower=64), "stairs": PictureEffort(s
 _EMBREE = tuple(reference for reference in REFERENCES if reference.key == "embree_robust")
 _HITS = HitEffort(rays=3_000, exact=40, leaks=20_000, references=_EMBREE)
 # Other libraries are not asked: they judge nothing here.
-_QUERIES = section.QueryEffort(random=3_000, nasty=12_000, beside=0, distances=240, rays=40)
+_QUERIES = section.QueryEffort(random=3_000, nasty=12_000, beside=0, distances=240, rays=40, drop_in=1)
 # Leak rays of each kind in each placement: the rarest of these defects leaks one in 20,000.
 _LEAKS = 200_000
 # The extreme case of a million triangles; no defect here affects what it tests about size.

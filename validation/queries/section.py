@@ -1,4 +1,6 @@
-"""The section on queries: inside, distance and all hits against exact arithmetic, with other libraries beside ours."""
+"""The section on queries: inside, distance, all hits and the drop-in for trimesh against exact arithmetic, with other
+libraries beside ours.
+"""
 
 from typing import Any, NamedTuple
 
@@ -6,14 +8,16 @@ from validation.gates import Gate
 from validation.job import Job
 from validation.queries.contacts import check_contacts
 from validation.queries.distances import ULPS, check_distances, meshes
+from validation.queries.drop_in import check_drop_in
 from validation.queries.inside import check_inside
 from validation.queries.peers import peers
+from validation.queries.shapes import families
 from validation.queries.solids import solids
 
 
 class QueryEffort(NamedTuple):
     """Points asked whether they lie inside, random and nasty, and how many of each kind others are asked; points whose
-    distance is asked, for each mesh; and rays through each solid.
+    distance is asked, for each mesh; rays through each solid; and rays of each family through each of trimesh's meshes.
     """
 
     random: int
@@ -21,10 +25,11 @@ class QueryEffort(NamedTuple):
     beside: int
     distances: int
     rays: int
+    drop_in: int
 
 
-QUICK = QueryEffort(200_000, 60_000, 400, 60, 60)
-FULL = QueryEffort(10_080_000, 1_008_000, 4_000, 400, 500)
+QUICK = QueryEffort(200_000, 60_000, 400, 60, 60, 4)
+FULL = QueryEffort(10_080_000, 1_008_000, 4_000, 400, 500, 24)
 _REASON = "exact: whole numbers, or rational arithmetic"
 _DISTANCE = (
     f"within {ULPS} ulp of the exact distance, nearer than 2^-64 of the reach 2^-90 of it; 0 on the surface only"
@@ -32,8 +37,10 @@ _DISTANCE = (
 
 
 def steps(job: Job) -> int:
-    """Number of calls of ``job.step``: two for each solid, and one for each mesh whose distance is asked."""
-    return 2 * len(solids()) + len(meshes())
+    """Number of calls of ``job.step``: two for each solid, one for each mesh whose distance is asked, and one for each
+    family of rays that the drop-in is asked.
+    """
+    return 2 * len(solids()) + len(meshes()) + len(families())
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
@@ -48,9 +55,11 @@ def judge(effort: QueryEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
         *check_distances(effort.distances, job),
         *check_contacts(effort.rays, job),
     ]
+    drop_in = check_drop_in(effort.drop_in, job)
     gates = [
         Gate("queries", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0,
              _DISTANCE if "ulps" in row else _REASON)
-        for row in rows
+        for row in (*rows, *drop_in)
     ]  # fmt: skip
-    return {"rows": rows, "peers": list(peers()), "costs": dict.fromkeys(("exact arithmetic", *peers()))}, gates
+    costs = dict.fromkeys(("exact arithmetic", *peers()))
+    return {"rows": rows, "drop_in": drop_in, "peers": list(peers()), "costs": costs}, gates

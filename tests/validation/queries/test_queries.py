@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 from renderer import Octree
+from renderer.trimesh_ray import RayMeshIntersector
 from validation.job import Job
+from validation.oracle.contacts import contacts
 from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
 from validation.queries import section
 from validation.queries.contacts import check_contacts
 from validation.queries.distances import check_distances, meshes, points_about
+from validation.queries.drop_in import FAULTS, OURS, check_drop_in
 from validation.queries.inside import check_inside
 from validation.queries.peers import LIBIGL, OPEN3D, TRIMESH, peers
+from validation.queries.shapes import families, shapes
 from validation.queries.solids import nasty_points, random_points, solids
 from validation.references.trimesh_queries import TrimeshQueries
 from validation.thresholds import Thresholds
@@ -28,11 +32,12 @@ def wrong(rows):
 
 
 def test_the_section_counts_its_steps_and_passes(monkeypatch, tmp_path):
-    monkeypatch.setattr(section, "QUICK", section.QueryEffort(2400, 1200, 8, 4, 6))
+    monkeypatch.setattr(section, "QUICK", section.QueryEffort(2400, 1200, 8, 4, 6, 1))
     taken = []
     job = Job(True, Thresholds(), tmp_path, taken.append)
     record, gates = section.run(job)
-    assert len(taken) == section.steps(job) and len(gates) == len(record["rows"]) == 26
+    assert len(taken) == section.steps(job) and len(record["rows"]) == 26 and len(record["drop_in"]) == 10
+    assert len(gates) == 36
     assert all(gate.passed for gate in gates)
     assert all(row["asked"] > 0 and row["beside"] > 0 for row in record["rows"])
 
@@ -91,6 +96,34 @@ def test_wrong_contacts_are_counted(monkeypatch, query):
 
     monkeypatch.setattr(Octree, query, changed)
     assert len(wrong(check_contacts(8, JOB))) == len(solids())
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_of_the_drop_in_are_counted(monkeypatch, fault):
+    asked = RayMeshIntersector.intersects_location
+
+    def changed(*arguments, **options):
+        places, rays, faces = asked(*arguments, **options)
+        if fault == "number":
+            return places[1:], rays[1:], faces[1:]
+        return (places, rays, np.roll(faces, 1)) if fault == "faces" else (places * (1 + 2.0**-38), rays, faces)
+
+    monkeypatch.setattr(RayMeshIntersector, "intersects_location", changed)
+    rows = check_drop_in(1, JOB)
+    assert all(row["faults"][OURS][fault] == row["wrong"] > 0 for row in rows)
+
+
+def test_rays_of_the_drop_in_touch_edges_and_corners_and_the_shapes_are_what_they_say():
+    kinds = shapes()
+    assert sum(map(len, kinds.values())) == 50
+    assert all(mesh.area_faces.min() > 0 for mesh in kinds["as made"])
+    for aim in list(families().values())[:3]:
+        mesh = kinds["as made"][1]
+        origins, directions = aim(mesh, np.random.default_rng(0), 60)
+        found = [contacts(mesh.vertices, mesh.faces, *ray) for ray in zip(origins, directions, strict=True)]
+        assert {1, 2} <= {len(contact.faces) for ray in found for contact in ray} and max(map(len, found)) == 2
+        # Slopes in fourths, which float64 holds.
+        assert (np.abs(directions).max(axis=1) == 4).all() and (directions == np.round(directions)).all()
 
 
 def test_points_are_on_and_beside_the_surface():
