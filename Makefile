@@ -7,12 +7,14 @@ STAMP  := .venv/.stamp
 # make validate QUICK=1 ARGS="--only hits"; ARGS=--defects and ARGS=--write-baseline likewise
 QUICK  ?=
 ARGS   ?=
+# make conformance TRIMESH=/path/to/a/checkout; its tests need some packages more, such as shapely
+TRIMESH ?=
 
 # Languages that this project does without: everything here is Python.
 FOREIGN := c cc cpp cxx c++ cu h hh hpp hxx pyx pxd pxi rs
 
 .DEFAULT_GOAL := help
-.PHONY: help validate test lint bench clean
+.PHONY: help validate test lint bench conformance clean
 
 help:
 	@echo "make validate   prove hits and pictures against the references; writes reports/index.html"
@@ -21,6 +23,7 @@ help:
 	@echo "make lint       check style, types, import order and the absence of other languages"
 	@echo "make bench      measure speed beside other systems; writes reports/benchmark.html"
 	@echo "                QUICK=1 for the short run, ARGS='--mesh FILE' or '--huge' for more"
+	@echo "make conformance TRIMESH=DIR   run trimesh's own tests, from a checkout of its repository, with the drop-in"
 	@echo "make clean      remove everything that make made, .venv included"
 
 validate: $(STAMP)
@@ -31,6 +34,9 @@ test: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python -m validation.benchmark $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)
+
+conformance: $(STAMP)
+	$(BIN)/python -m validation.conformance "$(TRIMESH)"
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
