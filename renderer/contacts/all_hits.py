@@ -1,5 +1,7 @@
 """All hits of a batch of rays, or their number: in chunks, on threads, in memory that what is found needs."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -26,8 +28,8 @@ from renderer.trace.layout import Tree
 from renderer.trace.query import rays_against_blocks
 from renderer.trace.traverse import make_memory
 
-# Hits that a thread gathers before it hands them over, unless one ray has more: 3.5 MB.
-_CAPACITY = 1 << 15
+# Hits that a thread gathers before it hands them over, unless one ray has more: 3.5 MB; of few rays, so many a ray.
+_CAPACITY, _OF_A_RAY = 1 << 15, 64
 _ANY_NUMBER = np.iinfo(np.int64).max
 
 
@@ -81,7 +83,7 @@ def _gathered(tree: Tree, rays: RayBatch, choice: Choice, threads: int) -> tuple
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
         if bad and bad[0] < begin:
             return
-        memory, scratch = _memory(_CAPACITY), make_memory(tree.depth, CANDIDATE_WORDS)
+        memory, scratch = _memory(min(_CAPACITY, _OF_A_RAY * (end - begin))), make_memory(tree.depth, CANDIDATE_WORDS)
         while begin < end:
             reached, row = gather_chunk(tree.words, rays, (begin, end), choice, counts, *memory, scratch)
             if row >= 0:

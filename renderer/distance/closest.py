@@ -1,5 +1,7 @@
 """Closest points on a mesh: checks at the boundary, chunks on threads, and the answer."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 

@@ -1,5 +1,7 @@
 """Points inside a mesh: checks at the boundary, chunks on threads."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Points as queries get them: shape, type and finiteness are checked."""
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -22,7 +24,7 @@ def check_points(
         rows = np.require(given, np.float64, ("C_CONTIGUOUS", "WRITEABLE")).reshape(-1, 3)
         # Two passes and no array beside; of NaN both are NaN, which no comparison holds for.
         least, most = (rows.min(), rows.max()) if rows.size else (0.0, 0.0)
-        near = -farthest <= least and most <= farthest and np.isfinite([least, most]).all()
+        near = -farthest <= least and most <= farthest and isfinite(least) and isfinite(most)
     if not near:
         row = int((~((np.abs(rows) <= farthest) & np.isfinite(rows)).all(axis=1)).argmax())
         expected = "finite numbers" if np.isinf(farthest) else f"finite numbers within {farthest:.3g}"

@@ -3,6 +3,8 @@
 A grid of cells over the mesh, and a counting sort by cell. Answers do not depend on the order.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -18,6 +20,8 @@ Ask = Callable[[NDArray[np.int64], NDArray[np.float64]], Iterator[None]]
 _CELLS = 4096
 # So that Ctrl-C and other threads need not wait for long.
 _MOST = 1 << 17
+# Points that are asked at once, on the caller's thread: ordering them takes longer than it saves.
+_FEW = 32
 
 
 def ask_in_order(
@@ -26,8 +30,12 @@ def ask_in_order(
     """Call ``ask(rows, some)`` on threads until all points (n, 3) are asked: ``some`` are the points in these rows.
 
     Each time it yields, Ctrl-C is heard. The points come in the order of a grid's cells, of a grid across the axis
-    ``along`` if that is given; the fewest at a time are ``least``.
+    ``along`` if that is given; the fewest at a time are ``least``. A few stay as they are.
     """
+    if len(points) <= _FEW:
+        for _ in ask(np.arange(len(points)), points):
+            pass
+        return
     grid = _make_grid(*mesh.bounds, along)
 
     def ask_some(begin: int, end: int) -> Iterator[None]:

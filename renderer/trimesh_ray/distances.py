@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.trimesh_ray.facing import facing_faces
-from renderer.trimesh_ray.intersector import RayMeshIntersector, checked_points
+from renderer.trimesh_ray.intersector import RayMeshIntersector, as_rows
 from renderer.trimesh_ray.trees import octree_of
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,7 @@ def closest_point(mesh: Any, points: ArrayLike) -> tuple[Floats, Floats, NDArray
     Of the faces that meet at the nearest point it is the one least aslant to the query, as in trimesh; of others that
     are as near, the lowest.
     """
-    given = checked_points(points)
+    given = as_rows("points", points)
     found = octree_of(mesh).closest_point(given)
     nearest = found.points
     weights = np.stack([1.0 - found.u - found.v, found.u, found.v], axis=1)
@@ -30,6 +30,6 @@ def signed_distance(mesh: Any, points: ArrayLike) -> Floats:
 
     The sign is that of ``contains_points``, exact for closed meshes.
     """
-    given = checked_points(points)
+    given = as_rows("points", points)
     distance = octree_of(mesh).closest_point(given).distance
     return np.where(RayMeshIntersector(mesh).contains_points(given), distance, -distance) + 0.0

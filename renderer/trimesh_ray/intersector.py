@@ -1,5 +1,6 @@
 """A ``RayMeshIntersector`` like trimesh's own two, answered by the octree."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from renderer.trimesh_ray.trees import octree_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+_NOWHERE = np.empty((0, 3))
 
 
 class RayMeshIntersector:
@@ -46,20 +48,17 @@ class RayMeshIntersector:
         ray_origins, ray_directions  (n, 3)
         multiple_hits                whether all hits of a ray are listed, at most the nearest ``max_hits``
         """
-        rows, origins, directions = _checked(ray_origins, ray_directions)
-        faces, rays, places = np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3))
-        if len(origins) and len(self.mesh.faces):
+
+        def ask(origins: Floats, directions: Floats) -> tuple[Integers, Integers, Floats]:
             octree = octree_of(self.mesh)
-            found: Any
             if multiple_hits:
                 found = octree.all_hits(origins, directions, max_hits=max_hits)
-                faces, rays = found.face, found.ray
-            else:
-                found = octree.closest_hit(origins, directions)
-                rays = np.flatnonzero(found.hit)
-                faces = found.face[rays]
-            if return_locations:
-                places = found.points if multiple_hits else found.points[rays]
+                return found.face, found.ray, found.points if return_locations else _NOWHERE
+            first = octree.closest_hit(origins, directions)
+            rays = np.flatnonzero(first.hit)
+            return first.face[rays], rays, first.points[rays] if return_locations else _NOWHERE
+
+        rows, (faces, rays, places) = _asked(ask, ray_origins, ray_directions)
         rays = rays if rows is None else rows[rays]
         return (faces, rays, places) if return_locations else (faces, rays)
 
@@ -73,52 +72,58 @@ class RayMeshIntersector:
 
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Integers:
         """The first face that each ray hits, (n,); -1 for none."""
-        rows, origins, directions = _checked(ray_origins, ray_directions)
-        faces = np.full(len(np.asarray(ray_origins)), -1, np.int64)
-        if len(origins) and len(self.mesh.faces):
-            faces[slice(None) if rows is None else rows] = octree_of(self.mesh).closest_hit(origins, directions).face
-        return faces
+        rows, faces = _asked(lambda o, d: octree_of(self.mesh).closest_hit(o, d).face, ray_origins, ray_directions)
+        return faces if rows is None else _spread(faces, rows, np.shape(ray_origins)[0], -1)
 
     def intersects_any(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> NDArray[np.bool_]:
         """Whether each ray hits the mesh, (n,)."""
-        rows, origins, directions = _checked(ray_origins, ray_directions)
-        hit = np.zeros(len(np.asarray(ray_origins)), np.bool_)
-        if len(origins) and len(self.mesh.faces):
-            hit[slice(None) if rows is None else rows] = octree_of(self.mesh).any_hit(origins, directions)
-        return hit
+        rows, hit = _asked(lambda o, d: octree_of(self.mesh).any_hit(o, d), ray_origins, ray_directions)
+        return hit if rows is None else _spread(hit, rows, np.shape(ray_origins)[0], False)
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether each point (n, 3) lies inside, (n,): by parity as in trimesh; of an open mesh by its winding number.
 
-        A point on the surface is inside; one that is not finite is outside.
+        A point on the surface is inside; one that is not finite is outside, as is any beyond the mesh's box.
         """
-        given = checked_points(points)
-        inside, finite = np.zeros(len(given), np.bool_), np.isfinite(given).all(axis=1)
-        if finite.any() and len(self.mesh.faces):
-            octree = octree_of(self.mesh)
+        given = as_rows("points", points)
+        if len(self.mesh.faces) == 0:
+            return np.zeros(len(given), np.bool_)
+        octree = octree_of(self.mesh)
+        lower, upper = octree.mesh.bounds
+        within = ((given >= lower) & (given <= upper)).all(axis=1)  # of NaN too
+        if within.any():
             closed = len(octree.mesh.odd_edges) == 0
             how: Any = {"rule": "even-odd"} if closed else {"winding": True}
-            inside[finite] = octree.contains(given[finite], **how)
-        return inside
+            within[within] = octree.contains(given[within], **how)
+        return within
 
 
-def checked_points(points: ArrayLike) -> Floats:
-    """Points as an (n, 3) array; ``ValueError`` for another shape."""
-    array = np.asarray(points, np.float64)
-    array = array.reshape(0, 3) if array.size == 0 else array
-    expect(array.ndim == 2 and array.shape[1] == 3, "points", "shape (n, 3)", f"shape {array.shape}")
+def _asked(ask: Callable[[Floats, Floats], Any], origins: ArrayLike, directions: ArrayLike) -> tuple[Any, Any]:
+    """The answer for all rays, after None; or the rows of those that can hit something, and the answer for them.
+
+    Rays that are not finite or have no direction are told only when some are refused: most calls have none.
+    """
+    o, d = as_rows("ray_origins", origins), as_rows("ray_directions", directions)
+    expect(d.shape == o.shape, "ray_directions", f"the shape of ray_origins, {o.shape}", f"shape {d.shape}")
+    try:
+        return None, ask(o, d)
+    except ValueError:
+        good = (np.isfinite(o) & np.isfinite(d)).all(axis=1) & d.any(axis=1)
+        if good.all():
+            raise
+        return np.flatnonzero(good), ask(o[good], d[good])
+
+
+def as_rows(argument: str, values: ArrayLike) -> Floats:
+    """Vectors as an (n, 3) array; an empty list is one without rows."""
+    array = np.asarray(values, np.float64)
+    array = array.reshape(0, 3) if array.shape == (0,) else array
+    expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
     return array
 
 
-def _checked(origins: ArrayLike, directions: ArrayLike) -> tuple[Integers | None, Floats, Floats]:
-    """The rows of the rays that can hit something, None for all, and their origins and directions."""
-    o, d = np.asarray(origins, np.float64), np.asarray(directions, np.float64)
-    if o.size == d.size == 0:
-        return None, np.empty((0, 3)), np.empty((0, 3))
-    expect(o.ndim == 2 and o.shape[1] == 3, "ray_origins", "shape (n, 3)", f"shape {o.shape}")
-    expect(d.shape == o.shape, "ray_directions", f"the shape of ray_origins, {o.shape}", f"shape {d.shape}")
-    good = (np.isfinite(o) & np.isfinite(d)).all(axis=1) & d.any(axis=1)
-    if good.all():
-        return None, o, d
-    rows = np.flatnonzero(good)
-    return rows, o[rows], d[rows]
+def _spread(values: NDArray[Any], rows: Integers, count: int, other: Any) -> NDArray[Any]:
+    """The values in their rows of ``count``, and ``other`` in the rest."""
+    whole = np.full(count, other, values.dtype)
+    whole[rows] = values
+    return whole
