@@ -74,7 +74,7 @@ def measure(
     quick: bool, huge: bool, paths: tuple[Path, ...], command: str, step: Callable[[str], None]
 ) -> dict[str, Any]:
     """The whole record; see ``validation.benchmark.page.record``."""
-    from validation.benchmark.measures import ablation, first_answers, frames, meshes, processes
+    from validation.benchmark.measures import ablation, drop_in, first_answers, frames, meshes, processes
     from validation.benchmark.measures.queries import fits
     from validation.benchmark.page import record, targets
     from validation.benchmark.parameters import study
@@ -97,7 +97,7 @@ def measure(
         "commit": record.commit(), "quick": quick, "environment": record.describe(_libllvm(llvm), load),
         "systems": record.described(systems), "missing": missing, "series": series,
         "open_edges": open_edges, **rows,
-        "fits": fits(rows["queries"], series),
+        "fits": fits(rows["queries"], series), "drop_in": drop_in.run(quick, step),
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
         "first_answers": first_answers.measure(names, step),

@@ -10,7 +10,7 @@ from renderer.mesh.load import save_ply
 from renderer.mesh.mesh import Mesh
 from validation import timing
 from validation.benchmark import __main__ as command
-from validation.benchmark.measures import ablation, first_answers, frames, memory, meshes, processes
+from validation.benchmark.measures import ablation, drop_in, first_answers, frames, memory, meshes, processes
 from validation.benchmark.page import page, record
 from validation.benchmark.parameters import study
 from validation.benchmark.peers import systems
@@ -54,6 +54,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(timing, "REST", 0.0)
         patch.setattr(meshes, "QUICK", (100, 400, 1_000))
         patch.setattr(command, "QUICK_RAYS", 300)
+        patch.setattr(drop_in, "QUICK_RAYS", (1, 40))
         patch.setattr(frames, "measure", _frames)
         patch.setattr(processes, "measure", _processes)
         patch.setattr(first_answers, "measure", _first_answers)
@@ -83,6 +84,7 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
         assert ours["ns"] == pytest.approx(1e3 / ours["mrays"])
     # The mesh by path is none of the series, so no fit knows of it: a fit needs all three others.
     assert {f["contender"] for f in found["fits"]} >= {OURS, OURS_ONE, "embree", "trimesh", "mitsuba_scalar"}
+    assert len(found["drop_in"]) == 5 * 2 and all(min(row["ratios"].values()) > 0 for row in found["drop_in"])
     for row in found["builds"]:
         assert {"ours_midpoint", "ours_sah", "embree"} <= set(row["contenders"])
 
@@ -141,7 +143,7 @@ def test_other_records_are_refused(folder: Path, tmp_path: Path) -> None:
     stored = record.read(folder / "benchmark.json")
     path = tmp_path / "benchmark.json"
     path.write_text(json.dumps(stored | {"schema": 99}))
-    with pytest.raises(ValueError, match="schema 3, got 99"):
+    with pytest.raises(ValueError, match="schema 4, got 99"):
         record.read(path)
     path.write_text(json.dumps({k: v for k, v in stored.items() if k != "fits"}))
     with pytest.raises(ValueError, match="expected the keys"):

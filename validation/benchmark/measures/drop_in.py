@@ -18,7 +18,8 @@ from validation.benchmark.measures.meshes import displaced_spheres
 from validation.timing import RUNS, interleaved, ratio, timed
 
 OURS, EMBREEX, ALONE = "drop-in", "trimesh + embreex", "trimesh alone"
-FACES, RAYS = (1_000, 100_000, 1_000_000), (1, 10, 1_000, 100_000, 1_000_000)
+QUICK_FACES, QUICK_RAYS = (1_000,), (1, 10, 1_000)
+FACES, RAYS = (*QUICK_FACES, 100_000, 1_000_000), (*QUICK_RAYS, 100_000, 1_000_000)
 _SEED = 15
 _LEAST = 50
 # The most rays or points that trimesh is asked, for the time that it takes: some seconds a run.
@@ -66,6 +67,12 @@ def _calls() -> dict[str, Callable[[Any, _Asked], Any]]:
     }
 
 
+def run(quick: bool, step: Callable[[str], None]) -> list[dict[str, Any]]:
+    """All rows, for JSON."""
+    faces, counts = (QUICK_FACES, QUICK_RAYS) if quick else (FACES, RAYS)
+    return [row._asdict() for size in faces for row in measure(size, counts, step)]
+
+
 def measure(faces: int, counts: Sequence[int], step: Callable[[str], None] = lambda name: None) -> Iterator[Row]:
     """A row for each call and number of rays or points."""
     whole = displaced_spheres(faces)
@@ -76,7 +83,7 @@ def measure(faces: int, counts: Sequence[int], step: Callable[[str], None] = lam
     asked = _asked(meshes[OURS], max(counts))
     for name, call in _calls().items():
         for count in counts:
-            step(f"{name}, {len(whole.faces)} faces, {count}")
+            step(f"drop-in for trimesh: {name}, {len(whole.faces)} faces, {count}")
             yield _row(name, call, meshes, asked.at_most(count))
 
 

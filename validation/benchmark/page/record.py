@@ -16,6 +16,7 @@ queries[]         one a mesh, family and kind of query
   contenders        by name: rays, hits, differing (see ``kinds``), seconds (all runs), median, mrays, ns
   ratios            by peer: the median over the rounds of its time a ray or point over ours
 fits[]            family, query, contender, and a, b, residual of ns = a log2 N + b
+drop_in[]         call, faces, rays; seconds a ray by contender (all runs), ratios: theirs over the drop-in's
 builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint
 memory[]          mesh, faces, systems: rest, peak (bytes by which a process grows), own (our own count or null)
 frames            scene, size, max_depth, faces, labels, contenders, ratios, rays (by contender), pictures: ssim,
@@ -38,11 +39,11 @@ from renderer.process.files import write_atomically
 from validation import environment
 from validation.benchmark.peers.contender import System
 
-SCHEMA = 3
+SCHEMA = 4
 KEYS = (
     "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series",
-    "open_edges", "queries", "fits", "builds", "memory", "frames", "processes", "first_answers", "ablation", "knobs",
-    "targets",
+    "open_edges", "queries", "fits", "drop_in", "builds", "memory", "frames", "processes", "first_answers", "ablation",
+    "knobs", "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 
