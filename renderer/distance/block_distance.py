@@ -14,6 +14,8 @@ from renderer.trace.intersect import load_corners
 # Corners less the point, u, v and the nearest point err by 2^-53 each, of a corner's reach; together by 20 such errors
 # at most. The same holds for the products along the direction, as shares of the direction's length.
 _ERROR = 2.0**-48
+# What squares lose besides, where they vanish: 2^-1073, whose root is 2^-536.5, and quotients by such a root as much.
+_VANISHED = 2.0**-530
 _MORE = 1.0 + 2.0**-48
 
 
@@ -35,7 +37,8 @@ def bound_distances(tree, base, point, limit):
     along = _smaller(
         _dot(x0, y0, z0, x, y, z), _smaller(_dot(x1, y1, z1, x, y, z), _dot(x2, y2, z2, x, y, z))
     )  # fmt: skip
-    error = splat4(_ERROR) * _larger(_size(x0, y0, z0), _larger(_size(x1, y1, z1), _size(x2, y2, z2)))
+    reach = _larger(_size(x0, y0, z0), _larger(_size(x1, y1, z1), _size(x2, y2, z2)))
+    error = splat4(_ERROR) * reach + splat4(_VANISHED)
     distance, zero = square_root(square), splat4(0.0)
     low, high = select(distance <= zero, zero, along / distance - error), distance * splat4(_MORE) + error
     # Of an unused place all is NaN, which is not within any limit.

@@ -42,6 +42,8 @@ WORK, _APART = 1 << 16, 16
 _FARTHEST = 2.0**130
 # More than squares and their sum lose, and what a bound's square needs above it.
 _LESS, _MORE = 1.0 - 2.0**-48, 1.0 + 2.0**-48
+# What they lose besides, where they vanish.
+_VANISHED = 2.0**-1060
 
 
 class Search(NamedTuple):
@@ -136,7 +138,7 @@ def _search(tree, point, limit, search):
     put(search.near, 0, 0.0)
     while top > 0:
         top -= 1
-        if get(search.near, top) > limit * limit * _MORE:
+        if get(search.near, top) > _squared(limit):
             continue
         child = get(search.children, top)
         if child < 0:
@@ -144,9 +146,15 @@ def _search(tree, point, limit, search):
             best, listed, limit = _search_blocks(tree, first, count, point, search, best, listed, limit)
             continue
         base = child * NODE_WORDS
-        bits = _bound_boxes(tree.nodes, base, point, splat4(limit * limit * _MORE), search.squares)
+        bits = _bound_boxes(tree.nodes, base, point, splat4(_squared(limit)), search.squares)
         top = _push_nearest_last(tree.links, base + CHILDREN, bits, search, top)
     return _settle(tree, point, search, best, listed, limit)
+
+
+@inlined
+def _squared(limit):
+    """At least as much as the square of a box's distance that is within the limit."""
+    return limit * limit * _MORE + _VANISHED
 
 
 @inlined

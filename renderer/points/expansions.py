@@ -13,14 +13,16 @@ from renderer.kernels.simd import get, larger, put, smaller
 OUT_OF_RANGE = -1
 # The most parts: a volume has 6 products of 2 x 2 x 2 parts, four numbers each. Callers may use the memory behind them.
 PARTS = 192
-_SMALLEST, _LARGEST = 2.0**-960, 2.0**960
+# The least product of two or of three parts. The last bit of a product of three is 2^-156 of that, and of the sums and
+# products before it no more is lost: it may not fall below the least denormal, 2^-1074.
+_SMALLEST_AREA, _SMALLEST_VOLUME, _LARGEST = 2.0**-960, 2.0**-900, 2.0**960
 
 
 @kernel
 def expand_area(a, b, p, parts):
     """(a - p) x (b - p) of points (x, y) into ``parts``; returns the number of parts, or OUT_OF_RANGE."""
     ax, ay, bx, by = difference(a[0], p[0]), difference(a[1], p[1]), difference(b[0], p[0]), difference(b[1], p[1])
-    if not _in_range(_least(ax, bx) * _least(ay, by), _most(ax, bx) * _most(ay, by)):
+    if _least(ax, bx) * _least(ay, by) <= _SMALLEST_AREA or _most(ax, bx) * _most(ay, by) >= _LARGEST:
         return OUT_OF_RANGE
     count = _add_area(parts, 0, ax, by, 1.0)
     return _add_area(parts, count, ay, bx, -1.0)
@@ -36,7 +38,7 @@ def expand_volume(a, b, c, p, parts):
     most = larger(_most(ax, bx), _most(cx, cx)) * larger(_most(ay, by), _most(cy, cy))
     least *= smaller(_least(az, bz), _least(cz, cz))
     most *= larger(_most(az, bz), _most(cz, cz))
-    if not _in_range(least, most):
+    if least <= _SMALLEST_VOLUME or most >= _LARGEST:
         return OUT_OF_RANGE
     count = _add_volume(parts, 0, ax, by, cz, 1.0)
     count = _add_volume(parts, count, ay, bz, cx, 1.0)
@@ -77,12 +79,6 @@ def _least(a, b):
 def _most(a, b):
     """The largest part of two pairs, without signs; 1 at least."""
     return larger(larger(abs(a[0]), abs(b[0])), 1.0)
-
-
-@kernel
-def _in_range(least, most):
-    """Whether no product of parts can vanish or overflow."""
-    return least > _SMALLEST and most < _LARGEST
 
 
 @kernel

@@ -9,6 +9,8 @@ from renderer.points.expansions import OUT_OF_RANGE, expand_area, expand_volume,
 
 # What all functions here say where products would vanish or overflow.
 UNDECIDED = 2
+# An axis is stretched by that at most, so that none becomes infinite.
+_MOST = 2.0**1000
 
 
 @kernel
@@ -39,7 +41,7 @@ def _balance(a, b, c, d):
     least, most = np.inf, 0.0
     for x in (abs(a), abs(b), abs(c), abs(d)):
         least, most = (smaller(least, x) if x != 0.0 else least), larger(most, x)
-    return power_below(1.0 / (np.sqrt(least) * np.sqrt(most))) if most != 0.0 else 1.0
+    return power_below(smaller(1.0 / (np.sqrt(least) * np.sqrt(most)), _MOST)) if most != 0.0 else 1.0
 
 
 @inlined

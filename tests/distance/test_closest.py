@@ -262,3 +262,17 @@ def test_rational_arithmetic_says_what_float64_says():
             distance, u, v, face = nearest_exactly(point, mesh.triangles, scale)
             assert (distance, face) == (found.distance[i], found.face[i])
             assert abs(u - found.u[i]) < 1e-9 and abs(v - found.v[i]) < 1e-9
+
+
+@pytest.mark.parametrize("points", [((0.72, 0, 0), (0.7, 0.7, 0.7)), ((0.7, 0.7, 0.7), (0.72, 0, 0)),
+                                    ((0.1, 0.1, 0.1), (0.72, 0, 0)), ((0.7, 0, 0), (1e-3, 0, 0))])  # fmt: skip
+@pytest.mark.parametrize("unit", [2.0**-537, 2.0**-540, 2.0**-530])
+def test_faces_whose_squared_distances_vanish_are_told_apart(points, unit):
+    """Their bounds were none: the farther of two faces was named, at 1.7 times the least distance."""
+    tiny = np.array(points) * unit
+    vertices = np.concatenate([[[1, 1, 1], [1, 2, 1], [1, 1, 2]], tiny])
+    faces = [[0, 1, 2], [3, 3, 3], [4, 4, 4]]
+    least = min(np.linalg.norm(np.array(points), axis=1)) * unit
+    for accelerator in (Octree, BruteForce):
+        found = accelerator(vertices, faces).closest_point([0.0, 0.0, 0.0])
+        assert found.distance == pytest.approx(least, rel=1e-15)

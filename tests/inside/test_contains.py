@@ -160,6 +160,25 @@ def test_signs_whose_products_vanish_are_not_believed(vertices, point):
     assert BruteForce(vertices, TETRAHEDRON).contains([point]) == expected
 
 
+def test_a_volume_whose_last_bits_vanish_is_not_believed():
+    """Products of three parts lost bits below the least denormal: the origin, inside, was taken as on a face."""
+    corners = [
+        ["-0x1.aa5e6309459a8p-319", "-0x1.9347e59b849dcp-319", "0x1.c511f3115e084p-319"],
+        ["0x1.7bf564d7775c8p-319", "0x1.60f7cbc481550p-319", "-0x1.f3fbd0a4c2cccp-319"],
+        ["-0x1.e42a2f418f070p-321", "-0x1.c021eb1e51da0p-321", "0x1.4ad8fcd035a40p-320"],
+        ["0x1.3333333333333p-2", "0x1.999999999999ap-2", "0x1.ccccccccccccdp-1"],
+    ]
+    vertices = [[float.fromhex(x) for x in corner] for corner in corners]
+    faces = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]
+    origin = [0.0, 0.0, 0.0]
+    triangles = [rational([vertices[i] for i in face]) for face in faces]
+    assert winding_number(rational([origin])[0], triangles) == 1
+    for accelerator in (Octree, BruteForce):
+        queries = accelerator(vertices, faces)
+        assert queries.contains(origin, boundary=False) and queries.contains(origin, winding=True)
+        assert queries.signed_distance(origin) < 0.0
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_points_with_one_tiny_coordinate_need_no_rational_arithmetic(monkeypatch, axis):
     """A point at 1e-310 took 2.5 ms: products with what lies at 1 vanish. The axis is stretched now."""
