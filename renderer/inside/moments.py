@@ -76,23 +76,28 @@ _KEPT: WeakKeyDictionary[Tree, NDArray[np.float64]] = WeakKeyDictionary()
 
 def _computed(tree: Tree, threads: int) -> NDArray[np.float64]:
     count = len(tree.nodes) // NODE_WORDS
-    rows = cache_aligned(count * MOMENT_WORDS, np.float64)
+    rows, leaves = cache_aligned(count * MOMENT_WORDS, np.float64), _leaf_count(tree)
 
     def measure(begin: int, end: int) -> None:
-        _measure_octants(tree.words, rows, _room(tree), begin, end)
+        _measure_octants(tree.words, rows, _room(tree, leaves), begin, end)
 
     for_chunks(measure, count, _NODES, threads)
-    room = _room(tree)
+    room = _room(tree, leaves)
     for end in range(count, 0, -_NODES):
         _join_octants(tree.words, rows, room, max(0, end - _NODES), end)
     return rows
 
 
-def _room(tree: Tree) -> Room:
+def _leaf_count(tree: Tree) -> int:
+    """The number of leaves, counted: in a file that was forged they may be more than there are blocks."""
+    links = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
+    return int((links < 0).sum())
+
+
+def _room(tree: Tree, leaves: int) -> Room:
     total, other, work = np.zeros((3, ORDER + 1, ORDER + 2), np.complex128)
-    # A leaf has at least one block.
-    leaves = np.empty(len(tree.faces) // BLOCK_FACES, np.int64)
-    return Room(total, other, work, np.empty(stack_size(tree.depth), np.int64), leaves)
+    stack = np.empty(stack_size(tree.depth), np.int64)
+    return Room(total, other, work, stack, np.empty(max(1, leaves), np.int64))
 
 
 @kernel
