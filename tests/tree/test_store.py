@@ -530,12 +530,29 @@ def test_any_numbers_in_boxes_and_blocks_crash_no_query(fill: str, kind: str, mm
     links[:] = kept
     path.write_bytes(forged(content, nothing, nodes=nodes, blocks=blocks))
     loaded = Octree.load(path, mmap=mmap)
-    # Empty octants have boxes now, and so are leaves: more than there are blocks, for which there was no room.
-    loaded.winding_number(ORIGINS)
     found = asked(loaded)
     assert {name: len(bits) for name, bits in found.items() if "all" not in name} == {
         name: len(bits) for name, bits in asked(it).items() if "all" not in name
     }
+
+
+def test_more_leaves_than_blocks_crash_no_query(path: Path) -> None:
+    """Those who list the leaves below a node had room for one of each block: they wrote beyond it."""
+    content, count = whole(path, "carrying"), 200
+    nodes = np.zeros((count, NODE_WORDS), np.float32)
+    nodes[:, :CHILDREN].reshape(count, 3, 2, 8)[:, :, 0], nodes[:, :CHILDREN].reshape(count, 3, 2, 8)[:, :, 1] = -1, 2
+    links, levels = nodes.view(np.int32)[:, CHILDREN : CHILDREN + 8], np.zeros(count, int)
+    links[:] = -1  # the first block
+    for child in range(1, count):
+        parent = (child - 1) // 8
+        links[parent, (child - 1) % 8], levels[child] = child, levels[parent] + 1
+    depth = int(levels.max()) + 1
+    path.write_bytes(forged(content, lambda header: header.update(depth=depth), nodes=nodes.ravel()))
+    script = (
+        "import sys; from renderer import Octree; print(Octree.load(sys.argv[1]).winding_number([[0.1, 0.2, 0.3]]))"
+    )
+    done = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
 
 
 # --- saving -----------------------------------------------------------------------------------------------------
