@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import thread as pools
-from contextlib import suppress
 from functools import cache
 from numbers import Integral
 from threading import Lock, current_thread
@@ -17,6 +16,8 @@ from renderer.errors import expect
 
 # The pool's threads: at least so many, and so many per processor. More would not change results.
 _LEAST_POOL, _PER_PROCESSOR = 16, 4
+# How the errors of a pool begin whose interpreter ends, or whose system has no more threads.
+_NO_THREADS = ("cannot schedule new futures", "can't start new thread")
 # Seconds between checks of helpers that have been told to stop, which take milliseconds to do so.
 _MOMENT = 0.0005
 
@@ -129,12 +130,12 @@ class _Shared:
 
 
 def _stop_helpers(shared: _Shared, taking: Lock) -> None:
-    """Return when no helper is at work any more, even on Ctrl-C: they write to memory of the caller's.
+    """Return when no helper is at work any more, whatever signals raise here: they write to memory of the caller's.
 
     By plain flags: interrupted at the wrong moment, an ``Event`` keeps its lock for good, and a future just submitted
     is lost.
     """
-    interrupted = False
+    interrupted: BaseException | None = None
     while True:
         try:
             shared.stopped = True
@@ -143,25 +144,26 @@ def _stop_helpers(shared: _Shared, taking: Lock) -> None:
             while shared.helpers:
                 time.sleep(_MOMENT)
             break
-        except KeyboardInterrupt:
-            interrupted = True
-    if interrupted:
-        raise KeyboardInterrupt
+        except BaseException as error:  # of Ctrl-C, a time limit, or another handler's
+            interrupted = error
+    if interrupted is not None:
+        raise interrupted
 
 
 def _start(work: Callable[[], None], count: int, running: list[Future[None]]) -> None:
     """Begin ``work`` on ``count`` threads of the pool, or on fewer: the caller does what is left.
 
-    Adds to ``running`` one by one, so that Ctrl-C between two of them loses none.
+    Adds to ``running`` one by one, so that a signal between two of them loses none.
     """
     pool = _pool()
-    # Raised where the main thread has ended, or the system gives no more threads.
-    with suppress(RuntimeError):
-        for _ in range(count):
-            try:
-                running.append(pool.submit(work))
-            except KeyboardInterrupt:
-                # A thread that started just now may be on no list, and the interpreter would wait for it forever.
-                pool.shutdown(wait=False)
-                _pool.cache_clear()
-                raise
+    for _ in range(count):
+        try:
+            running.append(pool.submit(work))
+        except BaseException as error:
+            if isinstance(error, RuntimeError) and str(error).startswith(_NO_THREADS):
+                return
+            # Of a signal. A thread that started just now may be on no list, and the interpreter would wait for it
+            # forever.
+            pool.shutdown(wait=False)
+            _pool.cache_clear()
+            raise

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from renderer.process import parallel
 from renderer.process.parallel import available_threads, checked_threads, for_chunks
 
 
@@ -278,6 +279,9 @@ def test_control_c_while_threads_start_stops_those_that_did(monkeypatch, submitt
 INTERRUPTED = """
 import signal, threading
 from renderer.process.parallel import for_chunks
+def handler(number, frame):
+    raise {error}
+signal.signal(signal.SIGINT, handler)
 start = threading.Thread.start
 def interrupted(self):
     start(self)
@@ -286,18 +290,44 @@ def interrupted(self):
 threading.Thread.start = interrupted
 try:
     for_chunks(lambda begin, end: None, 100, 1, 4)
-except KeyboardInterrupt:
+except {error}:
     threading.Thread.start = start
     for_chunks(lambda begin, end: print(begin), 1, 1, 4)
 """
 
 
-def test_control_c_while_a_thread_starts_leaves_none_that_the_interpreter_waits_for():
+@pytest.mark.parametrize("error", ["KeyboardInterrupt", "TimeoutError", "SystemExit", "RuntimeError"])
+def test_a_signal_while_a_thread_starts_leaves_none_that_the_interpreter_waits_for(error):
     """The thread was on no list, so nobody woke it, and the process said that it was interrupted and never ended."""
-    command = [sys.executable, "-c", INTERRUPTED]
-    handler = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, preexec_fn=handler)
+    command = [sys.executable, "-c", INTERRUPTED.format(error=error)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout == "0\n"
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, TimeoutError, SystemExit])
+def test_no_helper_is_left_at_work_whatever_a_signal_raises(monkeypatch, error):
+    """A second signal comes while the helpers of the first are waited for: they write to the caller's memory."""
+    at_work, sound, slept = [], parallel.time.sleep, []
+
+    def work(begin, end):
+        at_work.append(begin)
+        if threading.current_thread() is threading.main_thread():
+            while len(at_work) < 2:
+                sound(0.001)
+            raise ZeroDivisionError
+        sound(0.05)
+        at_work.clear()
+
+    def sleep(seconds):
+        slept.append(seconds)
+        if len(slept) == 2:
+            raise error
+        sound(seconds)
+
+    monkeypatch.setattr(parallel.time, "sleep", sleep)
+    with pytest.raises(error):
+        for_chunks(work, 2, 1, 2)
+    assert len(slept) > 2 and not at_work
 
 
 DAEMON = """
