@@ -215,10 +215,12 @@ def _save(image: Any, path: Path) -> None:
     except (OSError, MemoryError) as error:
         # Its radiance is written as it is, where there is no memory to encode it.
         name = path.name if isinstance(error, OSError) else f"{path.stem}.npy"
+        folder = tempfile.mkdtemp(prefix="octree-render-")
+        kept = Path(folder) / name
         try:
-            kept = Path(tempfile.mkdtemp(prefix="octree-render-")) / name
             image.save(kept)
         except OSError:
+            os.rmdir(folder)
             raise error from None
         reason = str(error) if isinstance(error, OSError) else "there is not enough memory to encode the picture"
         raise OSError(f"{reason}; the picture is kept as {kept}") from error

@@ -9,7 +9,6 @@ from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from renderer.mesh.mesh import Mesh, Repairs, RepairWarning, build_mesh
 from renderer.mesh.obj import parse_obj
 from renderer.mesh.ply import format_ply, parse_ply
 from renderer.mesh.stl import parse_stl
-from renderer.process.files import read_whole, write_atomically
+from renderer.process.files import as_path, read_whole, write_atomically
 
 
 def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: bool = False) -> Mesh:
@@ -40,9 +39,9 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
     not finite. With ``repair`` it is raised where no good face is left, and for faults that no repair mends.
     """
     try:
-        path = Path(path)
-    except TypeError as error:
-        raise MeshError(f"path: expected a string or path, got {type(path).__name__}") from error
+        path = as_path("path", path)
+    except ValueError as error:
+        raise MeshError(str(error)) from None
     if not isinstance(repair, bool):
         raise MeshError(f"repair: expected True or False, got {repair!r}")
     if path.suffix.lower() not in _PARSERS:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.arrays import real_argument
 from renderer.errors import expect
 from renderer.picture.exr import check_exr, exr_bytes
-from renderer.process.files import check_writable, write_atomically
+from renderer.process.files import as_path, check_writable, write_atomically
 
 # The arrays of an ``Image``; radiance is always there.
 PLANES = ("radiance", "depth", "normal", "face", "rays")
@@ -110,7 +110,7 @@ class Image:
         An EXR file also has the depth as Z and the normal as normal.X, normal.Y and normal.Z, float32. It needs the
         package OpenEXR.
         """
-        suffix = Path(path).suffix.lower()
+        suffix = as_path("path", path).suffix.lower()
         check_picture_path(path)
         if suffix == ".npy":
             write_atomically(path, lambda file: np.save(file, self.radiance))
@@ -151,7 +151,7 @@ class Image:
 
 def check_picture_path(path: str | Path) -> None:
     """Raise ``ValueError`` or ``OSError`` unless ``save`` can write there; to be called before a long render."""
-    path = Path(path)
+    path = as_path("path", path)
     expect(path.suffix.lower() in (".png", ".exr", ".npy"), "output", "a .png, .exr or .npy file", repr(str(path)))
     expect(path.parent.is_dir(), "output", "a path in an existing folder", repr(str(path)))
     expect(not path.is_dir(), "output", "a file", f"the folder {str(path)!r}")

@@ -1,7 +1,7 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
 import warnings
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from numbers import Real
 from typing import Any, Literal
@@ -65,7 +65,10 @@ def render(
     eye = source.camera if camera is None else camera
     expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
     chosen = checked_settings(source.render, settings)
-    kept = tuple(planes) if isinstance(planes, Iterable) and not isinstance(planes, str) else (planes,)
+    try:
+        kept: tuple[Any, ...] = (planes,) if isinstance(planes, str) else tuple(planes)
+    except TypeError:  # also of what claims to be iterable and is not
+        kept = (None,)
     known = not isinstance(planes, str) and all(isinstance(p, str) and p in PLANES for p in kept)
     expect(known, "planes", f"some of {', '.join(PLANES)}", repr(planes))
     if isinstance(scene, PreparedScene):

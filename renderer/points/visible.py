@@ -16,6 +16,8 @@ Faces = NDArray[np.int64]
 # A point on a face is 2^-53 of its coordinates off the face's plane, and a ray is as much beside the point, by the
 # rounding of its direction and of t. At a slope of 2^-11, 0.03 degrees, it meets the plane 2^11 as far away.
 _BESIDE = 2.0**-40
+# The least room: an end at 0 is left out, too.
+_LEAST = float(np.finfo(np.float64).smallest_subnormal)
 _ZERO, _INFINITY = np.zeros(1), np.full(1, np.inf)
 
 
@@ -61,7 +63,7 @@ def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) ->
     room = _BESIDE * np.maximum(np.abs(start.points), np.abs(stop.points)).max(axis=1, initial=0.0)
     first, last = (_moved(tree, mesh, *both, threads) for both in ((start, stop), (stop, start)))
     directions, reach = _way(first, last)
-    room /= np.abs(directions).max(axis=1, initial=0.0)
+    room = np.maximum(room / np.abs(directions).max(axis=1, initial=0.0), _LEAST)
     # Where the ends leave no room between them, t_min is above t_max, and nothing hides.
     return RayBatch(first, directions, np.where(start.faces < 0, room, 0.0), np.maximum(reach - room, 0.0))
 
@@ -76,8 +78,10 @@ def _moved(tree: Tree, mesh: Mesh, ends: _Ends, others: _Ends, threads: int) -> 
 
 def _way(start: Floats, stop: Floats) -> tuple[Floats, Floats]:
     """Directions whose largest components are from 1/2 to 1, and the t at which they reach ``stop``."""
-    # Of halves, whose difference does not overflow.
-    half = stop * 0.5 - start * 0.5
-    exponent = np.frexp(np.abs(half).max(axis=1, initial=0.0))[1]
+    # Of halves where they are large, so that the difference does not overflow; half of the least denormal is 0.
+    large = np.maximum(np.abs(start), np.abs(stop)).max(axis=1, initial=0.0) > 1.0
+    share = np.where(large, 0.5, 1.0)[:, None]
+    way = stop * share - start * share
+    exponent = np.frexp(np.abs(way).max(axis=1, initial=0.0))[1]
     with np.errstate(over="ignore"):
-        return np.ldexp(half, -exponent[:, None]), np.ldexp(1.0, exponent + 1)
+        return np.ldexp(way, -exponent[:, None]), np.ldexp(1.0, exponent + large)

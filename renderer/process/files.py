@@ -10,6 +10,13 @@ from typing import BinaryIO
 from uuid import uuid4
 
 
+def as_path(argument: str, value: object) -> Path:
+    """A path given as a string or path; ``ValueError`` that names the argument for anything else."""
+    if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
+        raise ValueError(f"{argument}: expected a string or path, got {type(value).__name__}")
+    return Path(value)
+
+
 def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> None:
     """Let ``write`` fill a temporary file beside ``path``, then rename it: never a half-written file.
 

@@ -28,17 +28,18 @@ def interruptible(message: str) -> Callable[[Command], Command]:
     def decorate(command: Command) -> Command:
         @wraps(command)
         def run(arguments: Sequence[str] | None = None) -> int:
-            own_process, ended_by = arguments is None, list[int]()
+            own_process, ended_by, code = arguments is None, list[int](), INTERRUPTED
             try:
                 with _ends_clean(ended_by, own_process), ends_while_compiling(message, own_process):
-                    return command(arguments)
+                    code = command(arguments)
             except KeyboardInterrupt:
                 if not ended_by:
                     print(message, file=sys.stderr)
-                    return INTERRUPTED
-            # The process ends by the signal itself, as without a handler, so that its sender sees that it took effect.
-            signal.raise_signal(ended_by[0])
-            return 128 + ended_by[0]
+            if ended_by:
+                # By the signal itself, as without a handler, so that its sender sees that it took effect; also where
+                # the command took it for Ctrl-C and ended well.
+                signal.raise_signal(ended_by[0])
+            return code
 
         return run
 

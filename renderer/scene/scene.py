@@ -18,7 +18,7 @@ from renderer.errors import MeshError, SceneError, expect
 from renderer.lazy import lazy
 from renderer.mesh.load import MESH_SUFFIXES, load_mesh
 from renderer.mesh.mesh import Mesh
-from renderer.process.files import read_whole, write_atomically
+from renderer.process.files import as_path, read_whole, write_atomically
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
 from renderer.scene.light import DirectionalLight, PointLight
@@ -197,7 +197,10 @@ def load_scene(path: str | Path) -> Scene:
 
     Raises ``SceneError``.
     """
-    path = Path(path)
+    try:
+        path = as_path("path", path)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
     if path.suffix.lower() in MESH_SUFFIXES:
         try:
             mesh = load_mesh(path)
@@ -220,12 +223,13 @@ def write_scene(mesh_file: str | Path, path: str | Path) -> None:
 
     Raises ``ValueError`` unless ``path`` is that of a .toml file, and leads to no other kind.
     """
+    mesh_file, path = as_path("mesh_file", mesh_file), as_path("path", path)
     target = Path(os.path.realpath(path))
-    for name in (Path(path), target):
-        leads = "" if name == Path(path) else f", a link to {target}"
+    for name in (path, target):
+        leads = "" if name == path else f", a link to {target}"
         expect(name.suffix.lower() == ".toml", "path", "a .toml file", f"{path}{leads}")
     # From beside the scene file as it is named, where ``load_scene`` looks, and not from where a link may lead.
-    inside = os.path.relpath(Path(mesh_file).resolve(), Path(path).parent.resolve())
+    inside = os.path.relpath(mesh_file.resolve(), path.parent.resolve())
     is_text = inside.encode(errors="replace").decode() == inside
     expect(is_text, "mesh", "a name in UTF-8, as TOML has no other", ascii(inside))
     text = showcase_text(load_mesh(mesh_file), Path(inside).as_posix())

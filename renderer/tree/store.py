@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from renderer.errors import expect, is_count
 from renderer.mesh.mesh import Mesh, Repairs
-from renderer.process.files import write_atomically
+from renderer.process.files import as_path, write_atomically
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, NODE_WORDS, Tree, cache_aligned, locked
 from renderer.tree.invariants import check_safe
 
@@ -134,10 +134,7 @@ def load_octree(path: str | os.PathLike[str], mapped: bool) -> Stored:
 
 def _path(path: str | os.PathLike[str]) -> Path:
     expect(sys.byteorder == "little", "sys.byteorder", "little, as numbers in the file", sys.byteorder)
-    try:
-        return Path(path)
-    except TypeError:
-        raise ValueError(f"path: expected a string or path, got {type(path).__name__}") from None
+    return as_path("path", path)
 
 
 # --- writing ----------------------------------------------------------------------------------------------------

@@ -42,6 +42,8 @@ def test_ends_hide_nothing_and_walls_between_do():
     assert octree.visible([0.5, 0.5, 0.0], [0.5, 0.5, 1.0])
     assert octree.visible([0.5, 0.5, 1.0], [0.25, 0.5, 1.0])
     assert octree.visible([0.5, 0.5, 0.5], [0.5, 0.5, 0.5])
+    # Half of the least denormal is 0, which is no direction.
+    assert octree.visible([0.0, 0.0, 0.0], [[5e-324, 0.0, 0.0], [0.0, 1e-323, 1e-320]]).all()
     assert not octree.visible([0.5, 0.5, 0.5], [0.5, 0.5, 1.0 + 1e-9])
     assert not octree.visible([0.5, 0.5, -1e-9], [0.5, 0.5, 1.0])
 

@@ -32,9 +32,9 @@ sys.exit(main())
 """
 
 
-def started(folder: Path, before: str = "") -> "subprocess.Popen[str]":
+def started(folder: Path, before: str = "", script: str = SCRIPT) -> "subprocess.Popen[str]":
     return subprocess.Popen(
-        [sys.executable, "-c", before + SCRIPT], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-c", before + script], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         # A job in the background may have had them ignored.
         preexec_fn=lambda: [signal.signal(number, signal.SIG_DFL) for number in (signal.SIGTERM, signal.SIGHUP)],
@@ -50,6 +50,17 @@ def test_no_temporary_file_stays(tmp_path, number):
         assert running.wait(timeout=30) == -number
         assert running.stderr.read() == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_command_that_takes_it_for_ctrl_c_and_ends_well_ends_by_the_signal_too(tmp_path):
+    """As view does, for whom Ctrl-C is the usual way to end."""
+    script = SCRIPT.replace(
+        "        time.sleep(60)\n", "        try: time.sleep(60)\n        except KeyboardInterrupt: pass\n"
+    )
+    with started(tmp_path, script=script) as running:
+        assert running.stdout.readline() == "writing\n"
+        running.send_signal(signal.SIGTERM)
+        assert running.wait(timeout=30) == -signal.SIGTERM
 
 
 def test_an_ignored_signal_stays_ignored(tmp_path):
