@@ -82,6 +82,10 @@ def _gather() -> None:
     Octree.from_mesh(_TRIANGLE).all_hits([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
 
+def _bound_errors() -> None:
+    Octree.from_mesh(_TRIANGLE).closest_hit([0.1, 0.1, 1.0], [0.0, 0.0, -1.0], t_error=True)
+
+
 def _find_nearest() -> None:
     for accelerator in (Octree.from_mesh(_TRIANGLE), BruteForce.from_mesh(_TRIANGLE)):
         # One point is told by float64, the other is not.
@@ -121,6 +125,7 @@ _QUERIES = (
     Part("rays that leave faces", _leave),
     Part("brute force", _search),
     Part("all hits", _gather),
+    Part("errors of t", _bound_errors),
     Part("points inside", _contain),
     Part("closest points", _find_nearest),
     Part("steps of a search", _count_steps),
