@@ -14,7 +14,8 @@ def add_errors(
 ) -> None:
     """Set ``hits.t_error``: how far t may be from where each hit's ray meets its face.
 
-    A ray nearly in its plane may pass it by and meet the plane elsewhere: then the bound is as long as the face's box.
+    A ray nearly in its plane may pass it by and meet the plane elsewhere: then the bound holds for where the ray is
+    within the face's box.
     ``rows`` are the rays of the hits; None says that each ray has a row of its own. ``scale`` is the tree's.
     """
     mesh, errors = hits._mesh, np.empty(len(hits.t))
