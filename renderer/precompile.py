@@ -75,7 +75,8 @@ def _cut() -> None:
 def _contain() -> None:
     mesh = icosphere(0)
     for accelerator in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
-        accelerator.contains([0.0, 0.0, 0.0])
+        # So many that they are put in order.
+        accelerator.contains(np.zeros((64, 3)))
 
 
 def _gather() -> None:

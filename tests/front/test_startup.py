@@ -149,7 +149,7 @@ Octree.from_mesh(box(), threads=2).contains(np.asfortranarray(vertices.astype(np
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(script).splitlines()[-1].split(maxsplit=1)
-    assert int(count) == 43 and not new
+    assert int(count) == 44 and not new
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
