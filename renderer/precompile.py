@@ -75,11 +75,16 @@ def _cut() -> None:
 def _contain() -> None:
     mesh = icosphere(0)
     for accelerator in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
-        accelerator.contains([0.0, 0.0, 0.0])
+        # So many that they are put in order.
+        accelerator.contains(np.zeros((64, 3)))
 
 
 def _gather() -> None:
     Octree.from_mesh(_TRIANGLE).all_hits([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
+
+
+def _bound_errors() -> None:
+    Octree.from_mesh(_TRIANGLE).closest_hit([0.1, 0.1, 1.0], [0.0, 0.0, -1.0], t_error=True)
 
 
 def _find_nearest() -> None:
@@ -121,6 +126,7 @@ _QUERIES = (
     Part("rays that leave faces", _leave),
     Part("brute force", _search),
     Part("all hits", _gather),
+    Part("errors of t", _bound_errors),
     Part("points inside", _contain),
     Part("closest points", _find_nearest),
     Part("steps of a search", _count_steps),

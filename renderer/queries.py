@@ -86,7 +86,7 @@ class Queries:
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
         hits = closest_hits(tree, rays, mesh, self.threads)
         if flag_argument("t_error", t_error):
-            add_errors(hits, rays, np.flatnonzero(hits.hit), tree.scale)
+            add_errors(hits, rays, None, tree.scale, self.threads)
         return hits.shaped(shape)
 
     def any_hit(
@@ -147,7 +147,7 @@ class Queries:
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
         hits = all_hits(tree, rays, mesh, (contacts, max_hits), shape, self.threads)
         if flag_argument("t_error", t_error):
-            add_errors(hits, rays, hits.ray, tree.scale)
+            add_errors(hits, rays, hits.ray, tree.scale, self.threads)
         return hits
 
     def count_hits(

@@ -140,7 +140,8 @@ for points in (vertices, vertices.astype(np.float32)):
     for target in (Octree(points, np.arange(90).reshape(-1, 3)), BruteForce(points, np.arange(90).reshape(-1, 3))):
         constant = np.broadcast_to(points[0], (9, 3))
         for rays in (points, np.asfortranarray(points), points[::2], points.tolist(), constant):
-            target.closest_hit(rays, rays)
+            target.closest_hit(rays, rays, t_error=True)
+            target.all_hits(rays, rays, t_error=True)
             target.any_hit(rays, rays, t_min=0.5, t_max=np.full(len(rays), 9.0))
             target.closest_hit(rays[:9], rays[:9], leaving=np.arange(9, dtype=np.int32))
 BruteForce.from_mesh(box()).contains(vertices.tolist())
@@ -148,7 +149,7 @@ Octree.from_mesh(box(), threads=2).contains(np.asfortranarray(vertices.astype(np
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(script).splitlines()[-1].split(maxsplit=1)
-    assert int(count) == 43 and not new
+    assert int(count) == 44 and not new
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
@@ -263,6 +264,6 @@ sys.stderr = Terminal()
 assert main(["compile", "--queries"]) == 0
 shown = sys.stderr.getvalue()
 sys.stderr = sys.__stderr__
-print("brute force" in shown, "/12 " in shown)
+print("brute force" in shown, "/13 " in shown)
 """
     assert output(script).split()[-2:] == ["True", "True"]

@@ -1,0 +1,126 @@
+"""Bounds of the errors of t, for each hit from its own ray and face, found once t is known.
+
+They do not follow how t came about. What t leaves of the equation of the face's plane is computed with twice the
+digits; divided by the plane's slope along the ray it is how far t is from the plane. Where rounding may have made that
+slope, as of faces so thin that their area is lost and of rays along a face, the face's box bounds the error: the ray
+meets the face within it.
+"""
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import (
+    as_pairs,
+    cross_pairs,
+    dot_pairs,
+    heads,
+    minus,
+    power_below,
+    product,
+    scaled_difference,
+)
+from renderer.kernels.simd import get, larger, pointer, put, smaller
+from renderer.kernels.vec3 import dot, largest_component, row3, scale, sub, three
+from renderer.trace.intersect import ROOM
+
+# A product of pairs errs by 7 * 2^-106 of itself, a sum by 3 * 2^-106. So a component of the normal errs by 2^-102 of
+# its two products, and its scalar product with a vector by 2^-100 of all; the rest is room for what adds these up.
+_PAIRS = 2.0**-98
+# What vanishes of products of numbers up to 48, each by 2^-1074, and of coordinates by the tree's scale, as a share of
+# the units of ``_plane_error``: less than 2^8 times that.
+_VANISHED = 2.0**-1040
+# A corner relative to the origin and its quotient by the direction: two roundings, and as much for the terms' own.
+_ROUNDED = 2.0**-51
+# Bounds are computed with some roundings themselves. What is denormal loses up to half of the least number, 2^-1075,
+# each time that it is scaled: added where the unit changes.
+_MORE, _LEAST = 1.0 + 2.0**-20, 2.0**-1073
+_LEAST_NORMAL = 2.0**-1022
+
+
+@kernel
+def bound_errors(vertices, faces, rays, t, face, errors, bounds):
+    """Write the bounds of the errors of the hits begin:end to ``errors``; NaN where a ray hits nothing.
+
+    ``rays`` are origins, directions, each with one row for all or one each, and the ray of each hit, or no row where it
+    is the hit's own. ``bounds`` are begin, end, and the tree's scale, in whose units no product overflows.
+    """
+    origins, directions, rows = rays
+    origin_step, direction_step = 3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1)
+    corners, own = pointer(vertices), len(rows) == 0
+    begin, end, unit = bounds
+    for i in range(begin, end):
+        error, row = np.nan, get(pointer(face), i)
+        if row >= 0:
+            ray = i if own else get(pointer(rows), i)
+            o = scale(three(pointer(origins), ray * origin_step), unit)
+            d = three(pointer(directions), ray * direction_step)
+            a, b, c = row3(pointer(faces), row)
+            p0, p1, p2 = row3(corners, a), row3(corners, b), row3(corners, c)
+            p0, p1, p2, at = scale(p0, unit), scale(p1, unit), scale(p2, unit), get(pointer(t), i) * unit
+            plane, box = _plane_error(p0, p1, p2, o, d, at), _box_error(sub(p0, o), sub(p1, o), sub(p2, o), d, at)
+            # False for NaN too, of a plane of which nothing is known.
+            error = ((plane if plane < box else box) * _MORE + _LEAST) / unit + _LEAST
+        put(pointer(errors), i, error)
+
+
+@kernel
+def _plane_error(p0, p1, p2, o, d, t):
+    """How far t may be from where a ray meets a face's plane, inf where rounding may have made that.
+
+    With n the plane's normal, t is off by (n . (p0 - o) - t n . d) / (n . d). Sides, distances and the direction are
+    scaled by powers of two to less than 4, so that no product overflows.
+    """
+    reach = larger(largest_component(sub(p0, o)), larger(largest_component(sub(p1, o)), largest_component(sub(p2, o))))
+    side = larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
+    far, side = power_below(larger(reach, _LEAST_NORMAL)), power_below(larger(side, _LEAST_NORMAL))
+    unit = power_below(largest_component(d))
+    corner, d, t = scaled_difference(p0, o, 1.0 / far), scale(d, 1.0 / unit), t * unit / far
+    one, other = scaled_difference(p1, p0, 1.0 / side), scaled_difference(p2, p0, 1.0 / side)
+    normal, sizes = cross_pairs(one, other), _cross_sizes(_sizes(heads(one)), _sizes(heads(other)))
+    slope = dot_pairs(normal, as_pairs(d))
+    left = minus(dot_pairs(normal, corner), product(slope, (t, 0.0)))[0]
+    vanished = _VANISHED / smaller(1.0, smaller(far, side))
+    slope_error = _PAIRS * dot(sizes, _sizes(d)) + vanished
+    left_error = _PAIRS * dot(sizes, _sizes(heads(corner))) + vanished + t * slope_error
+    least = abs(slope[0]) - slope_error
+    return ((abs(left) + left_error) / least * far + _LEAST) / unit if least > 0.0 else np.inf
+
+
+@inlined
+def _sizes(a):
+    """The components of a vector without their signs."""
+    return abs(a[0]), abs(a[1]), abs(a[2])
+
+
+@inlined
+def _cross_sizes(a, b):
+    """For each component of a vector product the sizes of its two products together; a and b without signs."""
+    return a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]
+
+
+@kernel
+def _box_error(q0, q1, q2, d, t):
+    """How far t may be from where a ray meets a face, whose corners are relative to the origin, by the face's box.
+
+    The box is wider than the face by ROOM, so that a ray that passes a face by only by rounding meets its plane within,
+    if it is not nearly in the plane. Where it passes the box by, the box's planes across its longest component count.
+    """
+    largest, first, last, before, behind = 0.0, -np.inf, np.inf, -np.inf, np.inf
+    for k in range(3):
+        near, far = _meet_slab(smaller(q0[k], smaller(q1[k], q2[k])), larger(q0[k], larger(q1[k], q2[k])), d[k])
+        if abs(d[k]) > largest:
+            largest, before, behind = abs(d[k]), near, far
+        first, last = larger(first, near), smaller(last, far)
+    if first > last:
+        first, last = before, behind
+    return larger(abs(t - first), abs(last - t))
+
+
+@inlined
+def _meet_slab(low, high, d):
+    """From which t to which a ray from 0 may be between two planes, or ROOM beside them."""
+    room = (high - low) * ROOM + _LEAST
+    low, high = low - (room + abs(low) * _ROUNDED), high + (room + abs(high) * _ROUNDED)
+    if d == 0.0:
+        return -np.inf, np.inf
+    return (low / d, high / d) if d > 0.0 else (high / d, low / d)
