@@ -55,8 +55,8 @@ def no_turn():
 def add_blocks(tree, first, count, point, total, parts):
     """``total`` and the angles of the faces of some blocks, seen from ``point``; ``parts`` is memory for an expansion.
 
-    A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products of coordinates leave
-    float64's range, which takes some as unlike as 1 and 2^-500.
+    A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products that tell a face
+    leave float64's range, for which it takes coordinates as unlike as 1 and 2^-300.
     """
     real, imaginary, turns, apart = total
     for block in range(first, first + count):

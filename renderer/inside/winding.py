@@ -61,7 +61,7 @@ def _search_in_order(
 ) -> None:
     """Fill ``numbers`` by ``search(some, out, stack, begin, end)``, which returns the row before which it ended.
 
-    Where it leaves NaN, which is very rare, exact arithmetic tells the faces that float64 cannot.
+    Where it leaves NaN, rational arithmetic tells the faces that float64 cannot.
     """
     step = _STEP if tree.has_nodes else min(_STEP, rays_against_blocks(tree))
 

@@ -24,8 +24,9 @@ _FIRST_SIDE, _NEXT_SIDE = 1.0, 2.0**-4
 def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
     """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``.
 
-    NaN is what float64's range does not hold, which is for rational arithmetic to tell. ``rows`` is what ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns the row
-    before which it ended: early where a sum over all of many faces took long.
+    They are NaN where float64's range does not hold what tells them, see ``add_blocks``. ``rows`` is what
+    ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns the row before which it
+    ended: early where a sum over all of many faces took long.
     """
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
     for i in range(begin, end):
