@@ -38,7 +38,7 @@ def careful_angle(a, b, c, p, parts):
 
     It is 0 for a point on the face: the mean of its two sides.
     """
-    if farthest(a, p) == 0.0 or farthest(b, p) == 0.0 or farthest(c, p) == 0.0:
+    if _farthest(a, p) == 0.0 or _farthest(b, p) == 0.0 or _farthest(c, p) == 0.0:
         return 0.0
     x, y, z = _direction(a, p), _direction(b, p), _direction(c, p)
     xy, yz, zx = dot(x, y), dot(y, z), dot(z, x)
@@ -63,22 +63,18 @@ def _angle_at(corners, x, y, z, parts):
         side = volume_sign(a, b, c, p, parts)
         if side == 0 or side == UNDECIDED:
             return 0.0 if side == 0 else np.nan
-    return angle_of(side * sine, dot(m, n), x, y, z)
+    return math.atan2(side * sine, dot(m, n) + _cotangent(x, y) * _cotangent(x, z))
 
 
 @kernel
-def angle_of(sine, cosine, x, y, z):
-    """Half the solid angle, by sine and cosine of the face's angle at the corner in direction x; y, z: to the others.
-
-    The cotangents are 2 at most, as the angles between these directions are 54 degrees at least.
-    """
-    first, second = length(cross(x, y)) / (1.0 - dot(x, y)), length(cross(x, z)) / (1.0 - dot(x, z))
-    return math.atan2(sine, cosine + first * second)
+def _cotangent(x, y):
+    """The cotangent of half the angle between two directions; 2 at most, as that angle is 54 degrees at least."""
+    return length(cross(x, y)) / (1.0 - dot(x, y))
 
 
 @kernel
 def _normal(a, b, p, parts):
-    """The direction of (a - p) x (b - p); NaN or 0 where that is 0, and NaN where products leave float64's range."""
+    """The direction of (a - p) x (b - p); NaN where that is 0 and where products leave float64's range."""
     m = heads(cross_pairs(_near_one(a, p), _near_one(b, p)))
     if _largest(m) < _LEAST_PRODUCT:
         # Digits that cancel: their exact sum.
@@ -115,7 +111,7 @@ def _largest(v):
 
 
 @inlined
-def farthest(a, p):
+def _farthest(a, p):
     """The largest component of a - p without its sign."""
     return larger(larger(abs(a[0] - p[0]), abs(a[1] - p[1])), abs(a[2] - p[2]))
 
@@ -130,4 +126,4 @@ def _direction(a, p):
 @inlined
 def _near_one(a, p):
     """a - p times a power of two that brings its largest component near 1, which changes no angle."""
-    return scaled_difference(a, p, 1.0 / power_below(larger(farthest(a, p), _TINIEST)))
+    return scaled_difference(a, p, 1.0 / power_below(larger(_farthest(a, p), _TINIEST)))

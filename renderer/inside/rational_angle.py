@@ -2,14 +2,15 @@
 
 import math
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.inside.careful_angle import PLAIN, angle_of
+from renderer.inside.careful_angle import PLAIN
 
-_Exact = tuple[Fraction, Fraction, Fraction]
-_Direction = tuple[float, float, float]
+# Of fractions, or of float64.
+_Vector = tuple[Any, Any, Any]
 # Coordinates whose differences may overflow, and what they are multiplied by then.
 _HUGE, _LESS = 2.0**1000, 2.0**-10
 
@@ -40,24 +41,29 @@ def _angle(point: NDArray[np.float64], triangle: NDArray[np.float64]) -> float:
     volume = _dot(a, _cross(b, c))
     if volume == 0:
         return 0.0
-    between = [float(np.dot(_direction(u), _direction(v))) for u, v in ((b, c), (c, a), (a, b))]
+    between = [_dot(_direction(u), _direction(v)) for u, v in ((b, c), (c, a), (a, b))]
     first = between.index(max(between))
     a, b, c = (a, b, c, a, b)[first : first + 3]
     m, n = _direction(_cross(a, b)), _direction(_cross(a, c))
-    sine = math.hypot(m[1] * n[2] - m[2] * n[1], m[2] * n[0] - m[0] * n[2], m[0] * n[1] - m[1] * n[0])
-    cosine = m[0] * n[0] + m[1] * n[1] + m[2] * n[2]
-    return float(angle_of(sine if volume > 0 else -sine, cosine, _direction(a), _direction(b), _direction(c)))
+    x, y, z = _direction(a), _direction(b), _direction(c)
+    sine = math.hypot(*_cross(m, n))
+    return math.atan2(sine if volume > 0 else -sine, _dot(m, n) + _cotangent(x, y) * _cotangent(x, z))
 
 
-def _cross(a: _Exact, b: _Exact) -> _Exact:
+def _cotangent(x: _Vector, y: _Vector) -> float:
+    """The cotangent of half the angle between two directions."""
+    return math.hypot(*_cross(x, y)) / (1.0 - _dot(x, y))
+
+
+def _cross(a: _Vector, b: _Vector) -> _Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _dot(a: _Exact, b: _Exact) -> Fraction:
+def _dot(a: _Vector, b: _Vector) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _direction(a: _Exact) -> _Direction:
+def _direction(a: _Vector) -> _Vector:
     """A vector made of size one; it is not 0."""
     largest = max(abs(x) for x in a)
     x, y, z = (float(x / largest) for x in a)
