@@ -261,7 +261,7 @@ class Queries:
         as what that may leave out stays below the tolerance. Rounding adds 2^-44 at most for each face that counts
         alone. The same bits for any number of threads; those of ``BruteForce``, which sums over all faces, differ by
         the tolerance. Raises ``ValueError`` naming argument and row. The first call takes some time to sum up the faces
-        of each octant.
+        of each octant, and a point some milliseconds whose coordinates, or the mesh's, are as unlike as 1 and 2^-300.
 
         Sources: Jacobson et al., Robust Inside-Outside Segmentation, 2013; Barill et al., Fast Winding Numbers, 2018.
 

@@ -9,20 +9,11 @@ faces.
 import math
 from typing import Any, NamedTuple
 
+from renderer.inside.careful_angle import careful_angle
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import (
-    cross_pairs,
-    dot_pairs,
-    length_pair,
-    plus,
-    power_below,
-    product,
-    scaled_difference,
-)
 from renderer.kernels.simd import (
     extract,
     get,
-    larger,
     lowest_bit,
     magnitude,
     movemask,
@@ -30,7 +21,6 @@ from renderer.kernels.simd import (
     splat4,
     square_root,
 )
-from renderer.points.signs import UNDECIDED, volume_sign
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.sides import corner
@@ -41,9 +31,8 @@ from renderer.trace.sides import corner
 _LEAST_SQUARE = 2.0**-10
 # A volume above it has its true sign, which tells both sides of the face apart.
 _LEAST_VOLUME = 2.0**-46
-# Of the volume with twice the digits, which errs by 2^-96.
-_LEAST_CAREFUL = 2.0**-90
-_TINIEST = 2.0**-1000
+# The sum of three inverse distances, of corners from the point, below which no square has lost digits to underflow.
+_NEAREST = 2.0**450
 _TURN = 2.0 * math.pi
 
 
@@ -66,7 +55,8 @@ def no_turn():
 def add_blocks(tree, first, count, point, total, parts):
     """``total`` and the angles of the faces of some blocks, seen from ``point``; ``parts`` is memory for an expansion.
 
-    A face that the point lies on, or is nearer to than 2^-900 of its size, counts 0: the mean of its two sides.
+    A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products that tell a face
+    leave float64's range, for which it takes coordinates as unlike as 1 and 2^-300.
     """
     real, imaginary, turns, apart = total
     for block in range(first, first + count):
@@ -99,22 +89,23 @@ def _see_block(tree, base, point):
     """The real and imaginary parts of four faces' numbers, and the mask of those that are sure."""
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, point)
     px, py, pz = splat4(point.x), splat4(point.y), splat4(point.z)
-    x0, y0, z0 = _direction(x0 - px, y0 - py, z0 - pz)
-    x1, y1, z1 = _direction(x1 - px, y1 - py, z1 - pz)
-    x2, y2, z2 = _direction(x2 - px, y2 - py, z2 - pz)
+    x0, y0, z0, share0 = _direction(x0 - px, y0 - py, z0 - pz)
+    x1, y1, z1, share1 = _direction(x1 - px, y1 - py, z1 - pz)
+    x2, y2, z2, share2 = _direction(x2 - px, y2 - py, z2 - pz)
     volume = x0 * (y1 * z2 - z1 * y2) + y0 * (z1 * x2 - x1 * z2) + z0 * (x1 * y2 - y1 * x2)
     rest = (splat4(1.0) + (x0 * x1 + y0 * y1 + z0 * z1)) + (
         (x1 * x2 + y1 * y2 + z1 * z2) + (x2 * x0 + y2 * y0 + z2 * z0)
     )
     # Of an unused place all is NaN, and of a corner at the point, so neither is sure.
     away = volume * volume + rest * rest >= splat4(_LEAST_SQUARE)
+    away = away & ((share0 + share1) + share2 <= splat4(_NEAREST))
     return rest, volume, away & ((rest > splat4(0.0)) | (magnitude(volume) > splat4(_LEAST_VOLUME)))
 
 
 @inlined
 def _direction(x, y, z):
     share = splat4(1.0) / square_root(x * x + y * y + z * z)
-    return x * share, y * share, z * share
+    return x * share, y * share, z * share, share
 
 
 @inlined
@@ -132,30 +123,6 @@ def _times(real, imaginary, turns, a, b):
 
 @kernel
 def _careful_angle(tree, place, point, parts):
-    """Half the solid angle of one face with twice the digits, on the side that the exact sign of its volume says."""
+    """Half the solid angle of one face to float64's digits, however near to the point its edges are."""
     p = point.x, point.y, point.z
-    a, b, c = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
-    if _farthest(a, p) == 0.0 or _farthest(b, p) == 0.0 or _farthest(c, p) == 0.0:
-        return 0.0
-    x, y, z = _near_one(a, p), _near_one(b, p), _near_one(c, p)
-    volume = dot_pairs(x, cross_pairs(y, z))[0]
-    if abs(volume) < _LEAST_CAREFUL:
-        side = volume_sign(a, b, c, p, parts)
-        if side == 0 or side == UNDECIDED:
-            return 0.0
-        volume = side * abs(volume)
-    i, j, k = length_pair(x), length_pair(y), length_pair(z)
-    rest = plus(product(product(i, j), k), product(dot_pairs(x, y), k))
-    rest = plus(rest, plus(product(dot_pairs(y, z), i), product(dot_pairs(z, x), j)))
-    return math.atan2(volume, rest[0])
-
-
-@inlined
-def _farthest(a, p):
-    return larger(larger(abs(a[0] - p[0]), abs(a[1] - p[1])), abs(a[2] - p[2]))
-
-
-@inlined
-def _near_one(a, p):
-    """a - p times a power of two that brings its largest component near 1, which changes no angle."""
-    return scaled_difference(a, p, 1.0 / power_below(larger(_farthest(a, p), _TINIEST)))
+    return careful_angle(corner(tree, place), corner(tree, place + 12), corner(tree, place + 24), p, parts)

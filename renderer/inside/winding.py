@@ -1,7 +1,6 @@
 """Winding numbers of any mesh around points: checks at the boundary, chunks on threads."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.arrays import real_argument
 from renderer.errors import expect
 from renderer.inside.moments import moments_of
+from renderer.inside.rational_angle import number_of
 from renderer.inside.winding_search import exceed_half, sum_windings
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points
@@ -33,7 +33,7 @@ def winding_number(
     expect(0.0 <= limit < np.inf, "tolerance", "a finite number from 0", limit)
     moments, numbers = moments_of(tree, threads), np.empty(len(rows))
 
-    def search(some: Floats, out: NDArray[Any], stack: NDArray[np.int64], begin: int, end: int) -> int:
+    def search(some: Floats, out: Floats, stack: NDArray[np.int64], begin: int, end: int) -> int:
         return int(sum_windings(tree.words, moments, some, limit, out, stack, begin, end))
 
     _search_in_order(search, tree, mesh, rows, numbers, threads)
@@ -42,31 +42,38 @@ def winding_number(
 
 def exceeds_half(tree: Tree, mesh: Mesh, rows: NDArray[np.float64], threads: int) -> NDArray[np.bool_]:
     """Whether the winding numbers around points (n, 3) are above 1/2, (n,)."""
-    moments, above = moments_of(tree, threads), np.empty(len(rows), np.bool_)
+    moments, numbers = moments_of(tree, threads), np.empty(len(rows))
 
-    def search(some: Floats, out: NDArray[Any], stack: NDArray[np.int64], begin: int, end: int) -> int:
+    def search(some: Floats, out: Floats, stack: NDArray[np.int64], begin: int, end: int) -> int:
         return int(exceed_half(tree.words, moments, some, out, stack, begin, end))
 
-    _search_in_order(search, tree, mesh, rows, above, threads)
-    return above
+    _search_in_order(search, tree, mesh, rows, numbers, threads)
+    return numbers > 0.5
 
 
 def _search_in_order(
-    search: Callable[[Floats, NDArray[Any], NDArray[np.int64], int, int], int],
+    search: Callable[[Floats, Floats, NDArray[np.int64], int, int], int],
     tree: Tree,
     mesh: Mesh,
     points: Floats,
-    answers: NDArray[Any],
+    numbers: Floats,
     threads: int,
 ) -> None:
-    """Fill ``answers`` by ``search(some, out, stack, begin, end)``, which returns the row before which it ended."""
+    """Fill ``numbers`` by ``search(some, out, stack, begin, end)``, which returns the row before which it ended.
+
+    Where it leaves NaN, rational arithmetic tells the faces that float64 cannot.
+    """
     step = _STEP if tree.has_nodes else min(_STEP, rays_against_blocks(tree))
 
     def find(rows: NDArray[np.int64], some: Floats) -> Iterator[None]:
-        stack, found, done = np.empty(stack_size(tree.depth), np.int64), np.empty(len(some), answers.dtype), 0
+        stack, found, done = np.empty(stack_size(tree.depth), np.int64), np.empty(len(some)), 0
         while done < len(some):
             done = search(some, found, stack, done, min(done + step, len(some)))
             yield
-        answers[rows] = found
+        numbers[rows] = found
 
     ask_in_order(find, points, mesh, None, step, threads)
+    untold = np.flatnonzero(np.isnan(numbers))
+    triangles = mesh.triangles if len(untold) else np.empty((0, 3, 3))
+    for row in untold:
+        numbers[row] = number_of(points[row], triangles)

@@ -24,13 +24,17 @@ _FIRST_SIDE, _NEXT_SIDE = 1.0, 2.0**-4
 def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
     """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``.
 
-    ``rows`` is what ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns the row
-    before which it ended: early where a sum over all of many faces took long.
+    They are NaN where float64's range does not hold what tells them, see ``add_blocks``. ``rows`` is what
+    ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns the row before which it
+    ended: early where a sum over all of many faces took long.
     """
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
     for i in range(begin, end):
-        point = _point_at(tree, at(pointer(points), 3 * i))
+        row = at(pointer(points), 3 * i)
+        point = _point_at(tree, row)
         number, bound, share = 0.0, np.inf, _FIRST * tolerance
+        if not _is_held(tree, row, point):
+            number, bound = np.nan, 0.0
         while bound > tolerance and share > ROUNDING and tree.has_nodes:
             number, bound = _search(tree, rows, point, share, stack, parts)
             share *= smaller(_LESS, _AIM * tolerance / bound)
@@ -44,17 +48,20 @@ def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
 
 @kernel
 def exceed_half(words, rows, points, out, stack, begin, end):
-    """Write whether winding numbers exceed 1/2 to ``out`` (n,) bool; arguments and return value as above."""
+    """Write numbers above 1/2 where winding numbers are, and else others, to ``out`` (n,); all else as above."""
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
     for i in range(begin, end):
-        point = _point_at(tree, at(pointer(points), 3 * i))
+        row = at(pointer(points), 3 * i)
+        point = _point_at(tree, row)
         number, bound, share = 0.5, 0.0, _FIRST_SIDE
+        if not _is_held(tree, row, point):
+            number = np.nan
         while abs(number - 0.5) <= bound and share > ROUNDING and tree.has_nodes:
             number, bound = _search(tree, rows, point, share, stack, parts)
             share *= _NEXT_SIDE
-        out[i] = number > 0.5
+        out[i] = number
         if abs(number - 0.5) <= bound:
-            out[i] = _all_faces(tree, point, parts) > 0.5
+            out[i] = _all_faces(tree, point, parts)
             if tree.count > _MANY:
                 return i + 1
     return end
@@ -64,6 +71,17 @@ def exceed_half(words, rows, points, out, stack, begin, end):
 def _point_at(tree, row):
     x, y, z = tree.scale * get(row, 0), tree.scale * get(row, 1), tree.scale * get(row, 2)
     return Point(0, 4, 8, _within(x), _within(y), _within(z))
+
+
+@inlined
+def _is_held(tree, row, point):
+    """Whether the tree's units hold a point exactly; far away they need not."""
+    return _keeps(tree, get(row, 0), point.x) & _keeps(tree, get(row, 1), point.y) & _keeps(tree, get(row, 2), point.z)
+
+
+@inlined
+def _keeps(tree, x, scaled):
+    return abs(scaled) >= 1.0 or scaled / tree.scale == x
 
 
 @inlined

@@ -18,7 +18,7 @@ def area_sign(a, b, p, parts):
     """The sign of (a - p) x (b - p) of points (x, y), 1, 0, -1, or UNDECIDED; ``parts`` is memory for an expansion."""
     count = expand_area(a, b, p, parts)
     if count == OUT_OF_RANGE:
-        x, y = _balance(a[0], b[0], b[0], p[0]), _balance(a[1], b[1], b[1], p[1])
+        x, y = balance(a[0], b[0], b[0], p[0]), balance(a[1], b[1], b[1], p[1])
         count = expand_area((a[0] * x, a[1] * y), (b[0] * x, b[1] * y), (p[0] * x, p[1] * y), parts)
     return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
 
@@ -28,13 +28,13 @@ def volume_sign(a, b, c, p, parts):
     """The sign of (a - p) . ((b - p) x (c - p)), as of ``area_sign``."""
     count = expand_volume(a, b, c, p, parts)
     if count == OUT_OF_RANGE:
-        s = _balance(a[0], b[0], c[0], p[0]), _balance(a[1], b[1], c[1], p[1]), _balance(a[2], b[2], c[2], p[2])
-        count = expand_volume(_stretched(a, s), _stretched(b, s), _stretched(c, s), _stretched(p, s), parts)
+        s = balance(a[0], b[0], c[0], p[0]), balance(a[1], b[1], c[1], p[1]), balance(a[2], b[2], c[2], p[2])
+        count = expand_volume(stretched(a, s), stretched(b, s), stretched(c, s), stretched(p, s), parts)
     return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
 
 
 @kernel
-def _balance(a, b, c, d):
+def balance(a, b, c, d):
     """The power of two by which an axis is stretched, which turns no sign, so that its least and largest coordinates
     are as far from 1: beside one of 1e-310 products with one of 1 are in range then.
     """
@@ -45,7 +45,8 @@ def _balance(a, b, c, d):
 
 
 @inlined
-def _stretched(a, s):
+def stretched(a, s):
+    """A point whose axes are stretched."""
     return a[0] * s[0], a[1] * s[1], a[2] * s[2]
 
 

@@ -68,8 +68,6 @@ def test_around_closed_meshes_it_is_the_exact_integer(name):
     """At points anywhere, in planes of corners, and one ulp beside corners, edges and faces."""
     mesh = SOLIDS[name]
     points = points_at(mesh, np.random.default_rng(11), 8)
-    # Nearer than 2^-900 a point counts as on a face, so 5e-324 becomes 0.
-    points[np.abs(points) < 1e-300] = 0.0
     exact = winding_numbers(mesh, points)
     on = np.array([number is None for number in exact])
     numbers = np.array([0 if number is None else number for number in exact])
@@ -78,6 +76,82 @@ def test_around_closed_meshes_it_is_the_exact_integer(name):
         np.testing.assert_allclose(accelerator.winding_number(points, 0)[~on], numbers[~on], rtol=0, atol=1e-11)
         np.testing.assert_array_equal(accelerator.contains(points, winding=True), (numbers > 0) | on)
         np.testing.assert_array_equal(accelerator.contains(points, False, winding=True), (numbers > 0) & ~on)
+
+
+def check_numbers(vertices, faces, points, expected):
+    """Winding numbers within their rounding, and sides, of points off the surface of a closed mesh."""
+    expected = np.asarray(expected)
+    for accelerator in (Octree(vertices, faces), BruteForce(vertices, faces), Octree(vertices, faces, leaf_size=1)):
+        for tolerance in (0.0, 1e-3):
+            error = np.abs(accelerator.winding_number(points, tolerance) - expected)
+            assert error.max() <= tolerance + ROUNDING * len(faces)
+        np.testing.assert_array_equal(accelerator.contains(points, winding=True), expected > 0.5)
+        distance = accelerator.signed_distance(points, winding=True)
+        np.testing.assert_array_equal(np.sign(distance), np.where(expected > 0.5, -1, 1))
+
+
+@pytest.mark.parametrize("wide", [1e-10, 1e-15, 1e-20, 1e-60])
+def test_in_and_around_needles(wide):
+    """Boxes a thousandth or less of a rounding wide: from within, all long edges are near at once."""
+    rng, size = np.random.default_rng(0), np.array([wide, 1.0, wide])
+    inside = rng.uniform(-0.9, 0.9, (100, 3))
+    outside = rng.uniform(1.1, 3, (100, 3)) * rng.choice([-1, 1], (100, 3))
+    beside = np.where(np.arange(3) == 1, inside, outside)
+    points = np.concatenate([[[0.0, 0.0, 0.0]], inside, outside, beside]) * size
+    cube = box((-1, -1, -1), (1, 1, 1))
+    check_numbers(cube.vertices * size, cube.faces, points, np.repeat([1, 0], [101, 200]))
+
+
+@pytest.mark.parametrize("bits", [60, 80, 100, 150, 500, 530, 600, 700, 900, 1000, 1060])
+def test_at_any_nearness_to_edges_and_corners(bits):
+    d = 2.0**-bits
+    within = [
+        [0.3, d, d],
+        [0.3, d, 1.75 * d],
+        [d, 1.25 * d, 0.75 * d],
+        [d, d, d],
+        [0.25, 0.5, d],
+        [d, 0.75, 1.0 - 2**-53],
+    ]
+    without = [[0.3, -d, 1.75 * d], [0.7, -d, -0.5 * d], [-d, d, d], [-d, -d, -1.5 * d], [0.25, 0.5, -d]]
+    check_numbers(box().vertices, box().faces, within + without, np.repeat([1, 0], [len(within), len(without)]))
+
+
+def test_at_coordinates_that_the_trees_units_do_not_hold():
+    size, d = 2.0**1000, 2.0**-80
+    points = [[0.25 * size, d, d], [d, 1.5 * d, d], [0.25 * size, -d, d], [-d, d, d], [5e307, d, -5e307]]
+    check_numbers(box().vertices * size, box().faces, points, [1, 1, 0, 0, 0])
+
+
+@pytest.mark.parametrize("bits", [54, 80, 100, 200, 600])
+def test_near_an_edge_askew(bits):
+    """An edge through the origin along no axis: the exact sides of the two faces that meet there tell."""
+    vertices = np.array([[-3.0, -1, -2], [3, 1, 2], [0.5, 3, 0], [0.25, 1, 3]])
+    faces = np.array([[0, 1, 2], [1, 0, 3], [2, 1, 3], [0, 2, 3]])
+    points = np.random.default_rng(0).uniform(-1, 1, (100, 3)) * 2.0**-bits
+    mesh = Mesh(vertices, faces)
+    expected = winding_numbers(mesh, points)
+    if min(expected) < 0:
+        mesh, expected = Mesh(vertices, faces[:, ::-1]), [-number for number in expected]
+    assert 10 < sum(expected) < 90
+    check_numbers(mesh.vertices, mesh.faces, points, expected)
+
+
+def test_beside_a_sliver_of_one_rounding():
+    third, most = 0.3333333333333333, 0.9999999999999996
+    vertices = [[0.33333333333333354, third, 1.0], [0.33333333333333354, third, most]]
+    vertices += [[most, 0.09999999999999956, -0.7000000000000002], [most, 0.9999999999999998, third]]
+    faces = np.array([[0, 1, 2], [2, 1, 3], [0, 2, 3], [1, 0, 3]])
+    check_numbers(vertices, faces, [[0.6666666666666665, 0.21666666666666645, 0.1499999999999997]], [0])
+
+
+def test_in_the_planes_of_faces_nearer_than_products_hold():
+    """On a face a point counts the mean of its sides, also where rational arithmetic tells so."""
+    d = 2.0**-900
+    points = [[d, d, 0.0], [d, 0.0, 0.0], [0.0, 0.0, 0.0], [-d, d, 0.0]]
+    for accelerator in (Octree.from_mesh(box()), BruteForce.from_mesh(box())):
+        numbers = accelerator.winding_number(points, 0)
+        np.testing.assert_allclose(numbers, [0.5, 0.25, 0.125, 0.0], rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("mesh", [icosphere(4), torus()], ids=["ball", "torus"])
