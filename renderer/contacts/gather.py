@@ -34,7 +34,7 @@ _T, _U, _V, _W, OUT_T, OUT_U, OUT_V, DOUBLE_ROWS = range(8)
 _FACE, _AT, _EDGES, _ORDER, OUT_FACE, INTEGER_ROWS = range(6)
 _MERGED = -1
 # The hits and rounds of rays in a call, some 10 ms, so that Ctrl-C need not wait for long.
-_WORK = 1 << 17
+_WORK = 1 << 16
 
 
 class Found(NamedTuple):

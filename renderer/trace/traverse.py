@@ -36,7 +36,7 @@ from renderer.trace.stream import (
 _SPREAD = 0.125
 # The rounds of lanes in a call, beside those of the rays under way then: some 10 ms, so that Ctrl-C need not wait for
 # long. A chunk of rays takes fewer on most meshes, and is not cut.
-_WORK = 1 << 16
+_WORK = 1 << 15
 
 
 class Scratch(NamedTuple):
