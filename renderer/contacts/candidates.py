@@ -5,6 +5,8 @@ A block is listed where the ray passes some face's edges on the same side; where
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, get, movemask, put, smaller
 from renderer.trace.intersect import see_triangles
@@ -17,6 +19,8 @@ from renderer.trace.traverse import load_lane
 # meshes meet. A ray that meets more is searched for alone.
 TOGETHER, LISTED = 256, 32
 CANDIDATE_WORDS = TOGETHER * (LISTED + 1)
+# The rounds of sixteen rays after which no further ray begins: some milliseconds, several times what most meshes take.
+_ROUNDS = 1 << 13
 
 
 class Candidates(NamedTuple):
@@ -34,8 +38,11 @@ def make_candidates(words):
 
 @kernel
 def find_blocks(tree, rays, begin, end, scratch, found):
-    """List the blocks that the rays begin:end may hit, at most TOGETHER rays."""
-    prepared, lanes = scratch.prepared, scratch.lanes
+    """List the blocks that the rays from ``begin`` on may hit, at most TOGETHER rays.
+
+    Returns the ray before which it ended, ``end`` unless there was much to do, and the number of rounds.
+    """
+    prepared, lanes, rounds = scratch.prepared, scratch.lanes, np.int64(0)
     for k in range(end - begin):
         put(found.counts, k, 0)
     nodes, leaves = smaller(end - begin, WIDTH), 0
@@ -44,6 +51,7 @@ def find_blocks(tree, rays, begin, end, scratch, found):
         load_lane(rays, scratch, r, begin + r)
         put(lanes.at_node, r, r)
     while nodes + leaves > 0:
+        rounds += 1
         meet_nodes(tree, prepared, lanes, nodes)
         entered, nodes = nodes, 0
         for k in range(entered):
@@ -59,11 +67,12 @@ def find_blocks(tree, rays, begin, end, scratch, found):
                     _list_block(found, get(scratch.number, r) - begin, ~child >> LEAF_BITS)
                 child = leave_leaf(tree, prepared, lanes, r)
             if child == END:
-                if following == end:
+                if following == end or rounds > _ROUNDS:
                     continue
                 load_lane(rays, scratch, r, following)
                 following, child = following + 1, 0
             nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
+    return following, rounds
 
 
 @inlined

@@ -33,6 +33,8 @@ from renderer.trace.traverse import make_scratch
 _T, _U, _V, _W, OUT_T, OUT_U, OUT_V, DOUBLE_ROWS = range(8)
 _FACE, _AT, _EDGES, _ORDER, OUT_FACE, INTEGER_ROWS = range(6)
 _MERGED = -1
+# The hits and rounds of rays in a call, some 10 ms, so that Ctrl-C need not wait for long.
+_WORK = 1 << 16
 
 
 class Found(NamedTuple):
@@ -57,8 +59,8 @@ def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, memory)
     doubles   (DOUBLE_ROWS, capacity) float64, integers (INTEGER_ROWS, capacity) int64: memory, and what is kept
     memory    a ``traverse.Memory`` for CANDIDATE_WORDS rays
 
-    Returns the ray before which it ended because the memory was full, or bounds[1]; and the row of a ray out of range,
-    for which nothing is gathered, or -1.
+    Returns the ray before which it ended, because the memory was full or after _WORK, or bounds[1]; and the row of a
+    ray out of range, for which nothing is gathered, or -1.
     """
     tree = tree_pointers(words)
     source, found = ray_pointers(rays, tree.scale), Found(pointer(doubles), pointer(integers), doubles.shape[1])
@@ -68,20 +70,24 @@ def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, memory)
     merge, most, keep = choice
     scratch = make_scratch(memory)
     candidates = make_candidates(scratch.waiting)
-    for begin in range(bounds[0], bounds[1], TOGETHER):
-        end = smaller(begin + TOGETHER, bounds[1])
+    begin, hits, rounds = bounds[0], np.int64(0), np.int64(0)
+    # Where the candidates of rays were found, they are used: only hits end it between such rays.
+    while begin < bounds[1] and hits + rounds <= _WORK:
+        end, taken = smaller(begin + TOGETHER, bounds[1]), np.int64(0)
         if tree.has_nodes:
-            find_blocks(tree, source, begin, end, scratch, candidates)
+            end, taken = find_blocks(tree, source, begin, end, scratch, candidates)
+        rounds += taken
         for i in range(begin, end):
             count = _list_all(tree, source, i, candidates, i - begin, found, scratch.packet_stack)
-            if kept + count > found.capacity:
+            if kept + count > found.capacity or hits > _WORK:
                 return i, -1
+            hits += count
             counts[i] = smaller(_ordered(tree, found, count, merge, keep), most)
             if keep:
                 _keep(found, kept, counts[i], tree.scale)
-            # Where hits are counted only, so that a chunk ends after some work, and Ctrl-C need not wait for long.
-            kept += count if not keep else counts[i]
-    return bounds[1], -1
+                kept += counts[i]
+        begin = end
+    return begin, -1
 
 
 @kernel

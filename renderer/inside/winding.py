@@ -18,8 +18,8 @@ from renderer.trace.query import rays_against_blocks
 from renderer.trace.singly import stack_size
 
 Floats = NDArray[np.float64]
-# Points between two looks at Ctrl-C: some milliseconds of search.
-_STEP = 512
+# The fewest points of a chunk: some milliseconds of search.
+_LEAST = 512
 
 
 def winding_number(
@@ -63,16 +63,16 @@ def _search_in_order(
 
     Where it leaves NaN, rational arithmetic tells the faces that float64 cannot.
     """
-    step = _STEP if tree.has_nodes else min(_STEP, rays_against_blocks(tree))
+    least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))
 
     def find(rows: NDArray[np.int64], some: Floats) -> Iterator[None]:
         stack, found, done = np.empty(stack_size(tree.depth), np.int64), np.empty(len(some)), 0
         while done < len(some):
-            done = search(some, found, stack, done, min(done + step, len(some)))
+            done = search(some, found, stack, done, len(some))
             yield
         numbers[rows] = found
 
-    ask_in_order(find, points, mesh, None, step, threads)
+    ask_in_order(find, points, mesh, None, least, threads)
     untold = np.flatnonzero(np.isnan(numbers))
     triangles = mesh.triangles if len(untold) else np.empty((0, 3, 3))
     for row in untold:

@@ -10,8 +10,9 @@ from renderer.limits import FARTHEST
 from renderer.points.point import Point
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
 
-# Blocks whose sum takes a tenth of a millisecond, beside which a return to Python costs nothing.
-_MANY = 1 << 12
+# The nodes and blocks that a call sums, beside those of one point: some milliseconds, so that Ctrl-C need not wait for
+# long.
+_WORK = 1 << 16
 # The share with which a search for a tolerance begins: the bounds add up to about the tolerance around a closed mesh.
 _FIRST = 2.0
 # The next share aims at so much of the tolerance, and is at most half of the last.
@@ -26,9 +27,10 @@ def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
 
     They are NaN where float64's range does not hold what tells them, see ``add_blocks``. ``rows`` is what
     ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns the row before which it
-    ended: early where a sum over all of many faces took long.
+    ended: early after _WORK.
     """
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
+    work = np.int64(0)
     for i in range(begin, end):
         row = at(pointer(points), 3 * i)
         point = _point_at(tree, row)
@@ -36,13 +38,15 @@ def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
         if not _is_held(tree, row, point):
             number, bound = np.nan, 0.0
         while bound > tolerance and share > ROUNDING and tree.has_nodes:
-            number, bound = _search(tree, rows, point, share, stack, parts)
+            number, bound, steps = _search(tree, rows, point, share, stack, parts)
+            work += steps
             share *= smaller(_LESS, _AIM * tolerance / bound)
         out[i] = number
         if bound > tolerance:
             out[i] = _all_faces(tree, point, parts)
-            if tree.count > _MANY:
-                return i + 1
+            work += tree.count
+        if work > _WORK:
+            return i + 1
     return end
 
 
@@ -50,6 +54,7 @@ def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
 def exceed_half(words, rows, points, out, stack, begin, end):
     """Write numbers above 1/2 where winding numbers are, and else others, to ``out`` (n,); all else as above."""
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
+    work = np.int64(0)
     for i in range(begin, end):
         row = at(pointer(points), 3 * i)
         point = _point_at(tree, row)
@@ -57,13 +62,15 @@ def exceed_half(words, rows, points, out, stack, begin, end):
         if not _is_held(tree, row, point):
             number = np.nan
         while abs(number - 0.5) <= bound and share > ROUNDING and tree.has_nodes:
-            number, bound = _search(tree, rows, point, share, stack, parts)
+            number, bound, steps = _search(tree, rows, point, share, stack, parts)
+            work += steps
             share *= _NEXT_SIDE
         out[i] = number
         if abs(number - 0.5) <= bound:
             out[i] = _all_faces(tree, point, parts)
-            if tree.count > _MANY:
-                return i + 1
+            work += tree.count
+        if work > _WORK:
+            return i + 1
     return end
 
 
@@ -92,8 +99,10 @@ def _within(x):
 
 @kernel
 def _search(tree, rows, point, share, stack, parts):
-    """The winding number and a bound of its error, where ``share`` says how near a series is asked."""
-    total, values, bounds, top = no_turn(), splat4(0.0), splat4(0.0), 1
+    """The winding number and a bound of its error, where ``share`` says how near a series is asked; and the number of
+    nodes and blocks that it took.
+    """
+    total, values, bounds, top, steps = no_turn(), splat4(0.0), splat4(0.0), 1, np.int64(0)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
@@ -101,11 +110,13 @@ def _search(tree, rows, point, share, stack, parts):
         if child < 0:
             first, count = blocks_of(child)
             total = add_blocks(tree, first, count, point, total, parts)
+            steps += count
             continue
         bits, value, bound = see_octants(rows, child * MOMENT_WORDS, point, share)
         values, bounds = values + value, bounds + bound
         top = push_children(tree, child, bits, stack, top)
-    return sum_lanes(values) + turns_of(total), sum_lanes(bounds)
+        steps += 1
+    return sum_lanes(values) + turns_of(total), sum_lanes(bounds), steps
 
 
 @kernel

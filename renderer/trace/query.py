@@ -1,6 +1,7 @@
 """Closest and any hits of a batch of rays: in chunks, on threads."""
 
 import threading
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,18 +73,27 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
         size = min(size, rays_against_blocks(tree))
     bad: list[int] = []
 
-    def trace(begin: int, end: int) -> None:
+    def trace(begin: int, end: int) -> Iterator[None]:
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
-        if not bad or begin < bad[0]:
-            if tree.has_nodes:
-                row = trace_chunk(tree.words, rays, out, begin, end, any_hit, _thread_memory(tree.depth))
-            else:
-                row = search_chunk(tree.words, rays, out, begin, end, any_hit)
+        if bad and bad[0] < begin:
+            return
+        if not tree.has_nodes:
+            row = search_chunk(tree.words, rays, out, begin, end, any_hit)
             if row >= 0:
                 bad.append(row)
+            return
+        memory, state = _take_memory(tree.depth), (begin, 0, 0)
+        while state[0] < end or state[1] < state[2]:
+            state, row = trace_chunk(tree.words, rays, out, state, end, any_hit, memory)
+            if row >= 0:
+                bad.append(row)
+                break
+            yield
+        _local.memory = memory
 
     if count <= size:
-        trace(0, count)
+        for _ in trace(0, count):
+            pass
     else:
         for_chunks(trace, count, size, threads)
     if bad:
@@ -91,7 +101,7 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
 
 
 class _Local(threading.local):
-    """The memory in which one thread traces chunks, kept from one chunk to the next: 100 kB."""
+    """Memory in which a thread traces its next chunk, kept from the last one: 100 kB."""
 
     memory: Memory | None = None
 
@@ -99,8 +109,9 @@ class _Local(threading.local):
 _local = _Local()
 
 
-def _thread_memory(depth: int) -> Memory:
-    memory = _local.memory
+def _take_memory(depth: int) -> Memory:
+    """The thread's memory, or new: taken, because a handler of a signal may trace rays while a chunk is half done."""
+    memory, _local.memory = _local.memory, None
     if memory is None or memory.stack_size < stack_size(depth):
-        memory = _local.memory = make_memory(depth, CHUNK)
+        memory = make_memory(depth, CHUNK)
     return memory

@@ -1,5 +1,6 @@
 """The steps of the search for a ray's closest hit, counted: what heat maps of a tree's quality are made of."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,9 @@ from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
 from renderer.trace.singly import stack_size
 
 _WORD = 0xFFFFFFFF
+# The nodes and triangles that a call tests, beside those of one ray: some milliseconds, so that Ctrl-C need not wait
+# for long.
+_WORK = 1 << 18
 
 
 @dataclass(eq=False, slots=True)
@@ -34,12 +38,15 @@ def count_steps(tree: Tree, rays: RayBatch, shape: tuple[int, ...], threads: int
     """Steps of a batch of rays of some dimensions, see ``Octree.count_steps``."""
     counts, bad = np.zeros((2, rays.number), np.int64), list[int]()
 
-    def count(begin: int, end: int) -> None:
+    def count(begin: int, end: int) -> Iterator[None]:
         size = stack_size(tree.depth)
         stack, near = np.empty(size, np.int64), np.empty(size + 8, np.float32)
-        row = _count_chunk(tree.words, rays, counts, stack, near, (begin, end))
-        if row >= 0:
-            bad.append(row)
+        while begin < end:
+            begin, row = _count_chunk(tree.words, rays, counts, stack, near, (begin, end))
+            if row >= 0:
+                bad.append(row)
+                return
+            yield
 
     for_chunks(count, rays.number, CHUNK // 8, threads)
     if bad:
@@ -56,16 +63,19 @@ def _count_chunk(words, rays, counts, stack, near, bounds):
     stack  memory for ``singly.stack_size`` int64
     near   for as many float32 and eight more
 
-    Returns the row of a ray out of range, or -1.
+    Returns the ray before which it ended, early after _WORK; and the row of a ray out of range, or -1.
     """
     tree, source = tree_pointers(words), ray_pointers(rays, tree_pointers(words).scale)
-    bad = first_bad_ray(source, bounds[0], bounds[1])
+    bad, work = first_bad_ray(source, bounds[0], bounds[1]), np.int64(0)
     if bad < 0 and tree.has_nodes:
         for i in range(bounds[0], bounds[1]):
             ray, t_max = ray_at(source, i)
             distances = at(pointer(near), len(stack))
             counts[0, i], counts[1, i] = _count(tree, ray, t_max, pointer(stack), pointer(near), distances)
-    return bad
+            work += counts[0, i] + counts[1, i]
+            if work > _WORK:
+                return i + 1, bad
+    return bounds[1], bad
 
 
 @kernel

@@ -34,6 +34,9 @@ from renderer.trace.stream import (
 # Sixteen rays are no packet when a slope against their dominant axis differs by more than this from the first ray's.
 # The bound only spares scattered rays the attempt; a packet whose rays part later ends by its BUDGET.
 _SPREAD = 0.125
+# The rounds of lanes in a call, beside those of the rays under way then: some 10 ms, so that Ctrl-C need not wait for
+# long. A chunk of rays takes fewer on most meshes, and is not cut.
+_WORK = 1 << 15
 
 
 class Scratch(NamedTuple):
@@ -106,12 +109,16 @@ def are_coherent(rays, begin):
 
 @inlined
 def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
-    """Write the hit of ray ``i``, in lane ``r``; if one was in doubt, after a careful search on the lane's stack."""
-    best = best_of(scratch.prepared, r)
+    """Write the hit of ray ``i``, in lane ``r``; if one was in doubt, after a careful search on the lane's stack.
+
+    Returns the rounds of sixteen lanes that take as long as that search.
+    """
+    best, steps = best_of(scratch.prepared, r), np.int64(0)
     if doubtful:
         ray, t_max = ray_at(rays, i)
-        best = search_singly(tree, ray, t_max, at(scratch.lanes.stacks, r * scratch.lanes.stack_size))
+        best, steps = search_singly(tree, ray, t_max, at(scratch.lanes.stacks, r * scratch.lanes.stack_size))
     write_hit(found, i, rays.scale, best, any_hit)
+    return steps // WIDTH
 
 
 @inlined
@@ -127,10 +134,13 @@ def load_lane(rays, scratch, r, i):
 @kernel
 def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_hit):
     """Run the listed lanes to their ends; the rays in ``scratch.waiting`` from ``following`` to ``count`` take the
-    places of those that end.
+    places of those that end, but none does after _WORK.
+
+    Returns the first ray that still waits, and the number of rounds.
     """
-    prepared, lanes, waiting = scratch.prepared, scratch.lanes, scratch.waiting
+    prepared, lanes, waiting, rounds = scratch.prepared, scratch.lanes, scratch.waiting, np.int64(0)
     while nodes + leaves > 0:
+        rounds += 1
         # Take the lanes at nodes one step on.
         meet_nodes(tree, prepared, lanes, nodes)
         entered, nodes = nodes, 0
@@ -150,28 +160,34 @@ def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_
                 child = leave_leaf(tree, prepared, lanes, r)
             if child == END or (any_hit and hit):
                 i, doubtful = get(scratch.number, r), get(scratch.doubtful, r) != 0
-                _finish(tree, rays, found, i, scratch, r, doubtful, any_hit)
-                if following == count:
+                rounds += _finish(tree, rays, found, i, scratch, r, doubtful, any_hit)
+                if following == count or rounds > _WORK:
                     continue
                 load_lane(rays, scratch, r, get(waiting, following))
                 following += 1
                 child = 0
             nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
+    return following, rounds
 
 
 @inlined
-def _trace_stream(tree, rays, found, scratch, count, any_hit):
-    """Trace the ``count`` rays in ``scratch.waiting``, sixteen at a time."""
-    lanes, first = scratch.lanes, smaller(count, WIDTH)
-    for r in range(first):
-        load_lane(rays, scratch, r, get(scratch.waiting, r))
+def _trace_stream(tree, rays, found, scratch, following, count, any_hit):
+    """Trace the rays in ``scratch.waiting`` from ``following`` to ``count``, sixteen at a time; returns the first that
+    still waits.
+    """
+    lanes, nodes = scratch.lanes, smaller(count - following, WIDTH)
+    for r in range(nodes):
+        load_lane(rays, scratch, r, get(scratch.waiting, following + r))
         put(lanes.at_node, r, r)
-    _run_lanes(tree, rays, found, scratch, first, 0, first, count, any_hit)
+    return _run_lanes(tree, rays, found, scratch, nodes, 0, following + nodes, count, any_hit)[0]
 
 
 @kernel
 def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
-    """Let the rays of a packet that gave up go on as lanes, each with those of the waiting octants that it meets."""
+    """Let the rays of a packet that gave up go on as lanes, each with those of the waiting octants that it meets.
+
+    Returns the number of rounds.
+    """
     prepared, lanes = scratch.prepared, scratch.lanes
     for r in range(WIDTH):
         begin_ray(lanes, r)
@@ -190,22 +206,22 @@ def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
             _finish(tree, rays, found, first + r, scratch, r, False, any_hit)
         else:
             nodes, leaves = list_lane(lanes, r, resume(tree, prepared, lanes, r), nodes, leaves)
-    _run_lanes(tree, rays, found, scratch, nodes, leaves, 0, 0, any_hit)
+    return _run_lanes(tree, rays, found, scratch, nodes, leaves, 0, 0, any_hit)[1]
 
 
 @inlined
 def _trace_sixteen(tree, rays, found, first, scratch, any_hit):
-    """Trace the rays from ``first`` on as a packet, and as lanes from where it gave up."""
-    prepared = scratch.prepared
+    """Trace the rays from ``first`` on as a packet, and as lanes from where it gave up; returns the rounds of lanes."""
+    prepared, rounds = scratch.prepared, np.int64(0)
     for r in range(WIDTH):
         ray, t_max = ray_at(rays, first + r)
         prepare_ray(prepared, r, ray, t_max)
     top, doubtful = trace_packet(tree, prepared, scratch.packet_stack, any_hit)
     if top > 0:
-        _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit)
-        return
+        return _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit)
     for r in range(WIDTH):
-        _finish(tree, rays, found, first + r, scratch, r, (doubtful >> r) & 1 != 0, any_hit)
+        rounds += _finish(tree, rays, found, first + r, scratch, r, (doubtful >> r) & 1 != 0, any_hit)
+    return rounds
 
 
 @kernel
@@ -225,36 +241,51 @@ def trace(tree, rays, found, begin, end, scratch, any_hit):
     neither on the order of the visits nor on the rays that travel together. Watertight and deterministic (Woop et al.
     2013); see ``intersect`` for the bounds.
     """
-    count = np.int64(0)
+    state = begin, np.int64(0), np.int64(0)
+    while state[0] < end or state[1] < state[2]:
+        state = _trace_on(tree, rays, found, state, end, scratch, any_hit)
+
+
+@kernel
+def _trace_on(tree, rays, found, state, end, scratch, any_hit):
+    """``trace`` of some rays more. ``state`` is the first ray that no packet was asked for, and of the rays in
+    ``scratch.waiting`` the first that no stream took, and their number. Returns the state after it.
+    """
+    begin, following, count = state
+    rounds = np.int64(0)
     for first in range(begin, end, WIDTH):
         if first + WIDTH <= end and are_coherent(rays, first):
-            _trace_sixteen(tree, rays, found, first, scratch, any_hit)
+            rounds += _trace_sixteen(tree, rays, found, first, scratch, any_hit)
+            if rounds > _WORK:
+                return first + WIDTH, following, count
             continue
         for i in range(first, smaller(first + WIDTH, end)):
             put(scratch.waiting, count, i)
             count += 1
-    if count > 0:
-        _trace_stream(tree, rays, found, scratch, count, any_hit)
+    if following < count:
+        following = _trace_stream(tree, rays, found, scratch, following, count, any_hit)
+    return end, following, count
 
 
 @kernel
-def trace_chunk(words, rays, out, begin, end, any_hit, memory):
-    """Hits of the rays begin:end into ``out``: rows t, u, v and face, or with ``any_hit`` bools.
+def trace_chunk(words, rays, out, state, end, any_hit, memory):
+    """Hits of rays up to ``end`` into ``out``: rows t, u, v and face, or with ``any_hit`` bools.
 
-    ``words`` are the tree's, which must have nodes. Returns the row of the first ray out of range, for which nothing
-    is traced, or -1.
+    ``words`` are the tree's, which must have nodes. ``state`` is (begin, 0, 0) in the first call for a chunk, and later
+    what the last one returned first, with the same memory: it ends early where much was to do, and all is done at
+    (end, n, n). Also returns the row of the first ray out of range, for which nothing is traced, or -1.
     """
     tree = tree_pointers(words)
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])
-    bad = first_bad_ray(source, begin, end)
+    bad = first_bad_ray(source, state[0], end)
     if bad < 0:
-        trace(tree, source, found, begin, end, make_scratch(memory), any_hit)
-    return bad
+        state = _trace_on(tree, source, found, state, end, make_scratch(memory), any_hit)
+    return state, bad
 
 
 @kernel
 def search_chunk(words, rays, out, begin, end, any_hit):
-    """``trace_chunk`` for a tree without nodes."""
+    """Hits of the rays begin:end, as ``trace_chunk`` writes them, for a tree without nodes; returns the row or -1."""
     tree = tree_pointers(words)
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])
     bad = first_bad_ray(source, begin, end)

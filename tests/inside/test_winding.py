@@ -272,7 +272,8 @@ def search_all(words, rows, points, share, out, stack):
     """The winding number and its bound of each point, in the rows of ``out`` (n, 2)."""
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
     for i in range(len(points)):
-        out[i, 0], out[i, 1] = _search(tree, rows, _point_at(tree, at(pointer(points), 3 * i)), share, stack, parts)
+        point = _point_at(tree, at(pointer(points), 3 * i))
+        out[i, 0], out[i, 1], _ = _search(tree, rows, point, share, stack, parts)
 
 
 def errors_and_bounds(mesh, points, share):

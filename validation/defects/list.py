@@ -100,8 +100,9 @@ HITS = (
             "first, count = blocks_of(child)\n"
             "count = count - 1 if count > 1 else count"),
     _kernel("hits", "single rays are an ulp too far", "trace_few",
-            "best = search_singly(tree, ray, limit, stack)",
-            "t, face, u, v, w = search_singly(tree, ray, limit, stack)\nbest = t * (1.0 + 2.0**-52), face, u, v, w"),
+            "best, _ = search_singly(tree, ray, limit, stack)",
+            "(t, face, u, v, w), _ = search_singly(tree, ray, limit, stack)\n"
+            "best = t * (1.0 + 2.0**-52), face, u, v, w"),
     _python("hits", "bad rays are let through", "_run",
             "if bad:\n"
             "    reject(rays, min(bad), tree.scale)",
