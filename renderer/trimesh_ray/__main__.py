@@ -1,26 +1,42 @@
 """``python -m renderer.trimesh_ray [--proximity] script.py ...``: run a script whose trimesh asks the octree."""
 
-import argparse
-import runpy
+import os
 import sys
-from pathlib import Path
+import types
 
 from renderer.trimesh_ray.install import install
 
+_USAGE = "usage: python -m renderer.trimesh_ray [--proximity] script.py [arguments of the script]"
+_HELP = f"""{_USAGE}
+
+Run a script with renderer.trimesh_ray installed: its trimesh then asks the octree.
+
+  --proximity  nearest points and signed distances too"""
+
 
 def main() -> None:
-    """Run the script as ``python script.py ...`` would."""
-    parser = argparse.ArgumentParser(prog="python -m renderer.trimesh_ray", description=__doc__)
-    parser.add_argument("--proximity", action="store_true", help="nearest points and signed distances too")
-    parser.add_argument("script", type=Path)
-    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="the script's own")
-    options = parser.parse_args()
-    if not options.script.is_file():
-        parser.error(f"script: expected a file, got {options.script}")
-    install(proximity=options.proximity)
-    sys.argv = [str(options.script), *options.arguments]
-    sys.path[0] = str(options.script.resolve().parent)
-    runpy.run_path(str(options.script), run_name="__main__")
+    """Run the script as ``python script.py ...`` would. Processes that it starts have nothing installed."""
+    arguments = sys.argv[1:]
+    proximity = arguments[:1] == ["--proximity"]
+    given = arguments[proximity:]
+    if given[:1] in (["-h"], ["--help"]):
+        print(_HELP)
+        return
+    if not given or not os.path.isfile(given[0]):
+        got = given[0] if given else "nothing"
+        sys.exit(f"{_USAGE}\npython -m renderer.trimesh_ray: error: script: expected a file, got {got}")
+    install(proximity)
+    script = os.path.abspath(given[0])
+    sys.argv = given
+    if not sys.flags.safe_path:
+        sys.path[0] = os.path.dirname(os.path.realpath(script))
+    with open(script, "rb") as file:
+        code = compile(file.read(), script, "exec")
+    # It stays __main__ to the end, for threads and functions that run after the script.
+    module = sys.modules["__main__"] = types.ModuleType("__main__")
+    module.__file__ = script
+    module.__dict__["__builtins__"] = __builtins__
+    exec(code, module.__dict__)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.trimesh_ray.facing import facing_faces
 from renderer.trimesh_ray.intersector import RayMeshIntersector, as_rows
-from renderer.trimesh_ray.trees import octree_of
+from renderer.trimesh_ray.trees import traced
 
 Floats = NDArray[np.float64]
 
@@ -18,11 +18,11 @@ def closest_point(mesh: Any, points: ArrayLike) -> tuple[Floats, Floats, NDArray
     Of the faces that meet at the nearest point it is the one least aslant to the query, as in trimesh; of others that
     are as near, the lowest.
     """
-    given = as_rows("points", points)
-    found = octree_of(mesh).closest_point(given)
+    given, it = as_rows("points", points), traced(mesh)
+    found = it.octree.closest_point(given)
     nearest = found.points
     weights = np.stack([1.0 - found.u - found.v, found.u, found.v], axis=1)
-    return nearest, found.distance, facing_faces(mesh, given, nearest, found.face, weights)
+    return nearest, found.distance, facing_faces(it.rings, it.normals, given, nearest, it.named(found.face), weights)
 
 
 def signed_distance(mesh: Any, points: ArrayLike) -> Floats:
@@ -31,5 +31,5 @@ def signed_distance(mesh: Any, points: ArrayLike) -> Floats:
     The sign is that of ``contains_points``, exact for closed meshes.
     """
     given = as_rows("points", points)
-    distance = octree_of(mesh).closest_point(given).distance
+    distance = traced(mesh).octree.closest_point(given).distance
     return np.where(RayMeshIntersector(mesh).contains_points(given), distance, -distance) + 0.0

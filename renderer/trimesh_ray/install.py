@@ -1,9 +1,12 @@
 """Installed, new meshes of trimesh get intersectors of ours, where they would get those over embreex."""
 
+import copyreg
 import importlib
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import RLock
+from types import ModuleType
 from typing import Any
 
 from renderer.trimesh_ray import distances, intersector
@@ -11,6 +14,10 @@ from renderer.trimesh_ray import distances, intersector
 # What stood in a module or in ``sys.modules`` before, by the module's name and the attribute's; None for nothing.
 _before: dict[tuple[str, str], Any] = {}
 _MODULES = "sys.modules"
+# Who wants it: of ``install()`` and of each block under way, whether proximity too. The first may be absent.
+_installed: list[bool] = []
+_blocks: list[list[bool]] = []
+_changing = RLock()
 
 
 def install(proximity: bool = False) -> None:
@@ -19,41 +26,69 @@ def install(proximity: bool = False) -> None:
     proximity  whether ``trimesh.proximity``'s ``closest_point`` and ``signed_distance`` answer by ours too, for all
                meshes, and with them ``mesh.nearest``, ``thickness`` and ``max_tangent_sphere``
 
-    May be called again, as to add ``proximity``. Undone by ``uninstall()``.
+    May be called again, as to add ``proximity``. Undone by ``uninstall()``. Names imported from trimesh before keep
+    what they name, and a mesh made with ``use_embree=False`` has trimesh's own intersector.
     """
-    import trimesh
-
-    _put("trimesh.ray", "ray_pyembree", intersector)
-    _put("trimesh.ray", "has_embree", True)
-    _put(_MODULES, "trimesh.ray.ray_pyembree", intersector)
-    if proximity:
-        for name in ("closest_point", "signed_distance"):
-            _put(trimesh.proximity.__name__, name, getattr(distances, name))
+    with _changing:
+        _installed[:] = [proximity or any(_installed)]
+        _apply()
 
 
 def uninstall() -> None:
-    """Give trimesh back what stood there before ``install()``; does nothing where nothing is installed."""
-    while _before:
-        (place, name), value = _before.popitem()
-        _set(place, name, value)
+    """Take back ``install()``; does nothing where nothing is installed. Blocks of ``installed()`` go on."""
+    with _changing:
+        _installed.clear()
+        _apply()
 
 
 @contextmanager
 def installed(proximity: bool = False) -> Iterator[None]:
-    """``install()`` for a block, and after it whatever was installed before."""
-    earlier = dict(_before)
-    install(proximity)
+    """``install()`` for a block; blocks may overlap, on several threads too."""
+    block = [proximity]
+    with _changing:
+        _blocks.append(block)
+        _apply()
     try:
         yield
     finally:
-        for key in [key for key in _before if key not in earlier]:
-            _set(*key, _before.pop(key))
+        with _changing:
+            # By identity: others may be equal.
+            _blocks[:] = [other for other in _blocks if other is not block]
+            _apply()
 
 
-def _put(place: str, name: str, value: Any) -> None:
-    if (place, name) not in _before:
-        _before[place, name] = sys.modules.get(name) if place == _MODULES else getattr(_module(place), name)
-    _set(place, name, value)
+def _apply() -> None:
+    """Put in place, or give back, what is wanted now."""
+    wanted = [*_installed, *(block[0] for block in _blocks)]
+    names = [("trimesh.ray", "ray_pyembree"), ("trimesh.ray", "has_embree"), (_MODULES, "trimesh.ray.ray_pyembree")]
+    ours = dict(zip(names, (intersector, True, intersector), strict=True)) if wanted else {}
+    if any(wanted):
+        for name in ("closest_point", "signed_distance"):
+            ours["trimesh.proximity", name] = getattr(distances, name)
+    for key in [key for key in _before if key not in ours]:
+        _set(*key, _before.pop(key))
+    for key, value in ours.items():
+        if key not in _before:
+            _before[key] = _get(*key)
+            _keep_picklable(_before[key])
+            _set(*key, value)
+
+
+def _keep_picklable(module: Any) -> None:
+    """Let intersectors over embreex made before travel by a function: meanwhile no name leads to their class."""
+    if isinstance(module, ModuleType):
+        replaced: Any = vars(module)["RayMeshIntersector"]
+        copyreg.pickle(replaced, lambda ray: (over_embreex, (ray.mesh, ray._scale_to_box)))
+
+
+def over_embreex(mesh: Any, scale_to_box: bool) -> Any:
+    """trimesh's intersector over embreex, whatever is installed."""
+    module = _before.get((_MODULES, "trimesh.ray.ray_pyembree")) or _module("trimesh.ray.ray_pyembree")
+    return module.RayMeshIntersector(mesh, scale_to_box)
+
+
+def _get(place: str, name: str) -> Any:
+    return sys.modules.get(name) if place == _MODULES else getattr(_module(place), name)
 
 
 def _set(place: str, name: str, value: Any) -> None:

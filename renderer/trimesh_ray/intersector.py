@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from trimesh.ray import ray_util
 
 from renderer.errors import expect
-from renderer.trimesh_ray.trees import octree_of
+from renderer.trimesh_ray.trees import traced
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -18,8 +19,9 @@ class RayMeshIntersector:
     """Rays of one mesh, with the methods, arguments and results of trimesh's intersectors.
 
     Unlike those it lists each place where a ray passes the surface once, however close the places lie, at edges and
-    corners too; t = 0 counts, and a ray in a face's plane misses that face. Rows come by ray, then by distance. A ray
-    whose origin or direction is not finite, or whose direction is 0, misses.
+    corners too; t = 0 counts, to rounding, and a ray in a face's plane misses that face. Of faces at one place, as in a
+    body that is there twice, the first is named. Rows come by ray, then by distance. A ray whose origin or direction is
+    not finite, or whose direction is 0, misses, and every ray misses a face with a corner that is not finite.
 
     >>> import trimesh
     >>> from renderer.trimesh_ray import RayMeshIntersector
@@ -50,16 +52,18 @@ class RayMeshIntersector:
         """
 
         def ask(origins: Floats, directions: Floats) -> tuple[Integers, Integers, Floats]:
-            octree = octree_of(self.mesh)
+            it = traced(self.mesh)
             if multiple_hits:
-                found = octree.all_hits(origins, directions, max_hits=max_hits)
-                return found.face, found.ray, found.points if return_locations else _NOWHERE
-            first = octree.closest_hit(origins, directions)
+                found = it.octree.all_hits(origins, directions, max_hits=max_hits)
+                return it.named(found.face), found.ray, found.points if return_locations else _NOWHERE
+            first = it.octree.closest_hit(origins, directions)
             rays = np.flatnonzero(first.hit)
-            return first.face[rays], rays, first.points[rays] if return_locations else _NOWHERE
+            return it.named(first.face[rays]), rays, first.points[rays] if return_locations else _NOWHERE
 
-        rows, (faces, rays, places) = _asked(ask, ray_origins, ray_directions)
-        rays = rays if rows is None else rows[rays]
+        (faces, rays, places), good = _asked(ask, ray_origins, ray_directions)
+        if good is not None:
+            real = good[rays]
+            faces, rays, places = faces[real], rays[real], places[real] if return_locations else places
         return (faces, rays, places) if return_locations else (faces, rays)
 
     def intersects_location(
@@ -72,46 +76,69 @@ class RayMeshIntersector:
 
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Integers:
         """The first face that each ray hits, (n,); -1 for none."""
-        rows, faces = _asked(lambda o, d: octree_of(self.mesh).closest_hit(o, d).face, ray_origins, ray_directions)
-        return faces if rows is None else _spread(faces, rows, np.shape(ray_origins)[0], -1)
+
+        def ask(origins: Floats, directions: Floats) -> Integers:
+            it = traced(self.mesh)
+            return it.named(it.octree.closest_hit(origins, directions).face)
+
+        faces, good = _asked(ask, ray_origins, ray_directions)
+        return faces if good is None else np.where(good, faces, -1)
 
     def intersects_any(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> NDArray[np.bool_]:
         """Whether each ray hits the mesh, (n,)."""
-        rows, hit = _asked(lambda o, d: octree_of(self.mesh).any_hit(o, d), ray_origins, ray_directions)
-        return hit if rows is None else _spread(hit, rows, np.shape(ray_origins)[0], False)
+        hit, good = _asked(lambda o, d: traced(self.mesh).octree.any_hit(o, d), ray_origins, ray_directions)
+        return hit if good is None else hit & good
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether each point (n, 3) lies inside, (n,): by parity as in trimesh; of an open mesh by its winding number.
+        """Whether each point (n, 3) lies inside, (n,): by parity as in trimesh.
 
-        A point on the surface is inside; one that is not finite is outside, as is any beyond the mesh's box.
+        Of an open mesh whose faces are turned one way it is whether the surface winds around the point by more than a
+        half; of any other it is trimesh's vote of two opposite rays. A point on the surface is inside; one that is not
+        finite is outside, as is any beyond the mesh's box.
         """
         given = as_rows("points", points)
         if len(self.mesh.faces) == 0:
             return np.zeros(len(given), np.bool_)
-        octree = octree_of(self.mesh)
+        octree = traced(self.mesh).octree
         lower, upper = octree.mesh.bounds
         within = ((given >= lower) & (given <= upper)).all(axis=1)  # of NaN too
-        if within.any():
-            closed = len(octree.mesh.odd_edges) == 0
-            how: Any = {"rule": "even-odd"} if closed else {"winding": True}
-            within[within] = octree.contains(given[within], **how)
+        if not within.any():
+            return within
+        if len(octree.mesh.odd_edges) == 0:
+            within[within] = octree.contains(given[within], rule="even-odd")
+        elif self.mesh.is_winding_consistent:
+            some = given[within]
+            # Faces may all be turned inwards.
+            within[within] = octree.contains(some, winding=True) | (octree.winding_number(some) < -0.5)
+        else:
+            votes: Any = ray_util
+            within[within] = votes.contains_points(self, given[within])
         return within
 
+    def __copy__(self, *memo: Any) -> "RayMeshIntersector":
+        """Of the same mesh, as trimesh's own."""
+        return RayMeshIntersector(self.mesh, self._scale_to_box)
 
-def _asked(ask: Callable[[Floats, Floats], Any], origins: ArrayLike, directions: ArrayLike) -> tuple[Any, Any]:
-    """The answer for all rays, after None; or the rows of those that can hit something, and the answer for them.
+    __deepcopy__ = __copy__
 
-    Rays that are not finite or have no direction are told only when some are refused: most calls have none.
+
+def _asked(
+    ask: Callable[[Floats, Floats], Any], origins: ArrayLike, directions: ArrayLike
+) -> tuple[Any, NDArray[np.bool_] | None]:
+    """The answer for the rays, and which of them can hit anything; None for all.
+
+    That is told only where some ray is refused: most calls have none that is not finite or has no direction. In place
+    of these any other rays are asked.
     """
     o, d = as_rows("ray_origins", origins), as_rows("ray_directions", directions)
     expect(d.shape == o.shape, "ray_directions", f"the shape of ray_origins, {o.shape}", f"shape {d.shape}")
     try:
-        return None, ask(o, d)
+        return ask(o, d), None
     except ValueError:
-        good = (np.isfinite(o) & np.isfinite(d)).all(axis=1) & d.any(axis=1)
+        good = np.asarray((np.isfinite(o) & np.isfinite(d)).all(axis=1) & d.any(axis=1))
         if good.all():
             raise
-        return np.flatnonzero(good), ask(o[good], d[good])
+        return ask(np.where(good[:, None], o, 0.0), np.where(good[:, None], d, 1.0)), good
 
 
 def as_rows(argument: str, values: ArrayLike) -> Floats:
@@ -120,10 +147,3 @@ def as_rows(argument: str, values: ArrayLike) -> Floats:
     array = array.reshape(0, 3) if array.shape == (0,) else array
     expect(array.ndim == 2 and array.shape[1] == 3, argument, "shape (n, 3)", f"shape {array.shape}")
     return array
-
-
-def _spread(values: NDArray[Any], rows: Integers, count: int, other: Any) -> NDArray[Any]:
-    """The values in their rows of ``count``, and ``other`` in the rest."""
-    whole = np.full(count, other, values.dtype)
-    whole[rows] = values
-    return whole

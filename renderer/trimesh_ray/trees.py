@@ -4,9 +4,55 @@ import weakref
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import face_normals
+from renderer.trimesh_ray.distinct import distinct_faces
+from renderer.trimesh_ray.facing import Rings, rings_of
 
 if TYPE_CHECKING:
-    from renderer.octree import Octree
+    pass
+
+Integers = NDArray[np.int64]
+
+
+class Traced:
+    """The octree over a mesh's faces that count, and which of the mesh's they are.
+
+    octree           its vertices that are not finite are at 0; no face has one
+    rows             (k,) the mesh's face for each of the octree's; None where they are the same
+    vertices, faces  the mesh's at that time
+    """
+
+    def __init__(self, vertices: NDArray[np.float64], faces: Integers) -> None:
+        # Late, so that a mesh whose rays are never asked imports no compiler.
+        from renderer.octree import Octree
+
+        self.rows = distinct_faces(vertices, faces)
+        finite = np.where(np.isfinite(vertices), vertices, 0.0)
+        self.octree: Octree = Octree(finite, faces if self.rows is None else faces[self.rows])
+        self._rings: Rings | None = None
+        self._normals: NDArray[np.float64] | None = None
+        self.vertices = vertices.copy()
+        self.faces = faces.copy()
+
+    @property
+    def rings(self) -> Rings:
+        """The faces around the vertices, computed once."""
+        if self._rings is None:
+            self._rings = rings_of(self.octree.mesh.vertices, self.faces)
+        return self._rings
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """(f, 3) of all the mesh's faces, computed once."""
+        if self._normals is None:
+            self._normals = face_normals(self.octree.mesh.vertices[self.faces])
+        return self._normals
+
+    def named(self, faces: Integers) -> Integers:
+        """The mesh's numbers of the octree's faces; -1 stays."""
+        return faces if self.rows is None else np.where(faces >= 0, self.rows[faces], -1)
 
 
 class _Kept(NamedTuple):
@@ -14,38 +60,36 @@ class _Kept(NamedTuple):
 
     mesh: "weakref.ref[Any]"
     digest: int
-    octree: "Octree"
+    traced: Traced
 
 
 # By the mesh's id; and trees in use by the content's digest, so that a copy of a mesh needs no tree of its own.
 _kept: dict[int, _Kept] = {}
-_by_digest: "weakref.WeakValueDictionary[int, Octree]" = weakref.WeakValueDictionary()
+_by_digest: "weakref.WeakValueDictionary[int, Traced]" = weakref.WeakValueDictionary()
 
 
-def octree_of(mesh: Any) -> "Octree":
+def traced(mesh: Any) -> Traced:
     """The octree of a mesh as it is now: built when first asked for, and again after an edit."""
     key, digest = id(mesh), hash(mesh)
     kept = _kept.get(key)
     if kept is not None and kept.digest == digest and kept.mesh() is mesh:
-        return kept.octree
-    octree = _shared(mesh, digest)
+        return kept.traced
+    found = _shared(mesh, digest)
     own = weakref.ref(mesh, lambda gone: _forget(key, gone))
-    _kept[key] = _Kept(own, digest, octree)
-    return octree
+    _kept[key] = _Kept(own, digest, found)
+    return found
 
 
-def _shared(mesh: Any, digest: int) -> "Octree":
+def _shared(mesh: Any, digest: int) -> Traced:
     """A tree of a mesh with the same content, or a new one."""
-    # Late, so that a mesh whose rays are never asked imports no compiler.
-    from renderer.octree import Octree
-
-    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
+    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     found = _by_digest.get(digest)
     # A digest is no proof.
-    if found is not None and np.array_equal(found.mesh.vertices, vertices) and np.array_equal(found.mesh.faces, faces):
+    same = found is not None and np.array_equal(found.vertices, vertices, equal_nan=True)
+    if found is not None and same and np.array_equal(found.faces, faces):
         return found
-    octree = _by_digest[digest] = Octree(vertices, faces)
-    return octree
+    made = _by_digest[digest] = Traced(vertices, faces)
+    return made
 
 
 def _forget(key: int, gone: "weakref.ref[Any]") -> None:

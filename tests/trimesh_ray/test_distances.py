@@ -74,6 +74,23 @@ def test_of_faces_at_a_corner_too_and_between_them_the_face_itself(monkeypatch: 
         assert faces[len(corners) :].tolist() == list(range(len(mesh.faces)))
 
 
+@pytest.mark.parametrize("soup", [False, True])
+def test_the_face_named_has_its_front_to_points_outside_a_convex_body(soup: bool) -> None:
+    """Corners are told apart by position: of soup the face that was found had its back to a third of the points."""
+    mesh, rng = trimesh.creation.cone(1.0, 2.0, sections=7), np.random.default_rng(8)
+    if soup:
+        mesh.unmerge_vertices()
+    points = rng.uniform(-3, 3, (2000, 3))
+    points = points[~mesh.contains(points)]
+    places, _, faces = closest_point(mesh, points)
+    assert (np.einsum("ij,ij->i", mesh.face_normals[faces], points - places) > -1e-12).all()
+
+
+def test_of_faces_at_one_place_the_one_turned_to_the_point_is_named() -> None:
+    mesh = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]], process=False)
+    assert closest_point(mesh, [[0.2, 0.2, 1], [0.2, 0.2, -1], [-1, 0, 1], [-1, 0, -1]])[2].tolist() == [0, 1, 0, 1]
+
+
 def test_the_sign_is_right_where_the_nearest_normal_is_not() -> None:
     """Above the acute edge, in the plane of a face, and far from the surface."""
     solid = ACUTE.copy()

@@ -133,7 +133,7 @@ class TestContent:
     def test_an_edit_does_not_reach_the_tree_that_a_copy_has(self) -> None:
         mesh = trimesh.creation.box()
         twin = mesh.copy()
-        assert trees.octree_of(mesh) is trees.octree_of(twin)
+        assert trees.traced(mesh) is trees.traced(twin)
         mesh.vertices[:, 2] += 1.0
         assert asked(twin).intersects_location([[0, 0, 9]], DOWN)[0][:, 2].tolist() == [0.5, -0.5]
         assert asked(mesh).intersects_location([[0, 0, 9]], DOWN)[0][:, 2].tolist() == [1.5, 0.5]
@@ -243,3 +243,93 @@ assert "numba" not in sys.modules and "renderer.octree" not in sys.modules
 """
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
+
+
+def twice(mesh: Any, turned: bool) -> Any:
+    """A body whose faces are there twice; the second ones from the other side, if asked."""
+    again = mesh.copy()
+    if turned:
+        again.invert()
+    return trimesh.util.concatenate([mesh, again])
+
+
+class TestWhatTrimeshForgives:
+    """An attacker found these answered otherwise than trimesh does, and worse."""
+
+    @pytest.mark.parametrize("turned", [False, True])
+    def test_a_body_whose_faces_are_there_twice_has_an_inside(self, turned: bool) -> None:
+        mesh = twice(trimesh.creation.icosphere(subdivisions=2), turned)
+        assert asked(mesh).contains_points([[0, 0, 0], [0.5, 0.2, 0], [2, 0, 0]]).tolist() == [True, True, False]
+        faces, _, places = asked(mesh).intersects_id([[0.1, 0.2, 9]], DOWN, return_locations=True)
+        # Each place once, by the first face that is there.
+        assert len(places) == 2 and (faces < 320).all()
+
+    def test_named_faces_are_those_of_the_mesh(self) -> None:
+        mesh = trimesh.creation.icosphere(subdivisions=2)
+        late = trimesh.Trimesh(mesh.vertices, np.concatenate([mesh.faces[:1], mesh.faces]), process=False)
+        rays = np.random.default_rng(2).uniform(-2, 2, (50, 3)), np.random.default_rng(3).normal(size=(50, 3))
+        ours, expected = asked(late).intersects_first(*rays), asked(mesh).intersects_first(*rays)
+        assert (expected >= 0).any() and (expected == -1).any()
+        np.testing.assert_array_equal(ours, np.where(expected > 0, expected + 1, expected))
+
+    @pytest.mark.parametrize("inward", [False, True])
+    def test_an_open_body_has_an_inside_whichever_way_its_faces_are_turned(self, inward: bool) -> None:
+        mesh = trimesh.creation.icosphere(subdivisions=3)
+        if inward:
+            mesh.invert()
+        mesh.update_faces(np.arange(len(mesh.faces)) != 7)
+        assert asked(mesh).contains_points([[0, 0, 0], [0.5, 0.2, 0.1], [0.9, 0.9, 0.9]]).tolist() == [
+            True,
+            True,
+            False,
+        ]
+
+    def test_an_open_body_of_faces_turned_any_way_is_voted_on_as_by_trimesh(self) -> None:
+        mesh = trimesh.creation.icosphere(subdivisions=3)
+        faces = mesh.faces.copy()[:-1]
+        faces[::2] = faces[::2, ::-1]
+        mixed = trimesh.Trimesh(mesh.vertices, faces, process=False)
+        assert asked(mixed).contains_points([[0, 0, 0], [0.5, 0.2, 0.1], [0.9, 0.9, 0.9]]).tolist() == [
+            True,
+            True,
+            False,
+        ]
+
+    def test_faces_without_a_place_are_not_there(self) -> None:
+        vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [np.nan, 0, 0], [9, 9, np.inf]]
+        mesh = trimesh.Trimesh(vertices, [[0, 1, 3], [0, 1, 2]], process=False)
+        assert asked(mesh).intersects_first([[0.2, 0.2, 1]], DOWN).tolist() == [1]
+
+    def test_a_row_that_is_refused_has_its_own_number(self) -> None:
+        with pytest.raises(ValueError, match=r"in row 1$"):
+            asked(trimesh.creation.box()).intersects_any([[np.nan, 0, 0], [1e300, 0, 0]], DOWN * 2)
+
+
+def test_distinct_faces_are_told_by_position_whatever_their_corners_order() -> None:
+    from renderer.trimesh_ray.distinct import distinct_faces
+
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 0], [-0.0, 0, 0]], float)
+    faces = np.array([[0, 1, 2], [2, 4, 5], [0, 1, 3], [4, 5, 2], [3, 3, 1], [1, 3, 3]])
+    assert distinct_faces(vertices, faces).tolist() == [0, 2, 4]
+    assert distinct_faces(vertices, faces[[0, 2, 4]]) is None
+    rng = np.random.default_rng(9)
+    points, some = rng.integers(0, 2, (40, 3)).astype(float), rng.integers(0, 40, (500, 3))
+    keys = [tuple(sorted(map(tuple, points[face].tolist()))) for face in some]
+    assert distinct_faces(points, some).tolist() == sorted(
+        {key: i for i, key in reversed(list(enumerate(keys)))}.values()
+    )
+
+
+def test_blocks_may_overlap_and_meshes_made_before_still_travel() -> None:
+    first, second = installed(proximity=True), installed()
+    early = trimesh.creation.box()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert type(trimesh.creation.box().ray) is RayMeshIntersector
+    assert trimesh.proximity.closest_point is not renderer.trimesh_ray.distances.closest_point
+    again = pickle.loads(pickle.dumps(early))
+    assert type(again.ray) is type(early.ray) and again.ray.mesh is again
+    second.__exit__(None, None, None)
+    assert type(trimesh.creation.box().ray) is type(early.ray) is not RayMeshIntersector
+    assert copy.deepcopy(RayMeshIntersector(early)).mesh is early
