@@ -20,6 +20,8 @@ from renderer.trimesh_ray import RayMeshIntersector, install, installed, trees, 
 
 ROOT = Path(__file__).parents[2]
 DOWN = [[0.0, 0.0, -1.0]]
+# Two points inside of a unit ball, and one outside.
+POINTS = [[0, 0, 0], [0.5, 0.2, 0.1], [0.9, 0.9, 0.9]]
 
 
 def asked(mesh: Any) -> RayMeshIntersector:
@@ -278,7 +280,7 @@ class TestWhatTrimeshForgives:
         if inward:
             mesh.invert()
         mesh.update_faces(np.arange(len(mesh.faces)) != 7)
-        assert asked(mesh).contains_points([[0, 0, 0], [0.5, 0.2, 0.1], [0.9, 0.9, 0.9]]).tolist() == [
+        assert asked(mesh).contains_points(POINTS).tolist() == [
             True,
             True,
             False,
@@ -289,7 +291,7 @@ class TestWhatTrimeshForgives:
         faces = mesh.faces.copy()[:-1]
         faces[::2] = faces[::2, ::-1]
         mixed = trimesh.Trimesh(mesh.vertices, faces, process=False)
-        assert asked(mixed).contains_points([[0, 0, 0], [0.5, 0.2, 0.1], [0.9, 0.9, 0.9]]).tolist() == [
+        assert asked(mixed).contains_points(POINTS).tolist() == [
             True,
             True,
             False,
@@ -315,9 +317,8 @@ def test_distinct_faces_are_told_by_position_whatever_their_corners_order() -> N
     rng = np.random.default_rng(9)
     points, some = rng.integers(0, 2, (40, 3)).astype(float), rng.integers(0, 40, (500, 3))
     keys = [tuple(sorted(map(tuple, points[face].tolist()))) for face in some]
-    assert distinct_faces(points, some).tolist() == sorted(
-        {key: i for i, key in reversed(list(enumerate(keys)))}.values()
-    )
+    first = {key: row for row, key in reversed(list(enumerate(keys)))}
+    assert distinct_faces(points, some).tolist() == sorted(first.values())
 
 
 def test_blocks_may_overlap_and_meshes_made_before_still_travel() -> None:
