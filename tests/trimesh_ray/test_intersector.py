@@ -189,7 +189,9 @@ class TestInstall:
     def test_new_meshes_have_it_until_uninstalled(self) -> None:
         before = type(trimesh.creation.box().ray), trimesh.proximity.closest_point, trimesh.ray.ray_pyembree
         early = trimesh.creation.box()
+        install()
         install(proximity=True)
+        install()
         try:
             assert type(trimesh.creation.box().ray) is RayMeshIntersector is not before[0]
             assert type(trimesh.creation.box().copy().ray) is RayMeshIntersector

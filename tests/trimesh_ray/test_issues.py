@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from renderer.trimesh_ray import RayMeshIntersector, install, installed
+from renderer.trimesh_ray import RayMeshIntersector, installed
 
 
 @pytest.fixture(autouse=True)
@@ -203,8 +203,3 @@ def test_1416_points_level_with_corners_and_edges_are_told() -> None:
     level = (np.abs(grid[:, 2] - np.round(grid[:, 2])) != 0.5) & (np.abs(grid[:, :2]) != halves[:, None]).all(axis=1)
     inside = (np.abs(grid[:, :2]) < halves[:, None]).all(axis=1) & (grid[:, 2] > -0.5) & (grid[:, 2] < 2.5)
     np.testing.assert_array_equal(mesh.contains(grid[level]), inside[level])
-
-
-def test_installing_again_changes_nothing() -> None:
-    install(proximity=True)
-    assert isinstance(box().ray, RayMeshIntersector)
