@@ -16,7 +16,7 @@ from renderer import __version__
 from renderer.errors import expect
 from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS
 from renderer.process.interrupt import interruptible
-from renderer.process.terminal import flush_output, on_terminal, one_line, say, spell_everything
+from renderer.process.terminal import flush_output, give_up_output, on_terminal, one_line, say, spell_everything
 
 
 @interruptible("octree-render: interrupted")
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         flush_output()
     except BrokenPipeError:
         # The reader of standard output, such as ``| head``, has closed it. The picture is written.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        give_up_output()
     except (ValueError, OSError, ImportError, MemoryError) as error:
         kind = "not enough memory" if isinstance(error, MemoryError) else ""
         print(": ".join(filter(None, ("octree-render", kind, one_line(error)))), file=sys.stderr)

@@ -26,6 +26,7 @@ from renderer.kernels.simd import (
     splat4,
     store,
 )
+from renderer.kernels.vec3 import three
 from renderer.points.point import Point
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
@@ -105,19 +106,12 @@ def tell_faces(triangles, point, told):
 
     ``told`` has the shape (k, 4).
     """
-    parts, p = local_doubles(), _three(pointer(point))
+    parts, p = local_doubles(), three(pointer(point), 0)
     for i in range(len(triangles)):
         put(parts, UNTOLD, 0.0)
         base = at(pointer(triangles), 9 * i)
-        told[i, 0], told[i, 1], told[i, 2] = distance_to_face(
-            _three(base), _three(at(base, 3)), _three(at(base, 6)), p, parts
-        )
+        told[i, 0], told[i, 1], told[i, 2] = distance_to_face(three(base, 0), three(base, 3), three(base, 6), p, parts)
         told[i, 3] = 1.0 if get(parts, UNTOLD) == 0.0 else 0.0
-
-
-@inlined
-def _three(p):
-    return get(p, 0), get(p, 1), get(p, 2)
 
 
 @inlined

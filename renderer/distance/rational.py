@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.distance.nearest import tell_faces
+from renderer.points.rational import Vector, dot, exact, less
 
-_Vector = tuple[Fraction, Fraction, Fraction]
 # What the few roundings of the bounds below may change.
 _MORE = 1.0 + 2.0**-48
 # Bits of a root beyond those of float64, so that what is cut off never makes a tie.
@@ -35,7 +35,7 @@ def nearest_exactly(
 
 
 def _exactly(point: NDArray[np.float64], triangle: NDArray[np.float64]) -> tuple[float, float, float]:
-    square, u, v = _nearest(_exact(point), *(_exact(corner) for corner in triangle))
+    square, u, v = _nearest(exact(point), *(exact(corner) for corner in triangle))
     return _root(square), float(u), float(v)
 
 
@@ -47,10 +47,10 @@ def _candidates(point: NDArray[np.float64], triangles: NDArray[np.float64]) -> N
     return np.flatnonzero(gap <= corner * _MORE)
 
 
-def _nearest(p: _Vector, a: _Vector, b: _Vector, c: _Vector) -> tuple[Fraction, Fraction, Fraction]:
+def _nearest(p: Vector, a: Vector, b: Vector, c: Vector) -> tuple[Fraction, Fraction, Fraction]:
     """The squared distance of p from a face, and u and v of the face's nearest point."""
-    d, ab, ac = _less(p, a), _less(b, a), _less(c, a)
-    bb, bc, cc, x, y = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac), _dot(d, ab), _dot(d, ac)
+    d, ab, ac = less(p, a), less(b, a), less(c, a)
+    bb, bc, cc, x, y = dot(ab, ab), dot(ab, ac), dot(ac, ac), dot(d, ab), dot(d, ac)
     area = bb * cc - bc * bc
     if area > 0:
         u, v = (cc * x - bc * y) / area, (bb * y - bc * x) / area
@@ -58,12 +58,12 @@ def _nearest(p: _Vector, a: _Vector, b: _Vector, c: _Vector) -> tuple[Fraction, 
             return _square(d, ab, ac, u, v), u, v
     none, one = Fraction(0), Fraction(1)
     s, t = _share(x, bb), _share(y, cc)
-    r = _share(_dot(_less(p, b), _less(c, b)), bb - 2 * bc + cc)
+    r = _share(dot(less(p, b), less(c, b)), bb - 2 * bc + cc)
     places = ((s, none), (none, t), (one - r, r))
     return min((_square(d, ab, ac, u, v), u, v) for u, v in places)
 
 
-def _square(d: _Vector, ab: _Vector, ac: _Vector, u: Fraction, v: Fraction) -> Fraction:
+def _square(d: Vector, ab: Vector, ac: Vector, u: Fraction, v: Fraction) -> Fraction:
     """The square of d less u ab and v ac."""
     return sum(((x - u * y - v * z) ** 2 for x, y, z in zip(d, ab, ac, strict=True)), Fraction(0))
 
@@ -81,16 +81,3 @@ def _root(square: Fraction) -> float:
     root = math.isqrt(whole)
     cut = rest != 0 or root * root != whole
     return (2 * root + cut) / (1 << (shift + 1))
-
-
-def _exact(point: NDArray[np.float64]) -> _Vector:
-    x, y, z = (Fraction(float(coordinate)) for coordinate in point)
-    return x, y, z
-
-
-def _less(a: _Vector, b: _Vector) -> _Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _dot(a: _Vector, b: _Vector) -> Fraction:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -15,7 +15,7 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, heads, power_below, scaled_difference
 from renderer.kernels.simd import larger
-from renderer.kernels.vec3 import cross, dot, length, scale
+from renderer.kernels.vec3 import cross, dot, largest_component, length, scale, sub
 from renderer.points.expansions import OUT_OF_RANGE, expand_area, pair_of
 from renderer.points.signs import UNDECIDED, balance, stretched, volume_sign
 
@@ -38,7 +38,11 @@ def careful_angle(a, b, c, p, parts):
 
     It is 0 for a point on the face: the mean of its two sides.
     """
-    if _farthest(a, p) == 0.0 or _farthest(b, p) == 0.0 or _farthest(c, p) == 0.0:
+    if (
+        largest_component(sub(a, p)) == 0.0
+        or largest_component(sub(b, p)) == 0.0
+        or largest_component(sub(c, p)) == 0.0
+    ):
         return 0.0
     x, y, z = _direction(a, p), _direction(b, p), _direction(c, p)
     xy, yz, zx = dot(x, y), dot(y, z), dot(z, x)
@@ -110,12 +114,6 @@ def _largest(v):
     return larger(larger(abs(v[0]), abs(v[1])), abs(v[2])) + 0.0 * (v[0] + v[1] + v[2])
 
 
-@inlined
-def _farthest(a, p):
-    """The largest component of a - p without its sign."""
-    return larger(larger(abs(a[0] - p[0]), abs(a[1] - p[1])), abs(a[2] - p[2]))
-
-
 @kernel
 def _direction(a, p):
     """The direction from p to a, size one."""
@@ -126,4 +124,4 @@ def _direction(a, p):
 @inlined
 def _near_one(a, p):
     """a - p times a power of two that brings its largest component near 1, which changes no angle."""
-    return scaled_difference(a, p, 1.0 / power_below(larger(_farthest(a, p), _TINIEST)))
+    return scaled_difference(a, p, 1.0 / power_below(larger(largest_component(sub(a, p)), _TINIEST)))

@@ -1,16 +1,13 @@
 """Winding numbers in rational arithmetic, for the few points whose products float64 cannot hold."""
 
 import math
-from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.inside.careful_angle import PLAIN
+from renderer.points.rational import Vector, cross, dot, exact, less
 
-# Of fractions, or of float64.
-_Vector = tuple[Any, Any, Any]
 # Coordinates whose differences may overflow, and what they are multiplied by then.
 _HUGE, _LESS = 2.0**1000, 2.0**-10
 
@@ -36,34 +33,26 @@ def number_of(point: NDArray[np.float64], triangles: NDArray[np.float64]) -> flo
 
 def _angle(point: NDArray[np.float64], triangle: NDArray[np.float64]) -> float:
     """Half the solid angle of one face, by exact products; 0 in its plane."""
-    p = [Fraction(x) for x in point.tolist()]
-    a, b, c = ((Fraction(x) - p[0], Fraction(y) - p[1], Fraction(z) - p[2]) for x, y, z in triangle.tolist())
-    volume = _dot(a, _cross(b, c))
+    p = exact(point)
+    a, b, c = (less(exact(corner), p) for corner in triangle)
+    volume = dot(a, cross(b, c))
     if volume == 0:
         return 0.0
-    between = [_dot(_direction(u), _direction(v)) for u, v in ((b, c), (c, a), (a, b))]
+    between = [dot(_direction(u), _direction(v)) for u, v in ((b, c), (c, a), (a, b))]
     first = between.index(max(between))
     a, b, c = (a, b, c, a, b)[first : first + 3]
-    m, n = _direction(_cross(a, b)), _direction(_cross(a, c))
+    m, n = _direction(cross(a, b)), _direction(cross(a, c))
     x, y, z = _direction(a), _direction(b), _direction(c)
-    sine = math.hypot(*_cross(m, n))
-    return math.atan2(sine if volume > 0 else -sine, _dot(m, n) + _cotangent(x, y) * _cotangent(x, z))
+    sine = math.hypot(*cross(m, n))
+    return math.atan2(sine if volume > 0 else -sine, dot(m, n) + _cotangent(x, y) * _cotangent(x, z))
 
 
-def _cotangent(x: _Vector, y: _Vector) -> float:
+def _cotangent(x: Vector, y: Vector) -> float:
     """The cotangent of half the angle between two directions."""
-    return math.hypot(*_cross(x, y)) / (1.0 - _dot(x, y))
+    return math.hypot(*cross(x, y)) / (1.0 - dot(x, y))
 
 
-def _cross(a: _Vector, b: _Vector) -> _Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _dot(a: _Vector, b: _Vector) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _direction(a: _Vector) -> _Vector:
+def _direction(a: Vector) -> Vector:
     """A vector made of size one; it is not 0."""
     largest = max(abs(x) for x in a)
     x, y, z = (float(x / largest) for x in a)

@@ -24,6 +24,11 @@ def say(line: str, *, flush: bool = False) -> None:
         print(line, flush=flush)
 
 
+def give_up_output() -> None:
+    """Let what is still to be printed go nowhere: it would be tried, and fail, again when the process ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def flush_output() -> None:
     """Write out what was said; see ``say``."""
     with _naming_output():
@@ -38,8 +43,7 @@ def _naming_output() -> Iterator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        # What could not be written would be tried again, and fail again, when the process ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        give_up_output()
         raise OSError(error.errno, error.strerror, "standard output") from None
 
 

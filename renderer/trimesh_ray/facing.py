@@ -1,6 +1,6 @@
 """Among the faces that meet at a nearest point, the one that faces the query most, as trimesh chooses."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ class Rings(NamedTuple):
     again: NDArray[np.bool_]
 
 
-def rings_of(vertices: Floats, faces: Integers) -> Rings:
+def rings_of(vertices: Floats, faces: NDArray[np.integer[Any]]) -> Rings:
     """The rings of a mesh, whose vertices are told apart by position."""
     _, places = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     corners = places.reshape(-1)[faces]

@@ -1,7 +1,7 @@
 """The octree of a ``trimesh.Trimesh``, kept as long as the mesh lives and its content stays."""
 
 import weakref
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import face_normals
 from renderer.trimesh_ray.distinct import distinct_faces
 from renderer.trimesh_ray.facing import Rings, rings_of
-
-if TYPE_CHECKING:
-    pass
 
 Integers = NDArray[np.int64]
 
@@ -29,12 +26,14 @@ class Traced:
         from renderer.octree import Octree
 
         self.rows = distinct_faces(vertices, faces)
-        finite = np.where(np.isfinite(vertices), vertices, 0.0)
-        self.octree: Octree = Octree(finite, faces if self.rows is None else faces[self.rows])
+        finite = np.isfinite(vertices)
+        there = vertices if finite.all() else np.where(finite, vertices, 0.0)
+        self.octree: Octree = Octree(there, faces if self.rows is None else faces[self.rows])
         self._rings: Rings | None = None
         self._normals: NDArray[np.float64] | None = None
-        self.vertices = vertices.copy()
-        self.faces = faces.copy()
+        # The octree's copies, where it has all.
+        self.vertices = self.octree.mesh.vertices if there is vertices else vertices.copy()
+        self.faces = self.octree.mesh.faces if self.rows is None else faces.copy()
 
     @property
     def rings(self) -> Rings:

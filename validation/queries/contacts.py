@@ -11,6 +11,7 @@ from renderer.octree import Octree
 from validation.job import Job
 from validation.oracle.contacts import Contact, contacts
 from validation.queries.peers import peers
+from validation.queries.places import places_of_faces
 from validation.queries.solids import Solid, solids
 
 Floats = NDArray[np.float64]
@@ -40,10 +41,7 @@ def _rays(solid: Solid, rng: Generator, count: int) -> tuple[Floats, Floats, Flo
 
     Returns origins, directions, and those places.
     """
-    corners = solid.mesh().triangles[rng.integers(0, len(solid.mesh().faces), count)]
-    kind = rng.integers(0, 3, (count, 1))
-    targets = np.where(kind == 0, corners[:, 0], (corners[:, 0] + corners[:, 1]) / 2)
-    targets = np.where(kind == 2, (2 * corners[:, 0] + corners[:, 1] + corners[:, 2]) / 4, targets)
+    targets = places_of_faces(solid.mesh().triangles, rng, count)
     directions = rng.integers(-4, 5, (count, 3)).astype(np.float64)
     directions[rng.random((count, 3)) < 0.3] = 0.0
     directions[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-4.0, 4.0], count)

@@ -52,11 +52,11 @@ def _faults(
     found = []
     for row, contacts_of_ray in enumerate(expected):
         own = np.flatnonzero(rays == row)
-        along = (places[own] - origins[row]) @ directions[row]
-        fault = _fault(faces[own[np.argsort(along, kind="stable")]].tolist(), contacts_of_ray)
+        own = own[np.argsort((places[own] - origins[row]) @ directions[row], kind="stable")]
+        fault = _fault(faces[own].tolist(), contacts_of_ray)
         if fault is None and len(own):
             exact = [_place(origins[row], directions[row], contact.t) for contact in contacts_of_ray]
-            off = np.abs(places[own[np.argsort(along, kind="stable")]] - exact).max()
+            off = np.abs(places[own] - exact).max()
             fault = None if off <= PLACE * largest else "places"
         if fault is not None:
             found.append(fault)

@@ -8,6 +8,8 @@ import trimesh
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from validation.queries.places import places_of_faces
+
 Floats = NDArray[np.float64]
 # The grid on which corners lie: with 16 steps to it, fourths of the way between two corners are exact too.
 _GRID = 64.0
@@ -69,10 +71,7 @@ def families() -> dict[str, Callable[[Any, Generator, int], tuple[Floats, Floats
 def _aimed(mesh: Any, rng: Generator, steps: NDArray[Any]) -> tuple[Floats, Floats]:
     """Rays through corners, middles of edges and points of faces; fourths for slopes, so that float64 holds them."""
     count = len(steps)
-    corners = np.asarray(mesh.triangles)[rng.integers(0, len(mesh.faces), count)]
-    kind = rng.integers(0, 3, (count, 1))
-    targets = np.where(kind == 0, corners[:, 0], (corners[:, 0] + corners[:, 1]) / 2)
-    targets = np.where(kind == 2, (2 * corners[:, 0] + corners[:, 1] + corners[:, 2]) / 4, targets)
+    targets = places_of_faces(np.asarray(mesh.triangles), rng, count)
     directions = rng.integers(-4, 5, (count, 3)).astype(np.float64)
     directions[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-4.0, 4.0], count)
     return targets - directions * steps * _unit(mesh), directions

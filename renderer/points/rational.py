@@ -1,0 +1,31 @@
+"""Vectors of rational numbers, for the few points whose products float64 cannot hold."""
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Of fractions, or of float64.
+Vector = tuple[Any, Any, Any]
+
+
+def exact(point: NDArray[np.float64]) -> Vector:
+    """The coordinates of a point (3,)."""
+    x, y, z = (Fraction(coordinate) for coordinate in point.tolist())
+    return x, y, z
+
+
+def less(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def dot(a: Vector, b: Vector) -> Any:
+    """The scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
