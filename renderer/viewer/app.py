@@ -12,12 +12,12 @@ from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from renderer.viewer.payload import boxes_bytes, description, mesh_bytes
+from renderer.viewer.payload import Payload, boxes_payload, description, mesh_payload
 from renderer.viewer.security import ResponseHeaders, SameOrigin, TokenRequired, allowed_hosts
 from renderer.viewer.session import Connection, Session
 from renderer.viewer.shown import ShownScene, open_file
@@ -27,7 +27,6 @@ PAGE = Path(__file__).parent / "page"
 MAX_CONNECTIONS = 16
 # Threads per session: for its picture under way, the one before it whose last tiles end, and a click.
 _THREADS_A_SESSION = 3
-_BINARY = "application/octet-stream"
 _TRY_LATER = 1013  # RFC 6455's registry of close codes
 
 
@@ -54,7 +53,7 @@ class Viewer:
 
     async def mesh(self, _request: Request) -> Response:
         """GET /mesh."""
-        return Response(await run_in_threadpool(mesh_bytes, self.shown.prepared), media_type=_BINARY)
+        return _stream(mesh_payload(self.shown.prepared))
 
     async def boxes(self, request: Request) -> Response:
         """GET /octree?level=K."""
@@ -62,7 +61,7 @@ class Viewer:
         # No tree has levels of three digits.
         if not (level.isascii() and level.isdigit() and len(level) < 3):
             return PlainTextResponse(f"level: expected an integer from 0 to 99, got {level[:40]!r}", 400)
-        return Response(await run_in_threadpool(boxes_bytes, self.shown.prepared, int(level)), media_type=_BINARY)
+        return _stream(await run_in_threadpool(boxes_payload, self.shown.prepared, int(level)))
 
     async def connect(self, socket: WebSocket) -> None:
         """The WebSocket: one session, until the page leaves."""
@@ -87,6 +86,11 @@ class Viewer:
     async def stop(self) -> None:
         """Begin nothing more."""
         self._threads.shutdown(wait=False, cancel_futures=True)
+
+
+def _stream(payload: Payload) -> Response:
+    headers = {"Content-Length": str(payload.size)}
+    return StreamingResponse(payload.pieces, media_type="application/octet-stream", headers=headers)
 
 
 def _telling(send: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:

@@ -1,7 +1,9 @@
 """The data that the page fetches: a scene's description as JSON, its triangles and its octree's boxes as arrays."""
 
 import struct
-from typing import Any
+from collections.abc import Iterator
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +16,15 @@ from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.material import Material
 from renderer.scene.needs import examine
 from renderer.shade.records import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
+from renderer.shade.surface import SceneArrays
 from renderer.viewer.protocol import MODES
 from renderer.viewer.shown import ShownScene
 
 MAGIC = 0x4853454D
 # Materials are told apart by a uint16.
 _MAX_MATERIALS = 65536
+# Faces or boxes of a piece, some 100 KB: all that a client that stops reading keeps in memory.
+_FACES = 4096
 
 
 def description(shown: ShownScene) -> dict[str, Any]:
@@ -51,44 +56,53 @@ def description(shown: ShownScene) -> dict[str, Any]:
     }
 
 
-def mesh_bytes(prepared: PreparedScene) -> bytes:
-    """The answer to GET /mesh, little-endian: uint32 MAGIC and F, then for each of F faces the corners as 9 float32 and
-    their shading normals as 9 float32, then the materials as F uint16, filled up to four bytes.
+class Payload(NamedTuple):
+    """What a client gets: its size in bytes, and the pieces that are sent as fast as the client reads."""
+
+    size: int
+    pieces: Iterator[bytes]
+
+
+def mesh_payload(prepared: PreparedScene) -> Payload:
+    """The answer to GET /mesh, little-endian: uint32 MAGIC and F, then for each of F faces the corners as 9 float32,
+    then for each their shading normals as 9 float32, then the materials as F uint16, filled up to four bytes.
 
     Raises ``ValueError`` where there are more materials than a uint16 counts.
     """
-    arrays = prepared.arrays
+    arrays, count = prepared.arrays, len(prepared.arrays.faces)
     expect(len(arrays.materials) <= _MAX_MATERIALS, "materials", f"at most {_MAX_MATERIALS}", len(arrays.materials))
-    corners = arrays.vertices[arrays.faces]
-    normals = _normals(prepared, corners)
-    material = (arrays.material // MATERIAL_COLUMNS).astype("<u2")
-    head = struct.pack("<2I", MAGIC, len(arrays.faces))
-    return b"".join(
-        (
-            head,
-            corners.astype("<f4").tobytes(),
-            normals.astype("<f4").tobytes(),
-            material.tobytes(),
-            bytes(len(material) % 2 * 2),
-        )
-    )
+    head = struct.pack("<2I", MAGIC, count)
+    parts = (_corners, _normals, _materials)
+    chunks = (part(arrays, slice(i, i + _FACES)).tobytes() for part in parts for i in range(0, count, _FACES))
+    return Payload(8 + 74 * count + count % 2 * 2, chain([head], chunks, [bytes(count % 2 * 2)]))
 
 
-def boxes_bytes(prepared: PreparedScene, level: int) -> bytes:
+def boxes_payload(prepared: PreparedScene, level: int) -> Payload:
     """The answer to GET /octree, little-endian: uint32 n and the number of levels, then n boxes of 6 float32: the lower
     and the upper corner of each node of ``level``, the root's being 0.
     """
     boxes = boxes_at(prepared.octree, level).astype("<f4")
-    return struct.pack("<2I", len(boxes), levels(prepared.octree)) + boxes.tobytes()
+    head = struct.pack("<2I", len(boxes), levels(prepared.octree))
+    chunks = (boxes[i : i + _FACES].tobytes() for i in range(0, len(boxes), _FACES))
+    return Payload(8 + boxes.nbytes, chain([head], chunks))
 
 
-def _normals(prepared: PreparedScene, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _corners(arrays: SceneArrays, some: slice) -> NDArray[np.float32]:
+    return arrays.vertices[arrays.faces[some]].astype("<f4")
+
+
+def _normals(arrays: SceneArrays, some: slice) -> NDArray[np.float32]:
     """The normal at each corner, (F, 3, 3): the vertex's where a face is smooth, else the face's; 0 without area."""
-    arrays = prepared.arrays
+    corners = arrays.vertices[arrays.faces[some]]
     normals = np.repeat(face_normals(corners)[:, None], 3, axis=1)
     if len(arrays.smooth):
-        normals[arrays.smooth] = arrays.normals[arrays.faces[arrays.smooth]]
-    return normals
+        smooth = arrays.smooth[some]
+        normals[smooth] = arrays.normals[arrays.faces[some][smooth]]
+    return normals.astype("<f4")
+
+
+def _materials(arrays: SceneArrays, some: slice) -> NDArray[np.uint16]:
+    return (arrays.material[some] // MATERIAL_COLUMNS).astype("<u2")
 
 
 def _material(name: str, material: Material) -> dict[str, Any]:

@@ -15,6 +15,8 @@ from renderer.viewer.protocol import MAX_MESSAGE_BYTES
 from renderer.viewer.security import is_loopback, new_token
 from renderer.viewer.shown import ShownScene
 
+# Connections at a time, so that none that wait for nothing take all the process's files: pages open some seven each.
+_MOST_CONNECTIONS = 256
 # Seconds for connections to end; their pictures stop between tiles.
 _LAST_WORDS = 1
 # Seconds per turn of ``wait``: on Windows Ctrl-C has no effect before a turn ends.
@@ -47,6 +49,7 @@ class ViewerServer:
             server_header=False,
             ws_max_size=MAX_MESSAGE_BYTES,
             ws_per_message_deflate=False,  # pictures on loopback travel faster than they compress
+            limit_concurrency=_MOST_CONNECTIONS,
             timeout_graceful_shutdown=_LAST_WORDS,
         )
         logging.getLogger("uvicorn.error").addFilter(_no_mere_refusal)

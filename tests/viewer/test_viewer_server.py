@@ -14,7 +14,7 @@ import time
 import urllib.request
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 from viewer_page import MODELS, SCENE
 
@@ -35,6 +36,7 @@ from renderer.cli import main
 from renderer.inspect.face_phong import face_colors
 from renderer.inspect.false_color import false_color, limits_of
 from renderer.inspect.tree_boxes import boxes_at, visited
+from renderer.mesh.shapes import icosphere
 from renderer.picture.image import srgb
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.scene import Scene
@@ -651,6 +653,32 @@ def test_the_mesh_and_the_boxes_are_fetched(url: str, folder: Path) -> None:
         n, levels = struct.unpack("<2I", raw[:8])
         boxes = np.frombuffer(raw, "<f4", offset=8).reshape(-1, 6)
         assert np.array_equal(boxes, boxes_at(shown.prepared.octree, level)) and n == len(boxes) >= 1 and levels > 2
+
+
+def resident() -> int:
+    """Bytes of memory that this process holds."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_clients_that_do_not_read_take_little_memory(tmp_path: Path) -> None:
+    """250 that asked for the mesh of a large scene and read nothing held 2 GB."""
+    sphere = icosphere(6)
+    trimesh.Trimesh(sphere.vertices, sphere.faces).export(tmp_path / "sphere.ply")
+    text = SCENE.replace(str(MODELS / "stairs.ply"), str(tmp_path / "sphere.ply"))
+    assert "sphere.ply" in text
+    (tmp_path / "large.toml").write_text(text)
+    with renderer.view(tmp_path / "large.toml", browser=False) as viewing, ExitStack() as opened:
+        size = len(fetched(viewing.url, "mesh"))
+        before, count = resident(), 40
+        host, port = viewing.url.removeprefix("http://").rstrip("/").split(":")
+        for _ in range(count):
+            client = opened.enter_context(socket.create_connection((host, int(port)), PATIENCE))
+            client.sendall(f"GET /mesh HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n".encode())
+            assert client.recv(12) == b"HTTP/1.1 200"
+        fetched(viewing.url, "scene")
+        # A quarter of what the answers hold; a piece and the buffers of its socket are some 0.2 MB.
+        assert resident() - before < count * size / 4 and size > 5e6
 
 
 # How it is started and ends
