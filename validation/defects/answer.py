@@ -23,10 +23,11 @@ def answer(task: str) -> None:
         inject(Replacement(**replacement))
     # Imported only now, because it loads the renderer.
     found = import_module(checks).run(tuple(groups))
-    names = [_name(gate) for gate in found]
+    names = [name_of(gate) for gate in found]
     red = [name for name, gate in zip(names, found, strict=True) if not gate.passed]
     print(MARK + json.dumps({"gates": names, "red": red}))
 
 
-def _name(gate: "Gate") -> str:
+def name_of(gate: "Gate") -> str:
+    """The gate's section, subject and quantity."""
     return f"{gate.section}: {gate.subject}: {gate.quantity}"

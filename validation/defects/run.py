@@ -24,6 +24,8 @@ from validation.gates import Gate
 
 # Ten times the time of the slowest defect on two busy cores: beyond it a kernel does not terminate.
 _PATIENCE = 600.0
+# In place of a red gate, of checks that did not end in that time.
+HANGS = "defects: the checks: do not end"
 # Each process compiles on one core.
 _AT_ONCE = 2
 _CHECKS = "validation.defects.checks"
@@ -56,7 +58,8 @@ KEPT = {
 class Answer:
     """Results of the checks in one process: names of all gates and of the failing ones, its error, its seconds.
 
-    A gate's name is its section, subject and quantity. An error is not a verdict of any gate.
+    A gate's name is its section, subject and quantity; checks that do not end count as one red, ``HANGS``. An error is
+    not a verdict of any gate.
     """
 
     gates: tuple[str, ...]
@@ -108,7 +111,8 @@ def run_checks(replacement: Replacement | None, groups: tuple[str, ...], cache: 
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False)
     except subprocess.TimeoutExpired:
-        return Answer((), (), f"did not end within {_PATIENCE:.0f} s", time.perf_counter() - began)
+        # A kernel that runs for ever is noticed by whoever waits for the report.
+        return Answer((), (HANGS,), None, time.perf_counter() - began)
     seconds = time.perf_counter() - began
     said = [line for line in done.stdout.splitlines() if line.startswith(MARK)]
     if done.returncode or not said:

@@ -127,6 +127,20 @@ def test_an_error_is_no_verdict(tmp_path: Path, tiny_checks: str) -> None:
     assert not defects.record([defect], control, [answer])["defects"][0]["caught"]
 
 
+def test_a_defect_that_never_ends_is_caught(
+    tmp_path: Path, tiny_checks: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was counted as an error, and the suite said that nothing had noticed it."""
+    monkeypatch.setattr(defects, "_PATIENCE", 3.0)
+    endless = Replacement("image._encoded", "encoded * 255.0 + 0.5", "exec('while True: pass')")
+    answer = defects.run_checks(endless, ("pictures",), tmp_path, tiny_checks)
+    assert answer.red == (defects.HANGS,) and answer.error is None
+    defect = Defect("endless", "pictures", endless, kernel=False)
+    control = Answer(("images: a: b",), (), None, 1.0)
+    assert [gate.passed for gate in defects.gates([defect], control, [answer])] == [True, True]
+    assert [gate.passed for gate in defects.gates([defect], answer, [answer])][0] is False
+
+
 def test_record_tells_what_each_measure_caught_alone() -> None:
     """Places and views of one measure are one kind; an extreme case is one of its own, and is kept with a reason."""
     chosen = list(defects_list.PICTURES[:3])

@@ -1,0 +1,146 @@
+"""What notices a mutant is told right: a red gate, a failing test, a crash, a process that never ends, or nothing."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from validation.mutants import judge as judging
+from validation.mutants import record
+from validation.mutants.judge import Verdict
+from validation.mutants.record import Record, summary
+from validation.mutants.sites import Mutant, mutants
+from validation.mutants.touched import read, touching
+from validation.mutants.workshop import Ended, Workshop
+
+TOUCHED: dict[str, Any] = {
+    "tests/tree/test_far.py": {"lines": {"renderer/trace/a.py": [3]}, "kernels": [], "seconds": 1.0},
+    "tests/trace/test_own.py": {"lines": {"renderer/trace/a.py": [2, 3]}, "kernels": [], "seconds": 5.0},
+    "tests/shade/test_kernel.py": {"lines": {}, "kernels": ["renderer/trace/a.py"], "seconds": 9.0},
+    "tests/mesh/test_none.py": {"lines": {"renderer/mesh/b.py": [3]}, "kernels": [], "seconds": 1.0},
+    "tests/validation/defects/test_text.py": {"lines": {"renderer/trace/a.py": [3]}, "kernels": [], "seconds": 0.1},
+}
+
+
+def mutant(**changes: Any) -> Mutant:
+    fields = {
+        "file": "renderer/trace/a.py", "place": "renderer.trace.a.f", "line": 3, "operator": "arithmetic",
+        "before": "a + b", "instead": "(a) - (b)", "kernel": False, "at_top": False, "nth": 0,
+    }  # fmt: skip
+    return Mutant(**(fields | changes))
+
+
+def test_the_tests_of_a_mutant_run_its_line_and_its_own_room_comes_first() -> None:
+    own, far, kernel = "tests/trace/test_own.py", "tests/tree/test_far.py", "tests/shade/test_kernel.py"
+    assert touching(mutant(), TOUCHED) == [own, far, kernel]
+    assert touching(mutant(line=2), TOUCHED) == [own, kernel]
+    assert touching(mutant(line=99), TOUCHED) == [kernel]
+    assert touching(mutant(line=99, at_top=True), TOUCHED) == [own, far, kernel]
+
+
+class Shop:
+    """Stands in for a workshop: answers as it is told."""
+
+    def __init__(self, gates: list[Ended], tests: Ended) -> None:
+        self.answers, self.tests, self.asked = gates, tests, 0
+
+    def broken(self, mutant: Mutant) -> Any:
+        return memoryview(b"")  # a context that does nothing
+
+    def call(self, target: str, *arguments: str, patience: float) -> Ended:
+        assert json.loads(arguments[0])[0] in judging.groups_of(mutant())
+        self.asked += 1
+        return self.answers.pop(0)
+
+    def run(self, arguments: list[str], patience: float) -> Ended:
+        assert arguments[-1] == "tests/shade/test_kernel.py"
+        return self.tests
+
+
+GREEN = Ended(0, "red: null\n", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("gates", "tests", "by", "gate", "how"),
+    [
+        ([GREEN, Ended(0, 'noise\nred: "hits: cube: wrong"\n', 3.0)], None, "hits: cube: wrong", True, "fails"),
+        ([Ended(None, "", 9.0)], None, "the checks of hits", True, "hangs"),
+        ([Ended(-11, "", 9.0)], None, "the checks of hits: ", True, "crashes"),
+        ([Ended(1, "Trace\nKeyError: 3\n", 9.0)], None, "the checks of hits: KeyError: 3", True, "crashes"),
+        ([GREEN] * 3, Ended(1, "F\nFAILED tests/a.py::test_b - x\n", 4.0), "tests/a.py::test_b", False, "fails"),
+        ([GREEN] * 3, Ended(None, "..", 4.0), "the tests", False, "hangs"),
+        ([GREEN] * 3, Ended(-6, "..", 4.0), "the tests: exit code -6", False, "crashes"),
+        ([GREEN] * 3, Ended(0, "9 passed", 4.0), None, False, None),
+    ],
+)
+def test_a_verdict_says_what_noticed_and_how(
+    gates: list[Ended], tests: Ended | None, by: str | None, gate: bool, how: Any
+) -> None:
+    spent = sum(ended.seconds for ended in [*gates, *([tests] if tests else [])])
+    shop: Any = Shop(list(gates), tests or GREEN)
+    sound = dict.fromkeys(("hits", "queries", "pictures"), 1.0)
+    assert judging.judge(mutant(), shop, TOUCHED, sound) == Verdict(by, gate, how, spent)
+    assert shop.asked == len(gates)
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    for folder in ("renderer/trace", "tests", "validation"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "renderer" / "trace" / "a.py").write_text("\n\nx = a + b\n")
+    return tmp_path
+
+
+def test_a_record_goes_on_until_the_code_or_what_judges_it_changes(root: Path) -> None:
+    path = root / "mutants.json"
+    killed, survivor = mutant(), mutant(nth=1)
+    first = Record(path, root)
+    first.add(killed, Verdict("a gate", True, "fails", 1.0))
+    first.add(survivor, Verdict(None, False, None, 1.0))
+    again = Record(path, root)
+    assert again.row(killed)["by"] == "a gate" and again.row(survivor)["by"] is None  # type: ignore[index]
+    (root / "tests" / "test_new.py").write_text("")
+    again = Record(path, root)
+    assert again.row(killed) is not None and again.row(survivor) is None
+    (root / "renderer" / "trace" / "a.py").write_text("x = a + b + c\n")
+    assert Record(path, root).row(killed) is None
+
+
+def test_a_summary_counts_what_is_not_equivalent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record, "EQUIVALENT", {"b": "the same answer either way"})
+    rows = [
+        {"key": key, "kernel": key < "d", "by": by, "gate": by == "gate", "how": how}
+        for key, by, how in [("a", "gate", "fails"), ("b", None, None), ("c", "test", "hangs"), ("d", None, None)]
+    ]
+    found = summary(rows)
+    assert found["kernels"] == {
+        "mutants": 3, "equivalent": 1, "killed": 2, "by_gates": 1, "hung": 1, "crashed": 0, "survivors": [],
+    }  # fmt: skip
+    assert found["python"]["survivors"] == ["d"]
+
+
+def test_what_processes_measured_is_merged_and_kernels_bring_what_they_import(tmp_path: Path) -> None:
+    root = Path(__file__).parents[3]
+    leaf = str(root / "renderer" / "trace" / "leaf.py")
+    for number, lines in enumerate(([1, 2], [2, 5])):
+        found = {"tests/test_a.py": {"lines": {leaf: lines}, "kernels": [leaf], "seconds": 1.5}}
+        (tmp_path / f"{number}.json").write_text(json.dumps(found))
+    one = read(tmp_path, root)["tests/test_a.py"]
+    assert one["lines"] == {"renderer/trace/leaf.py": [1, 2, 5]} and one["seconds"] == 3.0
+    assert {"renderer/trace/leaf.py", "renderer/trace/intersect.py"} <= set(one["kernels"])
+
+
+def test_a_workshop_breaks_one_file_and_mends_it(tmp_path: Path) -> None:
+    root = Path(__file__).parents[3]
+    shop = Workshop(root, tmp_path)
+    shop.keep()
+    one = next(m for m in mutants(root / "renderer" / "process") if m.operator == "constant")
+    one = Mutant(**{**one.__dict__, "file": f"renderer/{one.file}", "place": f"renderer.{one.place}"})
+    sound = (shop.root / one.file).read_bytes()
+    with shop.broken(one):
+        assert (shop.root / one.file).read_bytes() != sound == (root / one.file).read_bytes()
+        ended = shop.run(["-c", "import renderer, sys; print(renderer.__file__); sys.exit(3)"], 60.0)
+        assert ended.code == 3 and str(shop.root) in ended.output
+    assert (shop.root / one.file).read_bytes() == sound
+    assert shop.run(["-c", "while True: pass"], 0.5).code is None

@@ -1,0 +1,97 @@
+"""Mutants are found, chosen and written the same way each time, and named so that other edits do not move them."""
+
+from pathlib import Path
+
+import pytest
+
+from validation.mutants.sites import chosen, mutants, text_of
+
+CODE = '''"""A module of é."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import nothing as b
+
+Either = int | float
+SIZE = 2 * 3
+
+
+def plain(a: "int | None", b=1):
+    """Adds 1."""
+    message = f"{a + 1}"
+    return a + b + SIZE
+
+
+@kernel
+def fast(a):
+    for i in range(a):
+        a += i * i
+    return a
+
+
+class Box:
+    """A class."""
+
+    lid = 1.5
+
+    @property
+    def open(self):
+        """Whether it is."""
+        return not self.lid
+'''
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    folder = tmp_path / "package"
+    folder.mkdir()
+    (folder / "module.py").write_text(CODE, encoding="utf-8")
+    return folder
+
+
+def test_words_and_types_are_left_and_all_else_is_found(package: Path) -> None:
+    found = mutants(package)
+    places = {(m.place.removeprefix("package.module"), m.before, m.instead) for m in found}
+    assert ("", "2 * 3", "(2) / (3)") in places and (".plain", "a + b", "(a) - (b)") in places
+    assert (".fast", "a += i * i", "pass") in places and (".Box.open", "not self.lid", "(self.lid)") in places
+    assert not [m for m in found if "int" in m.before or "1}" in m.before or "TYPE" in m.before]
+    assert {m.place.rpartition(".")[2] for m in found if m.kernel} == {"fast", "module"}
+    assert {m.place.rpartition(".")[2] for m in found if m.at_top} == {"Box", "module"}
+
+
+def test_each_is_one_edit_that_compiles(package: Path) -> None:
+    seen = set()
+    for mutant in mutants(package):
+        text = text_of(mutant, package.parent)
+        compile(text, "module.py", "exec")
+        seen.add(text)
+        changed = [new for old, new in zip(CODE.splitlines(), text.splitlines(), strict=True) if old != new]
+        assert len(changed) == 1
+    assert CODE not in seen and len(seen) == len(mutants(package))
+
+
+def test_equal_code_in_one_place_is_told_apart(package: Path) -> None:
+    (package / "module.py").write_text("def f(a):\n    return (a + 1) * (a + 1)\n", encoding="utf-8")
+    twice = [m for m in mutants(package) if m.before == "a + 1"]
+    assert [m.nth for m in twice] == [0, 1]
+    assert text_of(twice[1], package.parent).endswith("(a + 1) * (((a) - (1)))\n")
+
+
+def test_a_key_outlives_edits_elsewhere_and_names_code_that_went(package: Path) -> None:
+    mutant = next(m for m in mutants(package) if m.before == "a + b")
+    path = package / "module.py"
+    path.write_text("# A new line.\n" + CODE, encoding="utf-8")
+    assert "(a) - (b)" in text_of(mutant, package.parent)
+    path.write_text(CODE.replace("a + b", "a"), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"expected 'a \+ b' in package\.module\.plain, got none"):
+        text_of(mutant, package.parent)
+
+
+def test_a_choice_depends_on_its_seed_alone_and_begins_with_smaller_ones(package: Path) -> None:
+    found = mutants(package)
+    some = chosen(found, 10, 3)
+    assert chosen(found, 4, 3) == some[:4] and chosen(found, 10, 3) == some != chosen(found, 10, 4)
+    assert sum(m.kernel for m in some) == 5
+    with pytest.raises(ValueError, match="expected at most"):
+        chosen(found, 1000, 3)

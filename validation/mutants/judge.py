@@ -1,0 +1,107 @@
+"""Judges one mutant in a workshop: gates first, then the tests that touch its code."""
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from validation.mutants.answer import MARK
+from validation.mutants.sites import Mutant
+from validation.mutants.touched import Touched, touching
+from validation.mutants.workshop import Ended, Workshop
+
+How = Literal["fails", "crashes", "hangs"]
+# Groups of checks that run code of each folder or module of the renderer; what is not here no gate runs.
+_ALL = ("hits", "queries", "pictures")
+_GROUPS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("arrays", "errors", "kernels", "limits", "lazy", "mesh", "octree", "points", "process"), _ALL),
+    **dict.fromkeys(("queries", "trace", "tree"), _ALL),
+    **dict.fromkeys(("contacts", "distance", "inside", "trimesh_ray"), ("queries",)),
+    **dict.fromkeys(("scene", "shade", "picture", "inspect"), ("pictures",)),
+}
+# A process that takes this many times as long as with the sound renderer, and what compiling takes, hangs.
+_TIMES, _COMPILING = 6.0, 150.0
+# Seconds of tests, as long as the sound renderer takes for them, that are tried on a mutant.
+_TESTS = 240.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What noticed a mutant.
+
+    by       the name of the gate, or the test; None where nothing did
+    gate     whether it was a gate
+    how      what the mutant did
+    seconds  that it took
+    """
+
+    by: str | None
+    gate: bool
+    how: How | None
+    seconds: float
+
+
+def groups_of(mutant: Mutant) -> tuple[str, ...]:
+    """The groups of checks that may notice a mutant."""
+    return _GROUPS.get(Path(mutant.file).with_suffix("").parts[1], ())
+
+
+def judge(mutant: Mutant, workshop: Workshop, touched: Touched, sound: dict[str, float]) -> Verdict:
+    """Break the workshop's copy, and try gates and tests until one notices; ``sound`` is each group's seconds."""
+    spent = 0.0
+    with workshop.broken(mutant):
+        for group in groups_of(mutant):
+            ended = gates(workshop, (group,), _COMPILING + _TIMES * sound[group])
+            spent += ended.seconds
+            by, how = _noticed_by_gates(ended, group)
+            if how is not None:
+                return Verdict(by, True, how, spent)
+        tests = _affordable(touching(mutant, touched), touched)
+        if tests:
+            own = sum(touched[test]["seconds"] for test in tests)
+            ended = workshop.run(
+                ["-m", "pytest", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--durations=0", *tests],
+                _COMPILING + _TIMES * own,
+            )
+            spent += ended.seconds
+            by, how = _noticed_by_tests(ended)
+            return Verdict(by, False, how, spent)
+    return Verdict(None, False, None, spent)
+
+
+def gates(workshop: Workshop, groups: Sequence[str], patience: float) -> Ended:
+    """Run the gates of some groups until one is red."""
+    return workshop.call("validation.mutants.answer:answer", json.dumps(groups), patience=patience)
+
+
+def _noticed_by_gates(ended: Ended, group: str) -> tuple[str | None, How | None]:
+    said = re.search(rf"^{MARK}(.*)$", ended.output, re.MULTILINE)
+    if ended.code is None:
+        return f"the checks of {group}", "hangs"
+    if ended.code != 0 or said is None:
+        last = (ended.output.strip().splitlines() or [""])[-1]
+        return f"the checks of {group}: {last[:200]}", "crashes"
+    red = json.loads(said[1])
+    return (red, "fails") if red is not None else (None, None)
+
+
+def _noticed_by_tests(ended: Ended) -> tuple[str | None, How | None]:
+    if ended.code == 0:
+        return None, None
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", ended.output, re.MULTILINE)
+    if ended.code is None:
+        return "the tests", "hangs"
+    return (failed[1], "fails") if failed else (f"the tests: exit code {ended.code}", "crashes")
+
+
+def _affordable(tests: Sequence[str], touched: Touched) -> list[str]:
+    """The first tests, as many as _TESTS allows, at least one."""
+    taken: list[str] = []
+    left = _TESTS
+    for test in tests:
+        if not taken or touched[test]["seconds"] <= left:
+            taken.append(test)
+            left -= touched[test]["seconds"]
+    return taken

@@ -1,0 +1,106 @@
+"""Runs mutants on all processors, goes on from the last run, and keeps a record."""
+
+import json
+import os
+import queue
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from validation.mutants.judge import gates, judge
+from validation.mutants.record import Record, digest, summary
+from validation.mutants.sites import Mutant, chosen, mutants
+from validation.mutants.touched import VARIABLE, Touched, read
+from validation.mutants.workshop import Workshop
+
+ROOT = Path(__file__).resolve().parents[2]
+GROUPS = ("hits", "queries", "pictures")
+# Seconds that the sound renderer may take for all tests, or for one group of checks.
+_PATIENCE = 3600.0
+
+
+def run(count: int, seed: int, output: Path, step: Callable[[str], None]) -> dict[str, Any]:
+    """Judge ``count`` mutants chosen by ``seed``; those in ``output / "mutants.json"`` are not judged again.
+
+    Returns the counts, see ``record.summary``.
+    """
+    some = chosen(mutants(ROOT / "renderer"), count, seed)
+    record = Record(output / "mutants.json", ROOT)
+    waiting = [mutant for mutant in some if record.row(mutant) is None]
+    if waiting:
+        with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+            _judge_all(waiting, record, Path(folder), step)
+    return {"seed": seed, **summary([row for mutant in some if (row := record.row(mutant)) is not None])}
+
+
+def _judge_all(waiting: Sequence[Mutant], record: Record, folder: Path, step: Callable[[str], None]) -> None:
+    workers = min(len(waiting), os.cpu_count() or 1)
+    shops = [Workshop(ROOT, _made(folder / str(number))) for number in range(workers)]
+    touched = _touched(shops[0], record.path.with_name("touched.json"), step)
+    with ThreadPoolExecutor(workers) as pool:
+        sounds = list(pool.map(lambda shop: _sound(shop, step), shops))
+        free: queue.SimpleQueue[tuple[Workshop, dict[str, float]]] = queue.SimpleQueue()
+        for pair in zip(shops, sounds, strict=True):
+            free.put(pair)
+
+        def one(mutant: Mutant) -> None:
+            step(f"mutants: {mutant.key}")
+            shop, sound = pair = free.get()
+            try:
+                verdict = judge(mutant, shop, touched, sound)
+            finally:
+                free.put(pair)
+            results.put((mutant, verdict))
+
+        results: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        futures = [pool.submit(one, mutant) for mutant in waiting]
+        try:
+            for future in futures:
+                future.result()
+                while not results.empty():
+                    record.add(*results.get())
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
+
+
+def _touched(shop: Workshop, stored: Path, step: Callable[[str], None]) -> Touched:
+    """Which tests touch what, measured by a run of all tests unless ``stored`` has it for these sources."""
+    sources = digest([*(ROOT / "renderer").rglob("*.py"), *(ROOT / "tests").rglob("*.py")])
+    if stored.exists():
+        found = json.loads(stored.read_text(encoding="utf-8"))
+        if found["sources"] == sources:
+            return dict(found["touched"])
+    step("mutants: which tests touch what")
+    with tempfile.TemporaryDirectory(prefix="touched-") as folder:
+        ended = shop.run(
+            ["-m", "pytest", "-p", "validation.mutants.touched", "-n", str(os.cpu_count() or 1), "--dist", "loadfile"],
+            _PATIENCE, **{VARIABLE: folder},
+        )  # fmt: skip
+        if ended.code != 0:
+            raise RuntimeError(f"mutants: expected the sound renderer's tests to pass, got\n{ended.output[-2000:]}")
+        touched = read(Path(folder), shop.root)
+    stored.write_text(json.dumps({"sources": sources, "touched": touched}), encoding="utf-8")
+    return touched
+
+
+def _sound(shop: Workshop, step: Callable[[str], None]) -> dict[str, float]:
+    """The seconds of each group of checks with the sound renderer, none of which may be red; its kernels are kept."""
+    seconds = {}
+    for group in GROUPS:
+        step(f"mutants: none, as the control of {group}")
+        for _ in range(2):  # the first compiles
+            ended = gates(shop, (group,), _PATIENCE)
+        if ended.code != 0 or "red: null" not in ended.output:
+            raise RuntimeError(f"mutants: expected no red gate of {group}, got\n{ended.output[-2000:]}")
+        seconds[group] = ended.seconds
+    shop.run(["-m", "renderer", "compile"], _PATIENCE)
+    shop.keep()
+    return seconds
