@@ -20,6 +20,7 @@ from validation.hits.refit import check_refit
 from validation.hits.section import HitEffort, check_leaks, check_mesh
 from validation.job import Job
 from validation.pictures.section import PictureEffort, check_scene
+from validation.promises import section as promises
 from validation.queries import section
 from validation.references.table import REFERENCES
 from validation.scenes import SCENES
@@ -104,6 +105,11 @@ def hits(job: Job) -> Iterator[Gate]:
     yield from check_refit(job)[1]
 
 
+def promised(checks: dict[str, Callable[[], promises.Rows]]) -> Callable[[Job], list[Gate]]:
+    """A check of some promises."""
+    return lambda job: promises.gates(promises.judge(checks, job))
+
+
 def queries(job: Job) -> list[Gate]:
     """Inside, distances and all hits of some solids."""
     found: list[Gate] = section.judge(_QUERIES, job)[1]
@@ -112,7 +118,7 @@ def queries(job: Job) -> list[Gate]:
 
 # A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
-    "hits": (hits, extreme(1, 32), extreme(46, 46), extreme(49, 52), sweep, curves),
+    "hits": (promised(promises.HITS), hits, extreme(1, 32), extreme(46, 46), extreme(49, 52), sweep, curves),
     "queries": (queries, extreme(51, 54)),
-    "pictures": (pictures, extreme(33, 45), extreme(47, 48)),
+    "pictures": (promised(promises.PICTURES), pictures, extreme(33, 45), extreme(47, 48)),
 }

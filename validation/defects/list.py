@@ -108,6 +108,23 @@ HITS = (
             "    reject(rays, min(bad), tree.scale)",
             "if False:\n"
             "    reject(rays, min(bad), tree.scale)"),
+    _python("hits", "places of hits off by 1e-9 of a corner", "hits.points_on",
+            "return points", "return points + 1e-9 * vertices[corners[:, 0]]"),
+    _python("hits", "normals of hits turned inwards on half the faces", "hits._normals",
+            "return face_normals(mesh.vertices[mesh.faces[face]])",
+            "return face_normals(mesh.vertices[mesh.faces[face]]) * np.where(face % 2 == 0, -1.0, 1.0)[:, None]"),
+    _kernel("hits", "u and v exchanged in packets", "nearest_in_leaf",
+            "put_best(rays, r, (t, face, u, v, w))", "put_best(rays, r, (t, face, v, u, w))"),
+    _kernel("hits", "single rays accept hits up to 1.0001 t_max", "search_singly",
+            "best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)",
+            "best = (t_max * 1.0001, np.int32(NO_FACE), 0.0, 0.0, 1.0)"),
+    _kernel("hits", "the last ray of every full chunk is a miss", "write_hit",
+            "hit = face != NO_FACE", "hit = face != NO_FACE and i % 8192 != 8191"),
+    _kernel("hits", "a refit leaves each leaf's upper z", "refit._fit_leaf",
+            "nodes[at + 16 * axis], nodes[at + 16 * axis + 8] = low, high",
+            "nodes[at + 16 * axis] = low\n"
+            "if axis < 2:\n"
+            "    nodes[at + 16 * axis + 8] = high"),
 )  # fmt: skip
 
 QUERIES = (
@@ -177,7 +194,7 @@ PICTURES = (
                      "axis=1)))\n"
                      "if len(faces) > 5000:\n"
                      "    faces[hole] = faces[hole, 0]")),
-    _python("pictures", "ior 1.501 for 1.5", "_materials",
+    _python("pictures", "ior 1.501 for 1.5", "pack._materials",
             *_before("if needs.shadows and (not own.shadows):\n"
                      "    kinds[kinds == UNLIT] = LAMBERT",
                      "from renderer.shade.records import IOR\n"
@@ -305,6 +322,20 @@ PICTURES = (
             "scale(n_g, side * error)", "scale(n_g, 0.0 * error)"),
     _kernel("pictures", "the tint of glass lost", "_refract",
             "scale(k_t, 1.0 - f)", "scale((k_t[0], k_t[0], k_t[0]), 1.0 - f)"),
+    _python("pictures", "all samples of a pixel at one place", "sample_offsets",
+            "return np.stack([x.ravel(), y.ravel()], axis=1)", "return np.full((samples, 2), 0.5)"),
+    _python("pictures", "objects turned about y and z before x", "SceneObject.matrix",
+            "linear = _rotation(axis, degrees) @ linear",
+            "linear = _rotation(axis, degrees) @ linear if axis == 0 else linear @ _rotation(axis, degrees)"),
+    _python("pictures", "objects scaled after they are turned", "SceneObject.matrix",
+            "result[:3, :3] = linear",
+            "result[:3, :3] = np.diag(self.scale) @ linear @ np.diag(1 / np.array(self.scale))"),
+    _python("pictures", "the floor begins with its other colour", "_floor_meshes",
+            "color = (row + column) % len(floor.materials)", "color = (row + column + 1) % len(floor.materials)"),
+    _kernel("pictures", "min_weight judged by the mean of the channels", "whitted._goes_on",
+            "largest = largest_component(weight)", "largest = (weight[0] + weight[1] + weight[2]) / 3.0"),
+    _kernel("pictures", "leaving a medium forgets its outermost entry", "_enter_or_leave",
+            "range(count - 1, -1, -1)", "range(count)"),
 )  # fmt: skip
 
 DEFECTS = HITS + QUERIES + PICTURES

@@ -16,7 +16,7 @@ import coverage
 import pytest
 
 from renderer.kernels.compiler import Kernel
-from renderer.kernels.digest import imported_files
+from renderer.kernels.digest import PACKAGE, imported_files
 from validation.mutants.sites import Mutant
 
 # Where the plugin writes, a file for each process of the run.
@@ -30,7 +30,7 @@ class _Plugin:
     """Switches the context of coverage, and the set of called kernels, from test file to test file."""
 
     def __init__(self) -> None:
-        self.coverage = coverage.Coverage(data_file=None, source_pkgs=["renderer"])
+        self.coverage = coverage.Coverage(data_file=None, source=[str(PACKAGE)])
         self.kernels: dict[str, set[str]] = defaultdict(set)
         self.seconds: dict[str, float] = defaultdict(float)
         self.now = ""

@@ -25,6 +25,7 @@ PARTIALS = {
     "images": ("Pictures", "pictures.html"),
     "hits": ("Hits", "hits.html"),
     "queries": ("Queries", "queries.html"),
+    "promises": ("Promises", "promises.html"),
     "stability": ("Stability", "stability.html"),
     "efficiency": ("Efficiency", "efficiency.html"),
 }

@@ -127,9 +127,7 @@ def test_an_error_is_no_verdict(tmp_path: Path, tiny_checks: str) -> None:
     assert not defects.record([defect], control, [answer])["defects"][0]["caught"]
 
 
-def test_a_defect_that_never_ends_is_caught(
-    tmp_path: Path, tiny_checks: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_defect_that_never_ends_is_caught(tmp_path: Path, tiny_checks: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """It was counted as an error, and the suite said that nothing had noticed it."""
     monkeypatch.setattr(defects, "_PATIENCE", 3.0)
     endless = Replacement("image._encoded", "encoded * 255.0 + 0.5", "exec('while True: pass')")
@@ -138,7 +136,7 @@ def test_a_defect_that_never_ends_is_caught(
     defect = Defect("endless", "pictures", endless, kernel=False)
     control = Answer(("images: a: b",), (), None, 1.0)
     assert [gate.passed for gate in defects.gates([defect], control, [answer])] == [True, True]
-    assert [gate.passed for gate in defects.gates([defect], answer, [answer])][0] is False
+    assert not next(iter(defects.gates([defect], answer, [answer]))).passed
 
 
 def test_record_tells_what_each_measure_caught_alone() -> None:

@@ -1,0 +1,101 @@
+"""Each check of promises asks what it says, finds nothing in the sound renderer, and finds a rule that is broken."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from renderer.octree import Octree
+from renderer.picture import prepare
+from renderer.scene import scene
+from renderer.trace import hits
+from validation.promises import batches, bounces, bounds, floors, nesting, places, placing
+from validation.promises.ways import ways
+
+CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
+    "places": lambda: places.check_places(np.random.default_rng(5), 256),
+    "bounds": lambda: bounds.check_bounds(np.random.default_rng(5), 256),
+    "batches": lambda: batches.check_batches((17, 1025)),
+    "refits": batches.check_refits,
+    "placing": lambda: placing.check_placing(np.random.default_rng(5), 12),
+    "floors": floors.check_floors,
+    "bounces": bounces.check_bounces,
+    "nesting": nesting.check_nesting,
+}
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_the_sound_renderer_keeps_all_promises(name: str) -> None:
+    rows = CHECKS[name]()
+    assert rows and all(row["asked"] > 0 for row in rows)
+    assert [row["promise"] for row in rows if row["broken"]] == []
+    assert len({row["promise"] for row in rows}) == len(rows)
+
+
+def broken(name: str) -> set[str]:
+    """The first words of the promises that a check finds broken."""
+    return {" ".join(row["promise"].split()[:2]) for row in CHECKS[name]() if row["broken"]}
+
+
+def test_points_a_little_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = hits.points_on
+    monkeypatch.setattr(hits, "points_on", lambda *given: sound(*given) * (1.0 + 1e-9))
+    assert broken("places") == {"points are"}
+
+
+def test_normals_of_the_other_side_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = hits.face_normals
+    monkeypatch.setattr(hits, "face_normals", lambda corners: -sound(corners))
+    assert broken("places") == {"normals have"}
+
+
+def test_bounds_that_are_open_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Octree.closest_hit
+
+    def shrunk(self: Octree, o: Any, d: Any, *, t_min: Any, t_max: Any) -> Any:
+        return sound(self, o, d, t_min=np.nextafter(t_min, np.inf), t_max=t_max)
+
+    monkeypatch.setattr(Octree, "closest_hit", shrunk)
+    assert "[t_min, t_max]" in broken("bounds")
+
+
+def test_a_row_of_another_ray_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Octree.any_hit
+
+    def shifted(self: Octree, *given: Any) -> Any:
+        answers = sound(self, *given)
+        return np.roll(answers, 1) if len(answers) == 1025 else answers
+
+    monkeypatch.setattr(Octree, "any_hit", shifted)
+    assert broken("batches") == {"batches of"}
+
+
+def test_a_refit_that_does_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Octree, "refit", lambda self, vertices: None)
+    assert broken("refits") == {"a refit"}
+
+
+def test_scaling_in_another_order_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = scene.SceneObject.matrix
+
+    def other(self: scene.SceneObject) -> Any:
+        turned = sound(self.model_copy(update={"scale": (1.0, 1.0, 1.0)}))
+        turned[:3, :3] = np.diag(self.scale) @ turned[:3, :3]
+        return turned
+
+    monkeypatch.setattr(scene.SceneObject, "matrix", other)
+    assert "objects are" in broken("placing")
+
+
+def test_samples_at_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prepare, "sample_offsets", lambda samples: np.full((samples, 2), 0.5))
+    assert broken("floors") == {"samples lie"}
+
+
+def test_each_way_asks_rays_once_and_streams_ask_neighbours_apart() -> None:
+    octree: Any = "octree"
+    found = {name: batches_ for name, _, batches_ in ways(octree, octree, 1000)}
+    assert np.array_equal(np.sort(np.concatenate(found["in streams"])), np.arange(1000))
+    assert np.abs(np.diff(found["in streams"][0])).min() >= 97 and [len(b) for b in found["one by one"]] == [1] * 200
+    assert all(len(b) <= 9 for b in found["nine at a time"]) and len(found["in packets"][0]) == 1000

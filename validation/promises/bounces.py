@@ -1,0 +1,68 @@
+"""How many bounces a ray makes, and where its weight ends it: sums between two mirrors, and through panes, by hand."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.scene.camera import OrthographicCamera
+from renderer.scene.fields import Color
+from renderer.scene.scene import Scene
+from validation.promises.pictures import BLACK, equal, glowing, shown, square, thing
+from validation.promises.row import row
+
+Floats = NDArray[np.float64]
+# Powers of two, so that weights are exact and a bound can equal one: the largest channel, the mean, and red, green and
+# blue alone end a ray at different bounces.
+_WEIGHT: Color = (0.125, 0.5, 0.25)
+_GLOW: tuple[Color, Color] = ((0.25, 0.5, 1.0), (1.0, 0.125, 0.5))
+_DEPTHS = (0, 1, 2, 3, 6, 11)
+_BOUNDS = (0.0, 0.5**3, float(np.nextafter(0.5**3, 1.0)), float(np.nextafter(0.5**3, 0.0)), 0.3, 0.07)
+
+
+def check_bounces() -> list[dict[str, Any]]:
+    """Rays between two mirrors that face each other, and rays through parallel panes."""
+    found = []
+    for name, scene in (("between two mirrors", _mirrors()), ("through panes", _panes())):
+        kept = [_kept(scene, depth, 0.0) for depth in _DEPTHS]
+        found.append(row(f"max_depth bounces are followed, {name}", "the sum of the weights", np.concatenate(kept)))
+        kept = [_kept(scene, 20, bound) for bound in _BOUNDS]
+        promise = f"a ray ends where its largest weight is below min_weight, {name}"
+        found.append(row(promise, "the sum of the weights", np.concatenate(kept)))
+    return found
+
+
+def _kept(scene: Scene, depth: int, bound: float) -> NDArray[np.bool_]:
+    radiance = shown(scene, (5, 3), max_depth=depth, min_weight=bound)
+    return equal(radiance, _expected(depth, bound)).ravel()
+
+
+def _expected(depth: int, bound: float) -> Floats:
+    color, weight = np.zeros(3), np.ones(3)
+    for bounce in range(depth + 1):
+        if bounce and weight.max() < bound:
+            break
+        color += weight * _GLOW[bounce % 2]
+        weight *= _WEIGHT
+    return color
+
+
+def _scene(objects: list[tuple[float, float, str]], reflectance: Color, transmittance: Color) -> Scene:
+    """Squares (z, which way they face, material), seen from z = 1 along -z."""
+    x, y = np.array([8.0, 0.0, 0.0]), np.array([0.0, 8.0, 0.0])
+    squares = [
+        thing(square(np.array([-4.0, -4.0, z]), *((x, y) if facing > 0 else (y, x))), name)
+        for z, facing, name in objects
+    ]
+    materials = {name: glowing(glow, reflectance, transmittance) for name, glow in zip("ab", _GLOW, strict=True)}
+    camera = OrthographicCamera(eye=(0.1, 0.2, 1.0), target=(0.1, 0.2, 0.0), height=1.0)
+    return Scene(camera=camera, materials=materials, objects=tuple(squares), ambient=(1.0, 1.0, 1.0))
+
+
+def _mirrors() -> Scene:
+    return _scene([(0.0, 1.0, "a"), (2.0, -1.0, "b")], _WEIGHT, BLACK)
+
+
+def _panes() -> Scene:
+    """Each pane is entered: all of them face the eye."""
+    return _scene([(-float(i), 1.0, "ab"[i % 2]) for i in range(25)], BLACK, _WEIGHT)

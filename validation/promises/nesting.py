@@ -1,0 +1,97 @@
+"""Media in media: rays through slabs that nest and overlap in every order, bent as Snell's law says, by hand."""
+
+from itertools import pairwise, permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.scene.camera import OrthographicCamera
+from renderer.scene.fields import Color
+from renderer.scene.scene import Scene
+from validation.promises.pictures import box, equal, glowing, shown, square, thing
+from validation.promises.row import row
+
+Floats = NDArray[np.float64]
+# The index of each medium. The slabs of a pile are named by theirs, so two slabs may be of one medium.
+_INDEX = {"a": 1.3, "b": 1.7, "c": 2.2}
+_PILES = ("aba", "abc", "abab", "aab")
+_STRIPES = 320
+_WIDTH = 32.0
+_SIZE = (96, 2)
+_SLANT = 0.9
+
+
+def check_nesting() -> list[dict[str, Any]]:
+    """A striped floor seen aslant through piles of slabs; every stripe must be seen where Snell's law shows it."""
+    kept = [_kept(pile, order) for pile in _PILES for order in _orders(len(pile))]
+    promise = "leaving a medium takes out its innermost entry, in every order of nesting and overlap"
+    return [row(promise, "Snell's law, slab by slab", np.concatenate(kept))]
+
+
+def _orders(count: int) -> list[tuple[int, ...]]:
+    """The orders in which slabs that were entered one after another are left; for four of them, every fifth."""
+    orders = list(permutations(range(count)))
+    return orders if count < 4 else orders[::5]
+
+
+def _kept(pile: str, order: tuple[int, ...]) -> NDArray[np.bool_]:
+    slabs = [(name, 10.0 - i, 4.0 - order.index(i)) for i, name in enumerate(pile)]
+    x = _film_x() + _shift(slabs)
+    stripe = (x + _WIDTH / 2) / _WIDTH * _STRIPES
+    expected = np.where((np.floor(stripe).astype(int) % 2)[:, None], _DARK, _BRIGHT)
+    radiance = shown(_scene(slabs), _SIZE, max_depth=2 * len(pile))
+    clear = np.abs(stripe - np.rint(stripe)) > 1e-6
+    kept: NDArray[np.bool_] = (equal(radiance, np.broadcast_to(expected, radiance.shape)) | ~clear).ravel()
+    return kept
+
+
+_BRIGHT: Color = (1.0, 0.5, 0.25)
+_DARK: Color = (0.0, 0.25, 0.5)
+
+
+def _film_x() -> Floats:
+    """Where rays in a straight line would meet the floor."""
+    width, height = _SIZE
+    pixel = 1.0 / width
+    return (np.arange(width) + 0.5 - width / 2) * pixel * np.hypot(1.0, _SLANT) + 0.0 * height
+
+
+def _shift(slabs: list[tuple[str, float, float]]) -> float:
+    """How much further along x a ray of the slant meets the floor than it would in a straight line."""
+    borders = sorted([(top, name, True) for name, top, _ in slabs] + [(low, name, False) for name, _, low in slabs])[
+        ::-1
+    ]
+    within: list[str] = []
+    sine, y, x = _SLANT / np.hypot(1.0, _SLANT), 20.0, 0.0
+    for at, name, enters in borders:
+        x += (y - at) * sine / np.sqrt(1.0 - sine * sine)
+        y = at
+        if enters:
+            before = _INDEX[within[-1]] if within else 1.0
+            within.append(name)
+            after = _INDEX[name]
+        else:
+            before = _INDEX[name]
+            del within[len(within) - 1 - within[::-1].index(name)]
+            after = _INDEX[within[-1]] if within else 1.0
+        sine *= before / after
+    return float(x + y * sine / np.sqrt(1.0 - sine * sine) - 20.0 * _SLANT)
+
+
+def _scene(slabs: list[tuple[str, float, float]]) -> Scene:
+    """The slabs above the floor y = 0, seen from 20 above it; the ray in the film's middle aims at x = z = 0."""
+    far = 200.0
+    objects = [
+        thing(box(np.array([-far - i, low, -far - i]), np.array([far + i, top, far + i])), name)
+        for i, (name, top, low) in enumerate(slabs)
+    ]
+    edges = np.linspace(-_WIDTH / 2, _WIDTH / 2, _STRIPES + 1)
+    for k, (left, right) in enumerate(pairwise(edges)):
+        stripe = square(np.array([left, 0.0, -50.0]), np.array([0.0, 0.0, 100.0]), np.array([right - left, 0.0, 0.0]))
+        objects.append(thing(stripe, ("bright", "dark")[k % 2]))
+    clear = {name: glowing((0.0, 0.0, 0.0), transmittance=(1.0, 1.0, 1.0), ior=ior) for name, ior in _INDEX.items()}
+    eye = (-20.0 * _SLANT, 20.0, 0.0)
+    camera = OrthographicCamera(eye=eye, target=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), height=_SIZE[1] / _SIZE[0])
+    materials = {**clear, "bright": glowing(_BRIGHT), "dark": glowing(_DARK)}
+    return Scene(camera=camera, materials=materials, objects=tuple(objects), ambient=(1.0, 1.0, 1.0))

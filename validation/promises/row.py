@@ -1,0 +1,11 @@
+"""A row of the section: a promise, how often it was asked, how often it was broken, and who judged."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def row(promise: str, judge: str, kept: NDArray[np.bool_]) -> dict[str, Any]:
+    """The row of a promise that was kept where ``kept`` says so."""
+    return {"promise": promise, "judge": judge, "asked": int(kept.size), "broken": int(np.count_nonzero(~kept))}

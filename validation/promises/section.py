@@ -1,0 +1,65 @@
+"""The section on promises: rules of the contract that random rays and pictures may miss, each judged by itself."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from validation.gates import Gate
+from validation.job import Job
+from validation.promises.batches import check_batches, check_refits
+from validation.promises.bounces import check_bounces
+from validation.promises.bounds import check_bounds
+from validation.promises.floors import check_floors
+from validation.promises.nesting import check_nesting
+from validation.promises.places import check_places
+from validation.promises.placing import check_placing
+
+_SEED = 2031
+_RAYS = 4096
+_PLACED = 60
+Rows = list[dict[str, Any]]
+
+
+def _random() -> np.random.Generator:
+    return np.random.default_rng(_SEED)
+
+
+HITS: dict[str, Callable[[], Rows]] = {
+    "places of hits": lambda: check_places(_random(), _RAYS),
+    "bounds of rays": lambda: check_bounds(_random(), _RAYS),
+    "sizes of batches": check_batches,
+    "refits": check_refits,
+}
+PICTURES: dict[str, Callable[[], Rows]] = {
+    "objects placed": lambda: check_placing(_random(), _PLACED),
+    "floors and samples": check_floors,
+    "bounces": check_bounces,
+    "nested media": check_nesting,
+}
+_REASON = "a promise holds each time that it is asked"
+
+
+def steps(job: Job) -> int:
+    """Number of calls of ``job.step``: one for each check."""
+    return len(HITS) + len(PICTURES)
+
+
+def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Ask everything; returns a record for JSON, and a gate for each promise that it was never broken."""
+    rows = judge({**HITS, **PICTURES}, job)
+    return {"rows": rows, "costs": dict.fromkeys(row["judge"] for row in rows)}, gates(rows)
+
+
+def judge(checks: dict[str, Callable[[], Rows]], job: Job) -> Rows:
+    """The rows of some checks."""
+    rows: Rows = []
+    for name, check in checks.items():
+        job.step(f"promises: {name}")
+        rows += check()
+    return rows
+
+
+def gates(rows: Rows) -> list[Gate]:
+    """A gate for each row."""
+    return [Gate("promises", row["promise"], "times broken", row["broken"], "at most", 0.0, _REASON) for row in rows]
