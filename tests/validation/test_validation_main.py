@@ -69,7 +69,7 @@ def test_all_gates_hold(tmp_path: Path, sections: dict[str, Fake], capsys: pytes
     assert lines[-1].startswith("validation: PASS, 6 of 6 gates in ")
     assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 6, "failed": 0}
     assert ET.parse(tmp_path / "junit.xml").getroot().get("failures") == "0"
-    assert "5 of 5 gates hold" in (tmp_path / "index.html").read_text()
+    assert "6 of 6 gates hold" in (tmp_path / "index.html").read_text()
 
 
 def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
