@@ -10,6 +10,7 @@ from validation.job import Job
 from validation.promises.batches import check_batches, check_refits
 from validation.promises.bounces import check_bounces
 from validation.promises.bounds import check_bounds
+from validation.promises.cameras import check_cameras
 from validation.promises.floors import check_floors
 from validation.promises.nesting import check_nesting
 from validation.promises.places import check_places
@@ -32,6 +33,7 @@ HITS: dict[str, Callable[[], Rows]] = {
     "refits": check_refits,
 }
 PICTURES: dict[str, Callable[[], Rows]] = {
+    "cameras": lambda: check_cameras(_random(), _PLACED),
     "objects placed": lambda: check_placing(_random(), _PLACED),
     "floors and samples": check_floors,
     "bounces": check_bounces,

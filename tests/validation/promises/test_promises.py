@@ -9,8 +9,9 @@ import pytest
 from renderer.octree import Octree
 from renderer.picture import prepare
 from renderer.scene import scene
+from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
-from validation.promises import batches, bounces, bounds, floors, nesting, places, placing
+from validation.promises import batches, bounces, bounds, cameras, floors, nesting, places, placing
 from validation.promises.ways import ways
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
@@ -18,6 +19,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "bounds": lambda: bounds.check_bounds(np.random.default_rng(5), 256),
     "batches": lambda: batches.check_batches((17, 1025)),
     "refits": batches.check_refits,
+    "cameras": lambda: cameras.check_cameras(np.random.default_rng(5), 20),
     "placing": lambda: placing.check_placing(np.random.default_rng(5), 12),
     "floors": floors.check_floors,
     "bounces": bounces.check_bounces,
@@ -86,6 +88,12 @@ def test_scaling_in_another_order_is_found(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(scene.SceneObject, "matrix", other)
     assert "objects are" in broken("placing")
+
+
+def test_a_film_of_another_shape_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = PerspectiveCamera.rows
+    monkeypatch.setattr(PerspectiveCamera, "rows", lambda self, width, height: sound(self, width, width))
+    assert broken("cameras") == {"the depth"}
 
 
 def test_samples_at_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,97 @@
+"""Cameras: what each pixel sees, by the inverse of OpenGL's matrices, for odd sizes, wide and tall films and tilted up."""
+
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.picture.render import render
+from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from renderer.scene.scene import Floor, Scene
+from validation.promises.pictures import glowing
+from validation.promises.row import row
+
+Floats = NDArray[np.float64]
+_SIZES = ((1, 1), (7, 7), (33, 5), (4, 31), (50, 50))
+# Of the depth: OpenGL's matrices are inverted in float64, whose near plane is a hundredth of the far one.
+_ROUNDING = 1e-9
+_NEAR, _FAR = 0.5, 50.0
+
+
+def check_cameras(rng: Generator, count: int) -> list[dict[str, Any]]:
+    """Random cameras of both kinds above an endless floor: the depth of every pixel, inf above the horizon."""
+    kept: dict[str, list[NDArray[np.bool_]]] = {"perspective": [], "orthographic": []}
+    for number in range(count):
+        camera, size = _random(rng, number), _SIZES[number % len(_SIZES)]
+        image = render(_scene(camera), resolution=size, max_depth=0)
+        expected = _depth(camera, *size)
+        with np.errstate(invalid="ignore"):
+            near = np.abs(image.depth - expected) <= _ROUNDING * expected
+        kept[camera.type].append((near | (image.depth == expected)).ravel())
+    return [
+        row(f"the depth that each pixel of a camera sees, {kind}", "OpenGL's matrices, inverted", np.concatenate(found))
+        for kind, found in kept.items()
+    ]
+
+
+def _random(rng: Generator, number: int) -> Camera:
+    eye = rng.uniform((-3.0, 1.0, -3.0), (3.0, 6.0, 3.0))
+    target = eye + rng.uniform((-2.0, -3.0, -2.0), (2.0, -0.3, 2.0))
+    up = rng.normal(size=3)
+    place = {"eye": tuple(eye.tolist()), "target": tuple(target.tolist()), "up": tuple(up.tolist())}
+    if number % 2:
+        return OrthographicCamera.model_validate({**place, "height": float(rng.uniform(0.2, 4.0))})
+    return PerspectiveCamera.model_validate({**place, "fov": float(rng.uniform(5.0, 140.0))})
+
+
+def _scene(camera: Camera) -> Scene:
+    floor = Floor(min=(-1e6, -1e6), max=(1e6, 1e6), materials=("any",))
+    return Scene(camera=camera, materials={"any": glowing((0.5, 0.5, 0.5))}, floor=floor)
+
+
+def _depth(camera: Camera, width: int, height: int) -> Floats:
+    """How far the plane y = 0 is from each pixel's origin: on the near plane's ray, back to the eye or its film."""
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2)
+    inverse = np.linalg.inv(_projection(camera, width / height) @ _view(camera))
+    near, far = (_points(inverse, x, y, z) for z in (-1.0, 1.0))
+    if isinstance(camera, PerspectiveCamera):
+        start = np.broadcast_to(np.asarray(camera.eye), near.shape)
+    else:
+        start = near - (far - near) * (_NEAR / (_FAR - _NEAR))
+    way = far - near
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = -start[..., 1] / way[..., 1]
+    point = start + np.where(t > 0, t, 0.0)[..., None] * way
+    on = (t > 0) & (np.abs(point[..., 0]) <= 1e6) & (np.abs(point[..., 2]) <= 1e6)
+    return np.where(on, np.linalg.norm(point - start, axis=-1), np.inf)
+
+
+def _points(inverse: Floats, x: Floats, y: Floats, z: float) -> Floats:
+    clip = np.stack([x, y, np.full_like(x, z), np.ones_like(x)], axis=-1) @ inverse.T
+    points: Floats = clip[..., :3] / clip[..., 3:]
+    return points
+
+
+def _view(camera: Camera) -> Floats:
+    """The matrix of gluLookAt."""
+    eye, target, up = (np.asarray(v) for v in (camera.eye, camera.target, camera.up))
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    side = np.cross(forward, up / np.linalg.norm(up))
+    side /= np.linalg.norm(side)
+    view = np.eye(4)
+    view[:3, :3] = side, np.cross(side, forward), -forward
+    view[:3, 3] = -view[:3, :3] @ eye
+    return view
+
+
+def _projection(camera: Camera, aspect: float) -> Floats:
+    """The matrix of gluPerspective, or of glOrtho."""
+    depth = _FAR - _NEAR
+    if isinstance(camera, PerspectiveCamera):
+        f = 1.0 / np.tan(np.radians(camera.fov) / 2)
+        last = [[0, 0, -(_FAR + _NEAR) / depth, -2 * _FAR * _NEAR / depth], [0, 0, -1, 0]]
+        return np.array([[f / aspect, 0, 0, 0], [0, f, 0, 0], *last])
+    half = camera.height / 2
+    last = [[0, 0, -2 / depth, -(_FAR + _NEAR) / depth], [0, 0, 0, 1]]
+    return np.array([[1 / (half * aspect), 0, 0, 0], [0, 1 / half, 0, 0], *last])
