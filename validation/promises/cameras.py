@@ -1,4 +1,4 @@
-"""Cameras: what each pixel sees, by the inverse of OpenGL's matrices, for odd sizes, wide and tall films and tilted up."""
+"""Cameras: what each pixel sees, by the inverse of OpenGL's matrices, for films of every shape and tilted up."""
 
 from typing import Any
 
