@@ -53,8 +53,8 @@ def _scene(camera: Camera) -> Scene:
 def _depth(camera: Camera, width: int, height: int) -> Floats:
     """How far the plane y = 0 is from each pixel's origin: on the near plane's ray, back to the eye or its film."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2)
-    inverse = np.linalg.inv(_projection(camera, width / height) @ _view(camera))
-    inverse: Floats = np.linalg.inv(_projection(camera, width / height) @ _view(camera)).astype(np.float64)
+    inverse = np.linalg.inv(_projection(camera, width / height) @ _view(camera)).astype(np.float64)
+    near, far = (_points(inverse, x, y, z) for z in (-1.0, 1.0))
     if isinstance(camera, PerspectiveCamera):
         start = np.broadcast_to(np.asarray(camera.eye), near.shape)
     else:
