@@ -64,8 +64,16 @@ def make_parser() -> argparse.ArgumentParser:
             help=f"judge this {name} and not the suite's own, in the section {section}; may be given again",
         )  # fmt: skip
     parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about half an hour")
+    parser.add_argument("--mutants", type=_count, metavar="N", help="only judge N random small faults, hours; goes on")
+    parser.add_argument("--seed", type=int, default=1, help="of the mutants, 1 unless given")
     parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
     return parser
+
+
+def _count(text: str) -> int:
+    if not (text.isdigit() and int(text)):
+        raise argparse.ArgumentTypeError(f"expected a positive integer, got {text!r}")
+    return int(text)
 
 
 def _sections(text: str) -> tuple[str, ...]:
@@ -80,11 +88,12 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
     """Exit with code 2 where arguments are missing or contradict each other."""
     check_output(parser, options)
     kinds = {kind for kind in ("scene", "mesh") if getattr(options, kind)}
-    if options.defects or options.write_baseline:
-        alone = "--defects" if options.defects else "--write-baseline"
+    modes = {"--defects": options.defects, "--mutants": options.mutants, "--write-baseline": options.write_baseline}
+    given = [mode for mode, value in modes.items() if value]
+    if given:
+        alone = given[0]
         others = [f"--{kind}" for kind in sorted(kinds)] + ["--gate"] * (options.gate is not None)
-        others += ["--only"] * (options.only != NAMES)
-        others += ["--write-baseline"] * (options.defects and options.write_baseline)
+        others += ["--only"] * (options.only != NAMES) + given[1:]
         if others:
             parser.error(f"{alone} goes with --output alone{' and --quick' * options.defects}, got {others[0]} too")
     chosen, left_out = choose(options.only, kinds)
@@ -105,6 +114,8 @@ def _run(options: argparse.Namespace, command: str) -> int:
     )
     if options.defects:
         return _defects_verdict(suite.run_defects(request), request)
+    if options.mutants:
+        return _mutants_verdict(suite.run_mutants(request, options.mutants, options.seed), request)
     return _verdict(suite.run(request), request)
 
 
@@ -130,6 +141,23 @@ def _defects_verdict(gates: Sequence["Gate"], request: "Request") -> int:
     stored = request.output / "defects.json"
     print(f"validation: {state}, {held} of {len(gates)} gates on seeded defects; see {stored}")
     return int(state == "FAIL")
+
+
+def _mutants_verdict(found: Mapping[str, Any], request: "Request") -> int:
+    """Print the mutants that nothing noticed and a line of counts; returns the exit code."""
+    survivors = 0
+    for kind in ("kernels", "python"):
+        counts = found[kind]
+        real = counts["mutants"] - counts["equivalent"]
+        survivors += len(counts["survivors"])
+        for row in counts["survivors"]:
+            print(f"SURVIVED {row['file']}:{row['line']}: {row['key']}")
+        print(
+            f"validation: mutants in {kind}: {counts['killed']} of {real} noticed, {counts['by_gates']} by a gate; "
+            f"{counts['equivalent']} change no answer; {counts['hung']} hung, {counts['crashed']} crashed"
+        )
+    print(f"validation: see {request.output / 'mutants.json'}")
+    return int(survivors > 0)
 
 
 def _print_failures(gates: Sequence[Mapping[str, Any]]) -> None:

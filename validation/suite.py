@@ -75,7 +75,7 @@ def run(request: Request) -> dict[str, Any]:
             "environment": environment.describe(),
             **records,
         }
-        metrics |= _outcome(records, [gate.record() for gate in gates], stored_defects(request.output))
+        metrics |= _outcome(records, [gate.record() for gate in gates], request.output)
         metrics["baseline"] = baseline.compare(metrics, stored_baseline)
         metrics["seconds"] = time.perf_counter() - began
         write(metrics, request.output, pictures)
@@ -114,13 +114,16 @@ def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, 
     return records, gates
 
 
-def _outcome(
-    records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], defects: dict[str, Any] | None
-) -> dict[str, Any]:
+def _outcome(records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], output: Path) -> dict[str, Any]:
+    """What follows from records and gates, and what earlier runs stored about defects and mutants."""
+    from validation.mutants.record import summary as mutants_of
+
+    defects, mutants = stored_defects(output), mutants_of(output / "mutants.json")
     rows = summary.matrix(records, gates)
     found = {"gates": gates, "verdict": summary.verdict(gates), "matrix": rows}
     found["facts"] = summary.facts(rows, gates, defects)
-    return found if defects is None else found | {"defects": defects}
+    found |= {} if defects is None else {"defects": defects}
+    return found if mutants is None else found | {"mutants": mutants}
 
 
 def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
@@ -191,6 +194,21 @@ def run_defects(request: Request) -> list[Gate]:
     return gates
 
 
+def run_mutants(request: Request, count: int, seed: int) -> dict[str, Any]:
+    """Judge mutants, go on from the stored ``mutants.json``, and return the counts, see ``record.summary``.
+
+    A report in the same folder is drawn again with these results.
+    """
+    from validation.mutants import run as mutants
+
+    _check_folder(request.output)
+    request.output.mkdir(parents=True, exist_ok=True)
+    with steps() as step:
+        found = mutants.run(count, seed, request.output, step)
+    _draw_again(request.output)
+    return found
+
+
 def _draw_again(output: Path) -> None:
     """Draw the report in ``output`` again with the stored defects, if there is one of this schema."""
     try:
@@ -198,7 +216,7 @@ def _draw_again(output: Path) -> None:
     except (ValueError, OSError):
         return
     records = {row["section"]: metrics[row["section"]] for row in metrics["matrix"]}
-    write(metrics | _outcome(records, metrics["gates"], stored_defects(output)), output, output / "pictures")
+    write(metrics | _outcome(records, metrics["gates"], output), output, output / "pictures")
 
 
 def stored_defects(output: Path) -> dict[str, Any] | None:

@@ -14,6 +14,8 @@ from validation.defects import run as defects
 from validation.defects.list import DEFECTS
 from validation.gates import Gate
 from validation.job import Job
+from validation.mutants import run as mutants
+from validation.mutants.judge import Verdict
 from validation.report import page as report
 from validation.report import schema
 from validation.sections import SECTIONS
@@ -147,6 +149,9 @@ class TestUserFiles:
         (["--only", "hits", "--scene", "a.toml"], "no section is left to run"),
         (["--defects", "--only", "hits"], "got --only too"),
         (["--defects", "--mesh", "a.ply"], "got --mesh too"),
+        (["--mutants", "0"], "expected a positive integer, got '0'"),
+        (["--mutants", "5", "--only", "hits"], "got --only too"),
+        (["--mutants", "5", "--defects"], "got --mutants too"),
         (["--write-baseline", "--gate", "a.toml"], "got --gate too"),
     ],
 )
@@ -240,6 +245,32 @@ class TestDefects:
         assert command.main(["--defects", "--output", str(tmp_path)]) == 1
         assert "gates turned red is 0, expected at least 1" in capsys.readouterr().out
         assert json.loads((tmp_path / "defects.json").read_text())["caught"] == 0
+
+
+def test_mutants_are_judged_listed_and_drawn(
+    tmp_path: Path, sections: dict[str, Fake], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With a judge that notices the mutants in kernels and no other; a second run has nothing left to judge."""
+    judged: list[str] = []
+
+    def judge(waiting: Any, shops: Any, touched: Any, keep: Any, step: Any) -> None:
+        for one in waiting:
+            judged.append(one.key)
+            keep(one, Verdict("hits: a: b" if one.kernel else None, True, "fails" if one.kernel else None, 1.0))
+
+    monkeypatch.setattr(mutants, "_judge_all", judge)
+    monkeypatch.setattr(mutants, "_touched", lambda *_: {})
+    monkeypatch.setattr(mutants, "Workshop", lambda *_: None)
+    output = ["--output", str(tmp_path)]
+    assert command.main(["--only", "hits", *output]) == 0
+    for _ in range(2):
+        assert command.main(["--mutants", "6", "--seed", "3", *output]) == 1
+        printed = capsys.readouterr().out
+        assert "mutants in kernels: 3 of 3 noticed, 3 by a gate" in printed
+        assert "mutants in python: 0 of 3 noticed" in printed and printed.count("SURVIVED renderer/") == 3
+        assert len(judged) == 6
+    page = (tmp_path / "index.html").read_text()
+    assert "by seed 3" in page and "6 of 6 are judged" in page and "Nothing noticed these in Python: 3" in page
 
 
 def test_stability_counts_its_steps(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

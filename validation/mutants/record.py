@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -26,11 +26,7 @@ class Record:
     def __init__(self, path: Path, root: Path) -> None:
         self.path, self._root = path, root
         self._judges = digest([*(root / "tests").rglob("*.py"), *(root / "validation").rglob("*.py")])
-        self._rows: dict[str, Row] = {}
-        if path.exists():
-            stored = json.loads(path.read_text(encoding="utf-8"))
-            if stored.get("schema") == SCHEMA:
-                self._rows = {row["key"]: row for row in stored["mutants"]}
+        self._rows = {row["key"]: row for row in _stored(path)["mutants"]}
 
     def row(self, mutant: Mutant) -> Row | None:
         """The stored row of a mutant, None where its verdict holds no longer."""
@@ -39,17 +35,26 @@ class Record:
             return None
         return row
 
+    def forget(self, mutants: Sequence[Mutant]) -> None:
+        """Leave out what is stored of some mutants."""
+        for mutant in mutants:
+            self._rows.pop(mutant.key, None)
+
     def add(self, mutant: Mutant, verdict: Verdict) -> None:
-        """Add a verdict and write the file."""
-        self._rows[mutant.key] = {
-            "key": mutant.key,
-            **asdict(mutant),
-            **asdict(verdict),
-            "source": self._source(mutant),
-            "judges": self._judges,
+        """Add a verdict."""
+        state = {"source": self._source(mutant), "judges": self._judges}
+        self._rows[mutant.key] = {"key": mutant.key, **asdict(mutant), **asdict(verdict), **state}
+
+    def write(self, seed: int, asked: Sequence[Mutant]) -> None:
+        """Write the file: all verdicts, and which mutants this run asked for."""
+        whole = {
+            "schema": SCHEMA,
+            "seed": seed,
+            "asked": [mutant.key for mutant in asked],
+            "mutants": list(self._rows.values()),
         }
-        text = json.dumps({"schema": SCHEMA, "mutants": list(self._rows.values())}, indent=1, ensure_ascii=False)
-        write_atomically(self.path, lambda file: file.write((text + "\n").encode()))
+        text = json.dumps(whole, indent=1, ensure_ascii=False) + "\n"
+        write_atomically(self.path, lambda file: file.write(text.encode()))
 
     def _source(self, mutant: Mutant) -> str:
         return digest([self._root / mutant.file])
@@ -63,19 +68,57 @@ def digest(files: Sequence[Path]) -> str:
     return found.hexdigest()
 
 
-def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Counts, for mutants in kernels and in Python: all, equivalent, killed, killed by a gate, and the survivors."""
-    found: dict[str, Any] = {}
-    for kind, kernel in (("kernels", True), ("python", False)):
-        own = [row for row in rows if row["kernel"] == kernel]
-        real = [row for row in own if row["by"] or row["key"] not in EQUIVALENT]
-        found[kind] = {
-            "mutants": len(own),
-            "equivalent": len(own) - len(real),
-            "killed": sum(bool(row["by"]) for row in real),
-            "by_gates": sum(bool(row["by"]) and row["gate"] for row in real),
-            "hung": sum(row["how"] == "hangs" for row in real),
-            "crashed": sum(row["how"] == "crashes" for row in real),
-            "survivors": [row["key"] for row in real if not row["by"]],
-        }
-    return found
+def summary(path: Path) -> dict[str, Any] | None:
+    """What the last run found, for the report; None where there was none.
+
+    ``seed``, ``asked`` (how many) and ``judged``; for ``kernels`` and ``python`` the counts of all, equivalent, killed,
+    killed by a gate, hung and crashed, and the survivors' rows; ``operators``, a row each; and ``equivalent``, mutants
+    that change no answer, with the proofs.
+    """
+    stored = _stored(path)
+    if not stored["asked"]:
+        return None
+    by_key = {row["key"]: row for row in stored["mutants"]}
+    rows = [by_key[key] for key in stored["asked"] if key in by_key]
+    same = [row for row in rows if _changes_nothing(row)]
+    return {
+        "seed": stored["seed"],
+        "asked": len(stored["asked"]),
+        "judged": len(rows),
+        "kernels": _counts([row for row in rows if row["kernel"]]),
+        "python": _counts([row for row in rows if not row["kernel"]]),
+        "operators": [
+            {"operator": operator, **_counts([row for row in rows if row["operator"] == operator])}
+            for operator in sorted({row["operator"] for row in rows})
+        ],
+        "equivalent": [{"key": row["key"], "proof": EQUIVALENT[row["key"]]} for row in same],
+    }
+
+
+def _counts(rows: Sequence[Row]) -> dict[str, Any]:
+    real = [row for row in rows if not _changes_nothing(row)]
+    return {
+        "mutants": len(rows),
+        "equivalent": len(rows) - len(real),
+        "killed": sum(bool(row["by"]) for row in real),
+        "by_gates": sum(bool(row["by"]) and row["gate"] for row in real),
+        "hung": sum(row["how"] == "hangs" for row in real),
+        "crashed": sum(row["how"] == "crashes" for row in real),
+        "survivors": [{name: row[name] for name in ("key", "file", "line")} for row in real if not row["by"]],
+    }
+
+
+def _changes_nothing(row: Row) -> bool:
+    return not row["by"] and row["key"] in EQUIVALENT
+
+
+def _stored(path: Path) -> dict[str, Any]:
+    """The file, or an empty one where there is none of this schema."""
+    if path.exists():
+        try:
+            stored = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise ValueError(f"{path}: expected JSON, got a syntax error: {error}") from None
+        if isinstance(stored, dict) and stored.get("schema") == SCHEMA:
+            return stored
+    return {"seed": None, "asked": [], "mutants": []}

@@ -5,11 +5,11 @@ import os
 import queue
 import tempfile
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from validation.mutants.judge import gates, judge
+from validation.mutants.judge import Verdict, gates, judge
 from validation.mutants.record import Record, digest, summary
 from validation.mutants.sites import Mutant, chosen, mutants
 from validation.mutants.touched import VARIABLE, Touched, read
@@ -24,43 +24,56 @@ _PATIENCE = 3600.0
 def run(count: int, seed: int, output: Path, step: Callable[[str], None]) -> dict[str, Any]:
     """Judge ``count`` mutants chosen by ``seed``; those in ``output / "mutants.json"`` are not judged again.
 
-    Returns the counts, see ``record.summary``.
+    The file is written after each, so that a run that is cut off loses nothing. Returns ``record.summary``.
     """
     some = chosen(mutants(ROOT / "renderer"), count, seed)
-    record = Record(output / "mutants.json", ROOT)
+    path = output / "mutants.json"
+    record = Record(path, ROOT)
     waiting = [mutant for mutant in some if record.row(mutant) is None]
+
+    def keep(mutant: Mutant, verdict: Verdict) -> None:
+        record.add(mutant, verdict)
+        record.write(seed, some)
+
+    record.forget(waiting)
+    record.write(seed, some)
     if waiting:
         with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-            _judge_all(waiting, record, Path(folder), step)
-    return {"seed": seed, **summary([row for mutant in some if (row := record.row(mutant)) is not None])}
+            workers = min(len(waiting), os.cpu_count() or 1)
+            shops = [Workshop(ROOT, _made(Path(folder) / str(number))) for number in range(workers)]
+            touched = _touched(shops[0], output / "touched.json", step)
+            _judge_all(waiting, shops, touched, keep, step)
+    found = summary(path)
+    assert found is not None  # it was just written
+    return found
 
 
-def _judge_all(waiting: Sequence[Mutant], record: Record, folder: Path, step: Callable[[str], None]) -> None:
-    workers = min(len(waiting), os.cpu_count() or 1)
-    shops = [Workshop(ROOT, _made(folder / str(number))) for number in range(workers)]
-    touched = _touched(shops[0], record.path.with_name("touched.json"), step)
-    with ThreadPoolExecutor(workers) as pool:
+def _judge_all(
+    waiting: Sequence[Mutant],
+    shops: Sequence[Workshop],
+    touched: Touched,
+    keep: Callable[[Mutant, Verdict], None],
+    step: Callable[[str], None],
+) -> None:
+    """Judge mutants, one in each workshop at a time; ``keep`` is called by this thread."""
+    with ThreadPoolExecutor(len(shops)) as pool:
         sounds = list(pool.map(lambda shop: _sound(shop, step), shops))
         free: queue.SimpleQueue[tuple[Workshop, dict[str, float]]] = queue.SimpleQueue()
         for pair in zip(shops, sounds, strict=True):
             free.put(pair)
 
-        def one(mutant: Mutant) -> None:
+        def one(mutant: Mutant) -> tuple[Mutant, Verdict]:
             step(f"mutants: {mutant.key}")
             shop, sound = pair = free.get()
             try:
-                verdict = judge(mutant, shop, touched, sound)
+                return mutant, judge(mutant, shop, touched, sound)
             finally:
                 free.put(pair)
-            results.put((mutant, verdict))
 
-        results: queue.SimpleQueue[Any] = queue.SimpleQueue()
         futures = [pool.submit(one, mutant) for mutant in waiting]
         try:
-            for future in futures:
-                future.result()
-                while not results.empty():
-                    record.add(*results.get())
+            for future in as_completed(futures):
+                keep(*future.result())
         finally:
             for future in futures:
                 future.cancel()

@@ -69,8 +69,10 @@ class _Plugin:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Called by pytest."""
-    config.pluginmanager.register(_Plugin())
+    """Called by pytest, in each process."""
+    # One that shares tests out runs none.
+    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
+        config.pluginmanager.register(_Plugin())
 
 
 def read(folder: Path, root: Path) -> Touched:

@@ -103,6 +103,7 @@ class Metrics(_Strict):
     stability: SectionRecord | None = None
     efficiency: SectionRecord | None = None
     defects: dict[str, Any] | None = None
+    mutants: dict[str, Any] | None = None
 
 
 def check(metrics: Any, name: str = "metrics") -> None:

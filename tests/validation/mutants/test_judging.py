@@ -98,26 +98,43 @@ def test_a_record_goes_on_until_the_code_or_what_judges_it_changes(root: Path) -
     first = Record(path, root)
     first.add(killed, Verdict("a gate", True, "fails", 1.0))
     first.add(survivor, Verdict(None, False, None, 1.0))
+    first.write(7, [killed, survivor])
     again = Record(path, root)
     assert again.row(killed)["by"] == "a gate" and again.row(survivor)["by"] is None  # type: ignore[index]
     (root / "tests" / "test_new.py").write_text("")
     again = Record(path, root)
     assert again.row(killed) is not None and again.row(survivor) is None
+    again.forget([killed])
+    assert again.row(killed) is None
     (root / "renderer" / "trace" / "a.py").write_text("x = a + b + c\n")
     assert Record(path, root).row(killed) is None
 
 
-def test_a_summary_counts_what_is_not_equivalent(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record, "EQUIVALENT", {"b": "the same answer either way"})
-    rows = [
-        {"key": key, "kernel": key < "d", "by": by, "gate": by == "gate", "how": how}
-        for key, by, how in [("a", "gate", "fails"), ("b", None, None), ("c", "test", "hangs"), ("d", None, None)]
-    ]
-    found = summary(rows)
+def test_a_summary_counts_what_changes_an_answer(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    verdicts = {
+        "gate": (mutant(kernel=True, nth=0), Verdict("a gate", True, "fails", 1.0)),
+        "hangs": (mutant(kernel=True, nth=1), Verdict("a test", False, "hangs", 1.0)),
+        "same": (mutant(kernel=True, nth=2), Verdict(None, False, None, 1.0)),
+        "lost": (mutant(nth=3), Verdict(None, False, None, 1.0)),
+        "other": (mutant(nth=4), Verdict(None, False, None, 1.0)),
+    }
+    path = root / "mutants.json"
+    assert summary(path) is None
+    stored = Record(path, root)
+    for one, verdict in verdicts.values():
+        stored.add(one, verdict)
+    asked = [one for name, (one, _) in verdicts.items() if name != "other"] + [mutant(nth=9)]
+    stored.write(7, asked)
+    monkeypatch.setattr(record, "EQUIVALENT", {verdicts["same"][0].key: "the same either way"})
+    found = summary(path)
+    assert found is not None and (found["seed"], found["asked"], found["judged"]) == (7, 5, 4)
     assert found["kernels"] == {
         "mutants": 3, "equivalent": 1, "killed": 2, "by_gates": 1, "hung": 1, "crashed": 0, "survivors": [],
     }  # fmt: skip
-    assert found["python"]["survivors"] == ["d"]
+    lost = verdicts["lost"][0]
+    assert found["python"]["survivors"] == [{"key": lost.key, "file": lost.file, "line": lost.line}]
+    assert [row["operator"] for row in found["operators"]] == ["arithmetic"]
+    assert found["equivalent"] == [{"key": verdicts["same"][0].key, "proof": "the same either way"}]
 
 
 def test_what_processes_measured_is_merged_and_kernels_bring_what_they_import(tmp_path: Path) -> None:
