@@ -13,13 +13,16 @@ Integers = NDArray[np.int64]
 _MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 
-def distinct_faces(vertices: Floats, faces: Integers) -> Integers | None:
-    """The rows (k,) of faces that count, ascending; None where all do. Corners are told apart by position."""
+def placed_faces(vertices: Floats, faces: Integers) -> Integers:
+    """The rows of faces that have a place: all their corners are finite."""
     finite = np.asarray(np.isfinite(vertices).all(axis=1))
-    rows = np.arange(len(faces)) if finite.all() else np.flatnonzero(finite[faces].all(axis=1))
+    return np.arange(len(faces)) if finite.all() else np.flatnonzero(finite[faces].all(axis=1))
+
+
+def distinct_faces(vertices: Floats, faces: Integers, rows: Integers) -> Integers:
+    """Those of the faces in ``rows`` that stand where none before them does. Corners are told apart by position."""
     again = _repeated(vertices, faces, rows)
-    kept = rows[~again] if again.any() else rows
-    return None if len(kept) == len(faces) else kept
+    return rows[~again] if again.any() else rows
 
 
 def _repeated(vertices: Floats, faces: Integers, rows: Integers) -> NDArray[np.bool_]:

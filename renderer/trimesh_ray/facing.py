@@ -25,14 +25,15 @@ class Rings(NamedTuple):
     again: NDArray[np.bool_]
 
 
-def rings_of(vertices: Floats, faces: NDArray[np.integer[Any]]) -> Rings:
-    """The rings of a mesh, whose vertices are told apart by position."""
+def rings_of(vertices: Floats, faces: NDArray[np.integer[Any]], rows: Integers) -> Rings:
+    """The rings of the faces in ``rows``; vertices are told apart by position."""
     _, places = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     corners = places.reshape(-1)[faces]
+    there = corners[rows]
     starts = np.zeros(len(vertices) + 1, np.int64)
-    np.cumsum(np.bincount(corners.ravel(), minlength=len(vertices)), out=starts[1:])
+    np.cumsum(np.bincount(there.ravel(), minlength=len(vertices)), out=starts[1:])
     _, same, count = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True)
-    around = np.argsort(corners.ravel(), kind="stable") // 3
+    around = rows[np.argsort(there.ravel(), kind="stable") // 3]
     return Rings(starts, around, corners, count[same.reshape(-1)] > 1)
 
 

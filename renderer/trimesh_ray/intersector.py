@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from trimesh.ray import ray_util
 
 from renderer.errors import expect
 from renderer.trimesh_ray.trees import traced
+from renderer.trimesh_ray.within import points_within
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 _NOWHERE = np.empty((0, 3))
+_NO_ROWS = np.empty(0, np.int64)
 
 
 class RayMeshIntersector:
@@ -53,6 +54,8 @@ class RayMeshIntersector:
 
         def ask(origins: Floats, directions: Floats) -> tuple[Integers, Integers, Floats]:
             it = traced(self.mesh)
+            if multiple_hits and max_hits < 1:
+                return _NO_ROWS, _NO_ROWS, _NOWHERE
             if multiple_hits:
                 found = it.octree.all_hits(origins, directions, max_hits=max_hits)
                 return it.named(found.face), found.ray, found.points if return_locations else _NOWHERE
@@ -92,28 +95,15 @@ class RayMeshIntersector:
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether each point (n, 3) lies inside, (n,): by parity as in trimesh.
 
+        Faces at one place count once, as for a body that is there twice; but both walls of two bodies that touch count.
         Of an open mesh whose faces are turned one way it is whether the surface winds around the point by more than a
-        half; of any other it is trimesh's vote of two opposite rays. A point on the surface is inside; one that is not
-        finite is outside, as is any beyond the mesh's box.
+        half; of any other it is a vote of two opposite rays, as in trimesh, and of two more where they differ. A point
+        on the surface is inside; one that is not finite is outside, as is any beyond the mesh's box.
         """
         given = as_rows("points", points)
         if len(self.mesh.faces) == 0:
             return np.zeros(len(given), np.bool_)
-        octree = traced(self.mesh).octree
-        lower, upper = octree.mesh.bounds
-        within = ((given >= lower) & (given <= upper)).all(axis=1)  # of NaN too
-        if not within.any():
-            return within
-        if len(octree.mesh.odd_edges) == 0:
-            within[within] = octree.contains(given[within], rule="even-odd")
-        elif self.mesh.is_winding_consistent:
-            some = given[within]
-            # Faces may all be turned inwards.
-            within[within] = octree.contains(some, winding=True) | (octree.winding_number(some) < -0.5)
-        else:
-            votes: Any = ray_util
-            within[within] = votes.contains_points(self, given[within])
-        return within
+        return points_within(traced(self.mesh), given)
 
     def __copy__(self, *memo: Any) -> "RayMeshIntersector":
         """Of the same mesh, as trimesh's own."""

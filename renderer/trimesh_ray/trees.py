@@ -1,15 +1,21 @@
 """The octree of a ``trimesh.Trimesh``, kept as long as the mesh lives and its content stays."""
 
 import weakref
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.lazy import lazy
 from renderer.mesh.mesh import face_normals
-from renderer.trimesh_ray.distinct import distinct_faces
+from renderer.trimesh_ray.distinct import distinct_faces, placed_faces
 from renderer.trimesh_ray.facing import Rings, rings_of
+from renderer.trimesh_ray.solid import solid_faces
 
+if TYPE_CHECKING:
+    from renderer.octree import Octree
+
+Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
@@ -21,33 +27,48 @@ class Traced:
     vertices, faces  the mesh's at that time
     """
 
-    def __init__(self, vertices: NDArray[np.float64], faces: Integers) -> None:
+    def __init__(self, vertices: Floats, faces: Integers) -> None:
         # Late, so that a mesh whose rays are never asked imports no compiler.
         from renderer.octree import Octree
 
-        self.rows = distinct_faces(vertices, faces)
+        # trimesh takes numbers from the end, too.
+        known = faces if not len(faces) or faces.min() >= 0 else np.where(faces < 0, faces + len(vertices), faces)
+        self._placed = placed_faces(vertices, known)
+        self._distinct = distinct_faces(vertices, known, self._placed)
+        self.rows = None if len(self._distinct) == len(faces) else self._distinct
         finite = np.isfinite(vertices)
         there = vertices if finite.all() else np.where(finite, vertices, 0.0)
-        self.octree: Octree = Octree(there, faces if self.rows is None else faces[self.rows])
-        self._rings: Rings | None = None
-        self._normals: NDArray[np.float64] | None = None
+        self.octree: Octree = Octree(there, known if self.rows is None else known[self.rows])
+        self._known = self.octree.mesh.faces if self.rows is None else known
         # The octree's copies, where it has all.
         self.vertices = self.octree.mesh.vertices if there is vertices else vertices.copy()
-        self.faces = self.octree.mesh.faces if self.rows is None else faces.copy()
+        self.faces = self._known if known is faces and self.rows is None else faces.copy()
 
-    @property
+    @lazy
+    def solid(self) -> "Octree":
+        """The octree over the faces that bound the inside."""
+        from renderer.octree import Octree
+
+        rows = solid_faces(self.octree.mesh.vertices, self._known, self._placed, self._distinct)
+        return self.octree if rows is self._distinct else Octree(self.octree.mesh.vertices, self._known[rows])
+
+    @lazy
+    def bounds(self) -> Floats:
+        """(2, 3): the least and the greatest corner of the faces that count. Other vertices are not looked at."""
+        used = np.zeros(len(self.vertices), np.bool_)
+        used[self._known[self._placed].ravel()] = True
+        corners = self.octree.mesh.vertices[used]
+        return np.stack([corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf)])
+
+    @lazy
     def rings(self) -> Rings:
-        """The faces around the vertices, computed once."""
-        if self._rings is None:
-            self._rings = rings_of(self.octree.mesh.vertices, self.faces)
-        return self._rings
+        """The faces around the vertices."""
+        return rings_of(self.octree.mesh.vertices, self._known, self._placed)
 
-    @property
-    def normals(self) -> NDArray[np.float64]:
-        """(f, 3) of all the mesh's faces, computed once."""
-        if self._normals is None:
-            self._normals = face_normals(self.octree.mesh.vertices[self.faces])
-        return self._normals
+    @lazy
+    def normals(self) -> Floats:
+        """(f, 3) of all the mesh's faces."""
+        return face_normals(self.octree.mesh.vertices[self._known])
 
     def named(self, faces: Integers) -> Integers:
         """The mesh's numbers of the octree's faces; -1 stays."""

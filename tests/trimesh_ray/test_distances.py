@@ -143,3 +143,11 @@ def test_voxels_by_rays_have_no_holes(drop_in: None) -> None:
     grid = np.stack(np.meshgrid(np.arange(-17, 18), np.arange(-17, 18)), axis=-1).reshape(-1, 2) * 0.05
     within = grid[np.hypot(*grid.T) < 0.9]
     assert {tuple(np.round(c / 0.05)) for c in within} <= {tuple(np.round(c / 0.05)) for c in centres}
+
+
+def test_a_nearest_point_never_has_a_face_without_a_place() -> None:
+    """The face with a NaN corner, which shares an edge with the nearest, was taken to end at 0."""
+    vertices = [[1, 0, 1], [1, 1, 1], [2, 0, 0], [np.nan, 0, 0]]
+    mesh = trimesh.Trimesh(vertices, [[0, 1, 3], [0, 1, 2]], process=False)
+    _, distance, face = closest_point(mesh, [[0, 0.5, 2.0]])
+    assert face.tolist() == [1] and np.isclose(distance, np.sqrt(2.0))

@@ -17,6 +17,7 @@ from trimesh.ray import ray_triangle
 
 import renderer.trimesh_ray
 from renderer.trimesh_ray import RayMeshIntersector, install, installed, trees, uninstall
+from renderer.trimesh_ray.distinct import distinct_faces
 
 ROOT = Path(__file__).parents[2]
 DOWN = [[0.0, 0.0, -1.0]]
@@ -257,6 +258,10 @@ def twice(mesh: Any, turned: bool) -> Any:
     return trimesh.util.concatenate([mesh, again])
 
 
+def box(low: list[float], high: list[float]) -> trimesh.Trimesh:
+    return trimesh.creation.box(bounds=[low, high])
+
+
 class TestWhatTrimeshForgives:
     """An attacker found these answered otherwise than trimesh does, and worse."""
 
@@ -299,6 +304,85 @@ class TestWhatTrimeshForgives:
             False,
         ]
 
+    def test_bodies_far_away_that_share_a_wall_change_no_answer(self) -> None:
+        """Faces at one place counted once, and an edge of three faces made the whole mesh one that is open."""
+        pair, far = [box([0, 0, 0], [2, 2, 2]), box([1, 1, 1], [3, 3, 3])], [box([9, 0, 0], [11, 2, 1])]
+        base = box([9, 0, 0], [11, 2, 2])
+        points = [[0.5, 0.5, 0.5], [1.5, 1.4, 1.3], [2.5, 2.4, 2.3], [3.5, 0.4, 0.3]]
+        for parts in (
+            pair,
+            [*pair, *far],
+            [*pair, *far, base],
+            [*pair, *far, base, twice(box([20] * 3, [21] * 3), False)],
+        ):
+            whole = trimesh.util.concatenate(parts)
+            assert asked(whole).contains_points(points).tolist() == [True, False, True, False], len(parts)
+        assert asked(whole).contains_points([[10, 1, 0.5], [10, 1, 1.5], [20.5, 20.5, 20.5]]).tolist() == [
+            False,
+            True,
+            True,
+        ]
+        # On the base, which both bodies have.
+        assert asked(whole).contains_points([[10.2, 1, 0], [9, 1, 0.5]]).all()
+
+    @pytest.mark.parametrize("turned", [False, True])
+    def test_a_body_there_twice_has_an_inside_beside_bodies_that_share_a_wall(self, turned: bool) -> None:
+        parts = [twice(box([0] * 3, [1] * 3), turned), box([5, 0, 0], [6, 1, 1]), box([6, 0, 0], [7, 1, 1])]
+        points = [[0.3, 0.4, 0.6], [5.3, 0.4, 0.6], [6.3, 0.4, 0.6], [6, 0.4, 0.6], [3, 0.4, 0.6]]
+        whole = trimesh.util.concatenate(parts)
+        assert asked(whole).contains_points(points).tolist() == [True, True, True, True, False]
+
+    def test_an_open_soup_is_judged_as_the_mesh_of_its_faces(self) -> None:
+        """Which way faces are turned was told by the vertices' numbers, by which a soup has no common edge."""
+        mesh = trimesh.creation.icosphere(subdivisions=3)
+        faces = mesh.faces.copy()[1:]
+        turn = np.random.default_rng(0).random(len(faces)) < 0.5
+        faces[turn] = faces[turn, ::-1]
+        points = np.random.default_rng(1).uniform(-0.5, 0.5, (200, 3))
+        soup = trimesh.Trimesh(
+            mesh.vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3), process=False
+        )
+        assert asked(soup).contains_points(points).all()
+        assert asked(trimesh.Trimesh(mesh.vertices, faces, process=False)).contains_points(points).all()
+
+    def test_votes_are_the_same_each_time_and_in_each_batch(self) -> None:
+        """trimesh's own, which were taken, draw a direction at random where two rays differ."""
+        rng = np.random.default_rng(4)
+        mesh = trimesh.Trimesh(rng.uniform(-1, 1, (30, 3)), rng.integers(0, 30, (60, 3)), process=False)
+        points = rng.uniform(-1, 1, (300, 3))
+        first = asked(mesh).contains_points(points)
+        assert first.any() and not first.all()
+        for _ in range(3):
+            assert np.array_equal(asked(mesh).contains_points(points), first)
+        alone = [asked(mesh).contains_points(point[None])[0] for point in points]
+        assert np.array_equal(alone, first)
+
+    def test_points_on_an_open_mesh_turned_both_ways_are_inside(self) -> None:
+        body = box([0, 0, 0], [2, 2, 2])
+        faces = body.faces[~(body.vertices[body.faces][:, :, 2] == 2).all(axis=1)].copy()
+        faces[0] = faces[0, ::-1]
+        mesh = trimesh.Trimesh(body.vertices, faces, process=False)
+        assert asked(mesh).contains_points([[1, 1, 0], [0, 1, 0.5], [0.5, 0, 1], [2, 0.5, 0.25], [0, 0, 0]]).all()
+
+    def test_a_vertex_that_no_face_has_changes_no_answer(self) -> None:
+        parts = [box([0, 0, 0], [2, 2, 2]), box([0.1, 0.1, 0.1], [1.9, 1.9, 2])]
+        lidless = [part.faces[~(part.vertices[part.faces][:, :, 2] == 2).all(axis=1)] for part in parts]
+        two = trimesh.util.concatenate([trimesh.Trimesh(p.vertices, f) for p, f in zip(parts, lidless, strict=True)])
+        far = trimesh.Trimesh(np.vstack([two.vertices, [[0, 0, 9]], [[np.nan, 0, 0]]]), two.faces, process=False)
+        points = [[1, 1, 2.01], [1, 1, 0.5]]
+        assert (
+            asked(two).contains_points(points).tolist() == asked(far).contains_points(points).tolist() == [False, True]
+        )
+
+    def test_no_hits_are_asked_for(self) -> None:
+        faces, rays = asked(trimesh.creation.box()).intersects_id([[0, 0, 2]], DOWN, max_hits=0)
+        assert len(faces) == len(rays) == 0
+
+    def test_faces_may_count_vertices_from_the_end(self) -> None:
+        body = trimesh.creation.box()
+        mesh = trimesh.Trimesh(body.vertices, body.faces - len(body.vertices), process=False)
+        assert asked(mesh).contains_points([[0, 0, 0], [2, 0, 0]]).tolist() == [True, False]
+
     def test_faces_without_a_place_are_not_there(self) -> None:
         vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [np.nan, 0, 0], [9, 9, np.inf]]
         mesh = trimesh.Trimesh(vertices, [[0, 1, 3], [0, 1, 2]], process=False)
@@ -310,17 +394,15 @@ class TestWhatTrimeshForgives:
 
 
 def test_distinct_faces_are_told_by_position_whatever_their_corners_order() -> None:
-    from renderer.trimesh_ray.distinct import distinct_faces
-
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 0], [-0.0, 0, 0]], float)
     faces = np.array([[0, 1, 2], [2, 4, 5], [0, 1, 3], [4, 5, 2], [3, 3, 1], [1, 3, 3]])
-    assert distinct_faces(vertices, faces).tolist() == [0, 2, 4]
-    assert distinct_faces(vertices, faces[[0, 2, 4]]) is None
+    assert distinct_faces(vertices, faces, np.arange(6)).tolist() == [0, 2, 4]
+    assert distinct_faces(vertices, faces[[0, 2, 4]], np.arange(3)).tolist() == [0, 1, 2]
     rng = np.random.default_rng(9)
     points, some = rng.integers(0, 2, (40, 3)).astype(float), rng.integers(0, 40, (500, 3))
     keys = [tuple(sorted(map(tuple, points[face].tolist()))) for face in some]
     first = {key: row for row, key in reversed(list(enumerate(keys)))}
-    assert distinct_faces(points, some).tolist() == sorted(first.values())
+    assert distinct_faces(points, some, np.arange(500)).tolist() == sorted(first.values())
 
 
 def test_blocks_may_overlap_and_meshes_made_before_still_travel() -> None:
