@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import warnings
 from codecs import BOM_UTF8
 from collections.abc import Callable
@@ -94,10 +95,12 @@ def _parse_glb(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     """All triangle meshes, each placed by the scene's transforms; points and lines have no surface."""
     import trimesh  # half a second, which scenes of PLY files need not spend
 
-    _check_glb_frame(content)
+    document = _checked_document(content)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # a signalling NaN, which Mesh rejects or repairs
-            scene = trimesh.load_scene(BytesIO(content), file_type="glb", process=False)
+            scene = trimesh.load_scene(
+                BytesIO(_one_primitive_a_node(content, document)), file_type="glb", process=False
+            )
         meshes = []
         for node in scene.graph.nodes_geometry:
             transform, geometry_name = scene.graph[node]
@@ -121,8 +124,10 @@ _HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "K
 _FLOAT32 = 5126
 
 
-def _check_glb_frame(content: bytes) -> None:
-    """The 12-byte header and the JSON chunk (glTF 2.0, section 4.4): trimesh checks neither length nor encoding."""
+def _checked_document(content: bytes) -> Any:
+    """What the JSON chunk holds, after the 12-byte header (glTF 2.0, section 4.4): trimesh checks neither length nor
+    encoding.
+    """
     if content[:4] != b"glTF":
         raise MeshError(f"expected a first word 'glTF', got {content[:4]!r}")
     length, json_length = (int.from_bytes(content[at : at + 4], "little") for at in (8, 12))
@@ -133,6 +138,36 @@ def _check_glb_frame(content: bytes) -> None:
     except (ValueError, RecursionError) as error:
         raise MeshError(f"malformed GLB: its JSON chunk: {str(error)[:120]}") from error
     _refuse_unread(document)
+    return document
+
+
+def _one_primitive_a_node(content: bytes, document: Any) -> bytes:
+    """The file with a node of its own for each primitive of a mesh that has several.
+
+    trimesh names their nodes at random, so that of thousands some have the same name, and one of these is lost.
+    """
+    meshes, nodes = document.get("meshes"), document.get("nodes")
+    several = {i: mesh["primitives"] for i, mesh in enumerate(meshes or []) if len(mesh["primitives"]) > 1}
+    if not several:
+        return content
+    first: dict[int, int] = {}
+    for i, primitives in several.items():
+        first[i] = len(meshes)
+        meshes += [{"primitives": [primitive]} for primitive in primitives]
+    for node in list(nodes):
+        if node.get("mesh") in several:
+            i = node.pop("mesh")
+            count = len(several[i])
+            # The last comes first.
+            node["children"] = [*node.get("children", []), *reversed(range(len(nodes), len(nodes) + count))]
+            nodes += [{"mesh": first[i] + k} for k in range(count)]
+    for i in several:
+        meshes[i]["primitives"] = meshes[i]["primitives"][:1]
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    rest = content[20 + int.from_bytes(content[12:16], "little") :]
+    length = 20 + len(text) + len(rest)
+    return b"".join((content[:8], struct.pack("<II", length, len(text)), content[16:20], text, rest))
 
 
 def _refuse_unread(document: Any) -> None:
@@ -160,6 +195,9 @@ def _refuse_unread(document: Any) -> None:
             raise MeshError(f"GLB: expected plain accessors, got a sparse one, accessor {number}")
         if "bufferView" not in accessor:  # all zeros, as many as it says
             raise MeshError(f"GLB: expected accessors with data, got none in accessor {number}")
+    for number, buffer in enumerate(dicts(document, "buffers")):
+        if not str(buffer.get("uri", "data:")).startswith("data:"):
+            raise MeshError(f"GLB: expected its own bytes, got another file for buffer {number}: put it in")
     nodes = dicts(document, "nodes")
     for number, node in enumerate(nodes):
         for key in ("skin", "weights"):  # they move the vertices of the node's mesh
@@ -182,6 +220,9 @@ def _refuse_deep(nodes: list[dict[str, Any]]) -> None:
     """Raise ``MeshError`` for nodes in circles, or so deep within each other that trimesh takes minutes."""
     lists = [node.get("children") for node in nodes]
     children = [[c for c in row if isinstance(c, int)] if isinstance(row, list) else [] for row in lists]
+    below = [child for row in children for child in row]
+    if len(set(below)) < len(below):
+        raise MeshError("GLB: expected each node below at most one other, got one below two")
     level, seen = set(range(len(nodes))) - {child for row in children for child in row}, 0
     for _ in range(_MAX_NODE_DEPTH):
         seen += len(level)

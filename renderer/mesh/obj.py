@@ -217,11 +217,17 @@ def _read_any(content: bytes, keeps_bad_faces: bool) -> _Content:
     lines = list(_logical_lines(content.decode("utf-8", "replace")))
     statements = _Statements(keeps_bad_faces, Counter(word for _, line in lines for word in line.split(None, 1)[:1]))
     for number, line in lines:
-        words = line.split()
-        if not words or words[0].startswith("#"):
+        # The rest is a comment, at the end of a statement too, which many programs write.
+        words = line.partition("#")[0].split()
+        if not words:
             continue
         try:
-            if "_" in line and words[0] in ("v", "vt", "vn", "f"):  # Python takes 1_000 for a number
+            if any("_" in word for word in words) and words[0] in (
+                "v",
+                "vt",
+                "vn",
+                "f",
+            ):  # Python takes 1_000 for a number
                 raise ValueError(f"malformed number {next(word for word in words if '_' in word)!r}")
             _read_statement(words[0], words[1:], statements)
         except ValueError as error:

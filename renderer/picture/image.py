@@ -113,11 +113,17 @@ class Image:
         suffix = as_path("path", path).suffix.lower()
         check_picture_path(path)
         if suffix == ".npy":
-            write_atomically(path, lambda file: np.save(file, self.radiance))
+            write_atomically(path, self._write_npy)
         elif suffix == ".exr":
             write_exr(path, self.radiance, self._layers())
         else:
             write_atomically(path, self._write_png)
+
+    def _write_npy(self, file: BinaryIO) -> None:
+        """As ``numpy.save``, which writes to no pipe, and leaks its file where a signal's handler raises."""
+        radiance = np.ascontiguousarray(self.radiance)
+        np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(radiance))
+        file.write(radiance.data)
 
     def _layers(self) -> dict[str, NDArray[np.float32]]:
         """Depth and normal as an EXR file has them, where they were kept."""

@@ -839,3 +839,9 @@ def test_the_mutation_test_would_see_a_reader_that_lets_an_exception_through(mon
     run: Callable[..., None] = test_mutated_files_load_or_fail_clearly.hypothesis.inner_test  # type: ignore[attr-defined]
     with pytest.raises(KeyError):
         run("saved.ply", [(0, 0, 0)])
+
+
+def test_obj_statements_may_end_in_a_comment(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0 # a corner\nv 1 0 0\nv 0 1 0 #\nf 1 2 3 # 4 5_6\n#f 9\n")
+    assert load_mesh(path).faces.tolist() == [[0, 1, 2]]
