@@ -17,9 +17,9 @@ from pathlib import Path
 from renderer.process import child
 from validation.mutants.sites import Mutant, text_of
 
-_COPIED = ("renderer", "validation", "tests", "scenes", "docs", "reports")
-_FILES = ("pyproject.toml", "Makefile", "README.md", "requirements.lock", "LICENSE")
-_NOT_COPIED = shutil.ignore_patterns("__pycache__", "pictures", ".run-*", "*.html")
+_FOLDERS = ("renderer", "validation", "tests", "scenes", "docs", ".ci", ".github")
+_FILES = ("pyproject.toml", "Makefile", "README.md", "requirements.lock", "LICENSE", ".gitignore", "reports/README.md",
+          "reports/baseline.json")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,9 @@ class Workshop:
 
     def __init__(self, root: Path, folder: Path) -> None:
         self.root, self._folder = folder / "copy", folder
-        for name in _COPIED:
-            shutil.copytree(root / name, self.root / name, ignore=_NOT_COPIED)
+        for name in _FOLDERS:
+            shutil.copytree(root / name, self.root / name, ignore=shutil.ignore_patterns("__pycache__", "compiled"))
+        (self.root / "reports").mkdir()
         for name in _FILES:
             shutil.copy(root / name, self.root / name)
         self._cache, self._sound = folder / "cache", folder / "sound"
