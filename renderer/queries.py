@@ -63,7 +63,7 @@ class Queries:
         """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
 
         origins, directions  (..., 3), finite; their leading dimensions are broadcast, and the answers have these;
-                             directions are not zero, of any length
+                             directions are not zero, from 2^-300 to 2^700 long
         t_min, t_max         >= 0, one number or (...), in units of |direction|
         leaving              faces that the rays start on, one or (...), -1 for none: each start is moved off its face
                              by more than rounding errors, to the side that the direction points to, so that the ray
@@ -99,7 +99,7 @@ class Queries:
     ) -> NDArray[np.bool_]:
         """Whether each ray hits anything in the closed interval [t_min, t_max], (...) bool.
 
-        Arguments as for ``closest_hit``.
+        Arguments as for ``closest_hit``, but for ``t_error``.
 
         >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -181,8 +181,8 @@ class Queries:
     ) -> Steps:
         """The nodes and triangles that the search for each ray's closest hit tests, for heat maps.
 
-        Arguments as for ``closest_hit``. The counts are those of a ray that travels alone and goes to the nearest boxes
-        first. Rays of one direction are traced together and test some more, at less cost.
+        Arguments as for ``closest_hit``, but for ``t_error``. The counts are those of a ray that travels alone and goes
+        to the nearest boxes first. Rays of one direction are traced together and test some more, at less cost.
 
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import icosphere

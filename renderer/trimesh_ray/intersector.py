@@ -1,7 +1,7 @@
 """A ``RayMeshIntersector`` like trimesh's own two, answered by the octree."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 _NOWHERE = np.empty((0, 3))
 _NO_ROWS = np.empty(0, np.int64)
+# In place of a number of hits: the first alone, which is searched for otherwise.
+_FIRST: Literal["first"] = "first"
 
 
 class RayMeshIntersector:
@@ -52,30 +54,38 @@ class RayMeshIntersector:
         multiple_hits                whether all hits of a ray are listed, at most the nearest ``max_hits``
         """
 
-        def ask(origins: Floats, directions: Floats) -> tuple[Integers, Integers, Floats]:
-            it = traced(self.mesh)
-            if multiple_hits and max_hits < 1:
-                return _NO_ROWS, _NO_ROWS, _NOWHERE
-            if multiple_hits:
-                found = it.octree.all_hits(origins, directions, max_hits=max_hits)
-                return it.named(found.face), found.ray, found.points if return_locations else _NOWHERE
-            first = it.octree.closest_hit(origins, directions)
-            rays = np.flatnonzero(first.hit)
-            return it.named(first.face[rays]), rays, first.points[rays] if return_locations else _NOWHERE
-
-        (faces, rays, places), good = _asked(ask, ray_origins, ray_directions)
-        if good is not None:
-            real = good[rays]
-            faces, rays, places = faces[real], rays[real], places[real] if return_locations else places
+        kept = max_hits if multiple_hits else _FIRST
+        faces, rays, places = self._hits(ray_origins, ray_directions, kept, return_locations)
         return (faces, rays, places) if return_locations else (faces, rays)
 
     def intersects_location(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True
     ) -> tuple[Floats, Integers, Integers]:
         """Places (m, 3), rays (m,) and faces (m,) of all hits, or of the first of each ray."""
-        found: Any = self.intersects_id(ray_origins, ray_directions, multiple_hits, return_locations=True)
-        faces, rays, places = found
+        faces, rays, places = self._hits(ray_origins, ray_directions, None if multiple_hits else _FIRST, True)
         return places, rays, faces
+
+    def _hits(
+        self, ray_origins: ArrayLike, ray_directions: ArrayLike, max_hits: int | Literal["first"] | None, located: bool
+    ) -> tuple[Integers, Integers, Floats]:
+        """Faces, rays and, if ``located``, places of the nearest ``max_hits`` of each ray, None for all."""
+
+        def ask(origins: Floats, directions: Floats) -> tuple[Integers, Integers, Floats]:
+            it = traced(self.mesh)
+            if max_hits == _FIRST:
+                first = it.octree.closest_hit(origins, directions)
+                rays = np.flatnonzero(first.hit)
+                return it.named(first.face[rays]), rays, first.points[rays] if located else _NOWHERE
+            if max_hits is not None and max_hits < 1:
+                return _NO_ROWS, _NO_ROWS, _NOWHERE
+            found = it.octree.all_hits(origins, directions, max_hits=max_hits)
+            return it.named(found.face), found.ray, found.points if located else _NOWHERE
+
+        (faces, rays, places), good = _asked(ask, ray_origins, ray_directions)
+        if good is not None:
+            real = good[rays]
+            faces, rays, places = faces[real], rays[real], places[real] if located else places
+        return faces, rays, places
 
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Integers:
         """The first face that each ray hits, (n,); -1 for none."""

@@ -151,3 +151,24 @@ def test_a_nearest_point_never_has_a_face_without_a_place() -> None:
     mesh = trimesh.Trimesh(vertices, [[0, 1, 3], [0, 1, 2]], process=False)
     _, distance, face = closest_point(mesh, [[0, 0.5, 2.0]])
     assert face.tolist() == [1] and np.isclose(distance, np.sqrt(2.0))
+
+
+def test_of_equally_aslant_faces_it_is_the_lowest() -> None:
+    corners, faces = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+    points = [[0.5, 0.5, 1], [0.25, 0.25, 2], [0, 0, 1], [1, 1, 3]]
+    for order in (faces, faces[::-1]):
+        mesh = trimesh.Trimesh(corners, order, process=False)
+        assert closest_point(mesh, points)[2].tolist() == [0] * 4
+
+
+def test_at_slanted_edges_it_is_the_face_turned_to_the_point() -> None:
+    """There 1 - u - v of a point on the edge is not 0 but what rounding leaves of it."""
+    rng = np.random.default_rng(1)
+    mesh = trimesh.creation.box(transform=trimesh.transformations.random_rotation_matrix(rng.random(3)))
+    normals = mesh.face_normals
+    for (i, j), ends in zip(mesh.face_adjacency, mesh.vertices[mesh.face_adjacency_edges], strict=True):
+        if abs(normals[i] @ normals[j]) < 0.5:
+            t = rng.random((200, 1))
+            for a, b, facing in ((0.1, 1, j), (1, 0.1, i)):
+                points = ends[0] * t + ends[1] * (1 - t) + a * normals[i] + b * normals[j]
+                assert (normals[closest_point(mesh, points)[2]] @ normals[facing] > 0.9).all()

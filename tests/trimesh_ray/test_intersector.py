@@ -18,6 +18,7 @@ from trimesh.ray import ray_triangle
 import renderer.trimesh_ray
 from renderer.trimesh_ray import RayMeshIntersector, install, installed, trees, uninstall
 from renderer.trimesh_ray.distinct import distinct_faces
+from renderer.trimesh_ray.solid import _parts
 
 ROOT = Path(__file__).parents[2]
 DOWN = [[0.0, 0.0, -1.0]]
@@ -332,6 +333,83 @@ class TestWhatTrimeshForgives:
         whole = trimesh.util.concatenate(parts)
         assert asked(whole).contains_points(points).tolist() == [True, True, True, True, False]
 
+    def test_an_open_body_that_is_there_twice_has_an_inside_too(self) -> None:
+        """Its rim has two faces then, as if it were closed."""
+        mesh = trimesh.creation.icosphere(subdivisions=2)
+        faces = mesh.faces.copy()[:-1]
+        faces[::2] = faces[::2, ::-1]
+        for several in (faces, np.concatenate([faces, faces]), np.concatenate([faces, faces[:, ::-1], faces])):
+            whole = trimesh.Trimesh(mesh.vertices, several, process=False)
+            assert asked(whole).contains_points([[0.01, 0.02, 0.03], [2, 0, 0]]).tolist() == [True, False]
+
+    def test_bodies_that_share_a_wall_and_are_there_twice_have_an_inside(self) -> None:
+        a, b = box([0, 0, 0], [1, 1, 1]), box([1, 0, 0], [2, 1, 1])
+        points = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.99, 0.4, 0.3], [1.01, 0.4, 0.3], [2.5, 0.5, 0.5]]
+        for parts in ([a, b], [a, b, a, b], [a, b, a, b, a, b]):
+            whole = trimesh.util.concatenate(parts)
+            assert asked(whole).contains_points(points).tolist() == [True, True, True, True, False]
+
+    def test_cells_that_share_walls_have_an_inside(self) -> None:
+        rng = np.random.default_rng(6)
+        for _ in range(20):
+            cells = np.argwhere(rng.random((3, 3, 3)) < 0.5)
+            whole = trimesh.util.concatenate([box(cell.tolist(), (cell + 1).tolist()) for cell in cells])
+            around = np.argwhere(np.ones((5, 5, 5))) - 1
+            walled = [
+                sum((cells == cell + step).all(axis=1).any() for step in [*np.eye(3), *-np.eye(3)]) for cell in cells
+            ]
+            free = cells[np.array(walled) < 6]  # see docs/coming-from.md on a body whose whole surface others share
+            expected = (around[:, None] == cells).all(axis=2).any(axis=1)
+            asked_for = (around[:, None] == free).all(axis=2).any(axis=1) | ~expected
+            found = asked(whole).contains_points(np.add(around, [0.3, 0.4, 0.6]))
+            assert np.array_equal(found[asked_for], expected[asked_for])
+
+    def test_parts_of_any_shape_and_numbering_are_found_in_few_rounds(self) -> None:
+        """A strip of 200,000 faces, numbered at random; its rounds grew with its length, to hours."""
+        count = 200_000
+        order = np.random.default_rng(1).permutation(count)
+        edges = np.stack([np.arange(count), np.arange(count) + 1, count + 1 + np.arange(count)], axis=1)[order]
+        part = _parts(edges, np.ones_like(edges, bool))
+        assert (part == 0).all()
+        apart = edges.copy()
+        apart[order == 999, 1] = 2 * count + 1
+        part = _parts(apart, np.ones_like(edges, bool))
+        assert np.array_equal(part[order <= 999], np.full(1000, np.flatnonzero(order <= 999)[0]))
+        assert np.array_equal(part[order > 999], np.full(count - 1000, np.flatnonzero(order > 999)[0]))
+
+    def test_a_face_from_a_place_to_itself_opens_nothing(self) -> None:
+        pair = trimesh.util.concatenate([box([0, 0, 0], [2, 2, 1]), box([0, 0, 0], [2, 2, 2])])
+        faces = np.concatenate([pair.faces, [[0, 0, 1], [3, 3, 3]]])
+        points = [[1.1, 0.9, 0.5], [1.1, 0.9, 1.5]]
+        whole = trimesh.Trimesh(pair.vertices, faces, process=False, validate=False)
+        assert asked(whole).contains_points(points).tolist() == [False, True]
+
+    def test_a_face_without_a_place_widens_no_box(self) -> None:
+        """Three nested bowls, around which the surface winds by more than a half above their rims."""
+        ball = trimesh.creation.icosphere(3)
+        lower = ball.faces[ball.triangles_center[:, 2] < 0]
+        vertices = np.concatenate([ball.vertices * k - [0, 0, 0.2] for k in (1, 1.1, 1.2)])
+        faces = np.concatenate([lower + k * len(ball.vertices) for k in range(3)])
+        point = [[0, 0, vertices[np.unique(faces), 2].max() + 0.01]]
+        with_nan = np.r_[vertices, [[0, 0, np.nan]]], np.r_[faces, [[0, 1, len(vertices)]]]
+        for corners, some in ((vertices, faces), with_nan):
+            mesh = trimesh.Trimesh(corners, some, process=False, validate=False)
+            assert not asked(mesh).contains_points(point)[0]
+
+    def test_a_tiny_direction_is_one_beside_a_ray_without_direction_too(self) -> None:
+        ray, origins = asked(trimesh.creation.box()), [[0.1, 0.2, 5], [0, 0, 5]]
+        for tiny in 10.0 ** -np.arange(1, 80, 6):
+            directions = [[0, 0, -tiny], [0, 0, 0]]
+            alone = ray.intersects_first(origins[:1], directions[:1]).tolist()
+            assert ray.intersects_first(origins, directions).tolist() == [*alone, -1]
+            assert ray.intersects_any(origins, directions).tolist() == [True, False]
+
+    def test_all_hits_are_located_however_many(self) -> None:
+        """A hundred of 160, as over embreex."""
+        boxes = trimesh.util.concatenate([trimesh.creation.box(extents=[k, k, k]) for k in range(1, 81)])
+        assert len(asked(boxes).intersects_location([[0.1, 0.2, 99]], DOWN)[0]) == 160
+        assert len(asked(boxes).intersects_id([[0.1, 0.2, 99]], DOWN)[0]) == 100
+
     def test_an_open_soup_is_judged_as_the_mesh_of_its_faces(self) -> None:
         """Which way faces are turned was told by the vertices' numbers, by which a soup has no common edge."""
         mesh = trimesh.creation.icosphere(subdivisions=3)
@@ -403,6 +481,14 @@ def test_distinct_faces_are_told_by_position_whatever_their_corners_order() -> N
     keys = [tuple(sorted(map(tuple, points[face].tolist()))) for face in some]
     first = {key: row for row, key in reversed(list(enumerate(keys)))}
     assert distinct_faces(points, some, np.arange(500)).tolist() == sorted(first.values())
+
+
+def test_uninstall_in_a_block_leaves_the_block() -> None:
+    install()
+    with installed():
+        uninstall()
+        assert isinstance(trimesh.creation.box().ray, RayMeshIntersector)
+    assert not isinstance(trimesh.creation.box().ray, RayMeshIntersector)
 
 
 def test_blocks_may_overlap_and_meshes_made_before_still_travel() -> None:

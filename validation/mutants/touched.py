@@ -84,6 +84,8 @@ def read(folder: Path, root: Path) -> Touched:
         for test, found in json.loads(path.read_text(encoding="utf-8")).items():
             one = merged.setdefault(test, {"lines": {}, "kernels": [], "seconds": 0.0})
             for file, lines in found["lines"].items():
+                if not Path(file).is_relative_to(root):  # of an installed copy that a test looked into
+                    continue
                 name = Path(file).relative_to(root).as_posix()
                 one["lines"][name] = sorted({*one["lines"].get(name, []), *lines})
             one["kernels"] = sorted({*one["kernels"], *_closure(found["kernels"], root)})
@@ -107,11 +109,14 @@ def touching(mutant: Mutant, touched: Touched) -> list[str]:
 
 
 def _closure(files: Sequence[str], root: Path) -> set[str]:
+    """Files of the package in ``root`` with all that they import, by paths relative to it."""
     seen: set[Path] = set()
-    pending = [Path(file).resolve() for file in files if Path(file).is_relative_to(root / "renderer")]
+    own = [Path(file).relative_to(root) for file in files if Path(file).is_relative_to(root / PACKAGE.name)]
+    # What a file imports is told of this process's own package.
+    pending = [PACKAGE.parent / file for file in own]
     while pending:
         file = pending.pop()
         if file not in seen:
             seen.add(file)
             pending += imported_files(file)
-    return {file.relative_to(root.resolve()).as_posix() for file in seen}
+    return {file.relative_to(PACKAGE.parent).as_posix() for file in seen}
