@@ -182,7 +182,7 @@ QUERIES = (
             "inside & ~on", "inside | on"),
     _python("queries", "parity is taken as winding", "contains.contains",
             "(counted & 1) == 1", "counted != 0"),
-    _python("queries", "the drop-in lists each face at an edge", "intersects_id",
+    _python("queries", "the drop-in lists each face at an edge", "RayMeshIntersector._hits",
             "it.octree.all_hits(origins, directions, max_hits=max_hits)",
             "it.octree.all_hits(origins, directions, max_hits=max_hits, contacts=False)"),
 )  # fmt: skip
