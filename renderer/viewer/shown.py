@@ -37,8 +37,9 @@ class ShownScene:
 
     @property
     def files(self) -> list[str]:
-        """The scene files that may be opened: those beside this one, but for names that are no text."""
-        names = [path.name for path in self.path.parent.glob("*.toml")] if self.path else []
+        """The scene files that may be opened: those beside this one, but for pipes and names that are no text."""
+        # A pipe without a writer would be waited for.
+        names = [path.name for path in self.path.parent.glob("*.toml") if not path.is_fifo()] if self.path else []
         return sorted(name for name in names if name.encode(errors="replace").decode() == name)
 
     def beside(self, file: str) -> Path:

@@ -762,6 +762,17 @@ def test_what_is_no_scene_is_refused() -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names of files are bytes on Linux alone")
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+def test_a_pipe_beside_the_scene_is_no_scene(folder: Path, tmp_path: Path) -> None:
+    """Opening it waited for a writer, and no page could open another scene from then on."""
+    (tmp_path / "a.toml").write_text((folder / "blocks.toml").read_text())
+    os.mkfifo(tmp_path / "pipe.toml")
+    shown = open_file(tmp_path / "a.toml")
+    assert shown.files == ["a.toml"]
+    with pytest.raises(ValueError, match=r"scene.file: expected one of \['a.toml'\]"):
+        shown.beside("pipe.toml")
+
+
 def test_names_that_are_no_text_are_left_out(folder: Path, tmp_path: Path) -> None:
     """The list of files could not be sent, so the page had no scene."""
     try:
