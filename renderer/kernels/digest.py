@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+from collections.abc import Iterable
 from functools import cache
 from logging import getLogger
 from pathlib import Path
@@ -26,13 +27,7 @@ def source_digest(path: Path) -> str | None:
     may then differ from the file.
     """
     path = path.resolve()
-    seen: set[Path] = set()
-    pending = [path] if is_ours(path) else [path, *PACKAGE.rglob("*.py")]
-    while pending:
-        found = pending.pop()
-        if found not in seen and found.exists():
-            seen.add(found)
-            pending += imported_files(found)
+    seen = reached([path] if is_ours(path) else [path, *PACKAGE.rglob("*.py")])
     newer = sorted(found for found in seen if found.stat().st_mtime > loaded.AT)
     if path not in seen or newer:
         why = f"{newer[0]} was written after this process began" if newer else f"{path} cannot be read"
@@ -43,6 +38,18 @@ def source_digest(path: Path) -> str | None:
         name = found.relative_to(PACKAGE).as_posix() if found.is_relative_to(PACKAGE) else found.name
         digest.update(name.encode() + b"\0" + _source(found) + b"\0")
     return digest.hexdigest()
+
+
+def reached(files: Iterable[Path]) -> set[Path]:
+    """Those of the files that are there, and all of this package that they import, directly or not."""
+    seen: set[Path] = set()
+    pending = list(files)
+    while pending:
+        found = pending.pop()
+        if found not in seen and found.exists():
+            seen.add(found)
+            pending += imported_files(found)
+    return seen
 
 
 @cache

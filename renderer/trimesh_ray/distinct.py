@@ -45,3 +45,9 @@ def _repeated(vertices: Floats, faces: Integers, rows: Integers) -> NDArray[np.b
         again[some] = True
         again[some[first]] = False
     return again
+
+
+def standing_together(triples: Integers) -> tuple[Integers, Integers]:
+    """A number (f,) for each place where faces stand, told by three numbers in any order, and how many faces it has."""
+    _, place, count = np.unique(np.sort(triples, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return place.reshape(-1), count[place.reshape(-1)]

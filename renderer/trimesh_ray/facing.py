@@ -5,6 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.trimesh_ray.distinct import standing_together
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -32,9 +34,8 @@ def rings_of(vertices: Floats, faces: NDArray[np.integer[Any]], rows: Integers) 
     there = corners[rows]
     starts = np.zeros(len(vertices) + 1, np.int64)
     np.cumsum(np.bincount(there.ravel(), minlength=len(vertices)), out=starts[1:])
-    _, same, count = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True)
     around = rows[np.argsort(there.ravel(), kind="stable") // 3]
-    return Rings(starts, around, corners, count[same.reshape(-1)] > 1)
+    return Rings(starts, around, corners, standing_together(corners)[1] > 1)
 
 
 def facing_faces(

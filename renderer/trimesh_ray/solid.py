@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.mesh.edges import sides
+from renderer.trimesh_ray.distinct import standing_together
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -28,7 +31,7 @@ def solid_faces(vertices: Floats, faces: NDArray[np.integer[Any]], rows: Integer
     odd_once = _is_odd(edges, bounding & once[:, None])
     if not odd_once.any():
         return distinct
-    place, many = _places(edges)
+    place, many = standing_together(edges)
     part = _parts(edges[once], bounding[once])[place[once].argsort()][place]
     many //= _common(part, many)
     odd = _is_odd(edges, bounding & (once & (many % 2 == 1))[:, None])
@@ -42,9 +45,7 @@ def _edges(vertices: Floats, faces: NDArray[np.integer[Any]]) -> tuple[Integers,
 
     Edges are told apart by the places of their ends.
     """
-    place = np.unique(np.ascontiguousarray(vertices + 0.0).view("V24").ravel(), return_inverse=True)[1].ravel()
-    start, end = place[faces], np.roll(place[faces], -1, axis=1)
-    keys = np.minimum(start, end).astype(np.int64) * len(vertices) + np.maximum(start, end)
+    start, end, keys = sides(vertices, faces)
     return np.unique(keys, return_inverse=True)[1].reshape(faces.shape).astype(np.int64), start != end
 
 
@@ -52,12 +53,6 @@ def _is_odd(edges: Integers, counted: Flags) -> Flags:
     """Whether each edge has an odd number of the counted sides."""
     odd: Flags = np.bincount(edges[counted], minlength=edges.max() + 1) % 2 == 1
     return odd
-
-
-def _places(edges: Integers) -> tuple[Integers, Integers]:
-    """The number of each face's place, and how many faces stand there; a face is told by its edges."""
-    _, place, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return place.reshape(-1), count[place.reshape(-1)]
 
 
 def _parts(edges: Integers, bounding: Flags) -> Integers:

@@ -1,6 +1,8 @@
 """The command ``python -m validation``: exit codes, what it writes and leaves alone, and what it prints."""
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ from validation.defects.list import DEFECTS
 from validation.gates import Gate
 from validation.job import Job
 from validation.mutants import run as mutants
-from validation.mutants.judge import Verdict
+from validation.mutants.verdict import Verdict
 from validation.report import page as report
 from validation.report import schema
 from validation.sections import SECTIONS
@@ -245,6 +247,25 @@ class TestDefects:
         assert command.main(["--defects", "--output", str(tmp_path)]) == 1
         assert "gates turned red is 0, expected at least 1" in capsys.readouterr().out
         assert json.loads((tmp_path / "defects.json").read_text())["caught"] == 0
+
+
+def test_reports_need_neither_the_extra_dev_nor_the_viewer() -> None:
+    """Reading the record of mutants imported coverage and pytest, at the end of every run."""
+    program = """
+import sys
+
+class Without:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {"coverage", "pytest", "_pytest", "hypothesis", "uvicorn", "starlette"}:
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Without())
+from pathlib import Path
+from validation import suite
+from validation.promises import table
+assert suite._outcome({}, [], Path("nowhere"))["gates"] == [] and table.unjudged(table.read()) == []
+"""
+    subprocess.run([sys.executable, "-c", program], cwd=SCENE.parents[1], check=True)
 
 
 def test_mutants_are_judged_listed_and_drawn(

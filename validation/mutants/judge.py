@@ -3,21 +3,19 @@
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from validation.mutants.answer import MARK
 from validation.mutants.sites import Mutant
 from validation.mutants.touched import Touched, touching
+from validation.mutants.verdict import How, Verdict
 from validation.mutants.workshop import Ended, Workshop
 
-How = Literal["fails", "crashes", "hangs"]
-# Groups of checks that run code of each folder or module of the renderer; what is not here no gate runs.
-_ALL = ("hits", "queries", "pictures")
-_GROUPS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("arrays", "errors", "kernels", "limits", "lazy", "mesh", "octree", "points", "process"), _ALL),
-    **dict.fromkeys(("queries", "trace", "tree"), _ALL),
+# The groups of checks, and those that run code of each folder or module of the renderer; what is not here no gate runs.
+GROUPS = ("hits", "queries", "pictures")
+_RUNS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("arrays", "errors", "kernels", "limits", "lazy", "mesh", "octree", "points", "process"), GROUPS),
+    **dict.fromkeys(("queries", "trace", "tree"), GROUPS),
     **dict.fromkeys(("contacts", "distance", "inside", "trimesh_ray"), ("queries",)),
     **dict.fromkeys(("scene", "shade", "picture", "inspect"), ("pictures",)),
 }
@@ -27,25 +25,9 @@ _TIMES, _COMPILING = 6.0, 150.0
 _TESTS = 240.0
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What noticed a mutant.
-
-    by       the name of the gate, or the test; None where nothing did
-    gate     whether it was a gate
-    how      what the mutant did
-    seconds  that it took
-    """
-
-    by: str | None
-    gate: bool
-    how: How | None
-    seconds: float
-
-
 def groups_of(mutant: Mutant) -> tuple[str, ...]:
     """The groups of checks that may notice a mutant."""
-    return _GROUPS.get(Path(mutant.file).with_suffix("").parts[1], ())
+    return _RUNS.get(Path(mutant.file).with_suffix("").parts[1], ())
 
 
 def judge(mutant: Mutant, workshop: Workshop, touched: Touched, sound: dict[str, float]) -> Verdict:
@@ -55,7 +37,7 @@ def judge(mutant: Mutant, workshop: Workshop, touched: Touched, sound: dict[str,
         for group in groups_of(mutant):
             ended = gates(workshop, (group,), _COMPILING + _TIMES * sound[group])
             spent += ended.seconds
-            by, how = _noticed_by_gates(ended, group)
+            by, how = noticed_by_gates(ended, group)
             if how is not None:
                 return Verdict(by, True, how, spent)
         tests = _affordable(touching(mutant, touched), touched)
@@ -76,7 +58,8 @@ def gates(workshop: Workshop, groups: Sequence[str], patience: float) -> Ended:
     return workshop.call("validation.mutants.answer:answer", json.dumps(groups), patience=patience)
 
 
-def _noticed_by_gates(ended: Ended, group: str) -> tuple[str | None, How | None]:
+def noticed_by_gates(ended: Ended, group: str) -> tuple[str | None, How | None]:
+    """What noticed a fault in a process of ``gates``, and how; None where nothing did."""
     said = re.search(rf"^{MARK}(.*)$", ended.output, re.MULTILINE)
     if ended.code is None:
         return f"the checks of {group}", "hangs"

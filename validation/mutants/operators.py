@@ -13,9 +13,11 @@ _ARITHMETIC: dict[type[ast.operator], str] = {
     ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.FloorDiv: "*", ast.Mod: "*", ast.Pow: "*",
     ast.MatMult: "+", ast.LShift: ">>", ast.RShift: "<<", ast.BitAnd: "|", ast.BitOr: "&", ast.BitXor: "&",
 }  # fmt: skip
-_COMPARISONS: dict[type[ast.cmpop], str] = {
-    ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
-    ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in",
+# How each is written, and what stands instead.
+_COMPARISONS: dict[type[ast.cmpop], tuple[str, str]] = {
+    ast.Lt: ("<", "<="), ast.LtE: ("<=", "<"), ast.Gt: (">", ">="), ast.GtE: (">=", ">"), ast.Eq: ("==", "!="),
+    ast.NotEq: ("!=", "=="), ast.Is: ("is", "is not"), ast.IsNot: ("is not", "is"), ast.In: ("in", "not in"),
+    ast.NotIn: ("not in", "in"),
 }  # fmt: skip
 # Statements whose loss leaves all names bound.
 _DROPPED = (ast.Expr, ast.AugAssign, ast.Delete, ast.Raise, ast.Break, ast.Continue)
@@ -47,11 +49,10 @@ def _arithmetic(node: ast.AST) -> Iterator[Fault]:
 
 def _comparison(node: ast.AST) -> Iterator[Fault]:
     if isinstance(node, ast.Compare):
-        for k, operator in enumerate(node.ops):
+        for k in range(len(node.ops)):
             terms = [f"({ast.unparse(node.left)})"]
             for j, (other, right) in enumerate(zip(node.ops, node.comparators, strict=True)):
-                sign = _COMPARISONS[type(operator)] if j == k else _SIGNS[type(other)]
-                terms += [sign, f"({ast.unparse(right)})"]
+                terms += [_COMPARISONS[type(other)][j == k], f"({ast.unparse(right)})"]
             yield Fault("comparison", node, " ".join(terms))
 
 
@@ -116,9 +117,3 @@ def _logic(node: ast.AST) -> Iterator[Fault]:
 def _unary(node: ast.AST) -> Iterator[Fault]:
     if isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.UAdd):
         yield Fault("unary", node, f"({ast.unparse(node.operand)})")
-
-
-_SIGNS: dict[type[ast.cmpop], str] = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-    ast.Is: "is", ast.IsNot: "is not", ast.In: "in", ast.NotIn: "not in",
-}  # fmt: skip

@@ -9,8 +9,8 @@ from typing import Any
 
 from renderer.process.files import write_atomically
 from validation.mutants.equivalent import EQUIVALENT
-from validation.mutants.judge import Verdict
 from validation.mutants.sites import Mutant
+from validation.mutants.verdict import Verdict
 
 SCHEMA = 1
 Row = dict[str, Any]

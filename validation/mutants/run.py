@@ -9,14 +9,15 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from validation.mutants.judge import Verdict, gates, judge
+from renderer.process.files import write_atomically
+from validation.mutants.judge import GROUPS, gates, judge, noticed_by_gates
 from validation.mutants.record import Record, digest, summary
 from validation.mutants.sites import Mutant, chosen, mutants
-from validation.mutants.touched import VARIABLE, Touched, read
-from validation.mutants.workshop import Workshop
+from validation.mutants.touched import Touched, read
+from validation.mutants.verdict import Verdict
+from validation.mutants.workshop import TOUCHED, Workshop
 
 ROOT = Path(__file__).resolve().parents[2]
-GROUPS = ("hits", "queries", "pictures")
 # Seconds that the sound renderer may take for all tests, or for one group of checks.
 _PATIENCE = 3600.0
 
@@ -94,13 +95,14 @@ def _touched(shop: Workshop, stored: Path, step: Callable[[str], None]) -> Touch
     step("mutants: which tests touch what")
     with tempfile.TemporaryDirectory(prefix="touched-") as folder:
         ended = shop.run(
-            ["-m", "pytest", "-p", "validation.mutants.touched", "-n", str(os.cpu_count() or 1), "--dist", "loadfile"],
-            _PATIENCE, **{VARIABLE: folder},
+            ["-m", "pytest", "-p", "validation.mutants.plugin", "-n", str(os.cpu_count() or 1), "--dist", "loadfile"],
+            _PATIENCE, **{TOUCHED: folder},
         )  # fmt: skip
         if ended.code != 0:
             raise RuntimeError(f"mutants: expected the sound renderer's tests to pass, got\n{ended.output[-2000:]}")
         touched = read(Path(folder), shop.root)
-    stored.write_text(json.dumps({"sources": sources, "touched": touched}), encoding="utf-8")
+    text = json.dumps({"sources": sources, "touched": touched})
+    write_atomically(stored, lambda file: file.write(text.encode()))
     return touched
 
 
@@ -111,7 +113,7 @@ def _sound(shop: Workshop, step: Callable[[str], None]) -> dict[str, float]:
         step(f"mutants: none, as the control of {group}")
         for _ in range(2):  # the first compiles
             ended = gates(shop, (group,), _PATIENCE)
-        if ended.code != 0 or "red: null" not in ended.output:
+        if noticed_by_gates(ended, group)[1] is not None:
             raise RuntimeError(f"mutants: expected no red gate of {group}, got\n{ended.output[-2000:]}")
         seconds[group] = ended.seconds
     shop.run(["-m", "renderer", "compile"], _PATIENCE)

@@ -1,78 +1,16 @@
-"""Which tests touch which code: measured while the sound renderer passes them.
-
-As a plugin of pytest (``-p validation.mutants.touched``) it notes, for each test file, the renderer's lines that Python
-ran and the files of the kernels that it called, with the files that these import: compiled code has no lines to trace.
-"""
+"""Which tests touch which code, as ``validation.mutants.plugin`` measured it while the sound renderer passed them."""
 
 import json
-import os
-import time
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import coverage
-import pytest
-
-from renderer.kernels.compiler import Kernel
-from renderer.kernels.digest import PACKAGE, imported_files
+from renderer.kernels.digest import PACKAGE, reached
 from validation.mutants.sites import Mutant
 
-# Where the plugin writes, a file for each process of the run.
-VARIABLE = "TOUCHED_FOLDER"
 Touched = Mapping[str, Mapping[str, Any]]
 # Tests that read the sources' text: any change of it fails them, whatever it does.
 _READERS = ("tests/validation/defects/", "tests/validation/mutants/", "tests/front/test_documents.py")
-
-
-class _Plugin:
-    """Switches the context of coverage, and the set of called kernels, from test file to test file."""
-
-    def __init__(self) -> None:
-        self.coverage = coverage.Coverage(data_file=None, source=[str(PACKAGE)])
-        self.kernels: dict[str, set[str]] = defaultdict(set)
-        self.seconds: dict[str, float] = defaultdict(float)
-        self.now = ""
-        called = Kernel.__call__
-
-        def noting(kernel: Kernel, *arguments: Any) -> Any:
-            self.kernels[self.now].add(kernel.py_func.__code__.co_filename)
-            return called(kernel, *arguments)
-
-        setattr(Kernel, "__call__", noting)  # noqa: B010, mypy lets no method be assigned
-        self.coverage.start()
-
-    @pytest.hookimpl(hookwrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        """Around each test."""
-        self.now = item.location[0]
-        self.coverage.switch_context(self.now)
-        began = time.perf_counter()
-        yield
-        self.seconds[self.now] += time.perf_counter() - began
-
-    def pytest_unconfigure(self) -> None:
-        """At the end of the process."""
-        self.coverage.stop()
-        data = self.coverage.get_data()
-        lines: dict[str, dict[str, list[int]]] = defaultdict(dict)
-        for file in data.measured_files():
-            for line, contexts in data.contexts_by_lineno(file).items():
-                for context in filter(None, contexts):
-                    lines[context].setdefault(file, []).append(line)
-        found = {
-            test: {"lines": lines[test], "kernels": sorted(self.kernels[test]), "seconds": seconds}
-            for test, seconds in self.seconds.items()
-        }
-        (Path(os.environ[VARIABLE]) / f"{os.getpid()}.json").write_text(json.dumps(found), encoding="utf-8")
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Called by pytest, in each process."""
-    # One that shares tests out runs none.
-    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
-        config.pluginmanager.register(_Plugin())
 
 
 def read(folder: Path, root: Path) -> Touched:
@@ -110,13 +48,7 @@ def touching(mutant: Mutant, touched: Touched) -> list[str]:
 
 def _closure(files: Sequence[str], root: Path) -> set[str]:
     """Files of the package in ``root`` with all that they import, by paths relative to it."""
-    seen: set[Path] = set()
     own = [Path(file).relative_to(root) for file in files if Path(file).is_relative_to(root / PACKAGE.name)]
     # What a file imports is told of this process's own package.
-    pending = [PACKAGE.parent / file for file in own]
-    while pending:
-        file = pending.pop()
-        if file not in seen:
-            seen.add(file)
-            pending += imported_files(file)
-    return {file.relative_to(PACKAGE.parent).as_posix() for file in seen}
+    found = reached(PACKAGE.parent / file for file in own)
+    return {file.relative_to(PACKAGE.parent).as_posix() for file in found}

@@ -22,6 +22,10 @@ _FILES = ("pyproject.toml", "Makefile", "README.md", "requirements.lock", "LICEN
           "reports/baseline.json")  # fmt: skip
 
 
+# The variable that names the folder where the plugin of pytest writes, a file for each process of the run.
+TOUCHED = "TOUCHED_FOLDER"
+
+
 @dataclass(frozen=True)
 class Ended:
     """How a process ended: its exit code, None where it had to be killed; what it printed; its seconds."""

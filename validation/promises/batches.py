@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.promises.row import row
+from validation.promises.squares import squares
 
 Floats = NDArray[np.float64]
 # On either side of sixteen rays, of the least and the largest chunk, and of some of these.
@@ -103,11 +104,10 @@ def _grid() -> Mesh:
 def _lattice() -> Mesh:
     """Squares of side 1/2 on an 8 x 8 x 8 lattice, across x, y and z at each place, none touching another."""
     count = _SIDE // 8
-    vertices = []
+    corners = []
     for place in np.ndindex(count, count, count):
         for axis in range(3):
             u, v = np.eye(3)[(axis + 1) % 3] / 2, np.eye(3)[(axis + 2) % 3] / 2
             corner = 2.0 * np.array(place) + 0.25 * np.eye(3)[axis] + u / 4 + v / 4
-            vertices += [corner, corner + u, corner + u + v, corner + v]
-    faces = np.arange(len(vertices), dtype=np.int32).reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return Mesh(np.array(vertices), faces)
+            corners.append([corner, corner + u, corner + u + v, corner + v])
+    return squares(np.array(corners))

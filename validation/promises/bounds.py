@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
 from validation.promises.row import row
+from validation.promises.squares import squares
 from validation.promises.ways import Indices, asked
 
 Floats = NDArray[np.float64]
@@ -42,17 +43,15 @@ def check_bounds(rng: Generator, count: int) -> list[dict[str, Any]]:
         def ask(tracer: Octree | BruteForce, rows: Indices, low: Floats = low, high: Floats = high,
                 expected: Indices = expected, alone: NDArray[np.bool_] = alone) -> NDArray[np.bool_]:  # fmt: skip
             o, d, least, most = origins[rows], directions[rows], low[rows], high[rows]
-            face, hit = (
-                tracer.closest_hit(o, d, t_min=least, t_max=most).face,
-                tracer.any_hit(o, d, t_min=least, t_max=most),
-            )
+            face = tracer.closest_hit(o, d, t_min=least, t_max=most).face
+            hit = tracer.any_hit(o, d, t_min=least, t_max=most)
             number = tracer.count_hits(o, d, t_min=least, t_max=most)
             met = np.where(face >= 0, face // 2, -1)
             there = expected[rows] >= 0
             kept: NDArray[np.bool_] = (met == expected[rows]) & (hit == there) & ((number == there) | ~alone[rows])
             return kept
 
-        kept = np.concatenate([kept for _, kept in asked(ask, octree, brute, count)])
+        kept = asked(ask, octree, brute, count)
         found.append(row(f"[t_min, t_max] is closed: {name}", "planes at whole 64ths", kept))
     return found
 
@@ -60,7 +59,5 @@ def check_bounds(rng: Generator, count: int) -> list[dict[str, Any]]:
 def _pile() -> tuple[Mesh, Floats]:
     """Squares above each other, of two faces each, and their heights: 64ths, not evenly apart."""
     heights = np.cumsum(1 + np.arange(_PLANES) * 7 % 5) / 64.0
-    corners = np.array([(-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)])
-    vertices = np.array([(x, y, z) for z in heights for x, y in corners])
-    faces = np.array([(4 * k + a, 4 * k + b, 4 * k + c) for k in range(_PLANES) for a, b, c in ((0, 1, 2), (0, 2, 3))])
-    return Mesh(vertices, faces.astype(np.int32)), heights
+    corners = ((-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0))
+    return squares(np.array([[(x, y, z) for x, y in corners] for z in heights])), heights

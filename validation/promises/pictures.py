@@ -11,6 +11,7 @@ from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
 from renderer.scene.material import Phong
 from renderer.scene.scene import Scene, SceneObject
+from validation.promises.squares import squares
 
 Floats = NDArray[np.float64]
 BLACK: Color = (0.0, 0.0, 0.0)
@@ -32,8 +33,7 @@ def from_above(eye: tuple[float, float, float], height: float) -> OrthographicCa
 
 def square(corner: Floats, u: Floats, v: Floats) -> Mesh:
     """The parallelogram from ``corner`` along u and v; u x v is its outside."""
-    vertices = np.array([corner, corner + u, corner + u + v, corner + v])
-    return Mesh(vertices, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    return squares(np.array([[corner, corner + u, corner + u + v, corner + v]]))
 
 
 def box(low: Floats, high: Floats) -> Mesh:

@@ -50,7 +50,7 @@ def check_places(rng: Generator, count: int) -> list[dict[str, Any]]:
                 found.setdefault(what + suffix, []).append((good | ~exact.clear)[kept])
         return hits.face >= 0
 
-    met = np.concatenate([kept for _, kept in asked(ask, octree, brute, count)])
+    met = asked(ask, octree, brute, count)
     rows_ = [row(what, _JUDGE, np.concatenate(kept)) for what, kept in found.items()]
     return [*rows_, row("each ray at a face meets one", _JUDGE, met)]
 

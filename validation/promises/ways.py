@@ -25,8 +25,8 @@ def ways(octree: Octree, brute: BruteForce, count: int) -> Iterator[tuple[str, O
     yield "by brute force", brute, [rows]
 
 
-def asked(ask: Callable[[Octree | BruteForce, Indices], NDArray[np.bool_]], octree: Octree, brute: BruteForce,
-          count: int) -> Iterator[tuple[str, NDArray[np.bool_]]]:  # fmt: skip
-    """Each way's name, and which of its rays ``ask(tracer, rows)`` says were answered as promised."""
-    for name, tracer, batches in ways(octree, brute, count):
-        yield name, np.concatenate([ask(tracer, rows) for rows in batches])
+def asked(
+    ask: Callable[[Octree | BruteForce, Indices], NDArray[np.bool_]], octree: Octree, brute: BruteForce, count: int
+) -> NDArray[np.bool_]:
+    """Which rays of all ways ``ask(tracer, rows)`` says were answered as promised."""
+    return np.concatenate([ask(tracer, rows) for _, tracer, batches in ways(octree, brute, count) for rows in batches])

@@ -8,10 +8,10 @@ import pytest
 
 from validation.mutants import judge as judging
 from validation.mutants import record
-from validation.mutants.judge import Verdict
 from validation.mutants.record import Record, summary
 from validation.mutants.sites import Mutant, mutants
 from validation.mutants.touched import read, touching
+from validation.mutants.verdict import Verdict
 from validation.mutants.workshop import Ended, Workshop
 
 TOUCHED: dict[str, Any] = {
