@@ -80,8 +80,17 @@ def test_a_verdict_says_what_noticed_and_how(
     spent = sum(ended.seconds for ended in [*gates, *([tests] if tests else [])])
     shop: Any = Shop(list(gates), tests or GREEN)
     sound = dict.fromkeys(("hits", "queries", "pictures"), 1.0)
-    assert judging.judge(mutant(), shop, TOUCHED, sound) == Verdict(by, gate, how, spent)
+    assert judging.judge(mutant(kernel=True), shop, TOUCHED, sound) == Verdict(by, gate, how, spent)
     assert shop.asked == len(gates)
+
+
+@pytest.mark.parametrize(("kernel", "gate"), [(True, True), (False, False)])
+def test_gates_are_asked_first_about_kernels_and_tests_about_other_code(kernel: bool, gate: bool) -> None:
+    red, failed = Ended(0, 'red: "hits: cube: wrong"\n', 3.0), Ended(1, "FAILED tests/a.py::test_b - x\n", 4.0)
+    shop: Any = Shop([red], failed)
+    sound = dict.fromkeys(("hits", "queries", "pictures"), 1.0)
+    found = judging.judge(mutant(kernel=kernel), shop, TOUCHED, sound)
+    assert (found.gate, found.seconds) == (gate, 3.0 if kernel else 4.0)
 
 
 @pytest.fixture
