@@ -65,6 +65,7 @@ def make_parser() -> argparse.ArgumentParser:
         )  # fmt: skip
     parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about half an hour")
     parser.add_argument("--mutants", type=_count, metavar="N", help="only judge N random small faults, hours; goes on")
+    parser.add_argument("--of", choices=("renderer", "judges"), default="renderer", help="what the mutants break")
     parser.add_argument("--seed", type=int, default=1, help="of the mutants, 1 unless given")
     parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
     return parser
@@ -115,7 +116,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
     if options.defects:
         return _defects_verdict(suite.run_defects(request), request)
     if options.mutants:
-        return _mutants_verdict(suite.run_mutants(request, options.mutants, options.seed), request)
+        return _mutants_verdict(suite.run_mutants(request, options.of, options.mutants, options.seed), request)
     return _verdict(suite.run(request), request)
 
 
@@ -146,7 +147,7 @@ def _defects_verdict(gates: Sequence["Gate"], request: "Request") -> int:
 def _mutants_verdict(found: Mapping[str, Any], request: "Request") -> int:
     """Print the mutants that nothing noticed and a line of counts; returns the exit code."""
     survivors = 0
-    for kind in ("kernels", "python"):
+    for kind in (kind for kind in ("kernels", "python") if found[kind]["mutants"]):
         counts = found[kind]
         real = counts["mutants"] - counts["equivalent"]
         survivors += len(counts["survivors"])
@@ -156,7 +157,7 @@ def _mutants_verdict(found: Mapping[str, Any], request: "Request") -> int:
             f"validation: mutants in {kind}: {counts['killed']} of {real} noticed, {counts['by_gates']} by a gate; "
             f"{counts['equivalent']} change no answer; {counts['hung']} hung, {counts['crashed']} crashed"
         )
-    print(f"validation: see {request.output / 'mutants.json'}")
+    print(f"validation: see {request.output}")
     return int(survivors > 0)
 
 

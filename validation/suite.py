@@ -116,14 +116,12 @@ def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, 
 
 def _outcome(records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], output: Path) -> dict[str, Any]:
     """What follows from records and gates, and what earlier runs stored about defects and mutants."""
-    from validation.mutants.record import summary as mutants_of
-
-    defects, mutants = stored_defects(output), mutants_of(output / "mutants.json")
+    defects, mutants = stored_defects(output), stored_mutants(output)
     rows = summary.matrix(records, gates)
     found = {"gates": gates, "verdict": summary.verdict(gates), "matrix": rows}
     found["facts"] = summary.facts(rows, gates, defects)
     found |= {} if defects is None else {"defects": defects}
-    return found if mutants is None else found | {"mutants": mutants}
+    return found | ({"mutants": mutants} if mutants else {})
 
 
 def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
@@ -194,8 +192,8 @@ def run_defects(request: Request) -> list[Gate]:
     return gates
 
 
-def run_mutants(request: Request, count: int, seed: int) -> dict[str, Any]:
-    """Judge mutants, go on from the stored ``mutants.json``, and return the counts, see ``record.summary``.
+def run_mutants(request: Request, target: str, count: int, seed: int) -> dict[str, Any]:
+    """Judge mutants of a target, go on from the stored record, and return the counts, see ``record.summary``.
 
     A report in the same folder is drawn again with these results.
     """
@@ -204,7 +202,7 @@ def run_mutants(request: Request, count: int, seed: int) -> dict[str, Any]:
     _check_folder(request.output)
     request.output.mkdir(parents=True, exist_ok=True)
     with steps() as step:
-        found = mutants.run(count, seed, request.output, step)
+        found = mutants.run(target, count, seed, request.output, step)
     _draw_again(request.output)
     return found
 
@@ -217,6 +215,15 @@ def _draw_again(output: Path) -> None:
         return
     records = {row["section"]: metrics[row["section"]] for row in metrics["matrix"]}
     write(metrics | _outcome(records, metrics["gates"], output), output, output / "pictures")
+
+
+def stored_mutants(output: Path) -> dict[str, Any]:
+    """What the last runs of mutants found, by target; a target that was never broken is missing."""
+    from validation.mutants.record import summary as mutants_of
+    from validation.mutants.targets import TARGETS, record_of
+
+    found = {target: mutants_of(record_of(target, output)) for target in TARGETS}
+    return {target: one for target, one in found.items() if one is not None}
 
 
 def stored_defects(output: Path) -> dict[str, Any] | None:

@@ -153,6 +153,7 @@ class TestUserFiles:
         (["--defects", "--mesh", "a.ply"], "got --mesh too"),
         (["--mutants", "0"], "expected a positive integer, got '0'"),
         (["--mutants", "5", "--only", "hits"], "got --only too"),
+        (["--mutants", "5", "--of", "scenes"], "invalid choice: 'scenes'"),
         (["--mutants", "5", "--defects"], "got --mutants too"),
         (["--write-baseline", "--gate", "a.toml"], "got --gate too"),
     ],
@@ -291,7 +292,7 @@ def test_mutants_are_judged_listed_and_drawn(
         assert "mutants in python: 0 of 3 noticed" in printed and printed.count("SURVIVED renderer/") == 3
         assert len(judged) == 6
     page = (tmp_path / "index.html").read_text()
-    assert "by seed 3" in page and "6 of 6 are judged" in page and "Nothing noticed these in Python: 3" in page
+    assert "6 of 6 mutants by seed 3 are judged" in page and "Nothing noticed these in Python: 3" in page
 
 
 def test_stability_counts_its_steps(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

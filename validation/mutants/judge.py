@@ -28,7 +28,8 @@ _TESTS = 150.0
 
 def groups_of(mutant: Mutant) -> tuple[str, ...]:
     """The groups of checks that may notice a mutant."""
-    return _RUNS.get(Path(mutant.file).with_suffix("").parts[1], ())
+    package, part, *_ = Path(mutant.file).with_suffix("").parts
+    return _RUNS.get(part, ()) if package == "renderer" else ()  # a gate says nothing of what judges it
 
 
 def judge(mutant: Mutant, workshop: Workshop, touched: Touched, sound: dict[str, float]) -> Verdict:

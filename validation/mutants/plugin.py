@@ -1,7 +1,7 @@
 """A plugin of pytest (``-p validation.mutants.plugin``) that notes what each test file touches.
 
-These are the renderer's lines that Python ran, and the files of the kernels that it called: compiled code has no lines
-to trace. It needs the extra dev, so only the processes that measure import it.
+These are the lines of the renderer and the validation suite that Python ran, and the files of the kernels that it
+called: compiled code has no lines to trace. It needs the extra dev, so only the processes that measure import it.
 """
 
 import json
@@ -24,7 +24,7 @@ class _Plugin:
     """Switches the context of coverage, and the set of called kernels, from test file to test file."""
 
     def __init__(self) -> None:
-        self.coverage = coverage.Coverage(data_file=None, source=[str(PACKAGE)])
+        self.coverage = coverage.Coverage(data_file=None, source=[str(PACKAGE), str(PACKAGE.parent / "validation")])
         self.kernels: dict[str, set[str]] = defaultdict(set)
         self.seconds: dict[str, float] = defaultdict(float)
         self.now = ""

@@ -13,6 +13,7 @@ from renderer.process.files import write_atomically
 from validation.mutants.judge import GROUPS, gates, judge, noticed_by_gates
 from validation.mutants.record import Record, digest, summary
 from validation.mutants.sites import Mutant, chosen, mutants
+from validation.mutants.targets import files, record_of
 from validation.mutants.touched import Touched, read
 from validation.mutants.verdict import Verdict
 from validation.mutants.workshop import TOUCHED, Workshop
@@ -22,13 +23,14 @@ ROOT = Path(__file__).resolve().parents[2]
 _PATIENCE = 3600.0
 
 
-def run(count: int, seed: int, output: Path, step: Callable[[str], None]) -> dict[str, Any]:
-    """Judge ``count`` mutants chosen by ``seed``; those in ``output / "mutants.json"`` are not judged again.
+def run(target: str, count: int, seed: int, output: Path, step: Callable[[str], None]) -> dict[str, Any]:
+    """Judge ``count`` mutants of a target, chosen by ``seed``; those that its record in ``output`` has are not judged
+    again.
 
     The file is written after each, so that a run that is cut off loses nothing. Returns ``record.summary``.
     """
-    some = chosen(mutants(ROOT / "renderer"), count, seed)
-    path = output / "mutants.json"
+    some = chosen(mutants(files(target, ROOT), ROOT), count, seed)
+    path = record_of(target, output)
     record = Record(path, ROOT)
     waiting = [mutant for mutant in some if record.row(mutant) is None]
 
@@ -87,7 +89,7 @@ def _made(folder: Path) -> Path:
 
 def _touched(shop: Workshop, stored: Path, step: Callable[[str], None]) -> Touched:
     """Which tests touch what, measured by a run of all tests unless ``stored`` has it for these sources."""
-    sources = digest([*(ROOT / "renderer").rglob("*.py"), *(ROOT / "tests").rglob("*.py")])
+    sources = digest([file for name in ("renderer", "validation", "tests") for file in (ROOT / name).rglob("*.py")])
     if stored.exists():
         found = json.loads(stored.read_text(encoding="utf-8"))
         if found["sources"] == sources:

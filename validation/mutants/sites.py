@@ -16,7 +16,7 @@ _KERNELS = {"kernel", "inlined", "intrinsic"}
 class Mutant:
     """One fault in one file of a package.
 
-    file      the file's path within the package's parent, with slashes
+    file      the file's path within the checkout, with slashes
     place     the dotted name of the function, class or module that it stands in
     line      its line
     operator  the kind of fault
@@ -51,19 +51,20 @@ class _Site:
     fault: Fault
 
 
-def mutants(package: Path) -> list[Mutant]:
-    """All mutants of the package in a folder, in the order of files and lines."""
-    return [mutant for path in sorted(package.rglob("*.py")) for mutant, _ in _of_file(path, package.parent)]
+def mutants(files: Sequence[Path], root: Path) -> list[Mutant]:
+    """All mutants of some files below ``root``, in the order of files and lines."""
+    return [mutant for path in files for mutant, _ in _of_file(path, root)]
 
 
 def chosen(all_of_them: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
-    """``count`` mutants in random order, half of them in kernels, each operator as often as the others while it lasts.
+    """``count`` mutants in random order, half of them in kernels if there are any, each operator as often as the others
+    while it lasts.
 
     A larger count begins with the mutants of a smaller.
     """
     dice = random.Random(seed)
     halves = [_in_turn([m for m in all_of_them if m.kernel == kernel], dice) for kernel in (True, False)]
-    taken = list(chain.from_iterable(zip(*halves, strict=False)))[:count]
+    taken = list(chain.from_iterable(zip(*filter(None, halves), strict=False)))[:count]
     if count > len(taken):
         raise ValueError(f"mutants: expected at most {len(taken)}, got {count}")
     return taken

@@ -33,7 +33,8 @@ def read(folder: Path, root: Path) -> Touched:
 
 def touching(mutant: Mutant, touched: Touched) -> list[str]:
     """The test files that run a mutant's code: those in the folder of its module first, then the shortest."""
-    room = Path("tests", *Path(mutant.file).parts[1:-1]).as_posix()
+    package, *folders = Path(mutant.file).parent.parts
+    room = Path("tests", *folders if package == "renderer" else (package, *folders)).as_posix()
 
     def runs(found: Mapping[str, Any]) -> bool:
         lines = found["lines"].get(mutant.file, [])

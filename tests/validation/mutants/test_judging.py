@@ -39,6 +39,16 @@ def test_the_tests_of_a_mutant_run_its_line_and_its_own_room_comes_first() -> No
     assert touching(mutant(line=99, at_top=True), TOUCHED) == [own, far, kernel]
 
 
+def test_what_judges_is_judged_by_its_tests_alone_those_beside_it_first() -> None:
+    file = "validation/references/trace.py"
+    tests = ("tests/references/test_a.py", "tests/validation/hits/test_b.py", "tests/validation/references/test_c.py")
+    touched = {test: {"lines": {file: [3]}, "kernels": [], "seconds": 1.0} for test in tests}
+    broken = mutant(file=file)
+    assert touching(broken, touched)[0] == tests[2] and judging.groups_of(broken) == ()
+    assert judging.groups_of(mutant()) == ("hits", "queries", "pictures")
+    assert judging.groups_of(mutant(file="validation/queries/inside.py")) == ()
+
+
 class Shop:
     """Stands in for a workshop: answers as it is told."""
 
@@ -161,8 +171,8 @@ def test_a_workshop_breaks_one_file_and_mends_it(tmp_path: Path) -> None:
     root = Path(__file__).parents[3]
     shop = Workshop(root, tmp_path)
     shop.keep()
-    one = next(m for m in mutants(root / "renderer" / "process") if m.operator == "constant")
-    one = Mutant(**{**one.__dict__, "file": f"renderer/{one.file}", "place": f"renderer.{one.place}"})
+    files = sorted((root / "renderer" / "process").rglob("*.py"))
+    one = next(m for m in mutants(files, root) if m.operator == "constant")
     sound = (shop.root / one.file).read_bytes()
     with shop.broken(one):
         assert (shop.root / one.file).read_bytes() != sound == (root / one.file).read_bytes()

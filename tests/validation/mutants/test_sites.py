@@ -4,7 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from validation.mutants.sites import chosen, mutants, text_of
+from validation.mutants.sites import Mutant, chosen, mutants, text_of
+from validation.mutants.targets import TARGETS, files
+
+ROOT = Path(__file__).parents[3]
 
 CODE = '''"""A module of é."""
 
@@ -42,6 +45,10 @@ class Box:
 '''
 
 
+def every(package: Path) -> list[Mutant]:
+    return mutants(sorted(package.rglob("*.py")), package.parent)
+
+
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
     folder = tmp_path / "package"
@@ -51,7 +58,7 @@ def package(tmp_path: Path) -> Path:
 
 
 def test_words_and_types_are_left_and_all_else_is_found(package: Path) -> None:
-    found = mutants(package)
+    found = every(package)
     places = {(m.place.removeprefix("package.module"), m.before, m.instead) for m in found}
     assert ("", "2 * 3", "(2) / (3)") in places and (".plain", "a + b", "(a) - (b)") in places
     assert (".fast", "a += i * i", "pass") in places and (".Box.open", "not self.lid", "(self.lid)") in places
@@ -62,24 +69,24 @@ def test_words_and_types_are_left_and_all_else_is_found(package: Path) -> None:
 
 def test_each_is_one_edit_that_compiles(package: Path) -> None:
     seen = set()
-    for mutant in mutants(package):
+    for mutant in every(package):
         text = text_of(mutant, package.parent)
         compile(text, "module.py", "exec")
         seen.add(text)
         changed = [new for old, new in zip(CODE.splitlines(), text.splitlines(), strict=True) if old != new]
         assert len(changed) == 1
-    assert CODE not in seen and len(seen) == len(mutants(package))
+    assert CODE not in seen and len(seen) == len(every(package))
 
 
 def test_equal_code_in_one_place_is_told_apart(package: Path) -> None:
     (package / "module.py").write_text("def f(a):\n    return (a + 1) * (a + 1)\n", encoding="utf-8")
-    twice = [m for m in mutants(package) if m.before == "a + 1"]
+    twice = [m for m in every(package) if m.before == "a + 1"]
     assert [m.nth for m in twice] == [0, 1]
     assert text_of(twice[1], package.parent).endswith("(a + 1) * (((a) - (1)))\n")
 
 
 def test_a_key_outlives_edits_elsewhere_and_names_code_that_went(package: Path) -> None:
-    mutant = next(m for m in mutants(package) if m.before == "a + b")
+    mutant = next(m for m in every(package) if m.before == "a + b")
     path = package / "module.py"
     path.write_text("# A new line.\n" + CODE, encoding="utf-8")
     assert "(a) - (b)" in text_of(mutant, package.parent)
@@ -89,9 +96,22 @@ def test_a_key_outlives_edits_elsewhere_and_names_code_that_went(package: Path) 
 
 
 def test_a_choice_depends_on_its_seed_alone_and_begins_with_smaller_ones(package: Path) -> None:
-    found = mutants(package)
+    found = every(package)
     some = chosen(found, 10, 3)
     assert chosen(found, 4, 3) == some[:4] and chosen(found, 10, 3) == some != chosen(found, 10, 4)
     assert sum(m.kernel for m in some) == 5
     with pytest.raises(ValueError, match="expected at most"):
         chosen(found, 1000, 3)
+
+
+def test_without_kernels_all_are_of_other_code(package: Path) -> None:
+    found = [m for m in every(package) if not m.kernel]
+    assert len(chosen(found, 5, 3)) == 5
+
+
+def test_what_judges_the_renderer_is_found_whole() -> None:
+    names = {file.relative_to(ROOT).as_posix() for file in files("judges", ROOT)}
+    assert {"validation/gates.py", "validation/oracle/exact.py", "validation/references/mitsuba/phong.py"} <= names
+    assert not {name for name in names if "mutants" in name or "report" in name}
+    for target in TARGETS:
+        assert all(mutant.file.startswith(TARGETS[target]) for mutant in mutants(files(target, ROOT), ROOT))
