@@ -275,12 +275,12 @@ def shoot_embree(placement: Placement, count: int, rng: Generator) -> Iterator[L
     vertices, faces = float32_exact(placement.vertices()), placement.closed.mesh.faces
     if not placement.keeps_sides(vertices):
         return
+    embree = {mode: Embree(vertices, faces, robust=mode == "robust") for mode in ("robust", "default")}
     for kind in KINDS:
         origins = float32_exact(placement.place(placement.closed.inside(rng, count)))
         rays = aimed(kind, vertices, faces, origins, rng)
-        for mode in ("robust", "default"):
-            embree = Embree(vertices, faces, robust=mode == "robust")
-            lost = embree_leaks(embree, rays)
+        for mode, scene in embree.items():
+            lost = embree_leaks(scene, rays)
             where = placement.closed.name, kind, placement.offset, placement.scale
             yield LeakCount(f"embree_{mode}", *where, "", 0, 0, count, lost)
 

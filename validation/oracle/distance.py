@@ -47,7 +47,7 @@ def cross(a: Sequence[Number], b: Sequence[Number]) -> list[Number]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def difference(a: Vector, b: Vector) -> list[Fraction]:
+def difference(a: Sequence[Number], b: Sequence[Number]) -> list[Number]:
     """a - b."""
     return [x - y for x, y in zip(a, b, strict=True)]
 

@@ -84,6 +84,19 @@ def determinants(
     return u * edge_unit, v * edge_unit, w * edge_unit, _depth(a, b, c, query.origins[0]) * depth_unit
 
 
+def mesh_determinants(
+    vertices: ArrayLike, faces: ArrayLike, origin: ArrayLike, direction: ArrayLike
+) -> tuple[list[tuple[int, int, int, int]], Fraction]:
+    """(U, V, W, T) of every face as integers, scaled alike, and the unit of t = T / (U + V + W)."""
+    points, triangles = _mesh(vertices, faces)
+    query = _Scaled(points, _rows(origin, "origin"), _rows(direction, "direction"))
+    o, d, found = query.origins[0], query.directions[0], []
+    for i, j, k in triangles.tolist():
+        a, b, c = query.vertices[i], query.vertices[j], query.vertices[k]
+        found.append((*_edge_determinants(a, b, c, o, d), _depth(a, b, c, o)))
+    return found, query.t_unit
+
+
 def closest_hit(
     vertices: ArrayLike,
     faces: ArrayLike,

@@ -11,21 +11,32 @@ def winding_number(point: Vector, triangles: Sequence[Sequence[Vector]]) -> int 
 
     By the signed crossings of a ray in a direction that meets no edge and no corner; others are tried until one does.
     """
-    relative = [[difference(corner, point) for corner in triangle] for triangle in triangles]
+    relative = _relative(point, triangles)
     origin = [Fraction(0)] * 3
     flat = [triangle for triangle in relative if dot(triangle[0], cross(triangle[1], triangle[2])) == 0]
-    if any(squared_distance(origin, triangle) == 0 for triangle in flat):
+    if any(squared_distance(origin, [[Fraction(x) for x in corner] for corner in triangle]) == 0 for triangle in flat):
         return None
     # Without faces that are lines or points: a ray that meets no edge crosses none of them.
-    relative = [[a, b, c] for a, b, c in relative if any(cross(difference(b, a), difference(c, a)))]
-    # Integers, which are many times as fast: times a power of two, which changes no sign.
-    unit = max((x.denominator for triangle in relative for corner in triangle for x in corner), default=1)
-    integers = [[[int(x * unit) for x in corner] for corner in triangle] for triangle in relative]
+    faces = [[a, b, c] for a, b, c in relative if any(cross(difference(b, a), difference(c, a)))]
     for direction in _directions():
-        crossings = [_crossing(triangle, direction) for triangle in integers]
+        crossings = [_crossing(triangle, direction) for triangle in faces]
         if None not in crossings:
             return sum(crossing for crossing in crossings if crossing is not None)
     raise AssertionError("there are infinitely many directions")
+
+
+def _relative(point: Vector, triangles: Sequence[Sequence[Vector]]) -> list[list[list[int]]]:
+    """Corners less the point, times a power of two that makes integers of them: it changes no sign, and these are many
+    times as fast.
+    """
+    numbers = [x for triangle in triangles for corner in triangle for x in corner]
+    unit = max(x.denominator for x in (*numbers, *point))
+
+    def whole(vector: Vector) -> list[int]:
+        return [x.numerator * (unit // x.denominator) for x in vector]
+
+    own = whole(point)
+    return [[difference(whole(corner), own) for corner in triangle] for triangle in triangles]
 
 
 def _directions() -> Iterator[Sequence[int]]:
