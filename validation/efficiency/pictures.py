@@ -176,8 +176,9 @@ def _split(bench: Bench, costs: dict[str, float]) -> dict[str, Any]:
     the parameter halves it.
     """
     converged, deep = bench.ours(samples=CONVERGED).radiance, bench.ours(max_depth=DEEP).radiance
-    sampling = _costed([partial(bench.ours, samples=n) for n in SAMPLES], converged)
-    truncation = _costed([partial(bench.ours, max_depth=d) for d in range(SHALLOW, DEPTH + 1)], deep)
+    runs = RUNS if bench.effort.runs > 1 else 1
+    sampling = _costed([partial(bench.ours, samples=n) for n in SAMPLES], converged, runs)
+    truncation = _costed([partial(bench.ours, max_depth=d) for d in range(SHALLOW, DEPTH + 1)], deep, runs)
     size = bench.effort.size
     rays = mitsuba_scene.camera_rays(bench.scene, size, size, 1)[0]
     judge = spending(costs, mitsuba_path.NAME, partial(mitsuba_path.path, max_depth=DEPTH, rays=rays))
@@ -195,9 +196,9 @@ def _split(bench: Bench, costs: dict[str, float]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _costed(draws: Sequence[Callable[[], Drawn]], truth: Picture) -> list[tuple[float, float]]:
-    """Median seconds and RMSE of each setting."""
-    seconds = median_seconds({str(i): partial(_seconds, draw) for i, draw in enumerate(draws)}, RUNS, unseen=0)
+def _costed(draws: Sequence[Callable[[], Drawn]], truth: Picture, runs: int) -> list[tuple[float, float]]:
+    """Median seconds of ``runs`` and RMSE of each setting."""
+    seconds = median_seconds({str(i): partial(_seconds, draw) for i, draw in enumerate(draws)}, runs, unseen=0)
     return [(seconds[str(i)], _rmse(draw().radiance, truth)) for i, draw in enumerate(draws)]
 
 

@@ -76,12 +76,19 @@ def determinants(
         _rows(origin, "origin"),
         _rows(direction, "direction"),
     )
-    query = _Scaled(corners, origins, directions)
-    a, b, c = query.vertices
-    u, v, w = _edge_determinants(a, b, c, query.origins[0], query.directions[0])
-    edge_unit = Fraction(2) ** (2 * query.position_exponent + query.direction_exponent)
-    depth_unit = Fraction(2) ** (3 * query.position_exponent)
-    return u * edge_unit, v * edge_unit, w * edge_unit, _depth(a, b, c, query.origins[0]) * depth_unit
+    # For one triangle ``_Scaled`` would spend most of its time on calls of numpy.
+    (a, b, c, o), place = _whole([*corners.tolist(), origins[0].tolist()])
+    (d,), way = _whole([directions[0].tolist()])
+    u, v, w = (Fraction(value, place * place * way) for value in _edge_determinants(a, b, c, o, d))
+    return u, v, w, Fraction(_depth(a, b, c, o), place**3)
+
+
+def _whole(rows: list[list[float]]) -> tuple[list[Vector], int]:
+    """Rows of three finite numbers as integers, and the power of two that they were multiplied by."""
+    ratios = [[x.as_integer_ratio() for x in row] for row in rows]
+    unit = max(bottom for row in ratios for _, bottom in row)
+    whole = [[top * (unit // bottom) for top, bottom in row] for row in ratios]
+    return [(x, y, z) for x, y, z in whole], unit
 
 
 def mesh_determinants(
