@@ -14,12 +14,13 @@ TRIMESH ?=
 FOREIGN := c cc cpp cxx c++ cu h hh hpp hxx pyx pxd pxi rs
 
 .DEFAULT_GOAL := help
-.PHONY: help validate test lint bench conformance clean
+.PHONY: help validate test machines lint bench conformance clean
 
 help:
 	@echo "make validate   prove hits and pictures against the references; writes reports/index.html"
 	@echo "                QUICK=1 for the short run, ARGS='--only hits' for a part"
 	@echo "make test       run the tests; ARGS='-k octree' for some"
+	@echo "make machines   run the tests on a busy, a small, a large and a foreign machine, half an hour"
 	@echo "make lint       check style, types, import order and the absence of other languages"
 	@echo "make bench      measure speed beside other systems; writes reports/benchmark.html"
 	@echo "                QUICK=1 for the short run, ARGS='--mesh FILE' or '--huge' for more"
@@ -31,6 +32,9 @@ validate: $(STAMP)
 
 test: $(STAMP)
 	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal $(ARGS)
+
+machines: $(STAMP)
+	$(BIN)/python tests/machines.py $(ARGS)
 
 bench: $(STAMP)
 	$(BIN)/python -m validation.benchmark $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)

@@ -182,6 +182,12 @@ def test_kernels_work_without_our_compiler_where_numba_has_changed(tmp_path, cha
     assert not list(tmp_path.rglob("*.kernel"))
 
 
+def test_only_the_first_of_several_kernels_is_told_of():
+    script = "from renderer.kernels.notice import compiling\nfor name in 'ab':\n    with compiling(name, None): pass\n"
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stderr.count("compiling kernels") == 1 == len(done.stderr.splitlines())
+
+
 def test_another_numba_that_fits_is_used_without_a_word_and_keeps_its_kernels(tmp_path):
     for told in (1, 0):
         done = ask(PRETEND, tmp_path)

@@ -368,6 +368,8 @@ GOOD = ply("ascii", VERTEX, FACE).decode()
         ("3 0 1 2", "-3 0 1 2", "element face: list length -3.0 in row 0"),
         ("3 0 1 2", "nan 0 1 2", "element face: list length nan in row 0"),
         ("3 0 1 2", "inf 0 1 2", "element face: list length inf in row 0"),
+        ("3 0 1 2", "4294967296 0 1 2", "element face: list length 4294967296.0 in row 0"),
+        ("3 0 1 2", "4294967295 0 1 2", "truncated"),
         ("3 0 1 2", "3 0 1.5 2", "expected whole vertex indices, got 1.5"),
     ],
 )  # fmt: skip

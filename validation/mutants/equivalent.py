@@ -1,4 +1,12 @@
 """Mutants that change no answer, each with the proof in a sentence."""
 
 # A mutant's key, see ``sites.Mutant.key``: why nobody can tell it from the sound renderer.
-EQUIVALENT: dict[str, str] = {}
+EQUIVALENT: dict[str, str] = {
+    "renderer.tree.sah.bin_room #0: 3 -> 4": "scratch for a fourth axis is never written nor read",
+    "renderer.contacts.gather._ends #0: _compare_corners(tree, a, b) <= 0 -> not (_compare_corners(tree, a, b) <= 0)":
+        "ends ordered downwards bring the same hits together as ends ordered upwards, and nothing else asks for them",
+    "renderer.octree._scaled #0: _SMALLEST <= largest <= _LARGEST -> (_SMALLEST) <= (largest) < (_LARGEST)":
+        "a mesh whose largest coordinate is exactly 2^60 is scaled by a power of two, which changes no answer",
+    "renderer.distance.rational #0: 48 -> 49":
+        "a subtraction and two sums change a bound by at most 4 * 2^-53 of it, and 2^-49 is still more",
+}  # fmt: skip

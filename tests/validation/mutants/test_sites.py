@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from validation.mutants.equivalent import EQUIVALENT
 from validation.mutants.sites import Mutant, chosen, mutants, text_of
 from validation.mutants.targets import TARGETS, files
 
@@ -83,6 +84,11 @@ def test_equal_code_in_one_place_is_told_apart(package: Path) -> None:
     twice = [m for m in every(package) if m.before == "a + 1"]
     assert [m.nth for m in twice] == [0, 1]
     assert text_of(twice[1], package.parent).endswith("(a + 1) * (((a) - (1)))\n")
+
+
+def test_mutants_that_change_no_answer_are_mutants() -> None:
+    keys = {mutant.key for target in TARGETS for mutant in mutants(files(target, ROOT), ROOT)}
+    assert set(EQUIVALENT) <= keys
 
 
 def test_a_key_outlives_edits_elsewhere_and_names_code_that_went(package: Path) -> None:
