@@ -19,8 +19,8 @@ Row = dict[str, Any]
 class Record:
     """The verdicts on mutants of one checkout, by their keys, kept in ``path``.
 
-    A verdict holds while the mutant's file stays as it was; that nothing noticed a mutant holds only while the tests
-    and the validation suite stay too.
+    A verdict holds while the mutant's file stays as it was; that nothing noticed a mutant, or no gate one in a kernel,
+    holds only while the tests and the validation suite stay too.
     """
 
     def __init__(self, path: Path, root: Path) -> None:
@@ -31,9 +31,10 @@ class Record:
     def row(self, mutant: Mutant) -> Row | None:
         """The stored row of a mutant, None where its verdict holds no longer."""
         row = self._rows.get(mutant.key)
-        if row is None or row["source"] != self._source(mutant) or (not row["by"] and row["judges"] != self._judges):
+        if row is None or row["source"] != self._source(mutant):
             return None
-        return row
+        settled = row["gate"] if mutant.kernel else bool(row["by"])
+        return row if settled or row["judges"] == self._judges else None
 
     def forget(self, mutants: Sequence[Mutant]) -> None:
         """Leave out what is stored of some mutants."""

@@ -113,16 +113,21 @@ def root(tmp_path: Path) -> Path:
 
 def test_a_record_goes_on_until_the_code_or_what_judges_it_changes(root: Path) -> None:
     path = root / "mutants.json"
-    killed, survivor = mutant(), mutant(nth=1)
+    killed, survivor, tested, by_test = mutant(), mutant(nth=1), mutant(nth=2), mutant(nth=3, kernel=True)
     first = Record(path, root)
     first.add(killed, Verdict("a gate", True, "fails", 1.0))
     first.add(survivor, Verdict(None, False, None, 1.0))
+    for one in (tested, by_test):
+        first.add(one, Verdict("a test", False, "fails", 1.0))
     first.write(7, [killed, survivor])
     again = Record(path, root)
     assert again.row(killed)["by"] == "a gate" and again.row(survivor)["by"] is None  # type: ignore[index]
+    assert again.row(tested) is not None and again.row(by_test) is not None
     (root / "tests" / "test_new.py").write_text("")
     again = Record(path, root)
     assert again.row(killed) is not None and again.row(survivor) is None
+    # A new gate may notice what only a test did.
+    assert again.row(tested) is not None and again.row(by_test) is None
     again.forget([killed])
     assert again.row(killed) is None
     (root / "renderer" / "trace" / "a.py").write_text("x = a + b + c\n")
