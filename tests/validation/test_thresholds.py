@@ -1,10 +1,11 @@
 """Thresholds of a user's file: what moves, what is refused, and that the refusal says where."""
 
+import re
 from pathlib import Path
 
 import pytest
 
-from validation.thresholds import Thresholds, load_thresholds
+from validation.thresholds import Thresholds, _flat, load_thresholds
 
 
 def write(folder: Path, text: str) -> Path:
@@ -22,6 +23,19 @@ def test_a_file_moves_what_it_names_and_nothing_else(tmp_path: Path) -> None:
         "pictures.own.max_error": (own.pictures.own.max_error, 1.0),
         "hits.wrong": (0, 2),
     }
+
+
+def test_the_values_are_those_that_the_readme_of_reports_gives() -> None:
+    """Nobody moves a threshold without saying so there."""
+    said: dict[str, float | None] = {}
+    text = (Path(__file__).parents[2] / "reports" / "README.md").read_text(encoding="utf-8")
+    columns = re.findall(r"`(\w+)`", next(line for line in text.splitlines() if line.startswith("| key | `ssim`")))
+    for line in text.splitlines():
+        if row := re.match(r"\| `(pictures\.\w+)`[^|]*\|(.*)\|$", line):
+            cells = [cell.strip() for cell in row[2].split("|")]
+            said |= {f"{row[1]}.{key}": float(cell) if cell else None for key, cell in zip(columns, cells, strict=True)}
+    said |= {key: float(value) for key, value in re.findall(r"`((?:pictures|aovs|hits)\.\w+)` ([\d.e-]+\d)", text)}
+    assert said == _flat(Thresholds().model_dump())
 
 
 def test_an_empty_file_moves_nothing(tmp_path: Path) -> None:
