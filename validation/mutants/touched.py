@@ -36,13 +36,15 @@ def touching(mutant: Mutant, touched: Touched) -> list[str]:
     package, *folders = Path(mutant.file).parent.parts
     room = Path("tests", *folders if package == "renderer" else (package, *folders)).as_posix()
 
-    def runs(found: Mapping[str, Any]) -> bool:
-        lines = found["lines"].get(mutant.file, [])
-        # What stands at a module's top runs once, in whichever test imports it first.
-        return mutant.file in found["kernels"] or (bool(lines) if mutant.at_top else mutant.line in lines)
-
+    usable = {test: found for test, found in touched.items() if not test.startswith(_READERS)}
+    near = [
+        test for test, found in usable.items() if mutant.file in found["kernels"] or found["lines"].get(mutant.file)
+    ]
+    exact = [test for test in near if mutant.file in usable[test]["kernels"]
+             or mutant.line in usable[test]["lines"].get(mutant.file, [])]  # fmt: skip
+    # What stands at a module's top runs once, in whichever test imports it first; so does what is called from there.
     return sorted(
-        (test for test, found in touched.items() if runs(found) and not test.startswith(_READERS)),
+        near if mutant.at_top or not exact else exact,
         key=lambda test: (Path(test).parent.as_posix() != room, touched[test]["seconds"]),
     )
 

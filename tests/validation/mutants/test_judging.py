@@ -39,6 +39,12 @@ def test_the_tests_of_a_mutant_run_its_line_and_its_own_room_comes_first() -> No
     assert touching(mutant(line=99, at_top=True), TOUCHED) == [own, far, kernel]
 
 
+def test_a_line_that_runs_while_its_module_is_imported_is_left_to_all_tests_of_the_module() -> None:
+    lines = {test: {**found, "kernels": []} for test, found in TOUCHED.items()}
+    own, far = "tests/trace/test_own.py", "tests/tree/test_far.py"
+    assert touching(mutant(line=99), lines) == [own, far] and touching(mutant(line=2), lines) == [own]
+
+
 def test_what_judges_is_judged_by_its_tests_alone_those_beside_it_first() -> None:
     file = "validation/references/trace.py"
     tests = ("tests/references/test_a.py", "tests/validation/hits/test_b.py", "tests/validation/references/test_c.py")
