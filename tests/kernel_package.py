@@ -139,4 +139,6 @@ def _forked(folder: Path, script: str, environment: dict[str, str]) -> "subproce
         server.stdin.write(json.dumps(asked) + "\n")
         server.stdin.flush()
         code = int(server.stdout.readline())
-        return subprocess.CompletedProcess(script, code, out.read_text(), err.read_text())
+        return subprocess.CompletedProcess(
+            script, code, out.read_text(encoding="utf-8"), err.read_text(encoding="utf-8")
+        )

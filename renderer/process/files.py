@@ -11,10 +11,19 @@ from uuid import uuid4
 
 
 def as_path(argument: str, value: object) -> Path:
-    """A path given as a string or path; ``ValueError`` that names the argument for anything else."""
+    """A path given as a string or path; ``ValueError`` that names the argument for anything else, or for a name that
+    no file can have.
+    """
     if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
         raise ValueError(f"{argument}: expected a string or path, got {type(value).__name__}")
-    return Path(value)
+    path = Path(value)
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError as error:
+        raise ValueError(
+            f"{argument}: expected a path that the file system's {error.encoding} can spell, got {str(path)!r}"
+        ) from None
+    return path
 
 
 def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> None:

@@ -683,7 +683,7 @@ def test_the_good_scene_is_good() -> None:
 
 def test_every_public_name_is_met_here() -> None:
     """A new public name needs a row in this file: beyond the imports each stands in a call or an error."""
-    body = Path(__file__).read_text().partition("VERTICES, FACES")[2]
+    body = Path(__file__).read_text(encoding="utf-8").partition("VERTICES, FACES")[2]
     missing = [name for name in renderer.__all__ if not re.search(rf"\b{name}\b", body)]
     assert not missing
 

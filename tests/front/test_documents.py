@@ -46,19 +46,19 @@ def shown(value):
 
 
 def snippets():
-    return [(page, block) for page in PAGES for block in PYTHON.findall(page.read_text())]
+    return [(page, block) for page in PAGES for block in PYTHON.findall(page.read_text(encoding="utf-8"))]
 
 
 def typed(page):
     """The commands of a page's blocks, without folders of executables and variables of the environment before them."""
-    text = PYTHON.sub("", page.read_text())
+    text = PYTHON.sub("", page.read_text(encoding="utf-8"))
     lines = [re.sub(r"^(?:[A-Z_]+=\S+ )+", "", line) for line in TYPED.findall(text)]
     return [re.sub(r"^\.venv/bin/", "", part.strip()) for line in lines for part in line.split("&&")]
 
 
 def said(page):
     """The commands in a page's sentences that are whole: with an option, an argument or a target."""
-    found = [re.sub(r"^\.venv/bin/", "", words) for words in SAID.findall(page.read_text())]
+    found = [re.sub(r"^\.venv/bin/", "", words) for words in SAID.findall(page.read_text(encoding="utf-8"))]
     return [words for words in found if " " in words]
 
 
@@ -119,7 +119,7 @@ def test_programs_in_a_page_are_there(page, line):
 
 @pytest.mark.parametrize(("page", "line"), commands("make "), ids=shown)
 def test_what_a_page_lets_make_make_is_a_target(page, line):
-    makefile = (ROOT / "Makefile").read_text()
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     targets, variables = (
         set(re.findall(r"^(\w+):", makefile, re.MULTILINE)),
         set(re.findall(r"^(\w+)\s*\?=", makefile, re.M)),
@@ -135,18 +135,18 @@ def test_what_a_page_lets_make_make_is_a_target(page, line):
 
 def test_no_page_promises_a_package_on_an_index():
     for page in PAGES:
-        assert "pip install octree-renderer" not in page.read_text()
-        assert "'octree-renderer[" not in page.read_text()
+        assert "pip install octree-renderer" not in page.read_text(encoding="utf-8")
+        assert "'octree-renderer[" not in page.read_text(encoding="utf-8")
 
 
 def test_the_readme_stays_short():
-    assert len(README.read_text().splitlines()) <= MOST_LINES
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= MOST_LINES
 
 
 def test_the_readme_uses_nothing_before_it_is_installed():
     """Line by line on a fresh clone: a .venv, then what is installed into it, then what that brings."""
     there = {"python3", "make"}
-    for line in TYPED.findall(README.read_text()):
+    for line in TYPED.findall(README.read_text(encoding="utf-8")):
         program = line.split()[0]
         assert program in there, line
         if line.startswith("python3 -m venv .venv"):
@@ -161,12 +161,12 @@ def test_the_readme_uses_nothing_before_it_is_installed():
 
 def anchors(page):
     """The anchors of a page's headings, as GitHub makes them."""
-    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in HEADING.findall(text)}
 
 
 def links(page):
-    return [link for link in LINK.findall(PYTHON.sub("", page.read_text())) if "://" not in link]
+    return [link for link in LINK.findall(PYTHON.sub("", page.read_text(encoding="utf-8"))) if "://" not in link]
 
 
 @pytest.mark.parametrize(("page", "link"), [(p, link) for p in PAGES for link in links(p)], ids=shown)
@@ -191,7 +191,7 @@ def test_every_page_is_reached_from_the_readme():
 def defined(path):
     """What a source file defines: functions, classes, constants and fields, at any depth."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef):
             names.add(node.name)
         elif isinstance(node, ast.Assign | ast.AnnAssign):
@@ -204,7 +204,7 @@ def defined(path):
 def test_what_a_page_names_is_there(page):
     """Files and folders, and with ``::`` a function, class, constant or test that stands in the file."""
     absent = []
-    for path, name in NAMED.findall(page.read_text()):
+    for path, name in NAMED.findall(page.read_text(encoding="utf-8")):
         there = ROOT / path
         if path.rstrip("/") in WRITTEN:
             continue
@@ -229,21 +229,31 @@ def test_names_are_found_in_a_sentence(text, found):
 @pytest.mark.parametrize("page", PAGES, ids=shown)
 def test_extreme_cases_and_gates_that_a_page_names_are_there(page):
     numbers = {case.number for case in CASES}
-    assert {int(number) for number in re.findall(r"\b[Cc]ase (\d+)\b", page.read_text())} <= numbers
-    gates = set(re.findall(r"`hits\.(\w+)`", page.read_text())) - {"t", "face", "u", "v", "points", "normals", "hit"}
+    assert {int(number) for number in re.findall(r"\b[Cc]ase (\d+)\b", page.read_text(encoding="utf-8"))} <= numbers
+    gates = set(re.findall(r"`hits\.(\w+)`", page.read_text(encoding="utf-8"))) - {
+        "t",
+        "face",
+        "u",
+        "v",
+        "points",
+        "normals",
+        "hit",
+    }
     assert gates <= set(HitLimits.model_fields)
 
 
 @pytest.mark.parametrize("package", ["renderer", "validation"])
 def test_the_diagram_of_the_rooms_has_the_order_of_the_contracts(package):
     """Folder by folder from above, as import-linter checks them; names that may be absent need not be drawn."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
     (layers,) = (contract["layers"] for contract in contracts if contract["id"] == package)
     levels = {
         name: level for level, line in enumerate(layers) for name in line.strip("()").replace(")", "").split(" | ")
     }
     there = {name for name in levels if (ROOT / package / name).is_dir() or (ROOT / package / f"{name}.py").is_file()}
-    lines = (ROOT / "docs" / "architecture.md").read_text().splitlines()
+    lines = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").splitlines()
     (top,) = (k for k, line in enumerate(lines) if re.fullmatch(r"    renderer/ +validation/", line))
     column = (
         slice(4, lines[top].index("validation/"))

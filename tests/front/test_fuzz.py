@@ -194,7 +194,7 @@ def test_a_finding_is_kept_and_counted_once(tmp_path: Path, capsys: Any) -> None
         except AssertionError as error:
             log.find("camera", index, given, error)
     assert [p.name for p in tmp_path.iterdir()] == ["7.camera.txt"] and len(log.findings) == 1
-    assert (tmp_path / "7.camera.txt").read_text() == "{'eye': nan}\n"
+    assert (tmp_path / "7.camera.txt").read_text(encoding="utf-8") == "{'eye': nan}\n"
     log.print(9, 1.0)
     assert "input 7 of camera" in (said := capsys.readouterr().out) and "camera       2 WRONG" in said
 
@@ -295,7 +295,7 @@ def test_finds_a_process_that_damage_misleads(folder: Path, monkeypatch: pytest.
         (package / "below" / "deep" / "bottom.py").write_text("STEP = 11\n")
     elif damage == "not noticed":
         store = package / "kernels" / "store.py"
-        text = store.read_text()
+        text = store.read_text(encoding="utf-8")
         assert text.count("if head != _HEADER or ") == 1
         store.write_text(text.replace("if head != _HEADER or ", "if "))
         # Of its own sources, so that the kernels that are kept are those of this store.

@@ -57,7 +57,7 @@ def test_a_scene_that_is_there_is_not_written_again(folder, capsys):
     (folder / "s.toml").write_text("mine = 1\n")
     assert cli.main(arguments) == 2
     assert "--write-scene: expected a new file, got s.toml, which is there already" in capsys.readouterr().err
-    assert (folder / "s.toml").read_text() == "mine = 1\n"
+    assert (folder / "s.toml").read_text(encoding="utf-8") == "mine = 1\n"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX alone")

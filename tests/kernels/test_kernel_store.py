@@ -58,7 +58,7 @@ print(brute.any_hit([[0.25, 0.25, 1]], [[0, 0, -1]])[0])
 """
     assert run(folder, script) == ["True"]
     path = folder / "trace" / "intersect.py"
-    source = path.read_text()
+    source = path.read_text(encoding="utf-8")
     edited = source.replace("not_negative | not_positive", "not_negative & not_positive")
     assert edited != source
     path.write_text(edited)

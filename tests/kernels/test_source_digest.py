@@ -72,7 +72,7 @@ def test_a_module_imported_by_name_counts(tmp_path, line):
 
 def package_imports(path, package=PACKAGE):
     """The files of the package that a source imports, by Python's own parser; refuses what the digest cannot see."""
-    found, tree = set(), ast.parse(path.read_text())
+    found, tree = set(), ast.parse(path.read_text(encoding="utf-8"))
     within = {node for outer in ast.walk(tree) if isinstance(outer, ast.FunctionDef) for node in ast.walk(outer)}
     # What is imported inside a function, a kernel cannot use.
     for node in (node for node in ast.walk(tree) if node not in within):
@@ -137,7 +137,7 @@ def seen_by(path):
 
 def test_kernels_see_no_model_of_a_scene():
     """An edit of a scene's class or of a picture's file format compiles nothing anew."""
-    kernels = [path for path in PACKAGE.rglob("*.py") if "\n@kernel\n" in path.read_text()]
+    kernels = [path for path in PACKAGE.rglob("*.py") if "\n@kernel\n" in path.read_text(encoding="utf-8")]
     assert len(kernels) > 20
     for path in kernels:
         rooms = {found.relative_to(PACKAGE).parts[0] for found in seen_by(path)}

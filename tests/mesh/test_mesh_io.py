@@ -277,9 +277,9 @@ def test_a_million_faces_load_in_two_seconds(tmp_path: Path) -> None:
     """Quiet, it takes 0.15 s; the rest is room for a loaded machine."""
     path = tmp_path / "large.ply"
     save_ply(torus(around=1000, across=500), path)
-    start = time.perf_counter()
+    start = time.process_time()
     mesh = load_mesh(path)
-    assert time.perf_counter() - start < 2.0
+    assert time.process_time() - start < 2.0
     assert len(mesh.faces) == 1_000_000
 
 
@@ -375,9 +375,9 @@ GOOD = ply("ascii", VERTEX, FACE).decode()
 )  # fmt: skip
 def test_ply_text_faults(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in GOOD
-    start = time.perf_counter()
+    start = time.process_time()
     assert message in fault(tmp_path, GOOD.replace(old, new, 1).encode())
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
 
 
 @pytest.mark.parametrize("count", [-1, 2**31 - 1])

@@ -257,21 +257,21 @@ def test_any_polygon_on_a_grid_is_covered_once_or_keeps_its_fan(corners: list[tu
 
 def test_polygons_of_very_many_corners_end() -> None:
     """Quiet, each takes under 2 s. Beyond the limit the fan stays."""
-    start = time.perf_counter()
+    start = time.process_time()
     for outline in (comb(600), [(y, x) for x, y in comb(600)][::-1], star(2000), spiral(80)):
         points = placed(outline)
         assert len(points) <= 4096
         assert_right(points, cut(points))
     large = placed(star(2049))
     assert cut(large) == fan(len(large))
-    assert time.perf_counter() - start < 60
+    assert time.process_time() - start < 60
 
 
 def test_a_million_squares_in_two_seconds() -> None:
     """Quiet, it takes 0.5 s."""
     count = 1_000_000
     corners = np.tile(np.arange(4), count)
-    start = time.perf_counter()
+    start = time.process_time()
     triangles = triangulate(placed(SQUARE), corners, np.arange(count + 1) * 4)
-    assert time.perf_counter() - start < 2
+    assert time.process_time() - start < 2
     assert corners[triangles].reshape(-1, 6).min(axis=0).tolist() == [0, 1, 2, 0, 2, 3]

@@ -42,7 +42,7 @@ def folder(tmp_path):
 
 def executed(folder):
     path = folder.parent / "executed"
-    return path.read_text() if path.exists() else ""
+    return path.read_text(encoding="utf-8") if path.exists() else ""
 
 
 def console(name):

@@ -134,7 +134,7 @@ def test_no_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_full_standard_output_is_named(unbuffered: str) -> None:
     command = [sys.executable, "-m", "renderer", "info", str(STAIRS)]
-    with open("/dev/full", "w") as full:
+    with open("/dev/full", "w", encoding="utf-8") as full:
         ended = subprocess.run(
             command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=STAIRS.parents[1], timeout=100,
             env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
@@ -251,3 +251,10 @@ def test_a_private_file_is_private_while_it_is_written(tmp_path: Path) -> None:
     path.chmod(0o600)
     write_atomically(path, lambda file: modes.append(os.fstat(file.fileno()).st_mode & 0o777))
     assert modes == [0o600]
+
+
+def test_a_name_that_no_file_can_have_is_refused_with_its_argument(tmp_path: Path) -> None:
+    path = tmp_path / "\ud800.png"
+    for ask in (lambda: render(load_scene(STAIRS), resolution=(2, 2)).save(path), lambda: load_scene(path)):
+        with pytest.raises(ValueError, match=r"path: expected a path that .* can spell, got .*ud800.png"):
+            ask()

@@ -53,7 +53,7 @@ def test_answers_that_were_wrong_are_right() -> None:
 def test_one_added_line_does_the_same(tmp_path: Path) -> None:
     script = tmp_path / "answers.py"
     line = "import renderer.trimesh_ray; renderer.trimesh_ray.install(proximity=True)\n"
-    script.write_text(SCRIPT.read_text().replace("import trimesh\n", f"import trimesh\n{line}"))
+    script.write_text(SCRIPT.read_text(encoding="utf-8").replace("import trimesh\n", f"import trimesh\n{line}"))
     done = ran(str(script), "a", "--b")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == answers(*DROP_IN, "--proximity")

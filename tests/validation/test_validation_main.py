@@ -73,7 +73,7 @@ def test_all_gates_hold(tmp_path: Path, sections: dict[str, Fake], capsys: pytes
     assert lines[-1].startswith("validation: PASS, 6 of 6 gates in ")
     assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 6, "failed": 0}
     assert ET.parse(tmp_path / "junit.xml").getroot().get("failures") == "0"
-    assert "6 of 6 gates hold" in (tmp_path / "index.html").read_text()
+    assert "6 of 6 gates hold" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
@@ -84,9 +84,9 @@ def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
     out = capsys.readouterr().out
     assert "FAILED hits: torus: leaks is 3, expected at most 0" in out
     assert "validation: FAIL, 1 of 2 gates" in out
-    page = (tmp_path / "index.html").read_text()
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "FAIL" in page and page.index("torus: leaks") < page.index('id="checked"')
-    assert "a closed mesh has no holes" in (tmp_path / "junit.xml").read_text()
+    assert "a closed mesh has no holes" in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
 def test_no_gate_is_no_success(tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]) -> None:
@@ -109,7 +109,7 @@ class TestUserFiles:
         left_out = metrics(tmp_path)["left_out"]
         assert left_out["hits"] == "no file was given by --mesh"
         assert left_out.keys() == {"hits", "queries", "promises", "stability", "efficiency"}
-        page = (tmp_path / "index.html").read_text()
+        page = (tmp_path / "index.html").read_text(encoding="utf-8")
         assert all(reason in page for reason in left_out.values())
 
     def test_scene_and_mesh(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
@@ -141,7 +141,7 @@ class TestUserFiles:
         gate.write_text("[pictures.own]\nssim = 0.5\n")
         assert command.main(["--only", "hits", "--gate", str(gate), "--output", str(tmp_path)]) == 0
         assert sections["hits"].jobs[0].thresholds.pictures.own.ssim == 0.5
-        assert "pictures.own.ssim" in (tmp_path / "index.html").read_text()
+        assert "pictures.own.ssim" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_the_baseline_is_written_read_and_named_in_the_summary(
     sections["hits"].gates = [Gate("hits", "subject", "errors", 2.0, "at most", 0.0, "a reason")]
     assert command.main(arguments) == 1
     assert "better 0, worse 1 than baseline" in capsys.readouterr().out
-    assert "2 (fails) now" in (tmp_path / "index.html").read_text()
+    assert "2 (fails) now" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
 class TestDefects:
@@ -231,15 +231,15 @@ class TestDefects:
     ) -> None:
         output = ["--output", str(tmp_path)]
         assert command.main(["--only", "hits", *output]) == 0
-        assert "No run is stored" in (tmp_path / "index.html").read_text()
+        assert "No run is stored" in (tmp_path / "index.html").read_text(encoding="utf-8")
         gates = ("hits: a: b",)
         answers += [defects.Answer(gates, red, None, 1.0) for red in ((), gates)]
         assert command.main(["--defects", *output]) == 0
-        assert "The sources are the same now" in (tmp_path / "index.html").read_text()
+        assert "The sources are the same now" in (tmp_path / "index.html").read_text(encoding="utf-8")
         assert metrics(tmp_path)["facts"][0]["value"] == 1
         monkeypatch.setattr(suite.environment, "sources_sha256", lambda: "others")
         assert command.main(["--only", "hits", *output]) == 0
-        assert "The sources have changed since" in (tmp_path / "index.html").read_text()
+        assert "The sources have changed since" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
     def test_one_that_is_let_through_is_exit_code_1(
         self, tmp_path: Path, answers: list[defects.Answer], capsys: pytest.CaptureFixture[str]
@@ -247,7 +247,7 @@ class TestDefects:
         answers += [defects.Answer(("hits: a: b",), (), None, 1.0)] * 2
         assert command.main(["--defects", "--output", str(tmp_path)]) == 1
         assert "gates turned red is 0, expected at least 1" in capsys.readouterr().out
-        assert json.loads((tmp_path / "defects.json").read_text())["caught"] == 0
+        assert json.loads((tmp_path / "defects.json").read_text(encoding="utf-8"))["caught"] == 0
 
 
 def test_reports_need_neither_the_extra_dev_nor_the_viewer() -> None:
@@ -291,7 +291,7 @@ def test_mutants_are_judged_listed_and_drawn(
         assert "mutants in kernels: 3 of 3 noticed, 3 by a gate" in printed
         assert "mutants in python: 0 of 3 noticed" in printed and printed.count("SURVIVED renderer/") == 3
         assert len(judged) == 6
-    page = (tmp_path / "index.html").read_text()
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "6 of 6 mutants by seed 3 are judged" in page and "Nothing noticed these in Python: 3" in page
 
 

@@ -373,7 +373,9 @@ def test_picture_and_camera_are_saved(viewer: Viewer, tmp_path: Path) -> None:
     with viewer.page.expect_download() as camera:
         viewer.page.click("#save-camera")
     camera.value.save_as(tmp_path / "camera.toml")
-    saved = PerspectiveCamera.model_validate(tomllib.loads((tmp_path / "camera.toml").read_text())["camera"])
+    saved = PerspectiveCamera.model_validate(
+        tomllib.loads((tmp_path / "camera.toml").read_text(encoding="utf-8"))["camera"]
+    )
     assert np.allclose(saved.eye, viewer.camera["m"][12:15], rtol=1e-9)
 
 

@@ -657,7 +657,7 @@ def test_the_mesh_and_the_boxes_are_fetched(url: str, folder: Path) -> None:
 
 def resident() -> int:
     """Bytes of memory that this process holds."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    return int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -765,7 +765,7 @@ def test_what_is_no_scene_is_refused() -> None:
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
 def test_a_pipe_beside_the_scene_is_no_scene(folder: Path, tmp_path: Path) -> None:
     """Opening it waited for a writer, and no page could open another scene from then on."""
-    (tmp_path / "a.toml").write_text((folder / "blocks.toml").read_text())
+    (tmp_path / "a.toml").write_text((folder / "blocks.toml").read_text(encoding="utf-8"))
     os.mkfifo(tmp_path / "pipe.toml")
     shown = open_file(tmp_path / "a.toml")
     assert shown.files == ["a.toml"]

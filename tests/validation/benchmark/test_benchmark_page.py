@@ -90,12 +90,12 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
 
 
 def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    stored = json.loads((folder / "benchmark.json").read_text())
+    stored = json.loads((folder / "benchmark.json").read_text(encoding="utf-8"))
     stored["queries"][0]["ratios"]["embree"] = 12.34
     stored["environment"]["processor"] = "A <made-up> processor"
     record.write(stored, folder / "benchmark.json")
     assert command.main(["--page-only", "--output", str(folder)]) == 0
-    text = (folder / "benchmark.html").read_text()
+    text = (folder / "benchmark.html").read_text(encoding="utf-8")
     assert "12.34" in text and "A &lt;made-up&gt; processor" in text and "pip install nobody" in text
     # Memory is not drawn for meshes as small as these.
     assert text.count("<svg") == 8 + 7 + 1

@@ -107,6 +107,6 @@ def test_the_file_is_read_as_it_was_written_and_checked(tmp_path: Path) -> None:
     assert baseline.read(path) is None
     path.write_bytes(baseline.text(metrics(gate(0.5), gate(0.25, section="images"))))
     assert baseline.read(path) == baseline.summary(metrics(gate(0.5), gate(0.25, section="images")))
-    path.write_text(path.read_text().replace('"value": 0.5', '"value": "half"'))
+    path.write_text(path.read_text(encoding="utf-8").replace('"value": 0.5', '"value": "half"'))
     with pytest.raises(ValueError, match=r"baseline\.json: gates\.hits: subject: quantity\.value"):
         baseline.read(path)

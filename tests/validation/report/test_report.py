@@ -111,7 +111,7 @@ def test_metrics_are_read_as_they_were_written(metrics: dict[str, Any], tmp_path
     path = tmp_path / "metrics.json"
     path.write_bytes(schema.text(metrics))
     assert schema.read(path) == metrics
-    path.write_text(path.read_text().replace('"schema": 2', '"schema": 1'))
+    path.write_text(path.read_text(encoding="utf-8").replace('"schema": 2', '"schema": 1'))
     with pytest.raises(ValueError, match=r"metrics\.json: schema: .*got 1"):
         schema.read(path)
     path.write_text("{")

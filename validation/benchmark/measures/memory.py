@@ -57,7 +57,7 @@ def grown(system: System, folder: Path) -> dict[str, int | None]:
     build = system.load(vertices, faces)
     with system.scope():
         _trim()
-        Path("/proc/self/clear_refs").write_text("5")
+        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
         before = _bytes("VmRSS")
         peer = build()
         peer.touch()
@@ -76,7 +76,7 @@ def _trim() -> None:
 
 
 def _bytes(field: str) -> int:
-    found = re.search(rf"^{field}:\s+(\d+) kB", _STATUS.read_text(), re.MULTILINE)
+    found = re.search(rf"^{field}:\s+(\d+) kB", _STATUS.read_text(encoding="utf-8"), re.MULTILINE)
     if found is None:
         raise OSError(f"{_STATUS}: expected a line {field}, got none")
     return int(found.group(1)) * 1024
