@@ -15,4 +15,6 @@ EQUIVALENT: dict[str, str] = {
         "the bound from above is so loose that it leaves out no face: more work, the same answers",
     "validation.oracle.exact._BoxTree.__init__ #0: range(depth) -> range(depth - 1)":
         "the faces of the last level stay unsorted: wider boxes and more candidates, the same answers",
+    "validation.oracle.star #0: 1 -> 2": "points are judged one by one, however many are taken together",
+    "validation.references.mitsuba.path #0: 1000 -> 1001": "no path has as many edges, so none ends by chance",
 }  # fmt: skip

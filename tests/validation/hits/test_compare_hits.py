@@ -138,6 +138,16 @@ def test_a_hit_behind_the_origin_is_not_right():
     assert comparison.verdicts[OURS_RIGHT] == 1
 
 
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("place", [(0, 0), (1, 0), (0, 1), (-1, 0), (-1, -1)], ids=str)
+def test_their_hit_at_an_edge_or_corner_is_right_from_either_side(place, side):
+    triangle = np.array([[-1.0, -1, 0], [1, -1, 0], [-1, 1, 0]])
+    batch, faces = one_ray([*place, side], [0, 0, -side]), np.array([[0, 1, 2]])
+    comparison = judge(compare(answer(np.inf, -1), answer(1.0, 0), triangle, faces, batch), triangle, faces)
+    inside = max(place) <= 0
+    assert comparison.verdicts[THEIRS_RIGHT if inside else OURS_RIGHT] == 1
+
+
 def test_their_faults_are_theirs():
     for t, face in ((OURS.t[HIT] * 1.01, None), (np.inf, -1)):
         comparison = judged(theirs=changed(THEIRS, HIT, t=t, face=face))
