@@ -144,8 +144,8 @@ def test_their_hit_at_an_edge_or_corner_is_right_from_either_side(place, side):
     triangle = np.array([[-1.0, -1, 0], [1, -1, 0], [-1, 1, 0]])
     batch, faces = one_ray([*place, side], [0, 0, -side]), np.array([[0, 1, 2]])
     comparison = judge(compare(answer(np.inf, -1), answer(1.0, 0), triangle, faces, batch), triangle, faces)
-    inside = max(place) <= 0
-    assert comparison.verdicts[THEIRS_RIGHT if inside else OURS_RIGHT] == 1
+    (found,) = comparison.disagreements
+    assert found.theirs_right == (max(place) <= 0)
 
 
 def test_their_faults_are_theirs():
