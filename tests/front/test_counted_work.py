@@ -188,7 +188,7 @@ def test_a_long_tile_is_told_of_every_16384_rays() -> None:
         objects=(SceneObject(mesh=walls, material="m"),),
     )
     told: list[int] = []
-    chosen = RenderSettings(resolution=(32, 32), samples=4, max_depth=64)
+    chosen = RenderSettings(resolution=(32, 32), samples=16, max_depth=64)
     image = prepare(scene, accelerator="octree").picture(scene.camera, chosen, BOUNDED, 1, told.append)
-    assert (image.rays == 4 * 65).all()
-    assert told == [0] * (32 * 32 * 4 * 65 // 16384) + [1]
+    assert (image.rays == 16 * 65).all()
+    assert told == [0] * (32 * 32 * 16 * 65 // 16384) + [1]
