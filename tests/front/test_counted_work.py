@@ -107,8 +107,8 @@ def memory_of(path: Path) -> dict[str, int]:
 
 @pytest.mark.skipif(not Path("/proc/self/smaps").exists(), reason="only Linux tells what a process has of a map")
 def test_of_a_mapped_file_blocks_are_read_when_rays_come_and_none_is_a_copy(tmp_path: Path) -> None:
-    path = tmp_path / "a.octree"
-    Octree.from_mesh(icosphere(6)).save(path)
+    path = tmp_path.resolve() / "a.octree"
+    Octree.from_mesh(icosphere(7)).save(path)
     size = path.stat().st_size / 1024
     octree = Octree.load(path, mmap=True, threads=1)
     begun = memory_of(path)
@@ -116,7 +116,8 @@ def test_of_a_mapped_file_blocks_are_read_when_rays_come_and_none_is_a_copy(tmp_
     asked = memory_of(path)
     # Not one page is a copy: all processes that map the file have the same.
     assert begun["Anonymous"] == asked["Anonymous"] == 0
-    assert begun["Rss"] < size / 2 < asked["Rss"] <= asked["Size"]
+    # Nodes and the mesh are looked at when it is loaded, a third of the file; systems bring some more at once.
+    assert begun["Rss"] < size / 2 and asked["Rss"] > begun["Rss"] + size / 10
 
 
 @njit
