@@ -36,12 +36,11 @@ def _default(field: FieldInfo) -> str:
 
 def _owner(model: type[BaseModel], name: str) -> str:
     """The class that writes a field or a check."""
-    bases = [base for base in model.__mro__ if name in inspect.get_annotations(base) or name in vars(base)]
-    return bases[-1].__name__
+    return next(base.__name__ for base in model.__mro__ if name in inspect.get_annotations(base) or name in vars(base))
 
 
 def _spelled(kind: Any, metadata: Iterable[Any] = ()) -> str:
-    """A type with its limits, as in "float from 0.0 below 1.0 strict"."""
+    """A type with its limits, as in "float strict from 0.0 below 1.0"."""
     return " ".join([_named(kind), *(word for part in metadata for word in _words(part))])
 
 
@@ -57,9 +56,15 @@ def _named(kind: Any) -> str:
     if get_origin(kind) is dict:
         return f"table of {_named(parts[1])}"
     if get_origin(kind) is tuple:
-        inner = _named(parts[0])
-        return f"list of ({inner})" if parts[-1] is Ellipsis else f"{len(parts)} of ({inner})"
+        return _listed([_named(part) for part in parts if part is not Ellipsis], Ellipsis in parts)
     return "None" if kind is NoneType else str(kind.__name__)
+
+
+def _listed(kinds: list[str], any_number: bool) -> str:
+    """A list of any number of one type, of some of one type, or of several types in their order."""
+    if any_number:
+        return f"list of ({kinds[0]})"
+    return f"{len(kinds)} of ({kinds[0]})" if len(set(kinds)) == 1 else f"({', '.join(kinds)})"
 
 
 def _words(part: Any) -> Iterator[str]:
