@@ -132,7 +132,8 @@ class Queries:
         max_hits  keep at most so many of each ray, the nearest
 
         The first row of a ray is its ``closest_hit``, bit for bit, and a ray has rows where ``any_hit`` is true. The
-        tree is searched once, and no hit is told from another by its distance. Memory grows with what is found.
+        tree is not searched anew for each hit, and none is told from another by its distance. Memory grows with what is
+        found.
 
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box

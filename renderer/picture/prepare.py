@@ -63,8 +63,8 @@ class PreparedScene:
     ) -> Image:
         """The picture that ``camera`` takes, by checked settings; see ``render``.
 
-        ``finished(tiles)`` is called after each tile, and with 0 every few thousand rays of a long one, by one thread
-        at a time. What it raises stops the others and is raised here.
+        ``finished(tiles)`` is called after each tile, and with 0 at least every 16,384 rays of a long one, shadow rays
+        not counted, by one thread at a time. What it raises stops the others and is raised here.
         """
         clock = Stopwatch()
         width, height = chosen.resolution

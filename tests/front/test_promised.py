@@ -1,12 +1,15 @@
 """Sentences of the public docstrings and of the commands' help that no other test asked: one test each."""
 
+import io
+import json
+import struct
 import sys
 import time
 import tracemalloc
 import urllib.error
 import urllib.request
 import warnings
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,25 +17,33 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
 
 import renderer
 from renderer import (
     BruteForce,
     CutWarning,
     Dielectric,
+    DirectionalLight,
+    Floor,
     Mesh,
     Mirror,
     Octree,
+    PerspectiveCamera,
     Phong,
     PointLight,
+    Scene,
+    SceneObject,
+    load_mesh,
     load_scene,
     needs_of,
     prepare,
     render,
 )
 from renderer.cli import main
-from renderer.mesh.shapes import icosphere
+from renderer.mesh.shapes import grid, icosphere
 from renderer.picture import prepare as preparing
+from renderer.process.parallel import available_threads
 from renderer.shade import records
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -53,6 +64,39 @@ def test_all_hits_have_integers_of_64_bits_and_a_face_each() -> None:
     found = Octree.from_mesh(icosphere(2)).all_hits(*through(50))
     assert found.face.dtype == found.offsets.dtype == found.ray.dtype == found.counts.dtype == np.int64
     assert len(found.face) == len(found.t) == found.offsets[-1] == 100 and found.t_error is None
+
+
+def test_integers_have_64_bits_and_other_numbers_are_float64() -> None:
+    ball, rays = icosphere(2), through(9)
+    octree, broken = Octree.from_mesh(ball), ball.vertices.copy()
+    broken[3] = np.nan
+    near = [octree.closest_point(rays[0], limit).face for limit in (9.0, 0.1)]
+    hits, steps = octree.closest_hit(*rays), octree.count_steps(*rays)
+    repairs = Mesh.repaired(ball.vertices, ball.faces, normals=broken)[1]
+    assert (near[0] >= 0).all() and (near[1] == -1).all() and repairs.bad_normals.tolist() == [3]
+    for integers in (*near, hits.face, steps.nodes, steps.triangles, repairs.bad_normals):
+        assert integers.dtype == np.int64
+    single = ball.vertices.astype(np.float32)
+    for mesh in (
+        Mesh(single, ball.faces, single, None, single[:, :2]),
+        Mesh([[1, 2, 3]], [], [[0, 0, 1]], None, [[0, 1]]),
+    ):
+        for numbers in (mesh.vertices, mesh.normals, mesh.texcoords, mesh.triangles):
+            assert numbers is not None and numbers.dtype == np.float64
+
+
+def test_what_is_seen_at_more_than_3_hundredths_of_a_degree_does_not_hide_its_own_points() -> None:
+    """Points of a plain of many faces, turned at random, each with an eye that barely stands above it."""
+    rng, plain = np.random.default_rng(6), grid(12, 12)
+    for far in 10.0 ** rng.uniform(-3, 4, 60):
+        mesh = Mesh(plain.vertices @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T, plain.faces)
+        points, normals = mesh.triangles.mean(axis=1), mesh.face_normals()
+        along = np.cross(normals, rng.normal(size=points.shape))
+        along *= far / np.linalg.norm(along, axis=1)[:, None]
+        eyes = points + along + normals * far * np.tan(np.radians(rng.uniform(0.0301, 0.06, (len(points), 1))))
+        octree, faces = Octree.from_mesh(mesh), np.arange(len(points))
+        assert octree.visible(points, eyes).all() and octree.visible(eyes, points).all()
+        assert octree.visible(points, eyes, leaving=faces).all() and octree.visible(eyes, points, reaching=faces).all()
 
 
 def test_rays_of_several_dimensions_are_counted_in_c_order() -> None:
@@ -117,14 +161,98 @@ def test_closed_is_told_by_index() -> None:
     assert mesh.is_closed() and not soup.is_closed()
 
 
+def test_triangles_are_a_new_array_each_time() -> None:
+    mesh = icosphere(0)
+    first, second = mesh.triangles, mesh.triangles
+    first[:] = 9.0
+    assert not np.shares_memory(first, second) and not np.shares_memory(second, mesh.vertices)
+    assert np.array_equal(second, mesh.vertices[mesh.faces])
+
+
+def named(edges: Any) -> list[list[int]]:
+    return sorted(sorted(edge) for edge in edges.tolist())
+
+
+def test_open_and_odd_edges_are_named_by_their_vertices() -> None:
+    places = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]]
+    square = Mesh(places, [[0, 1, 2], [1, 0, 3]])
+    assert named(square.open_edges) == named(square.odd_edges) == [[0, 2], [0, 3], [1, 2], [1, 3]]
+    # The second face turned over: its edge to the first is passed twice in one direction, by an even number of faces.
+    turned = Mesh(places, [[0, 1, 2], [0, 1, 3]])
+    assert named(turned.open_edges) == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3]]
+    assert named(turned.odd_edges) == [[0, 2], [0, 3], [1, 2], [1, 3]]
+    fin = Mesh(places, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    assert [0, 1] in named(fin.open_edges) and [0, 1] in named(fin.odd_edges)
+    # Vertices doubled, as in soup: each open edge is named once, by one vertex at each of its ends.
+    soup = Mesh(square.triangles.reshape(-1, 3), [[0, 1, 2], [3, 4, 5]])
+    assert named(soup.open_edges) == named(soup.odd_edges) == [[0, 2], [1, 2], [3, 5], [4, 5]]
+    assert square.open_edges.dtype == np.int64 and icosphere(0).open_edges.shape == (0, 2)
+
+
+def test_joined_meshes_have_texture_coordinates_where_all_have_them() -> None:
+    ball = icosphere(0)
+    mapped = Mesh(ball.vertices, ball.faces, texcoords=ball.vertices[:, :2])
+    joined = Mesh.concatenate([mapped, mapped]).texcoords
+    assert joined is not None and np.array_equal(joined, np.tile(ball.vertices[:, :2], (2, 1)))
+    assert Mesh.concatenate([mapped, ball]).texcoords is None
+
+
+def glb(material: bool, attributes: dict[str, NDArray[Any]]) -> bytes:
+    """A GLB file of one triangle, put together by its specification."""
+    columns = {"POSITION": np.eye(3, dtype=np.float32), **attributes}
+    kinds = {np.dtype(np.float32): 5126, np.dtype(np.uint8): 5121}
+    data, views, accessors = b"", [], []
+    for array in columns.values():
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
+        entry = {
+            "bufferView": len(accessors),
+            "componentType": kinds[array.dtype],
+            "count": 3,
+            "type": f"VEC{array.shape[1]}",
+        }
+        accessors.append({**entry, "normalized": array.dtype == np.uint8})
+        data += array.tobytes()
+    accessors[0] |= {"min": [0, 0, 0], "max": [1, 1, 1]}
+    primitive: dict[str, Any] = {"attributes": {name: at for at, name in enumerate(columns)}}
+    told = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [primitive | ({"material": 0} if material else {})]}],
+        "materials": [{"pbrMetallicRoughness": {}}], "accessors": accessors, "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
+    }  # fmt: skip
+    text = json.dumps(told).encode()
+    text += b" " * (-len(text) % 4)
+    size = 12 + 8 + len(text) + 8 + len(data)
+    start = struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON")
+    return start + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+
+
+@pytest.mark.parametrize("material", [False, True])
+def test_a_glb_keeps_colours_without_and_texture_coordinates_with_a_material(tmp_path: Path, material: bool) -> None:
+    colors, uv = (
+        np.array([[255, 0, 0, 255], [0, 51, 0, 255], [0, 0, 255, 255]], np.uint8),
+        np.eye(3, 2, dtype=np.float32),
+    )
+    (tmp_path / "a.glb").write_bytes(glb(material, {"COLOR_0": colors, "TEXCOORD_0": uv}))
+    mesh = load_mesh(tmp_path / "a.glb")
+    assert np.array_equal(mesh.vertices, np.eye(3))
+    if material:
+        # A texture's origin is its upper left in a GLB file, and its lower left here.
+        assert mesh.colors is None and mesh.texcoords is not None
+        assert np.array_equal(mesh.texcoords, uv * [1, -1] + [0, 1])
+    else:
+        assert mesh.texcoords is None and mesh.colors is not None
+        assert np.array_equal(mesh.colors, np.float32(colors[:, :3] / 255))
+
+
 # Scenes and pictures
 
 
 def test_rows_for_kernels_have_their_columns() -> None:
     for material in (Dielectric(), Mirror(), Phong()):
         assert material.row().shape == (records.MATERIAL_COLUMNS,) and material.row().dtype == np.float64
-    light = PointLight(position=(0.0, 1.0, 0.0), intensity=(1.0, 1.0, 1.0))
-    assert light.row().shape == (records.LIGHT_COLUMNS,) and light.row().dtype == np.float64
+    for light in (PointLight(position=(0, 1, 0)), DirectionalLight(direction=(0, 1, 0), irradiance=2)):
+        assert light.row().shape == (records.LIGHT_COLUMNS,) and light.row().dtype == np.float64
 
 
 def test_the_kind_of_phong_follows_its_colours() -> None:
@@ -178,7 +306,93 @@ def test_split_is_that_of_the_tree(split: Any, tmp_path: Path, monkeypatch: pyte
     assert built == [split, split]
 
 
+def test_a_change_of_the_floor_or_the_objects_changes_no_altered_scene() -> None:
+    scene = load_scene(GLASS)
+    for change in ({"floor": None}, {"objects": ()}, {"floor": Floor(min=(0, 0), max=(1, 1), materials=("floor",))}):
+        altered = scene.altered(**change)
+        assert altered.instances is scene.instances
+        pictures = [render(one, resolution=SIZE).radiance for one in (altered, scene)]
+        assert np.array_equal(*pictures)
+
+
+def test_min_weight_bounds_no_error_where_rays_branch() -> None:
+    """Panes that reflect half and let half through: the rays of each bounce carry 1 together, and the fewer each."""
+    wall = np.array([[-6.0, -5.0, 0.0], [6.0, -5.0, 0.0], [0.2, 9.0, 0.0]])
+    panes = Mesh(np.concatenate([np.add(wall, [0.0, 0.0, z]) for z in range(-15, 15)]), np.arange(90).reshape(-1, 3))
+    scene = Scene(
+        camera=PerspectiveCamera(eye=(0, 0, 0.5), target=(0, 0, 2), fov=20),
+        materials={"m": Phong(diffuse=0.0, ambient=1.0, reflectance=0.5, transmittance=0.5, ior=1.0)},
+        objects=(SceneObject(mesh=panes, material="m"),),
+        ambient=1.0,
+    )
+    whole, cut = (render(scene, resolution=(1, 1), max_depth=10, min_weight=w).radiance[0, 0, 0] for w in (0.0, 0.1))
+    assert (whole, cut) == (11.0, 4.0)  # weights from 1 to 1/8 are above 0.1
+
+
+def test_render_and_prepare_hand_on_their_options(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``split``, ``threads`` and ``needs``: pictures are the same anyhow, so what is built and who works is watched."""
+    built, workers, scene = [], [], load_scene(STAIRS)
+    from_mesh, for_chunks = Octree.from_mesh, preparing.for_chunks
+
+    def watched(mesh: Mesh, **options: Any) -> Octree:
+        built.append((options["split"], options["threads"]))
+        return from_mesh(mesh, **options)
+
+    def chunks(work: Any, count: int, size: int, threads: int, finished: Any) -> None:
+        workers.append(threads)
+        for_chunks(work, count, size, threads, finished)
+
+    monkeypatch.setattr(preparing.Octree, "from_mesh", watched)
+    monkeypatch.setattr(preparing, "for_chunks", chunks)
+    more = replace(needs_of(scene), octree=True, refraction=True)
+    options: dict[str, Any] = {"accelerator": "octree", "split": "sah", "needs": more, "threads": 3}
+    ready = prepare(scene, **options)
+    assert ready.needs == more and prepare(scene).needs == needs_of(scene) != more
+    render(scene, resolution=SIZE, **options)
+    render(scene, resolution=SIZE, accelerator="octree")
+    render(ready, resolution=SIZE, threads=2)
+    assert [one for one in built if one[0] == "sah"] == [("sah", 3)] * 2
+    assert workers == [3, available_threads(), 2] and built[-1] == ("midpoint", available_threads())
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [("accelerator", "bvh"), ("split", "kd"), ("split", None), ("needs", {}), ("threads", 0), ("threads", 1.5)],
+)
+def test_prepare_refuses_what_it_does_not_know_and_names_it(argument: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=f"^{argument}: expected .* got "):
+        prepare(load_scene(GLASS), **{argument: value})
+
+
 # Commands
+
+
+def test_the_command_writes_an_exr_file_of_the_librarys_bits(tmp_path: Path) -> None:
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    path = tmp_path / "a.exr"
+    assert main(["render", str(GLASS), "--resolution", "24x16", "-o", str(path), "--quiet"]) == 0
+    read, image = mi.Bitmap(str(path)), render(load_scene(GLASS), resolution=SIZE)
+    channels = {field.name: np.array(read)[..., i] for i, field in enumerate(read.struct_())}
+    assert np.array_equal(np.stack([channels[name] for name in "RGB"], -1), image.radiance)
+    assert np.array_equal(channels["Z"], image.depth.astype(np.float32)) and len(channels) == 7
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_quiet_shows_no_bar_on_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quiet: bool) -> None:
+    said, shown = Terminal(), Terminal()
+    monkeypatch.setattr(sys, "stdout", said)
+    monkeypatch.setattr(sys, "stderr", shown)
+    given = ["render", str(STAIRS), "--resolution", "70x40", "-o", str(tmp_path / "a.npy")]
+    assert main([*given, "--quiet"] if quiet else given) == 0
+    assert ("tile" in shown.getvalue()) == ("70 x 40" in said.getvalue()) == (not quiet)
+    assert not quiet or shown.getvalue() == said.getvalue() == ""
 
 
 def test_max_rays_of_the_command_is_that_of_the_library(tmp_path: Path) -> None:
@@ -222,14 +436,57 @@ def test_the_command_view_takes_host_and_writes_the_scene_of_a_mesh(
     assert len(load_scene(written).instances) == len(load_scene(BLOCK).instances)
 
 
-@pytest.mark.parametrize("what", ["queries", "pictures", "all"])
-def test_compile_compiles_what_it_is_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("browser", [True, False])
+def test_the_command_view_shows_a_mesh_file_and_opens_a_browser_unless_told_not_to(
+    monkeypatch: pytest.MonkeyPatch, browser: bool
+) -> None:
+    pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+    from renderer.viewer.server import ViewerServer
+
+    opened: list[str] = []
+    served: list[Any] = []
+
+    def look(self: ViewerServer) -> None:
+        if not served:
+            with urllib.request.urlopen(f"{self.url}scene", timeout=30.0) as answer:
+                served.append((self.url, json.load(answer)))
+
+    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
+    monkeypatch.setattr(ViewerServer, "wait", look)
+    assert main(["view", str(BLOCK), *([] if browser else ["--no-browser"])]) == 0
+    ((url, told),) = served
+    assert opened == ([url] if browser else [])
+    # A floor of 16 x 16 squares is put under the mesh.
+    own = trimesh.load_mesh(BLOCK, process=False)
+    assert told["name"] == "block.ply" and told["faces"] == len(own.faces) + 2 * 16**2 and len(told["lights"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"), [("port", -1), ("port", 65536), ("port", "80"), ("host", 3), ("host", "no such host")]
+)
+def test_view_refuses_other_addresses_and_names_the_argument(argument: str, value: Any) -> None:
+    pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+    with pytest.raises(ValueError, match=f"^{argument}: expected .* got "):
+        renderer.view(STAIRS, browser=False, **{argument: value})
+
+
+def test_view_raises_module_not_found_without_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "uvicorn" or "renderer.viewer." in name]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    with pytest.raises(ModuleNotFoundError, match="the viewer needs the package uvicorn") as caught:
+        renderer.view(STAIRS)
+    assert caught.value.name == "uvicorn"
+
+
+@pytest.mark.parametrize("what", ["queries", "pictures", "all", None])
+def test_compile_compiles_what_it_is_told_and_all_by_default(what: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
     from renderer import precompile
 
     asked_for: list[str] = []
     monkeypatch.setattr(precompile, "compile_ahead", lambda what, began: asked_for.append(what))
-    assert main(["compile", f"--{what}", "--quiet"]) == 0
-    assert asked_for == [what]
+    assert main(["compile", "--quiet", *([f"--{what}"] if what else [])]) == 0
+    assert asked_for == [what or "all"]
     parts = [set(map(str, precompile.PARTS[one])) for one in ("queries", "pictures", "all")]
     assert parts[0] < parts[1] < parts[2]
 

@@ -152,6 +152,50 @@ print(len(before), *sorted(signatures() - before))
     assert int(count) == 44 and not new
 
 
+def test_kernels_of_queries_are_those_of_every_query_of_either_kind():
+    script = """
+import sys
+import numpy as np
+from renderer.kernels.compiler import Kernel
+from renderer.precompile import compile_ahead
+def signatures():
+    modules = [m for name, m in sys.modules.items() if name.startswith("renderer.")]
+    kernels = {id(v): v for m in modules for v in vars(m).values() if isinstance(v, Kernel)}
+    called = {k.py_func.__name__: vars(k)["entry"] for k in kernels.values() if "entry" in vars(k)}
+    return {(name, str(s)) for name, entry in called.items() for s in entry.signatures}
+compile_ahead("queries")
+before = signatures()
+from renderer import BruteForce, Mesh, Octree
+from renderer.mesh.shapes import icosphere
+from renderer.queries import Queries
+ball, rng = icosphere(3), np.random.default_rng(1)
+# In float64 and in float32, of which the kernels of trees have two kinds.
+meshes = [ball, Mesh(ball.vertices.astype(np.float32), ball.faces), Mesh(ball.vertices * 1e-60, ball.faces)]
+trees = [kind.from_mesh(mesh) for mesh in meshes for kind in (Octree, BruteForce)]
+asked = set()
+for tree in trees:
+    size = 1.0 / tree.tree.scale
+    for count in (1, 9, 100):
+        a, b = rng.normal(size=(2, count, 3)) * size
+        faces = np.arange(count)
+        for name in ("closest_hit", "any_hit", "all_hits", "count_hits", "count_steps"):
+            asked.add(name)
+            for more in ({}, {"t_min": 0.1, "t_max": np.full(count, 9.0)}, {"leaving": faces}):
+                getattr(tree, name)(a, b, **more)
+        tree.closest_hit(a, b, t_error=True), tree.all_hits(a, b, t_error=True, contacts=False, max_hits=2)
+        tree.visible(a, b), tree.visible(a, b, leaving=faces, reaching=faces)
+        tree.contains(a), tree.contains(a, False, "even-odd"), tree.contains(a, winding=True)
+        tree.winding_number(a), tree.closest_point(a, 0.5 * size), tree.signed_distance(a)
+        asked |= {"visible", "contains", "winding_number", "closest_point", "signed_distance"}
+    tree.refit(tree.mesh.vertices * 1.5)
+public = {name for name, value in vars(Queries).items() if callable(value) and not name.startswith("_")}
+assert public == asked, public ^ asked
+print(len(before), *sorted(signatures() - before))
+"""
+    count, *new = output(script).splitlines()[-1].split(maxsplit=1)
+    assert int(count) > 20 and not new
+
+
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 @pytest.mark.parametrize("seconds", [0.0, 0.5, 1.3])
 def test_control_c_while_compiling_ends_with_130_and_no_traceback(tmp_path, seconds):

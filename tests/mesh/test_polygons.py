@@ -188,6 +188,8 @@ PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
         [*L_SHAPE[:3], L_SHAPE[2], *L_SHAPE[3:]],
         [(0, 0), (4, 0), (4, 4), (2, 0), (0, 4), (1, 2)],  # a corner on an edge
         [(2, 1), (1, 1), (1, 2), (0, 2), (0, 0), (2, 0), (3, 0), (2, 0)],  # there and back
+        # A hole by a bridge.
+        [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)],
         *([*L_SHAPE[:k], (bad, 0.0), *L_SHAPE[k:]] for bad in (np.nan, np.inf, -np.inf) for k in (0, 3)),
         [(x * y, y) for x, y in zip([1e308, -1e308] * 4, [1.0, -1.0, 2, 3, -5, 1, 7, 1], strict=True)],
     ],

@@ -1,8 +1,11 @@
 """Images: the sRGB curve, files that are whole or not there, and what a notebook shows."""
 
+import ast
 import io
 import os
+import struct
 import sys
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +64,48 @@ def test_png_holds_the_srgb_codes_with_row_zero_at_the_top(tmp_path: Path) -> No
     assert PIL.Image.open(io.BytesIO(picture._repr_png_())).size == (7, 5)
 
 
+def test_png_is_of_8_bits_without_alpha_or_a_curve_of_its_own(tmp_path: Path) -> None:
+    """Its bytes, unpacked by the specification: what says nothing of its curve is shown as sRGB."""
+    picture = image()
+    picture.save(tmp_path / "a.png")
+    content, at = (tmp_path / "a.png").read_bytes(), 8
+    chunks: dict[bytes, bytes] = {}
+    while at < len(content):
+        length, name = struct.unpack(">I4s", content[at : at + 8])
+        body = content[at + 8 : at + 8 + length]
+        assert struct.unpack(">I", content[at + 8 + length : at + 12 + length]) == (zlib.crc32(name + body),)
+        chunks[name] = chunks.get(name, b"") + body
+        at += 12 + length
+    assert content[:8] == b"\x89PNG\r\n\x1a\n" and list(chunks) == [b"IHDR", b"IDAT", b"IEND"]
+    # Width, height, bits of a channel, colours without alpha; the only way to pack, to filter, and not interlaced.
+    assert struct.unpack(">IIBBBBB", chunks[b"IHDR"]) == (7, 5, 8, 2, 0, 0, 0)
+    assert len(zlib.decompress(chunks[b"IDAT"])) == 5 * (1 + 3 * 7)
+
+
+def test_png_is_read_by_mitsuba(tmp_path: Path) -> None:
+    """Another reader than the package that wrote it."""
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    picture = image()
+    picture.save(tmp_path / "a.png")
+    read = mi.Bitmap(str(tmp_path / "a.png"))
+    assert read.pixel_format() == mi.Bitmap.PixelFormat.RGB and read.srgb_gamma()
+    assert np.array(read).dtype == np.uint8 and np.array_equal(np.array(read), srgb(picture.radiance))
+
+
+def test_npy_is_of_float32_in_c_order(tmp_path: Path) -> None:
+    """Its bytes, unpacked by the description of the format."""
+    picture = image()
+    picture.save(tmp_path / "a.npy")
+    content = (tmp_path / "a.npy").read_bytes()
+    (length,) = struct.unpack("<H", content[8:10])
+    assert content[:8] == b"\x93NUMPY\x01\x00" and (10 + length) % 64 == 0
+    told = ast.literal_eval(content[10 : 10 + length].decode("latin1"))
+    assert told == {"descr": "<f4", "fortran_order": False, "shape": (5, 7, 3)}
+    assert struct.unpack("<105f", content[10 + length :]) == tuple(picture.radiance.ravel().tolist())
+
+
 def test_npy_holds_the_radiance(tmp_path: Path) -> None:
     picture = image()
     picture.save(str(tmp_path / "a.NPY"))
@@ -94,6 +139,37 @@ def test_exr_holds_the_radiance_and_its_layers(tmp_path: Path) -> None:
     assert all(np.array_equal(channels[f"normal.{name}"], picture.normal[..., i]) for i, name in enumerate("XYZ"))
     assert np.array_equal(channels["Z"], picture.depth.astype(np.float32)) and len(channels) == 7
     assert [p.name for p in tmp_path.iterdir()] == ["a.exr"]
+
+
+def attributes_of(content: bytes) -> dict[str, tuple[str, bytes]]:
+    """Types and bytes of the attributes in an EXR file's header, by the layout that OpenEXR's pages describe."""
+    at, found = 8, {}
+    while content[at]:
+        name, kind = (part.decode() for part in content[at:].split(b"\0", 2)[:2])
+        at += len(name) + len(kind) + 2
+        (size,) = struct.unpack("<I", content[at : at + 4])
+        found[name] = kind, content[at + 4 : at + 4 + size]
+        at += 4 + size
+    return found
+
+
+def test_exr_is_of_scanlines_of_float32_packed_by_zip(tmp_path: Path) -> None:
+    image().save(tmp_path / "a.exr")
+    content = (tmp_path / "a.exr").read_bytes()
+    # Version 2, and none of the flags of tiles, long names, deep data and parts.
+    assert struct.unpack("<II", content[:8]) == (20000630, 2)
+    told = attributes_of(content)
+    channels, rest = {}, told["channels"][1]
+    while rest != b"\0":
+        name, _, rest = rest.partition(b"\0")
+        kind, _, across, down = struct.unpack("<IIII", rest[:16])
+        channels[name.decode()], rest = (kind, across, down), rest[16:]
+    names = ["B", "G", "R", "Z", "normal.X", "normal.Y", "normal.Z"]
+    assert channels == dict.fromkeys(names, (2, 1, 1))  # float32, and one sample a pixel
+    assert told["compression"] == ("compression", b"\x03")  # ZIP, of sixteen lines
+    for window in ("dataWindow", "displayWindow"):
+        assert told[window] == ("box2i", struct.pack("<4i", 0, 0, 6, 4))
+    assert told["lineOrder"][1] == b"\0" and struct.unpack("<f", told["pixelAspectRatio"][1]) == (1.0,)
 
 
 @pytest.mark.parametrize("full", ["the system's folder for temporary files", "all"])

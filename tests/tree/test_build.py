@@ -109,6 +109,15 @@ def test_octants_lie_on_their_sides_of_the_middle(kind):
     assert len(whole) == 8
 
 
+@pytest.mark.parametrize("kind", ["soup", "soup_float32", "sizes", "lattice"])
+def test_the_last_few_faces_are_cut_by_the_heuristic_under_either_rule(kind):
+    """Of 32 faces the first cut is the same, of 33 it is not."""
+    for count, same in ((8, True), (32, True), (33, False)):
+        (first, _, one), (second, _, other) = (cut(kind, 5, count, split) for split in ("midpoint", "sah"))
+        alike = np.array_equal(first, second) and np.array_equal(one.ranges, other.ranges)
+        assert alike == same
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_the_sah_cut_is_as_cheap_as_the_best_of_its_planes(seed):
     count = 200

@@ -130,6 +130,35 @@ def test_a_class_of_ones_own_is_loaded_as_such(path: Path) -> None:
     assert type(Mine.load(path)) is Mine
 
 
+def test_the_file_is_as_its_description_says(path: Path) -> None:
+    """Read by ``struct``, ``json`` and ``zlib``, from the text at the head of ``store.py``."""
+    saved = Octree.from_mesh(carrying())
+    saved.save(path)
+    content = path.read_bytes()
+    assert content[:8] == bytes.fromhex("89 4F 43 54 52 45 45 0A")
+    order, version, length, crc = struct.unpack("<4I", content[8:24])
+    assert (order, version, crc) == (0x01020304, 1, zlib.crc32(content[:20] + content[24 : 24 + length]))
+    told = json.loads(content[24 : 24 + length])
+    assert told.keys() == {"depth", "scale", "name", "arrays"}
+    assert (told["depth"], told["scale"], told["name"]) == (saved.tree.depth, saved.tree.scale, saved.mesh.name)
+    mesh, tree, begin = saved.mesh, saved.tree, 24 + length
+    expected = {
+        "vertices": mesh.vertices, "faces": mesh.faces, "normals": mesh.normals, "colors": mesh.colors,
+        "texcoords": mesh.texcoords, "nodes": tree.nodes, "blocks": tree.blocks, "block_faces": tree.faces,
+    }  # fmt: skip
+    assert [entry["name"] for entry in told["arrays"]] == list(expected)
+    for entry in told["arrays"]:
+        array = expected[entry["name"]]
+        assert array is not None and np.dtype(entry["dtype"]) == array.dtype and entry["dtype"][0] == "<"
+        end = begin + array.nbytes
+        filled = -(-end // 64) * 64
+        assert begin % 64 == 0 and array.size % entry["rows"] == 0
+        assert content[begin:end] == array.tobytes() and not any(content[end:filled])
+        assert entry["crc32"] == zlib.crc32(content[begin:filled])
+        begin = filled
+    assert begin == len(content)
+
+
 # --- memory -----------------------------------------------------------------------------------------------------
 
 

@@ -1,4 +1,6 @@
-"""The public contract, piece by piece: the docstrings of what ``renderer`` exports, and the help of its commands."""
+"""The public contract, piece by piece: the docstrings of what ``renderer`` exports, the fields of its scenes, and the
+help of its commands.
+"""
 
 import argparse
 import inspect
@@ -6,8 +8,11 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from pydantic import BaseModel
+
 import renderer
 from renderer import cli
+from validation.promises.fields import described
 
 # A line that begins the definition of a name: "t_max   the last ..." or "faces : (F, 3) ...".
 _DEFINITION = re.compile(r"^\s*[\w.]+(?:, [\w.]+)*(?:  +| : )(?=\S)")
@@ -15,7 +20,7 @@ _SENTENCE = re.compile(r"(?<=[.:;])\s+(?=[A-Z(`\"])")
 
 
 class Piece(NamedTuple):
-    """A sentence or the definition of a name: where it stands, such as "Octree.save", and what it says."""
+    """A sentence, the definition of a name or a field: where it stands, such as "Octree.save", and what it says."""
 
     where: str
     says: str
@@ -34,6 +39,8 @@ def _documented() -> Iterator[Piece]:
         if inspect.isclass(thing):
             for owner, member, value in _members(thing):
                 yield from pieces(f"{owner}.{member}", inspect.getdoc(value) or "")
+            if issubclass(thing, BaseModel):
+                yield from (Piece(where, says) for where, says in described(thing))
 
 
 def _members(kind: type) -> Iterator[tuple[str, str, Any]]:

@@ -3,11 +3,14 @@
 import ast
 from functools import cache
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import pytest
+from pydantic import BaseModel, BeforeValidator, Field, create_model, field_validator, model_validator
 
 from validation.promises import contract, table
 from validation.promises.contract import Piece, pieces
+from validation.promises.fields import described
 from validation.sections import NAMES
 
 ROOT = Path(__file__).parents[3]
@@ -75,3 +78,64 @@ def test_texts_are_cut_into_sentences_and_definitions() -> None:
         Piece("f", "First sentence."), Piece("f", "Second one (see there)."),
         Piece("f", "name what it is, in two lines"), Piece("f", "other, b : and this. It has two."),
     ]  # fmt: skip
+
+
+def abs_of(value: Any) -> Any:
+    return abs(value)
+
+
+def lines_of(**fields: Any) -> list[str]:
+    """The lines of a record with such fields, (type, default) each, in which an ellipsis stands for no default."""
+    return [line for _, line in described(create_model("Record", **fields))]
+
+
+def test_fields_are_described_by_type_range_and_default() -> None:
+    share = Annotated[float, Field(ge=0.0, lt=1.0, strict=True)]
+    assert lines_of(size=(share, 0.5)) == ["float strict from 0.0 below 1.0; default 0.5"]
+    assert lines_of(a=(tuple[share, share], ...), b=(tuple[share, ...], ())) == [
+        "2 of (float strict from 0.0 below 1.0); required", "list of (float strict from 0.0 below 1.0); default ()",
+    ]  # fmt: skip
+    assert lines_of(a=(Literal["x", "y"], "x"), b=(dict[str, int | None], {}), c=(tuple[int, str], ...)) == [
+        "'x' or 'y'; default 'x'", "table of int or None; default {}", "(int, str); required",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        (Annotated[float, Field(ge=0.0, lt=1.0, strict=True)], 0.25),
+        (Annotated[float, Field(ge=0.0, lt=1.0, strict=True)], ...),
+        (Annotated[float, Field(gt=0.0, lt=1.0, strict=True)], 0.5),
+        (Annotated[float, Field(ge=0.0, lt=2.0, strict=True)], 0.5),
+        (Annotated[float, Field(ge=0.0, lt=1.0)], 0.5),
+        (Annotated[float, Field(ge=0.0, lt=1.0, strict=True), BeforeValidator(abs_of)], 0.5),
+        (Annotated[int, Field(ge=0.0, lt=1.0, strict=True)], 0.5),
+        (Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] | None, 0.5),
+    ],
+)
+def test_a_field_that_changes_is_described_otherwise(changed: Any) -> None:
+    before = lines_of(size=(Annotated[float, Field(ge=0.0, lt=1.0, strict=True)], 0.5))
+    assert lines_of(size=changed) != before
+
+
+def test_what_a_field_inherits_is_told_of_its_writer_and_its_checks_are_named() -> None:
+    class Base(BaseModel):
+        size: float
+
+        @field_validator("size")
+        @classmethod
+        def _is_even(cls, size: float) -> float:
+            return size
+
+        @model_validator(mode="after")
+        def _fits(self) -> "Base":
+            return self
+
+    class Derived(Base):
+        name: str = "a"
+
+    assert dict(described(Derived)) == {
+        "Base.size": "float; required; checked by is_even",
+        "Derived.name": "str; default 'a'",
+        "Base": "its values are checked together by fits",
+    }

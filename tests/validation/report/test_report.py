@@ -1,5 +1,6 @@
 """The page: it stands alone, shows each picture once, and says what the metrics say; the schema of the metrics."""
 
+import json
 import re
 import struct
 import zlib
@@ -117,6 +118,41 @@ def test_metrics_are_read_as_they_were_written(metrics: dict[str, Any], tmp_path
     path.write_text("{")
     with pytest.raises(ValueError, match=r"metrics\.json: expected JSON"):
         schema.read(path)
+
+
+README = Path(__file__).parents[3] / "reports" / "README.md"
+TYPES: dict[str, Any] = {"2": int, "text": str, "bool": bool, "number": float, "table": dict, "list": list}
+
+
+def described() -> dict[str, tuple[str, str]]:
+    """The type and the meaning of each key of ``metrics.json`` by its table in the folder's readme."""
+    rows = re.findall(
+        r"^\| (`.*?) \| (.*?) \| (.*) \|$", README.read_text().partition("## metrics.json")[2], re.MULTILINE
+    )
+    return {key: (kind, meaning) for keys, kind, meaning in rows for key in re.findall(r"`(\w+)`", keys)}
+
+
+def test_the_file_has_the_keys_and_types_that_the_readme_says(metrics: dict[str, Any]) -> None:
+    def refused(word: str) -> None:
+        pytest.fail(f"{word} is no JSON")
+
+    written = json.loads(schema.text(metrics), parse_constant=refused)
+    table = described()
+    assert set(written) <= set(table)
+    assert set(table) - set(written) == {key for key, (_, meaning) in table.items() if "absent where" in meaning} - {
+        "images"
+    }
+    for key, value in written.items():
+        assert type(value) is TYPES[table[key][0]], key
+    rows = {"verdict": written["verdict"], "facts": written["facts"][0], "matrix": written["matrix"][0]}
+    for key, row in {**rows, "gates": written["gates"][0], "thresholds": written["thresholds"]}.items():
+        assert set(row) == set(re.findall(r"`(\w+)`", table[key][1])), key
+    assert {"seconds", "costs"} <= set(written["images"])
+
+
+def test_every_key_of_the_schema_is_in_the_readme() -> None:
+    keys = {field.alias or name for name, field in schema.Metrics.model_fields.items()}
+    assert keys == set(described())
 
 
 @pytest.mark.parametrize(

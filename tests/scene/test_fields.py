@@ -1,0 +1,215 @@
+"""Each field of a scene's tables: what it is where it is left out, what it takes, and what it refuses, by hand."""
+
+import math
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from renderer import (
+    Dielectric,
+    DirectionalLight,
+    Floor,
+    Mirror,
+    OrthographicCamera,
+    PerspectiveCamera,
+    Phong,
+    PointLight,
+    RenderSettings,
+    Scene,
+    SceneError,
+    SceneObject,
+)
+from renderer.mesh.shapes import box
+
+BOX = box()
+NEEDED = object()
+# For each class the fields without which it cannot be.
+LEAST: dict[type, dict[str, Any]] = {
+    PerspectiveCamera: {"eye": (0, 0, 5), "target": (0, 0, 0)},
+    OrthographicCamera: {"eye": (0, 0, 5), "target": (0, 0, 0), "height": 2},
+    DirectionalLight: {"direction": (0, -1, 0)},
+    PointLight: {"position": (0, 1, 0)},
+    Phong: {},
+    Mirror: {},
+    Dielectric: {},
+    SceneObject: {"mesh": BOX, "material": "m"},
+    Floor: {"min": (-1, -1), "max": (1, 1), "materials": ("m",)},
+    RenderSettings: {},
+    Scene: {"camera": {"eye": (0, 0, 5), "target": (0, 0, 0)}, "materials": {"m": {}, "n": {}}},
+}
+
+
+class Field(NamedTuple):
+    """A field: its value where it is left out, values taken with those that come of them, and values refused."""
+
+    default: Any
+    takes: list[tuple[Any, Any]]
+    refuses: list[Any]
+
+
+def same(*values: Any) -> list[tuple[Any, Any]]:
+    return [(value, value) for value in values]
+
+
+NO_NUMBERS = [True, "1", None, [1.0], math.nan]
+HUGE, BEYOND = 1e308, math.inf
+TINY = 5e-324
+
+
+def triple(default: Any, *refused: Any) -> Field:
+    """Three finite numbers of any size."""
+    wrong = [1.0, (1, 2), (1, 2, 3, 4), (1, "2", 3), (True, 1, 1), (math.nan, 0, 0), (0, BEYOND, 0), (0, 0, -BEYOND)]
+    return Field(
+        default, [*same((1.0, -2.0, 3.5), (-1.0, TINY, 1.0)), ([1, 2, 4], (1.0, 2.0, 4.0))], [*wrong, *refused]
+    )
+
+
+def colour(default: Any) -> Field:
+    """Three numbers from 0, or one for all of them."""
+    taken = [*same((0.0, 0.5, HUGE)), (0.25, (0.25,) * 3), (2, (2.0,) * 3), ([0, 1, 7], (0.0, 1.0, 7.0))]
+    wrong = [-TINY, (0, 0, -1), (0, BEYOND, 0), BEYOND, math.nan, (math.nan, 0, 0), (1, 2), (1, 2, 3, 4), True, "1"]
+    return Field(default, taken, wrong)
+
+
+def number(default: Any, least: float, most: float, *, refused: tuple[float, ...]) -> Field:
+    """One number from ``least`` to ``most``."""
+    return Field(default, [*same(least, most, 1.0 if least <= 1.0 <= most else least)], [*NO_NUMBERS, *refused])
+
+
+def kind(name: str) -> Field:
+    return Field(name, same(name), ["other", "", None, 1])
+
+
+IOR = number(1.5, TINY, HUGE, refused=(0.0, -1.0, BEYOND))
+ANY_EYE = triple(NEEDED, (0, 0, math.nextafter(2.0**126, BEYOND)))
+CAMERA = {
+    "eye": ANY_EYE._replace(takes=[*ANY_EYE.takes, *same((0.0, 0.0, 2.0**126))]), "target": triple(NEEDED),
+    "up": triple((0.0, 1.0, 0.0))._replace(takes=[*same((1.0, 2.0, 3.0)), ([0, 1, 1], (0.0, 1.0, 1.0))]),
+}  # fmt: skip
+FIELDS: dict[type, dict[str, Field]] = {
+    PerspectiveCamera: {
+        "type": kind("perspective"), **CAMERA,
+        "fov": number(45.0, TINY, math.nextafter(180, 0), refused=(0.0, -1.0, 180.0, BEYOND)),
+    },
+    OrthographicCamera: {
+        "type": kind("orthographic"), **CAMERA,
+        "height": number(NEEDED, TINY, 2.0**126, refused=(0.0, -1.0, math.nextafter(2.0**126, BEYOND), BEYOND)),
+    },
+    DirectionalLight: {
+        "type": kind("directional"), "direction": triple(NEEDED, (0, 0, 0), (0.0, -0.0, 0.0)),
+        "irradiance": colour((1.0, 1.0, 1.0)),
+    },
+    PointLight: {"type": kind("point"), "position": triple(NEEDED), "intensity": colour((1.0, 1.0, 1.0))},
+    Phong: {
+        "type": kind("phong"), "diffuse": colour((0.8, 0.8, 0.8)), "specular": colour((0.0, 0.0, 0.0)),
+        "ambient": colour(None)._replace(takes=[*colour(None).takes, (None, None)]),
+        "shininess": number(32.0, 0.0, HUGE, refused=(-TINY, BEYOND)), "ior": IOR,
+        "reflectance": colour((0.0, 0.0, 0.0)), "transmittance": colour((0.0, 0.0, 0.0)),
+    },
+    Mirror: {"type": kind("mirror"), "reflectance": colour((1.0, 1.0, 1.0))},
+    Dielectric: {
+        "type": kind("dielectric"), "ior": IOR,
+        "reflectance": colour((1.0, 1.0, 1.0)), "transmittance": colour((1.0, 1.0, 1.0)),
+    },
+    SceneObject: {
+        "mesh": Field(NEEDED, [(BOX, BOX), ("a.ply", Path("a.ply")), (Path("b.stl"), Path("b.stl"))], [3, None, [BOX]]),
+        "material": Field(NEEDED, same("m", "ü b"), [3, None, ["m"]]),
+        "normals": Field("flat", same("flat", "smooth"), ["Flat", "", None, True]),
+        "scale": triple((1.0, 1.0, 1.0))._replace(
+            takes=[*same((1.0, -2.0, 0.5)), (2, (2.0, 2.0, 2.0)), (-0.5, (-0.5, -0.5, -0.5))],
+            refuses=[True, "1", None, math.nan, BEYOND, (1, 2), (1, 2, 3, 4), (1, 2, math.nan)],
+        ),
+        "rotate": triple((0.0, 0.0, 0.0)), "translate": triple((0.0, 0.0, 0.0)),
+    },
+    Floor: {
+        "min": Field(
+            NEEDED, [((-3, -2.5), (-3.0, -2.5))], [1, (-1,), (-3, -2, -1), ("a", 0), (1, -1), (-1, 1), (math.nan, 0)]
+        ),
+        "max": Field(NEEDED, [((3, 2.5), (3.0, 2.5))], [1, (1,), (3, 2, 1), (True, 2), (-1, 1), (1, -1), (BEYOND, 1)]),
+        "materials": Field(
+            NEEDED, [*same(("m",), ("m", "n")), (["n"], ("n",))], ["m", (), ("m", "n", "m"), (1,), None]
+        ),
+        "squares": Field((1, 1), same((1, 1000), (7, 3)), [2, (1,), (0, 1), (1, 1001), (1.5, 1), (True, 1), (1, 2, 3)]),
+    },
+    RenderSettings: {
+        "resolution": Field(
+            (512, 512), same((1, 16384), (640, 480)), [8, (0, 1), (1, 16385), (8.5, 1), (True, 1), (1, 2, 3)]
+        ),
+        "samples": Field(1, same(1, 4, 9, 256**2), [0, -1, 2, 3, 257**2, 1.0, True, "4", None]),
+        "max_depth": Field(6, same(0, 64), [-1, 65, 1.0, True, "3", None]),
+        "min_weight": number(0.0, 0.0, math.nextafter(1, 0), refused=(-TINY, 1.0, BEYOND)),
+        "max_rays": Field(16384, same(1, 2**62 - 1), [0, -1, 2**62, 1.5, True, "3", None]),
+        "shadows": Field(True, same(True, False), [0, 1, "yes", None]),
+    },
+    Scene: {
+        "camera": Field(NEEDED, [
+            (LEAST[PerspectiveCamera], PerspectiveCamera(**LEAST[PerspectiveCamera])),
+            ({"type": "orthographic", **LEAST[OrthographicCamera]}, OrthographicCamera(**LEAST[OrthographicCamera])),
+        ], [3, None, {}, {"type": "fisheye", **LEAST[PerspectiveCamera]}, Phong()]),
+        "materials": Field(NEEDED, [
+            ({}, {}), ({"a": {}}, {"a": Phong()}), ({"a": {"type": "dielectric"}}, {"a": Dielectric()}),
+            ({"a": {"type": "mirror"}, "b": Phong()}, {"a": Mirror(), "b": Phong()}),
+        ], [3, None, [Phong()], {"a": 3}, {"a": {"type": "gold"}}, {"a": PointLight(position=(0, 1, 0))}]),
+        "lights": Field((), [
+            ([], ()), ([{"type": "point", "position": (0, 1, 0)}], (PointLight(position=(0, 1, 0)),)),
+            ([{"type": "directional", "direction": (1, 0, 0)}], (DirectionalLight(direction=(1, 0, 0)),)),
+        ], [3, None, {}, [3], [{"position": (0, 1, 0)}], [{"type": "spot", "position": (0, 1, 0)}], [Phong()]]),
+        "objects": Field((), [
+            ([], ()), ([{"mesh": BOX, "material": "n"}], (SceneObject(mesh=BOX, material="n"),)),
+        ], [3, None, {}, [3], [{"mesh": BOX}], [{"mesh": BOX, "material": "gold"}]]),
+        "floor": Field(None, [
+            (None, None), (LEAST[Floor], Floor(**LEAST[Floor])),
+        ], [3, [], {}, {**LEAST[Floor], "materials": ["gold"]}]),
+        "ambient": colour((0.0, 0.0, 0.0)), "background": colour((0.0, 0.0, 0.0)),
+        "render": Field(RenderSettings(), [
+            ({}, RenderSettings()), ({"samples": 9}, RenderSettings(samples=9)),
+        ], [3, None, [], {"samples": 3}]),
+    },
+}  # fmt: skip
+
+
+EACH = [
+    pytest.param(model, name, field, id=f"{model.__name__}.{name}")
+    for model, fields in FIELDS.items()
+    for name, field in fields.items()
+]
+
+
+def made(model: Any, **changed: Any) -> Any:
+    return model(**{**LEAST[model], **changed})
+
+
+@pytest.mark.parametrize("model", FIELDS, ids=lambda model: model.__name__)
+def test_no_field_is_missing_here(model: Any) -> None:
+    assert set(FIELDS[model]) == set(model.model_fields)
+
+
+@pytest.mark.parametrize(("model", "name", "field"), EACH)
+def test_a_field_that_is_left_out_has_its_default_or_is_asked_for(model: Any, name: str, field: Field) -> None:
+    given = {key: value for key, value in LEAST[model].items() if key != name}
+    if field.default is NEEDED:
+        with pytest.raises(SceneError, match=rf"\b{name}: .*required"):
+            model(**given)
+    else:
+        found = getattr(model(**given), name)
+        assert found == field.default and type(found) is type(field.default)
+
+
+@pytest.mark.parametrize(("model", "name", "field"), EACH)
+def test_a_field_takes_values_to_the_ends_of_its_range(model: Any, name: str, field: Field) -> None:
+    for given, expected in field.takes:
+        found = getattr(made(model, **{name: given}), name)
+        assert found == expected and type(found) is type(expected), given
+
+
+@pytest.mark.parametrize(("model", "name", "field"), EACH)
+def test_a_field_refuses_other_values_and_its_error_names_it(model: Any, name: str, field: Field) -> None:
+    for given in field.refuses:
+        with pytest.raises(SceneError) as caught:
+            made(model, **{name: given})
+        said = str(caught.value)
+        # Where a record is wrong as a whole, the error's words name what is.
+        assert said.startswith(f"{model.__name__}: ") and re.search(rf"\b{name}\b", said), (given, said)
+        assert "\n" not in said
