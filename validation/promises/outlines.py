@@ -19,6 +19,8 @@ Whole = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 # On so few places, corners in line, corners on edges and edges that cross are as frequent as what is simple.
 _GRID, _LENGTHS = 5, (4, 5, 6, 7, 8)
+# Beside polygons that reach so far, on no line through places of the grid, all that lies on it counts as flat at first.
+_FAR = 2**21 * np.array([(7, 5), (-5, 7), (-7, -6), (5, -9)])
 # The most corners of a polygon that is cut otherwise than into a fan.
 _MOST = 4096
 # The axes of a plane as whole numbers: upright and turned, seen from in front and from behind, and tilted.
@@ -44,7 +46,7 @@ def check_outlines(rng: Generator, count: int) -> list[dict[str, Any]]:
         some, cut = np.stack([outlines[k] for k in numbers]), np.stack([triangles[k] for k in numbers])
         fan = np.broadcast_to(_fan(length), cut.shape)
         # The long ones are simple as they are made.
-        notched = _is_simple(some) if length <= max(_LENGTHS) else np.full(len(numbers), length <= _MOST)
+        notched = ~_meetings(some)[0] if length <= max(_LENGTHS) else np.full(len(numbers), length <= _MOST)
         notched &= ~_covers(some, fan, 0)
         covered.append(_covers(some, cut, 1)[notched])
         kept.append((cut == fan).all(axis=(1, 2))[~notched])
@@ -55,9 +57,14 @@ def check_outlines(rng: Generator, count: int) -> list[dict[str, Any]]:
 
 
 def _random(rng: Generator, count: int, length: int) -> Whole:
+    """Polygons on the grid, and those with two corners far from it. Of those that are not simple a few, mostly such
+    whose edges touch without crossing.
+    """
     outlines = rng.integers(0, _GRID, (count, length, 2))
-    simple = _is_simple(outlines)
-    return np.concatenate([outlines[simple], outlines[~simple][: count // 16]])
+    outlines[::4, -2:] = rng.choice(_FAR, (len(outlines[::4]), 2))
+    touching, crossing = _meetings(outlines)
+    others = outlines[touching & ~crossing][: count // 10], outlines[crossing][: count // 50]
+    return np.concatenate([outlines[~touching], *others])
 
 
 def _long(rng: Generator) -> list[Whole]:
@@ -141,19 +148,22 @@ def _turn(a: Whole, b: Whole, c: Whole) -> Whole:
     return turn
 
 
-def _is_simple(outlines: Whole) -> Bools:
-    """Whether no two edges of an outline share a point, but neighbours their corner."""
-    length, simple = outlines.shape[1], np.ones(len(outlines), np.bool_)
+def _meetings(outlines: Whole) -> tuple[Bools, Bools]:
+    """Whether any two edges of an outline, neighbours left out, share a point, and whether any cross there."""
+    count, length, _ = outlines.shape
+    touching, crossing = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     for first in range(length):
         for second in range(first + 2, min(length, length + first - 1)):
             a, b = outlines[:, first], outlines[:, first + 1]
             c, d = outlines[:, second], outlines[:, (second + 1) % length]
             apart = (np.maximum(a, b) < np.minimum(c, d)) | (np.maximum(c, d) < np.minimum(a, b))
-            simple &= apart.any(axis=1) | (_beside(a, b, c, d) | _beside(c, d, a, b))
-    return simple
+            sides, others = _sides(a, b, c, d), _sides(c, d, a, b)
+            touching |= ~apart.any(axis=1) & (sides <= 0) & (others <= 0)
+            crossing |= (sides < 0) & (others < 0)
+    return touching, crossing
 
 
-def _beside(a: Whole, b: Whole, c: Whole, d: Whole) -> Bools:
-    """Whether c and d lie on the same side of the line through a and b."""
-    beside: Bools = np.sign(_turn(a, b, c)) * np.sign(_turn(a, b, d)) > 0
-    return beside
+def _sides(a: Whole, b: Whole, c: Whole, d: Whole) -> Whole:
+    """1 where c and d lie on the same side of the line through a and b, -1 where on either side, else 0."""
+    sides: Whole = np.sign(_turn(a, b, c)) * np.sign(_turn(a, b, d))
+    return sides
