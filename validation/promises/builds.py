@@ -17,7 +17,8 @@ Floats = NDArray[np.float64]
 _SPLITS: tuple[Literal["sah", "midpoint"], ...] = ("sah", "midpoint")
 _SIZES = (1, 2, 3, 4, 5, 8, 12, 32)
 _DEPTHS = (1, 2, 64)
-_FACES = 150
+# As many as are cut twice by octants, and on either side of where the rules change.
+_MANY, _FEW = 150, (32, 33)
 # Boxes are wider than their faces by 2^-21 on either side; costs are sums of float32.
 _NEAR = 1e-5
 _JUDGE = "the rules in numpy"
@@ -42,30 +43,33 @@ def check_builds(rng: Generator) -> list[dict[str, Any]]:
 
 def _cases(rng: Generator) -> Iterator[tuple[Floats, Rule]]:
     for number, (extent, split) in enumerate(product(permutations((1.0, 1.7, 3.0)), _SPLITS)):
-        corners = _soup(rng, np.array(extent))
+        corners = _soup(rng, np.array(extent), _MANY)
         yield corners, Rule(split, _SIZES[number % len(_SIZES)], _DEPTHS[number % len(_DEPTHS)])
     for split in _SPLITS:
-        yield _beside_one(rng), Rule(split, 4, 32)
+        yield _below_one(rng), Rule(split, 4, 32)
         yield _equal(rng), Rule(split, 5, 32)
+        for count in _FEW:
+            yield _soup(rng, np.array([2.0, 3.0, 1.0]), count), Rule(split, 3, 32)
 
 
-def _soup(rng: Generator, extent: Floats) -> Floats:
+def _soup(rng: Generator, extent: Floats, count: int) -> Floats:
     """Faces of all sizes, in no order, with corners that are float32."""
-    size = 10.0 ** rng.uniform(-2.0, 0.0, (_FACES, 1, 1))
-    corners = extent * rng.normal(size=(_FACES, 1, 3)) + size * rng.normal(size=(_FACES, 3, 3))
+    size = 10.0 ** rng.uniform(-2.0, 0.0, (count, 1, 1))
+    corners = extent * rng.normal(size=(count, 1, 3)) + size * rng.normal(size=(count, 3, 3))
     return corners.astype(np.float32).astype(np.float64)
 
 
-def _beside_one(rng: Generator) -> Floats:
-    """Faces in one octant of the box that they have with a large one."""
-    corners = _soup(rng, np.array([3.0, 1.0, 2.0]))
-    corners[7] = [(-20.0, -20.0, -20.0), (400.0, 20.0, 20.0), (20.0, 300.0, 200.0)]
-    return corners
+def _below_one(rng: Generator) -> Floats:
+    """Faces throughout the lowest octant of a large one, whose centre is the middle of their box."""
+    extent = np.array([30.0, 10.0, 20.0])
+    corners = extent * rng.uniform(0.1, 0.4, (_MANY, 1, 3)) + rng.uniform(-0.5, 0.5, (_MANY, 3, 3))
+    corners[7] = [np.zeros(3), extent, 0.5 * extent]
+    return corners.astype(np.float32).astype(np.float64)
 
 
 def _equal(rng: Generator) -> Floats:
     """Faces of which half are equal."""
-    corners = _soup(rng, np.array([3.0, 1.0, 2.0]))
+    corners = _soup(rng, np.array([3.0, 1.0, 2.0]), _MANY)
     corners[::2] = corners[0]
     return corners
 

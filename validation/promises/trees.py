@@ -31,9 +31,12 @@ def check_trees(rng: Generator) -> list[dict[str, Any]]:
 
 
 def _octrees(rng: Generator) -> Iterator[Octree]:
-    """Of one face, of one leaf, of one subtree, and of many subtrees; equal faces too. Of float32 and of float64."""
+    """Of one face, of one leaf, of one subtree, and of many subtrees; equal and upright faces too. Of float32 and
+    of float64.
+    """
     for count, leaf_size in ((1, 1), (3, 1), (5, 8), (300, 32), (9_000, 3), (20_000, 8)):
         corners = rng.normal(size=(count, 1, 3)) + rng.exponential(0.1, (count, 1, 1)) * rng.normal(size=(count, 3, 3))
+        corners[0, :, 0] = corners[0, 0, 0]
         corners[count // 2 : count // 2 + count // 4] = corners[0]
         # A part of few faces, which is a leaf beside subtrees of thousands.
         corners[1:4] += 100.0 * (count > 8192)
@@ -66,6 +69,7 @@ def _judged(tree: Tree, mesh: Mesh) -> dict[str, Bools]:
         "a node's box is that of its octants": _unites(found),
         "each node is reached once": np.bincount(links[~ends], minlength=len(where))[1:] == 1,
         "an octant without faces is empty": _is_empty(every[unused], where[unused], len(tree.faces) // 4),
+        "words of nodes that nothing uses are 0": (tree.nodes.reshape(-1, 64)[:, 56:] == 0.0).all(axis=1),
         "a node but the first has two octants or more": (~unused).sum(axis=1)[1:] > 1,
         "the depth is the number of levels": np.array([tree.depth == len(found)]),
         "blocks hold their faces' corners": _holds(tree, mesh),
