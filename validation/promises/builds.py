@@ -25,7 +25,9 @@ _JUDGE = "the rules in numpy"
 
 
 def check_builds(rng: Generator) -> list[dict[str, Any]]:
-    """Small trees with every order of the axes, and with faces that no middle or nothing separates."""
+    """Small trees with every order of the axes, and with faces that no middle or nothing separates
+    or whose boxes have no area.
+    """
     costs, leaves = [], []
     for corners, rule in _cases(rng):
         faces = np.arange(3 * len(corners)).reshape(-1, 3)
@@ -48,6 +50,7 @@ def _cases(rng: Generator) -> Iterator[tuple[Floats, Rule]]:
     for split in _SPLITS:
         yield _below_one(rng), Rule(split, 4, 32)
         yield _equal(rng), Rule(split, 5, 32)
+        yield _soup(rng, np.eye(3)[1], _MANY) * np.eye(3)[1], Rule(split, 8, 32)
         for count in _FEW:
             yield _soup(rng, np.array([2.0, 3.0, 1.0]), count), Rule(split, 3, 32)
 
