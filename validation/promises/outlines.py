@@ -61,7 +61,7 @@ def _random(rng: Generator, count: int, length: int) -> Whole:
     whose edges touch without crossing.
     """
     outlines = rng.integers(0, _GRID, (count, length, 2))
-    outlines[::4, -2:] = rng.choice(_FAR, (len(outlines[::4]), 2))
+    outlines[::2, -2:] = rng.choice(_FAR, (len(outlines[::2]), 2))
     touching, crossing = _meetings(outlines)
     others = outlines[touching & ~crossing][: count // 10], outlines[crossing][: count // 50]
     return np.concatenate([outlines[~touching], *others])

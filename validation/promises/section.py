@@ -24,7 +24,7 @@ from validation.promises.trees import check_trees
 _SEED = 2031
 _RAYS = 4096
 _PLACED = 60
-_POLYGONS = 3000
+_POLYGONS = 4000
 _OPENED = 40
 Rows = list[dict[str, Any]]
 
