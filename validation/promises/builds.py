@@ -50,6 +50,7 @@ def _cases(rng: Generator) -> Iterator[tuple[Floats, Rule]]:
     for split in _SPLITS:
         yield _below_one(rng), Rule(split, 4, 32)
         yield _equal(rng), Rule(split, 5, 32)
+        yield rng.uniform(-1.0, 1.0, (7, 3, 3)).astype(np.float32).astype(np.float64), Rule(split, 8, 32)
         yield _soup(rng, np.eye(3)[1], _MANY) * np.eye(3)[1], Rule(split, 8, 32)
         for count in _FEW:
             yield _soup(rng, np.array([2.0, 3.0, 1.0]), count), Rule(split, 3, 32)

@@ -47,8 +47,10 @@ class Build:
         self.whole = min(rule.leaf_size, 4)
 
     def cheapest(self) -> Choice:
-        """The cheapest tree of nodes of up to eight octants."""
-        return self._choices(self._cut(np.arange(len(self.low)), 0))[0]
+        """The cheapest tree of nodes of up to eight octants; a leaf alone has a node above it."""
+        every = np.arange(len(self.low))
+        cost, leaves = self._choices(self._cut(every, 0))[0]
+        return Choice(cost + self._area(every) * (len(leaves) == 1), leaves)
 
     def _area(self, faces: Indices) -> float:
         return float(half_area(self.low[faces].min(axis=0), self.high[faces].max(axis=0)))
