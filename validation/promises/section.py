@@ -11,15 +11,21 @@ from validation.promises import table
 from validation.promises.batches import check_batches, check_refits
 from validation.promises.bounces import check_bounces
 from validation.promises.bounds import check_bounds
+from validation.promises.builds import check_builds
 from validation.promises.cameras import check_cameras
 from validation.promises.floors import check_floors
 from validation.promises.nesting import check_nesting
+from validation.promises.openings import check_openings
+from validation.promises.outlines import check_outlines
 from validation.promises.places import check_places
 from validation.promises.placing import check_placing
+from validation.promises.trees import check_trees
 
 _SEED = 2031
 _RAYS = 4096
 _PLACED = 60
+_POLYGONS = 4000
+_OPENED = 40
 Rows = list[dict[str, Any]]
 
 
@@ -32,6 +38,9 @@ HITS: dict[str, Callable[[], Rows]] = {
     "bounds of rays": lambda: check_bounds(_random(), _RAYS),
     "sizes of batches": check_batches,
     "refits": check_refits,
+    "trees": lambda: check_trees(_random()),
+    "builds": lambda: check_builds(_random()),
+    "polygons": lambda: check_outlines(_random(), _POLYGONS),
 }
 PICTURES: dict[str, Callable[[], Rows]] = {
     "cameras": lambda: check_cameras(_random(), _PLACED),
@@ -39,6 +48,7 @@ PICTURES: dict[str, Callable[[], Rows]] = {
     "floors and samples": check_floors,
     "bounces": check_bounces,
     "nested media": check_nesting,
+    "boxes shown": lambda: check_openings(_random(), _OPENED),
 }
 _COVERED = "what nobody judges may be broken unseen"
 _REASON = "a promise holds each time that it is asked"

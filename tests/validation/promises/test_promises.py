@@ -1,17 +1,35 @@
 """Each check of promises asks what it says, finds nothing in the sound renderer, and finds a rule that is broken."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from renderer.inspect import tree_boxes
+from renderer.mesh import ears, obj, polygons
 from renderer.octree import Octree
 from renderer.picture import prepare
 from renderer.scene import scene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
-from validation.promises import batches, bounces, bounds, cameras, floors, nesting, places, placing
+from renderer.trace.layout import Tree
+from renderer.tree import refit
+from validation.promises import (
+    batches,
+    bounces,
+    bounds,
+    builds,
+    cameras,
+    floors,
+    nesting,
+    openings,
+    outlines,
+    places,
+    placing,
+    trees,
+)
 from validation.promises.ways import ways
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
@@ -19,6 +37,10 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "bounds": lambda: bounds.check_bounds(np.random.default_rng(5), 256),
     "batches": lambda: batches.check_batches((17, 1025)),
     "refits": batches.check_refits,
+    "trees": lambda: trees.check_trees(np.random.default_rng(5)),
+    "builds": lambda: builds.check_builds(np.random.default_rng(5)),
+    "outlines": lambda: outlines.check_outlines(np.random.default_rng(5), 1500),
+    "openings": lambda: openings.check_openings(np.random.default_rng(5), 20),
     "cameras": lambda: cameras.check_cameras(np.random.default_rng(5), 20),
     "placing": lambda: placing.check_placing(np.random.default_rng(5), 12),
     "floors": floors.check_floors,
@@ -76,6 +98,96 @@ def test_a_row_of_another_ray_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_refit_that_does_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Octree, "refit", lambda self, vertices: None)
     assert broken("refits") == {"a refit"}
+
+
+def test_leaves_that_a_refit_forgets_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(refit, "_fit_leaves", lambda *given: None)
+    assert "a leaf's" in broken("trees")
+
+
+def test_nodes_that_a_refit_forgets_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(refit, "_fit_nodes", lambda *given: None)
+    assert broken("trees") == {"a node's"}
+
+
+def altered(tree: Tree, change: Callable[[Any, Any, Any], None]) -> Tree:
+    """A copy of a tree whose boxes, links and faces ``change`` alters."""
+    nodes, faces = tree.nodes.copy(), tree.faces.copy()
+    change(nodes.reshape(-1, 64)[:, :48].reshape(-1, 3, 2, 8), nodes.view(np.int32).reshape(-1, 64)[:, 48:56], faces)
+    return replace(tree, nodes=nodes, faces=faces)
+
+
+def one_leaf_wider(boxes: Any, links: Any, faces: Any) -> None:
+    node, place = np.argwhere((links < 0) & (boxes[:, 0, 0] <= boxes[:, 0, 1]))[-1]
+    boxes[node, 1, 1, place] += 4 * np.spacing(np.abs(boxes[node, 1, 1, place]))
+
+
+def an_empty_octant_with_a_box(boxes: Any, links: Any, faces: Any) -> None:
+    node, place = np.argwhere(boxes[:, 0, 0] > boxes[:, 0, 1])[0]
+    boxes[node, 2, :, place] = 0.0
+
+
+def two_faces_exchanged(boxes: Any, links: Any, faces: Any) -> None:
+    faces[[0, -4]] = faces[[-4, 0]]
+
+
+def one_face_twice(boxes: Any, links: Any, faces: Any) -> None:
+    faces[0] = faces[-4]
+
+
+def one_block_twice(boxes: Any, links: Any, faces: Any) -> None:
+    node, place = np.argwhere((links < 0) & (boxes[:, 0, 0] <= boxes[:, 0, 1]))[-1]
+    links[node, place] = ~((~links[node, place] >> 3 << 3) - 8)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (one_leaf_wider, "a leaf's"),
+        (an_empty_octant_with_a_box, "an octant"),
+        (two_faces_exchanged, "blocks hold"),
+        (one_face_twice, "every face"),
+        (one_block_twice, "every place"),
+    ],
+)
+def test_a_tree_that_is_altered_is_found(change: Any, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    octree = Octree(np.random.default_rng(5).normal(size=(900, 3)), np.arange(900).reshape(-1, 3))
+    octree._built = octree.mesh, altered(octree.tree, change)
+    monkeypatch.setattr(trees, "_octrees", lambda rng: [octree])
+    assert expected in broken("trees")
+
+
+def test_a_depth_overstated_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    octree = Octree(np.random.default_rng(5).normal(size=(900, 3)), np.arange(900).reshape(-1, 3))
+    octree._built = octree.mesh, replace(octree.tree, depth=octree.tree.depth + 1)
+    monkeypatch.setattr(trees, "_octrees", lambda rng: [octree])
+    assert broken("trees") == {"the depth"}
+
+
+@pytest.mark.parametrize("changed", [{"split": "sah"}, {"leaf_size": 6}, {"max_depth": 3}])
+def test_a_build_of_another_rule_is_found(changed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(builds, "Octree", lambda *given, **options: Octree(*given, **{**options, **changed}))
+    assert broken("builds") == {"a tree", "leaves hold"}
+
+
+def test_fans_over_notches_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(obj, "triangulate", lambda positions, corners, starts: polygons._fans(starts))
+    assert broken("outlines") == {"triangles cover"}
+
+
+def test_ears_of_polygons_that_cross_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ears, "is_simple", lambda outline, order: True)
+    assert broken("outlines") == {"a polygon"}
+
+
+def test_boxes_beyond_the_best_hit_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tree_boxes, "_limit", lambda ray, t: np.inf)
+    assert broken("openings") == {"a ray"}
+
+
+def test_boxes_of_another_level_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(openings, "boxes_at", lambda octree, level: tree_boxes.boxes_at(octree, level + 1))
+    assert broken("openings") == {"each level"}
 
 
 def test_scaling_in_another_order_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
