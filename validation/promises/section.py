@@ -17,6 +17,7 @@ from validation.promises.floors import check_floors
 from validation.promises.inside import check_inside
 from validation.promises.nearest import check_nearest
 from validation.promises.nesting import check_nesting
+from validation.promises.piles import check_piles
 from validation.promises.places import check_places
 from validation.promises.placing import check_placing
 from validation.promises.series import check_series
@@ -43,6 +44,7 @@ QUERIES: dict[str, Callable[[], Rows]] = {
     "sides of a half": lambda: check_halves(_random()),
     "series": lambda: check_series(_random()),
     "nearest faces": lambda: check_nearest(_random()),
+    "piles of hits": lambda: check_piles(_random()),
 }
 PICTURES: dict[str, Callable[[], Rows]] = {
     "cameras": lambda: check_cameras(_random(), _PLACED),
