@@ -21,8 +21,11 @@ _JUDGE = "each face in whole numbers"
 _ULPS, _NEAR, _BESIDE = 0.51, 2.0**-64, 2.0**-90
 # Where the nearest point is, as a share of the farthest corner's distance: u and v are quotients of float64.
 _OF_REACH = 2.0**-40
-_WEDGES = 2048
+_WEDGES, _PLACES = 64, 128
+# How near an edge a point is asked, in powers of two of the edge: below 2^-41 products are computed with all digits.
+_AWAY = -41.5, -39.0
 _SHELLS, _FACES = 20, 48
+_LARGE, _LEAST = 2.0**59 * np.array([[(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]]), 2.0**-1074
 
 
 def check_nearest(rng: Generator) -> list[dict[str, Any]]:
@@ -31,6 +34,10 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
     for faces, points in heaps(rng):
         for asked in (Octree.from_mesh(_mesh(faces)), BruteForce.from_mesh(_mesh(faces))):
             heap.append(_kept(asked, faces, points[::4]))
+    # So near a corner of a face so large that the way vanishes in units of the face.
+    heap.append(
+        _kept(Octree.from_mesh(_mesh(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
+    )
     for _ in range(_SHELLS):
         faces = _shell(rng)
         shell.append(_kept(Octree.from_mesh(_mesh(faces)), faces, np.zeros((1, 3))))
@@ -51,6 +58,8 @@ def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[
     beside = (found.distance <= _NEAR * reach) & (np.abs(found.distance - roots) <= _BESIDE * reach)
     way = np.linalg.norm((found.points - points) / reach[:, None], axis=1)
     kept: NDArray[np.bool_] = ((ulps < _ULPS) & (found.face <= lowest)) | beside
+    # 0 on the surface only, however near.
+    kept &= (found.distance == 0.0) == [square == 0 for square in squares]
     return kept & (np.abs(way - found.distance / reach) <= _OF_REACH)
 
 
@@ -65,23 +74,25 @@ def _nearest(point: Floats, faces: Floats) -> tuple[Fraction, int]:
 def _edges_kept(rng: Generator) -> NDArray[np.bool_]:
     """Pairs of faces along an edge, seen from so near it that its distance loses digits on the way.
 
-    Edges parallel to z, in planes of constant x, of constant y, and others; either face first, from either end.
+    Edges are parallel to z, in planes of constant x or y, and others. Points have smaller coordinates than corners, so
+    that differences lose digits too.
     """
-    a, b = rng.uniform(0.5, 1.0, (2, _WEDGES, 3)) * rng.choice([-1.0, 1.0], (2, _WEDGES, 3))
     kind = np.arange(_WEDGES) % 4
-    b[kind <= 1, 0] = a[kind <= 1, 0]
-    b[(kind == 0) | (kind == 2), 1] = a[(kind == 0) | (kind == 2), 1]
-    side = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
-    out = np.cross(side, rng.normal(size=(_WEDGES, 3)))
+    way = rng.uniform(0.9, 1.0, (_WEDGES, 3)) * rng.choice([-1.0, 1.0], (_WEDGES, 3))
+    way[kind <= 1, 0], way[(kind == 0) | (kind == 2), 1] = 0.0, 0.0
+    centre = rng.uniform(-1.0, 1.0, (_WEDGES, 3)) / 64.0
+    a, b = (centre + way * share for share in (-0.4999, 0.4999))
+    long = np.linalg.norm(way, axis=1)[:, None]
+    out = np.cross(way, rng.normal(size=(_WEDGES, 3)))
     out /= np.linalg.norm(out, axis=1)[:, None]
-    middle, across = (a + b) / 2, np.cross(side, out)
-    first = np.stack([a, b, middle - out + across], 1)
-    second = np.stack([b, a, middle - out - across], 1)
-    share, away = rng.uniform(0.3, 0.7, (_WEDGES, 1)), 2.0 ** rng.integers(-41, -33, (_WEDGES, 1))
-    points = a + share * (b - a) + away * out
+    across = np.cross(way / long, out)
+    faces = np.stack([a, b, centre - out + across, b, a, centre - out - across], 1).reshape(-1, 3, 3)
+    share = rng.uniform(0.49, 0.51, (_WEDGES, _PLACES, 1))
+    away = 2.0 ** rng.uniform(*_AWAY, (_WEDGES, _PLACES, 1)) * long[:, None]
+    points = a[:, None] + share * (b - a)[:, None] + away * out[:, None]
     # No other wedge comes so near.
-    octree = Octree.from_mesh(_mesh(np.stack([first, second], 1).reshape(-1, 3, 3)))
-    kept: NDArray[np.bool_] = octree.closest_point(points).face == 2 * np.arange(_WEDGES)
+    found = Octree.from_mesh(_mesh(faces)).closest_point(points)
+    kept: NDArray[np.bool_] = (found.face == 2 * np.arange(_WEDGES)[:, None]).ravel()
     return kept
 
 
