@@ -119,6 +119,6 @@ def queries(job: Job) -> list[Gate]:
 # A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
     "hits": (promised(promises.HITS), hits, extreme(1, 32), extreme(46, 46), extreme(49, 52), sweep, curves),
-    "queries": (queries, extreme(51, 54)),
+    "queries": (promised(promises.QUERIES), queries, extreme(51, 54)),
     "pictures": (promised(promises.PICTURES), pictures, extreme(33, 45), extreme(47, 48)),
 }

@@ -8,17 +8,22 @@ import numpy as np
 from validation.gates import Gate
 from validation.job import Job
 from validation.promises import table
+from validation.promises.angles import check_angles, check_halves
 from validation.promises.batches import check_batches, check_refits
 from validation.promises.bounces import check_bounces
 from validation.promises.bounds import check_bounds
 from validation.promises.builds import check_builds
 from validation.promises.cameras import check_cameras
 from validation.promises.floors import check_floors
+from validation.promises.inside import check_inside
+from validation.promises.nearest import check_nearest
 from validation.promises.nesting import check_nesting
 from validation.promises.openings import check_openings
 from validation.promises.outlines import check_outlines
+from validation.promises.piles import check_piles
 from validation.promises.places import check_places
 from validation.promises.placing import check_placing
+from validation.promises.series import check_series
 from validation.promises.trees import check_trees
 
 _SEED = 2031
@@ -42,6 +47,14 @@ HITS: dict[str, Callable[[], Rows]] = {
     "builds": lambda: check_builds(_random()),
     "polygons": lambda: check_outlines(_random(), _POLYGONS),
 }
+QUERIES: dict[str, Callable[[], Rows]] = {
+    "points inside": lambda: check_inside(_random()),
+    "winding numbers": lambda: check_angles(_random()),
+    "sides of a half": lambda: check_halves(_random()),
+    "series": lambda: check_series(_random()),
+    "nearest faces": lambda: check_nearest(_random()),
+    "piles of hits": lambda: check_piles(_random()),
+}
 PICTURES: dict[str, Callable[[], Rows]] = {
     "cameras": lambda: check_cameras(_random(), _PLACED),
     "objects placed": lambda: check_placing(_random(), _PLACED),
@@ -56,12 +69,12 @@ _REASON = "a promise holds each time that it is asked"
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step``: one for each check."""
-    return len(HITS) + len(PICTURES)
+    return len(HITS) + len(QUERIES) + len(PICTURES)
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask everything; returns a record for JSON, and a gate for each promise that it was never broken."""
-    rows, promises = judge({**HITS, **PICTURES}, job), table.read()
+    rows, promises = judge({**HITS, **QUERIES, **PICTURES}, job), table.read()
     missing = table.unjudged(promises)
     covered = Gate("promises", "the public contract", "pieces without a judge", len(missing), "at most", 0.0, _COVERED)
     record = {

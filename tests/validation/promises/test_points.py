@@ -1,0 +1,127 @@
+"""Each check of what points and piles are told finds nothing in the sound renderer, and finds what is broken."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from renderer.octree import Octree
+from validation.promises import angles, inside, nearest, piles, series, whole
+
+CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
+    "inside": inside.check_inside,
+    "angles": angles.check_angles,
+    "halves": angles.check_halves,
+    "series": series.check_series,
+    "nearest": nearest.check_nearest,
+    "piles": piles.check_piles,
+}
+
+
+def rows(name: str, seed: int = 5) -> list[dict[str, Any]]:
+    return CHECKS[name](np.random.default_rng(seed))
+
+
+def broken(name: str) -> set[str]:
+    """The first words of the promises that a check finds broken."""
+    return {" ".join(row["promise"].split()[:3]) for row in rows(name) if row["broken"]}
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+@pytest.mark.parametrize("name", CHECKS)
+def test_the_sound_renderer_keeps_all_promises(name: str, seed: int) -> None:
+    found = rows(name, seed)
+    assert found and all(row["asked"] > 0 for row in found)
+    assert [row["promise"] for row in found if row["broken"]] == []
+    assert len({row["promise"] for row in found}) == len(found)
+
+
+def changed(monkeypatch: pytest.MonkeyPatch, name: str, change: Callable[[Any], Any]) -> None:
+    """Let ``change`` alter what a query answers."""
+    sound = getattr(Octree, name)
+    monkeypatch.setattr(Octree, name, lambda self, *given, **options: change(sound(self, *given, **options)))
+
+
+def test_one_point_on_the_wrong_side_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong(answers: Any) -> Any:
+        answers[3] = ~answers[3]
+        return answers
+
+    changed(monkeypatch, "contains", wrong)
+    assert broken("inside") == {"inside is told"} and broken("halves") == {"inside a mesh"}
+
+
+def test_winding_numbers_a_little_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed(monkeypatch, "winding_number", lambda numbers: numbers * (1.0 + 1e-9))
+    assert broken("angles") == {"winding numbers near"}
+    assert broken("halves") == {"winding numbers are"}
+    assert broken("series") == {"a series errs"}
+
+
+def test_bounds_that_are_too_small_or_too_large_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = series.moments_of
+    for row, factor in ((series.SPREAD, 0.99), (series.SPREAD, 1.01), (series.SIZE, 1.01)):
+
+        def changed_moments(tree: Any, threads: int, row: int = row, factor: float = factor) -> Any:
+            moments = sound(tree, threads).copy()
+            moments[8 * row : 8 * row + 8] *= factor
+            return moments
+
+        monkeypatch.setattr(series, "moments_of", changed_moments)
+        expected = {"the bound of", "an octant has"} | ({"a series is"} if row == series.SPREAD else set())
+        assert broken("series") == expected
+
+
+def test_another_face_and_another_distance_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def another(found: Any) -> Any:
+        found.face[:] = np.where(found.face % 2 == 0, found.face + 1, found.face)
+        return found
+
+    def farther(found: Any) -> Any:
+        found.distance[:] = np.nextafter(found.distance, np.inf)
+        return found
+
+    with monkeypatch.context() as patch:
+        changed(patch, "closest_point", another)
+        assert "of two faces" in broken("nearest")
+    changed(monkeypatch, "closest_point", farther)
+    assert {"the nearest face", "the nearest of"} <= broken("nearest")
+
+
+def test_hits_in_another_order_and_places_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def turned(found: Any) -> Any:
+        found.face[:] = found.face[::-1].copy()
+        return found
+
+    def moved(found: Any) -> Any:
+        found.u[:] += 1e-12
+        return found
+
+    for change in (turned, moved):
+        with monkeypatch.context() as patch:
+            changed(patch, "all_hits", change)
+            assert broken("piles") == {"all hits of"}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_tetrahedra_of_all_sizes_have_points_on_them(seed: int) -> None:
+    on, beside = 0, 0
+    for faces, points in whole.heaps(np.random.default_rng(seed)):
+        for point in points:
+            told = [whole.volume(face) == 0 and inside.lies_on(face) for face in whole.relative(point, faces)[0]]
+            on, beside = on + any(told), beside + (not any(told))
+    assert on > 100 and beside > 100
+
+
+def test_whole_numbers_know_a_corner_an_edge_and_a_face() -> None:
+    face = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    squares = {(0.25, 0.25, 2.0): 4, (0.5, -1.0, 0.0): 1, (-3.0, -4.0, 0.0): 25, (1.0, 1.0, 0.0): 0.5}
+    for point, square in squares.items():
+        (corners,), unit = whole.relative(np.array(point), face)
+        assert whole.squared_distance(corners) / unit**2 == Fraction(square)
+    assert angles.turns(np.array([0.25, 0.25, -1e-300]), face) == pytest.approx(0.5)
+    # Above a corner with a right angle, from outside: an eighth of all directions at most.
+    assert angles.turns(np.array([0.0, 0.0, 1e-300]), face) == pytest.approx(-0.125)
+    assert angles.turns(np.array([0.25, 0.25, 0.0]), face) == 0.0

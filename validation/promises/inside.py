@@ -1,0 +1,54 @@
+"""Points in, on and beside closed solids whose coordinates are of all sizes: each solid alone, in whole numbers."""
+
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.octree import BruteForce, Octree
+from validation.promises.row import row
+from validation.promises.whole import Corner, Face, cross, dot, heaps, relative, volume
+
+Floats = NDArray[np.float64]
+
+
+def check_inside(rng: Generator) -> list[dict[str, Any]]:
+    """Tetrahedra that overlap, turned either way, some of them flat, by both rules, with and without surface."""
+    found = []
+    for faces, points in heaps(rng):
+        mesh = Mesh(faces.reshape(-1, 3), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3))
+        told = [_told(relative(point, faces)[0]) for point in points]
+        winding, on = (np.array(one) for one in zip(*told, strict=True))
+        for asked in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+            found += [
+                asked.contains(points) == ((winding != 0) | on),
+                asked.contains(points, boundary=False) == ((winding != 0) & ~on),
+                asked.contains(points, boundary=False, rule="even-odd") == ((winding % 2 == 1) & ~on),
+            ]
+    promise = "inside is told exactly, whatever the sizes of coordinates"
+    return [row(promise, "each tetrahedron in whole numbers", np.concatenate(found))]
+
+
+def _told(faces: list[Face]) -> tuple[int, bool]:
+    """How often tetrahedra wind around the origin, and whether it lies on a face of one."""
+    winding, on = 0, False
+    for k in range(0, len(faces), 4):
+        volumes = [volume(face) for face in faces[k : k + 4]]
+        # Outwards, all are above 0 where the origin lies inside.
+        winding += all(x > 0 for x in volumes) - all(x < 0 for x in volumes)
+        on = on or any(lies_on(face) for face, x in zip(faces[k : k + 4], volumes, strict=True) if x == 0)
+    return winding, on
+
+
+def lies_on(face: Face) -> bool:
+    """Whether the origin, in a face's plane, lies on the face, which may be a line or a point.
+
+    Within, it is to the left of all sides or to the right of all. On the line of such a face, coordinates tell.
+    """
+    a, b, c = face
+    sides: list[Corner] = [cross(a, b), cross(b, c), cross(c, a)]
+    if any(any(side) for side in sides):
+        return all(dot(sides[i], sides[i - 1]) >= 0 for i in range(3))
+    return all(min(x) <= 0 <= max(x) for x in zip(a, b, c, strict=True))

@@ -1,0 +1,108 @@
+"""Nearest faces where several are as near, or nearer by an ulp: at shared edges, around a point, and in heaps."""
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.octree import BruteForce, Octree
+from validation.oracle.distance import ulps_from_root
+from validation.promises.row import row
+from validation.promises.whole import heaps, relative, squared_distance
+
+Floats = NDArray[np.float64]
+_JUDGE = "each face in whole numbers"
+# The exact distance, rounded: half an ulp, and as little more as twice the digits leave. Where it is 2^-64 of the
+# farthest corner's or less it may be off by 2^-90 of that.
+_ULPS, _NEAR, _BESIDE = 0.51, 2.0**-64, 2.0**-90
+# Where the nearest point is, as a share of the farthest corner's distance: u and v are quotients of float64.
+_OF_REACH = 2.0**-40
+_WEDGES, _PLACES = 64, 128
+# How near an edge a point is asked, in powers of two of the edge: below 2^-41 products are computed with all digits.
+_AWAY = -41.5, -39.0
+_SHELLS, _FACES = 20, 48
+_LARGE, _LEAST = 2.0**59 * np.array([[(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]]), 2.0**-1074
+
+
+def check_nearest(rng: Generator) -> list[dict[str, Any]]:
+    """Distances, faces and nearest points."""
+    heap, shell = [], []
+    for faces, points in heaps(rng):
+        for asked in (Octree.from_mesh(_mesh(faces)), BruteForce.from_mesh(_mesh(faces))):
+            heap.append(_kept(asked, faces, points[::4]))
+    # So near a corner of a face so large that the way vanishes in units of the face.
+    heap.append(
+        _kept(Octree.from_mesh(_mesh(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
+    )
+    for _ in range(_SHELLS):
+        faces = _shell(rng)
+        shell.append(_kept(Octree.from_mesh(_mesh(faces)), faces, np.zeros((1, 3))))
+    return [
+        row("the nearest face and its distance, whatever the sizes of coordinates", _JUDGE, np.concatenate(heap)),
+        row("the nearest of faces that are as near but for some ulp", _JUDGE, np.concatenate(shell)),
+        row("of two faces whose edge is nearest the lower has it", "wedges of two faces", _edges_kept(rng)),
+    ]
+
+
+def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[np.bool_]:
+    """Which answers have the exact distance, no higher face than the lowest nearest, and a point at that distance."""
+    found = asked.closest_point(points)
+    squares, lowest = zip(*(_nearest(point, faces) for point in points), strict=True)
+    reach = np.abs(faces[found.face] - points[:, None]).max(axis=(1, 2))
+    ulps = np.array([ulps_from_root(d, square) for d, square in zip(found.distance, squares, strict=True)])
+    roots = np.array([math.sqrt(square) for square in squares])
+    beside = (found.distance <= _NEAR * reach) & (np.abs(found.distance - roots) <= _BESIDE * reach)
+    way = np.linalg.norm((found.points - points) / reach[:, None], axis=1)
+    kept: NDArray[np.bool_] = ((ulps < _ULPS) & (found.face <= lowest)) | beside
+    # 0 on the surface only, however near.
+    kept &= (found.distance == 0.0) == [square == 0 for square in squares]
+    return kept & (np.abs(way - found.distance / reach) <= _OF_REACH)
+
+
+def _nearest(point: Floats, faces: Floats) -> tuple[Fraction, int]:
+    """The least squared distance, and the lowest face that has it."""
+    whole, unit = relative(point, faces)
+    squares = [squared_distance(face) for face in whole]
+    least = min(squares)
+    return least / unit**2, squares.index(least)
+
+
+def _edges_kept(rng: Generator) -> NDArray[np.bool_]:
+    """Pairs of faces along an edge, seen from so near it that its distance loses digits on the way.
+
+    Edges are parallel to z, in planes of constant x or y, and others. Points have smaller coordinates than corners, so
+    that differences lose digits too.
+    """
+    kind = np.arange(_WEDGES) % 4
+    way = rng.uniform(0.9, 1.0, (_WEDGES, 3)) * rng.choice([-1.0, 1.0], (_WEDGES, 3))
+    way[kind <= 1, 0], way[(kind == 0) | (kind == 2), 1] = 0.0, 0.0
+    centre = rng.uniform(-1.0, 1.0, (_WEDGES, 3)) / 64.0
+    a, b = (centre + way * share for share in (-0.4999, 0.4999))
+    long = np.linalg.norm(way, axis=1)[:, None]
+    out = np.cross(way, rng.normal(size=(_WEDGES, 3)))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    across = np.cross(way / long, out)
+    faces = np.stack([a, b, centre - out + across, b, a, centre - out - across], 1).reshape(-1, 3, 3)
+    share = rng.uniform(0.49, 0.51, (_WEDGES, _PLACES, 1))
+    away = 2.0 ** rng.uniform(*_AWAY, (_WEDGES, _PLACES, 1)) * long[:, None]
+    points = a[:, None] + share * (b - a)[:, None] + away * out[:, None]
+    # No other wedge comes so near.
+    found = Octree.from_mesh(_mesh(faces)).closest_point(points)
+    kept: NDArray[np.bool_] = (found.face == 2 * np.arange(_WEDGES)[:, None]).ravel()
+    return kept
+
+
+def _shell(rng: Generator) -> Floats:
+    """Faces that are all at a distance of 1 from the origin, but for rounding: at corners, at edges and within."""
+    faces = rng.normal(size=(_FACES, 3, 3)) + 2.0 * rng.normal(size=(_FACES, 1, 3))
+    whole, unit = relative(np.zeros(3), faces)
+    distance: Floats = np.sqrt([float(squared_distance(face) / unit**2) for face in whole])
+    return faces / distance[:, None, None]
+
+
+def _mesh(faces: Floats) -> Mesh:
+    return Mesh(faces.reshape(-1, 3), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3))
