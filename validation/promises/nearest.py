@@ -19,6 +19,8 @@ _JUDGE = "each face in whole numbers"
 # The exact distance, rounded: half an ulp, and as little more as twice the digits leave. Where it is 2^-64 of the
 # farthest corner's or less it may be off by 2^-90 of that.
 _ULPS, _NEAR, _BESIDE = 0.51, 2.0**-64, 2.0**-90
+# Nearer than this share of it the distance may be 0.
+_VANISHING = Fraction(1, 2**900)
 # Where the nearest point is, as a share of the farthest corner's distance: u and v are quotients of float64.
 _OF_REACH = 2.0**-40
 _WEDGES, _PLACES = 64, 128
@@ -52,14 +54,19 @@ def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[
     """Which answers have the exact distance, no higher face than the lowest nearest, and a point at that distance."""
     found = asked.closest_point(points)
     squares, lowest = zip(*(_nearest(point, faces) for point in points), strict=True)
-    reach = np.abs(faces[found.face] - points[:, None]).max(axis=(1, 2))
+    named = np.minimum(found.face, len(faces) - 1)
+    reach, other = (np.abs(faces[list(face)] - points[:, None]).max(axis=(1, 2)) for face in (named, lowest))
     ulps = np.array([ulps_from_root(d, square) for d, square in zip(found.distance, squares, strict=True)])
     roots = np.array([math.sqrt(square) for square in squares])
-    beside = (found.distance <= _NEAR * reach) & (np.abs(found.distance - roots) <= _BESIDE * reach)
+    # Either face may have been measured that far off.
+    most = np.maximum(reach, other)
+    beside = (found.distance <= _NEAR * most) & (np.abs(found.distance - roots) <= _BESIDE * most)
     way = np.linalg.norm((found.points - points) / reach[:, None], axis=1)
-    kept: NDArray[np.bool_] = ((ulps < _ULPS) & (found.face <= lowest)) | beside
-    # 0 on the surface only, however near.
-    kept &= (found.distance == 0.0) == [square == 0 for square in squares]
+    kept: NDArray[np.bool_] = (((ulps < _ULPS) & (found.face <= lowest)) | beside) & (found.face == named)
+    # 0 on the surface, and else only where the promise lets it be.
+    least = [(Fraction(size) * _VANISHING) ** 2 for size in most.tolist()]
+    tiny = [square <= one for square, one in zip(squares, least, strict=True)]
+    kept &= np.where(found.distance == 0.0, tiny, np.array([square != 0 for square in squares]))
     return kept & (np.abs(way - found.distance / reach) <= _OF_REACH)
 
 
