@@ -27,7 +27,8 @@ _WEDGES, _PLACES = 64, 128
 # How near an edge a point is asked, in powers of two of the edge: below 2^-41 products are computed with all digits.
 _AWAY = -41.5, -39.0
 _SHELLS, _FACES = 20, 48
-_LARGE, _LEAST = 2.0**59 * np.array([[(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]]), 2.0**-1074
+_CORNER = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+_LARGE, _LEAST = 2.0**59 * np.array([_CORNER, _CORNER + [0.0, 0.0, 1.0]]), 2.0**-1074
 
 
 def check_nearest(rng: Generator) -> list[dict[str, Any]]:
@@ -54,15 +55,14 @@ def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[
     """Which answers have the exact distance, no higher face than the lowest nearest, and a point at that distance."""
     found = asked.closest_point(points)
     squares, lowest = zip(*(_nearest(point, faces) for point in points), strict=True)
-    named = np.minimum(found.face, len(faces) - 1)
-    reach, other = (np.abs(faces[list(face)] - points[:, None]).max(axis=(1, 2)) for face in (named, lowest))
+    reach, other = (np.abs(faces[list(face)] - points[:, None]).max(axis=(1, 2)) for face in (found.face, lowest))
     ulps = np.array([ulps_from_root(d, square) for d, square in zip(found.distance, squares, strict=True)])
     roots = np.array([math.sqrt(square) for square in squares])
     # Either face may have been measured that far off.
     most = np.maximum(reach, other)
     beside = (found.distance <= _NEAR * most) & (np.abs(found.distance - roots) <= _BESIDE * most)
     way = np.linalg.norm((found.points - points) / reach[:, None], axis=1)
-    kept: NDArray[np.bool_] = (((ulps < _ULPS) & (found.face <= lowest)) | beside) & (found.face == named)
+    kept: NDArray[np.bool_] = ((ulps < _ULPS) & (found.face <= lowest)) | beside
     # 0 on the surface, and else only where the promise lets it be.
     least = [(Fraction(size) * _VANISHING) ** 2 for size in most.tolist()]
     tiny = [square <= one for square, one in zip(squares, least, strict=True)]
