@@ -28,7 +28,8 @@ _WEDGES, _PLACES = 64, 128
 _AWAY = -41.5, -39.0
 _SHELLS, _FACES = 20, 48
 _CORNER = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
-_LARGE, _LEAST = 2.0**59 * np.array([_CORNER, _CORNER + [0.0, 0.0, 1.0]]), 2.0**-1074
+_ABOVE = np.array([0.0, 0.0, 1.0])
+_LARGE, _LEAST = 2.0**59 * np.stack([_CORNER, _CORNER + _ABOVE]), 2.0**-1074
 
 
 def check_nearest(rng: Generator) -> list[dict[str, Any]]:
