@@ -17,4 +17,7 @@ EQUIVALENT: dict[str, str] = {
         "the faces of the last level stay unsorted: wider boxes and more candidates, the same answers",
     "validation.oracle.star #0: 1 -> 2": "points are judged one by one, however many are taken together",
     "validation.references.mitsuba.path #0: 1000 -> 1001": "no path has as many edges, so none ends by chance",
+    "validation.oracle.rounding.RayView._encloses #0: (px * qy - py * qx > 0) == (qy > py) -> "
+    "(px * qy - py * qx > 0) != (qy > py)":
+        "a closed outline crosses a line an even number of times, so it passes a point on either side equally odd",
 }  # fmt: skip

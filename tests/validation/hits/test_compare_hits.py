@@ -325,6 +325,9 @@ def test_malformed_hits_are_refused():
         answer(np.nan, 0)
     with pytest.raises(ValueError, match="finite t exactly where face >= 0"):
         answer(1.0, -1)
+    for t, face in ((np.zeros((2, 2)), np.zeros((2, 2), int)), (np.zeros(2), np.zeros(3, int))):
+        with pytest.raises(ValueError, match=r"expected two arrays \(n,\), got \("):
+            HitArrays(t, face)
     with pytest.raises(ValueError, match="equal numbers of rays, got 1, 400 and 400"):
         compare(answer(1.0, 0), THEIRS, VERTICES, FACES, RAYS)
     with pytest.raises(ValueError, match="equal numbers of rays"):

@@ -43,5 +43,8 @@ def test_what_it_cannot_judge_is_refused(vertices, faces, said):
 def test_points_and_open_meshes_that_it_cannot_judge_are_refused():
     with pytest.raises(ValueError, match="points: expected whole numbers"):
         Star(CORNERS, FACES).sides(np.array([[0.5, 0.0, 0.0]]))
+    with pytest.raises(ValueError, match="points: expected whole numbers up to"):
+        Star(CORNERS, FACES).sides(np.array([[2.0**16 + 1, 0.0, 0.0]]))
+    assert Star(CORNERS, FACES).sides(np.array([[2.0**16, 0.0, 0.0]])) == [-1]
     with pytest.raises(ValueError, match="faces: expected a closed mesh"):
         Star(CORNERS, FACES[1:]).sides(np.array([[1.0, 1.0, 1.0]]))

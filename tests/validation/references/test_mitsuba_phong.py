@@ -65,6 +65,25 @@ def test_only_the_mirror_is_sampled() -> None:
         assert max(bsdf.sample(context(component), si, 0.1, anywhere)[1]) == 0.0
 
 
+def test_a_surface_says_which_components_it_has() -> None:
+    """An integrator samples lights only for smooth components, and paths only for the others."""
+    both = int(mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide)
+    smooth = int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.GlossyReflection) | both
+    mirror, refraction = (int(flag) | both for flag in (mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission))
+    black = Phong(diffuse=(0.0, 0.0, 0.0))
+    for bsdf, flags in (
+        (PhongMirror(SHINY), smooth | mirror),
+        (PhongMirror(SHINY.model_copy(update={"reflectance": (0.0, 0.0, 0.0)})), smooth),
+        (PhongMirror(black.model_copy(update={"reflectance": (1.0, 1.0, 1.0)})), mirror),
+        (PhongMirror(black), 0),
+    ):
+        assert [int(bsdf.flags(i)) for i in range(bsdf.component_count())] == [smooth, mirror]
+        assert int(bsdf.flags()) == flags
+    glass = Glass(Dielectric(ior=1.5))
+    kinds = [int(glass.flags(i)) & (mirror | refraction) & ~both for i in range(glass.component_count())]
+    assert kinds == [int(mi.BSDFFlags.DeltaReflection), int(mi.BSDFFlags.DeltaTransmission)]
+
+
 def test_glass_draws_one_branch_or_the_one_that_is_asked_for() -> None:
     glass, si = Glass(Dielectric(type="dielectric")), interaction((0.0, 0.0, 1.0))
     drawn = [glass.sample(mi.BSDFContext(), si, u, mi.Point2f(0.5, 0.5))[0].wo.z for u in (0.039, 0.041)]
