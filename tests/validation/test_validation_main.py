@@ -263,7 +263,7 @@ class Without:
 sys.meta_path.insert(0, Without())
 from pathlib import Path
 from validation import suite
-from validation.promises import table
+from validation.promises.contract import table
 assert suite._outcome({}, [], Path("nowhere"))["gates"] == [] and table.unjudged(table.read()) == []
 """
     subprocess.run([sys.executable, "-c", program], cwd=SCENE.parents[1], check=True)

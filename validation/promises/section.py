@@ -7,24 +7,24 @@ import numpy as np
 
 from validation.gates import Gate
 from validation.job import Job
-from validation.promises import table
-from validation.promises.angles import check_angles, check_halves
-from validation.promises.batches import check_batches, check_refits
-from validation.promises.bounces import check_bounces
-from validation.promises.bounds import check_bounds
-from validation.promises.builds import check_builds
-from validation.promises.cameras import check_cameras
-from validation.promises.floors import check_floors
-from validation.promises.inside import check_inside
-from validation.promises.nearest import check_nearest
-from validation.promises.nesting import check_nesting
-from validation.promises.openings import check_openings
-from validation.promises.outlines import check_outlines
-from validation.promises.piles import check_piles
-from validation.promises.places import check_places
-from validation.promises.placing import check_placing
-from validation.promises.series import check_series
-from validation.promises.trees import check_trees
+from validation.promises.contract import table
+from validation.promises.hits.batches import check_batches, check_refits
+from validation.promises.hits.bounds import check_bounds
+from validation.promises.hits.builds import check_builds
+from validation.promises.hits.outlines import check_outlines
+from validation.promises.hits.places import check_places
+from validation.promises.hits.trees import check_trees
+from validation.promises.pictures.bounces import check_bounces
+from validation.promises.pictures.cameras import check_cameras
+from validation.promises.pictures.floors import check_floors
+from validation.promises.pictures.nesting import check_nesting
+from validation.promises.pictures.openings import check_openings
+from validation.promises.pictures.placing import check_placing
+from validation.promises.queries.angles import check_angles, check_halves
+from validation.promises.queries.inside import check_inside
+from validation.promises.queries.nearest import check_nearest
+from validation.promises.queries.piles import check_piles
+from validation.promises.queries.series import check_series
 
 _SEED = 2031
 _RAYS = 4096

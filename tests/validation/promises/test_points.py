@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from renderer.octree import Octree
-from validation.promises import angles, inside, nearest, piles, series, whole
+from validation.promises.queries import angles, inside, nearest, piles, series, whole
 
 CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
     "inside": inside.check_inside,

@@ -16,21 +16,9 @@ from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
 from renderer.trace.layout import Tree
 from renderer.tree import refit
-from validation.promises import (
-    batches,
-    bounces,
-    bounds,
-    builds,
-    cameras,
-    floors,
-    nesting,
-    openings,
-    outlines,
-    places,
-    placing,
-    trees,
-)
-from validation.promises.ways import ways
+from validation.promises.hits import batches, bounds, builds, outlines, places, trees
+from validation.promises.hits.ways import ways
+from validation.promises.pictures import bounces, cameras, floors, nesting, openings, placing
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),

@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import BaseModel, BeforeValidator, Field, create_model, field_validator, model_validator
 
-from validation.promises import contract, table
-from validation.promises.contract import Piece, pieces
-from validation.promises.fields import described
+from validation.promises.contract import pieces as contract
+from validation.promises.contract import table
+from validation.promises.contract.fields import described
+from validation.promises.contract.pieces import Piece, pieces
 from validation.sections import NAMES
 
 ROOT = Path(__file__).parents[3]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from renderer.scene.fields import Color
 from renderer.scene.scene import Floor, Scene
-from validation.promises.pictures import equal, from_above, glowing, shown
+from validation.promises.pictures.glowing import equal, from_above, glowing, shown
 from validation.promises.row import row
 
 _COLORS: tuple[Color, Color] = ((1.0, 0.5, 0.25), (0.125, 0.75, 0.0))

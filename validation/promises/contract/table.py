@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from validation.promises.contract import Piece, contract
+from validation.promises.contract.pieces import Piece, contract
 
 TABLE = Path(__file__).with_name("table.toml")
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 import renderer
 from renderer import cli
-from validation.promises.fields import described
+from validation.promises.contract.fields import described
 
 # A line that begins the definition of a name: "t_max   the last ..." or "faces : (F, 3) ...".
 _DEFINITION = re.compile(r"^\s*[\w.]+(?:, [\w.]+)*(?:  +| : )(?=\S)")

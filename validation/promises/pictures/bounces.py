@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
 from renderer.scene.scene import Scene
-from validation.promises.pictures import BLACK, equal, glowing, shown, square, thing
+from validation.promises.pictures.glowing import BLACK, equal, glowing, shown, square, thing
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from validation.promises.queries.whole import Face, dot, heaps, relative, volume
 from validation.promises.row import row
-from validation.promises.whole import Face, dot, heaps, relative, volume
 
 Floats = NDArray[np.float64]
 _JUDGE = "solid angles in whole numbers"

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.promises.hits.ways import Indices, asked
 from validation.promises.row import row
-from validation.promises.ways import Indices, asked
 
 Floats = NDArray[np.float64]
 # Hits whose plane the ray meets at a sine below this say little: their u and v err by its inverse.

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
 from validation.oracle.distance import ulps_from_root
+from validation.promises.queries.whole import heaps, relative, squared_distance
 from validation.promises.row import row
-from validation.promises.whole import heaps, relative, squared_distance
 
 Floats = NDArray[np.float64]
 _JUDGE = "each face in whole numbers"

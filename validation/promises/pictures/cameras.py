@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from renderer.picture.render import render
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.scene.scene import Floor, Scene
-from validation.promises.pictures import glowing
+from validation.promises.pictures.glowing import glowing
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]

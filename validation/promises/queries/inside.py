@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.promises.queries.whole import Corner, Face, cross, dot, heaps, relative, volume
 from validation.promises.row import row
-from validation.promises.whole import Corner, Face, cross, dot, heaps, relative, volume
 
 Floats = NDArray[np.float64]
 

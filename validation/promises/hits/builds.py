@@ -9,9 +9,10 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.octree import Octree
-from validation.promises import levels, splits
+from validation.promises import levels
+from validation.promises.hits import splits
+from validation.promises.hits.splits import Choice, Rule
 from validation.promises.row import row
-from validation.promises.splits import Choice, Rule
 
 Floats = NDArray[np.float64]
 _SPLITS: tuple[Literal["sah", "midpoint"], ...] = ("sah", "midpoint")

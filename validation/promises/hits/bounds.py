@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.promises.hits.ways import Indices, asked
 from validation.promises.row import row
 from validation.promises.squares import squares
-from validation.promises.ways import Indices, asked
 
 Floats = NDArray[np.float64]
 _PLANES = 40

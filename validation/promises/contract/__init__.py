@@ -1,0 +1,1 @@
+"""The public contract, piece by piece, and who judges each piece."""

@@ -1,0 +1,1 @@
+"""Promises of questions asked of a mesh."""
