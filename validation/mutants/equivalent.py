@@ -20,4 +20,6 @@ EQUIVALENT: dict[str, str] = {
     "validation.oracle.rounding.RayView._encloses #0: (px * qy - py * qx > 0) == (qy > py) -> "
     "(px * qy - py * qx > 0) != (qy > py)":
         "a closed outline crosses a line an even number of times, so it passes a point on either side equally odd",
+    "validation.oracle.exact._possible #0: values > bounds -> (values) >= (bounds)":
+        "a bound is larger than any error, so a value as large as its bound has its sign too",
 }  # fmt: skip
