@@ -17,6 +17,7 @@ from validation.defects.list import DEFECTS
 from validation.gates import Gate
 from validation.job import Job
 from validation.mutants import run as mutants
+from validation.mutants.equivalent import EQUIVALENT
 from validation.mutants.verdict import Verdict
 from validation.report import page as report
 from validation.report import schema
@@ -293,6 +294,12 @@ def test_mutants_are_judged_listed_and_drawn(
         assert len(judged) == 6
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "6 of 6 mutants by seed 3 are judged" in page and "Nothing noticed these in Python: 3" in page
+    # One that is proved to change no answer is not run.
+    monkeypatch.setitem(EQUIVALENT, judged[-1], "the same either way")
+    (tmp_path / "mutants.json").unlink()
+    command.main(["--mutants", "6", "--seed", "3", *output])
+    assert len(judged) == 11 and judged[5] not in judged[6:]
+    assert "1 change no answer" in capsys.readouterr().out
 
 
 def test_stability_counts_its_steps(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from renderer.process.files import write_atomically
+from validation.mutants.equivalent import EQUIVALENT
 from validation.mutants.judge import GROUPS, gates, judge, noticed_by_gates
 from validation.mutants.record import Record, digest, summary
 from validation.mutants.sites import Mutant, chosen, mutants
@@ -25,7 +26,7 @@ _PATIENCE = 3600.0
 
 def run(target: str, count: int, seed: int, output: Path, step: Callable[[str], None]) -> dict[str, Any]:
     """Judge ``count`` mutants of a target, chosen by ``seed``; those that its record in ``output`` has are not judged
-    again.
+    again, and those that are proved to change no answer not at all.
 
     The file is written after each, so that a run that is cut off loses nothing. Returns ``record.summary``.
     """
@@ -39,6 +40,10 @@ def run(target: str, count: int, seed: int, output: Path, step: Callable[[str], 
         record.write(seed, some)
 
     record.forget(waiting)
+    for mutant in waiting:
+        if mutant.key in EQUIVALENT:
+            record.add(mutant, Verdict(None, False, None, 0.0))
+    waiting = [mutant for mutant in waiting if mutant.key not in EQUIVALENT]
     record.write(seed, some)
     if waiting:
         with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
