@@ -22,4 +22,6 @@ EQUIVALENT: dict[str, str] = {
         "a closed outline crosses a line an even number of times, so it passes a point on either side equally odd",
     "validation.oracle.exact._possible #0: values > bounds -> (values) >= (bounds)":
         "a bound is larger than any error, so a value as large as its bound has its sign too",
+    "validation.oracle.distance.squared_distance #0: _from_side(point, p, q) -> _from_side(point, q, p)":
+        "a side is the same from either end, and nothing is rounded",
 }  # fmt: skip
