@@ -70,13 +70,19 @@ def check_refits() -> list[dict[str, Any]]:
             octree = Octree.from_mesh(mesh, leaf_size=4)
             octree.refit(moved)
             found[name] += [_meets_all(octree, moved, along) for along in range(3)]
+    sizes: list[NDArray[np.bool_]] = []
+    octree = Octree.from_mesh(mesh, leaf_size=4)
+    for size in (2.0**100, 2.0**-100, 1.0):
+        octree.refit(mesh.vertices * size)
+        sizes += [_meets_all(octree, mesh.vertices * size, along, size) for along in range(3)]
     return [
-        row(f"a refit along {name}, growing, shrinking and moving", "a lattice of squares", np.concatenate(kept))
-        for name, kept in found.items()
-    ]
+        *(row(f"a refit along {name}, growing, shrinking and moving", "a lattice of squares", np.concatenate(kept))
+          for name, kept in found.items()),
+        row("a refit to sizes that the tree counts in other units", "a lattice of squares", np.concatenate(sizes)),
+    ]  # fmt: skip
 
 
-def _meets_all(octree: Octree, vertices: Floats, along: int) -> NDArray[np.bool_]:
+def _meets_all(octree: Octree, vertices: Floats, along: int, size: float = 1.0) -> NDArray[np.bool_]:
     """Whether a ray along an axis at each square that faces it meets that square, from just before it and from afar."""
     corners = vertices.reshape(-1, 4, 3)[along::3]
     middle = (3 * corners[:, 0] + corners[:, 1] + 2 * corners[:, 2] + 2 * corners[:, 3]) / 8
@@ -84,10 +90,10 @@ def _meets_all(octree: Octree, vertices: Floats, along: int) -> NDArray[np.bool_
     directions[:, along] = 1.0
     face = np.arange(len(corners)) * 6 + 2 * along
     kept = []
-    for t, sign in ((0.0625, 1.0), (0.0625, -1.0)):
+    for t, sign in ((0.0625 * size, 1.0), (0.0625 * size, -1.0)):
         hits = octree.closest_hit(middle - t * sign * directions, sign * directions)
         kept.append((hits.face // 2 == face // 2) & (hits.t == t))
-    number = octree.count_hits(middle - 1000.0 * directions, directions)
+    number = octree.count_hits(middle - 1000.0 * size * directions, directions)
     return np.concatenate([*kept, number == _SIDE // 8])
 
 

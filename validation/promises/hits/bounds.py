@@ -53,7 +53,31 @@ def check_bounds(rng: Generator, count: int) -> list[dict[str, Any]]:
 
         kept = asked(ask, octree, brute, count)
         found.append(row(f"[t_min, t_max] is closed: {name}", "planes at whole 64ths", kept))
-    return found
+    return [
+        *found,
+        row("a t_min above 0, however small, leaves out a hit at 0", "planes at whole 64ths", _started(count)),
+    ]
+
+
+def _started(count: int) -> NDArray[np.bool_]:
+    """Rays that begin on a plane, of a usual mesh and of those that the tree scales up or down."""
+    mesh, heights = _pile()
+    plane = np.arange(count) // 16 % (_PLANES - 1)
+    directions = np.concatenate([_SLOPES[plane % 4], np.ones((count, 1))], 1)
+    origins = np.concatenate([np.arange(2 * count).reshape(-1, 2) % 17 / 16 - 0.5, heights[plane][:, None]], 1)
+    kept = []
+    for size in (1.0, 2.0**100, 2.0**-100):
+        large = Mesh(mesh.vertices * size, mesh.faces)
+        for least, expected in ((0.0, plane), (2.0**-1074, plane + 1)):
+
+            def ask(tracer: Octree | BruteForce, rows: Indices, size: float = size, least: float = least,
+                    expected: Indices = expected) -> NDArray[np.bool_]:  # fmt: skip
+                face = tracer.closest_hit(origins[rows] * size, directions[rows], t_min=least).face
+                met: NDArray[np.bool_] = np.where(face >= 0, face // 2, -1) == expected[rows]
+                return met
+
+            kept.append(asked(ask, Octree.from_mesh(large, leaf_size=4), BruteForce.from_mesh(large), count))
+    return np.concatenate(kept)
 
 
 def _pile() -> tuple[Mesh, Floats]:

@@ -52,7 +52,20 @@ def check_places(rng: Generator, count: int) -> list[dict[str, Any]]:
 
     met = asked(ask, octree, brute, count)
     rows_ = [row(what, _JUDGE, np.concatenate(kept)) for what, kept in found.items()]
-    return [*rows_, row("each ray at a face meets one", _JUDGE, met)]
+    return [
+        *rows_,
+        row("each ray at a face meets one", _JUDGE, met),
+        row("normals of faces of any size have unit length", "the z axis", _sized()),
+    ]
+
+
+def _sized() -> NDArray[np.bool_]:
+    """Triangles in planes of constant z, from denormals to sides that float64 cannot hold."""
+    corner = np.array([(-1.0, -1.0, 0.5), (1.0, -1.0, 0.5), (-0.5, 1.0, 0.5)])
+    corners = corner * 2.0 ** np.append(np.arange(-1070, 1023, 7), 1023)[:, None, None]
+    mesh = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3))
+    kept: NDArray[np.bool_] = (mesh.face_normals() == [0.0, 0.0, 1.0]).all(axis=1)
+    return kept
 
 
 def _judged(who: Any, exact: _Exact, size: float) -> dict[str, NDArray[np.bool_]]:
