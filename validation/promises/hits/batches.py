@@ -49,6 +49,9 @@ def _answers(octree: Octree, number: NDArray[np.int64]) -> dict[str, NDArray[np.
     rows = np.flatnonzero(~beside)
     near = octree.closest_point(origins)
     below = origins - [0.0, 0.0, 20.0]
+    # A limit of its own for each row, which every other row's answer lies beyond.
+    limit, within = height + np.where(number % 2, 0.5, -0.5), number % 2 == 1
+    short = octree.closest_hit(origins, down, t_max=limit)
     return {
         "closest_hit": (hits.face == face) & (hits.t == t),
         "any_hit": octree.any_hit(origins, down) == ~beside,
@@ -56,7 +59,30 @@ def _answers(octree: Octree, number: NDArray[np.int64]) -> dict[str, NDArray[np.
         "all_hits": np.atleast_1d(np.array_equal(every.ray, rows) and np.array_equal(every.face, face[rows])),
         "closest_point": (near.distance == height) & (near.face == face) | beside,
         "visible": octree.visible(origins, below) == beside,
+        "t_max of each ray": short.hit == within & ~beside,
+        "max_distance of each point": ((octree.closest_point(origins, limit).face >= 0) == within) | beside,
+        "the dimensions of the rays": _shaped(octree, origins, down),
     }
+
+
+def _shaped(octree: Octree, origins: Floats, down: Floats) -> NDArray[np.bool_]:
+    """Whether answers to rays in two dimensions have these."""
+    shape = (1, len(origins))
+    hits = octree.closest_hit(origins[None], down[None], t_error=True)
+    assert hits.t_error is not None
+    number = octree.count_hits(origins[None], down[None])
+    given = (
+        hits.t,
+        hits.face,
+        hits.u,
+        hits.v,
+        hits.t_error,
+        hits.hit,
+        number,
+        octree.closest_point(origins[None]).face,
+    )
+    whole = [one.shape == shape for one in given]
+    return np.array([*whole, hits.points.shape == hits.normals.shape == (*shape, 3)])
 
 
 def check_refits() -> list[dict[str, Any]]:
