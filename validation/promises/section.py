@@ -11,6 +11,7 @@ from validation.promises.contract import table
 from validation.promises.hits.batches import check_batches, check_refits
 from validation.promises.hits.bounds import check_bounds
 from validation.promises.hits.builds import check_builds
+from validation.promises.hits.errors import check_errors
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
 from validation.promises.hits.trees import check_trees
@@ -41,6 +42,7 @@ def _random() -> np.random.Generator:
 HITS: dict[str, Callable[[], Rows]] = {
     "places of hits": lambda: check_places(_random(), _RAYS),
     "bounds of rays": lambda: check_bounds(_random(), _RAYS),
+    "errors of t": check_errors,
     "sizes of batches": check_batches,
     "refits": check_refits,
     "trees": lambda: check_trees(_random()),

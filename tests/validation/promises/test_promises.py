@@ -16,13 +16,14 @@ from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
 from renderer.trace.layout import Tree
 from renderer.tree import refit
-from validation.promises.hits import batches, bounds, builds, outlines, places, trees
+from validation.promises.hits import batches, bounds, builds, errors, outlines, places, trees
 from validation.promises.hits.ways import ways
 from validation.promises.pictures import bounces, cameras, floors, nesting, openings, placing
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
     "bounds": lambda: bounds.check_bounds(np.random.default_rng(5), 256),
+    "errors": errors.check_errors,
     "batches": lambda: batches.check_batches((17, 1025)),
     "refits": batches.check_refits,
     "trees": lambda: trees.check_trees(np.random.default_rng(5)),
@@ -70,6 +71,18 @@ def test_bounds_that_are_open_are_found(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr(Octree, "closest_hit", shrunk)
     assert "[t_min, t_max]" in broken("bounds")
+
+
+def test_a_bound_without_the_last_rounding_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Octree.all_hits
+
+    def narrow(self: Octree, *given: Any, **options: Any) -> Any:
+        found = sound(self, *given, **options)
+        found.t_error[:] = np.where(found.t < 2.0**-1000, found.t * 2.0**-50, found.t_error)
+        return found
+
+    monkeypatch.setattr(Octree, "all_hits", narrow)
+    assert broken("errors") == {"t_error bounds"}
 
 
 def test_a_row_of_another_ray_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,46 @@
+"""How far rounding may have moved t, judged by planes whose t is a quotient that float64 must round."""
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.octree import BruteForce, Octree
+from validation.promises.row import row
+from validation.promises.squares import squares
+
+# Powers of two, of sizes and of t: usual, and denormal.
+_SIZES = (0, 100, -330)
+_TIMES = (*range(-4, 5), *range(-1028, -1010, 2))
+# Shorter and longer directions are refused.
+_SHORTEST, _LONGEST = -298, 697
+_PLANES = 24
+
+
+def check_errors() -> list[dict[str, Any]]:
+    """Rays with directions so long that t is denormal, on meshes that the tree counts in other units too."""
+    corners = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+    heights = 1.0 + np.arange(_PLANES) / 7.0
+    mesh = squares(np.array([[(x, y, z) for x, y in corners] for z in heights]))
+    kept = []
+    for size in _SIZES:
+        scaled = Mesh(np.ldexp(mesh.vertices, size), mesh.faces)
+        times = [time for time in _TIMES if _SHORTEST <= size - time <= _LONGEST]
+        for tracer in (Octree.from_mesh(scaled), BruteForce.from_mesh(scaled)):
+            kept += [_bounded(tracer, np.ldexp(heights, size), math.ldexp(3.0, size - time)) for time in times]
+    return [row("t_error bounds the error of t, of denormal t too", "quotients in whole numbers", np.concatenate(kept))]
+
+
+def _bounded(tracer: Octree | BruteForce, heights: NDArray[np.float64], long: float) -> NDArray[np.bool_]:
+    """Whether a ray from z = 0 along z, with a direction so long, meets all planes, each at its t."""
+    found = tracer.all_hits([[heights[0] / 8, heights[0] / 4, 0.0]], [[0.0, 0.0, long]], contacts=False, t_error=True)
+    assert found.t_error is not None
+    exact = [Fraction(heights[face // 2]) / Fraction(long) for face in found.face.tolist()]
+    near = [
+        abs(Fraction(t) - whole) <= Fraction(error)
+        for t, whole, error in zip(found.t, exact, found.t_error, strict=True)
+    ]
+    return np.array([*near, len(near) == len(heights)])
