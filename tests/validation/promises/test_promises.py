@@ -66,7 +66,7 @@ def test_normals_of_the_other_side_are_found(monkeypatch: pytest.MonkeyPatch) ->
 def test_bounds_that_are_open_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = Octree.closest_hit
 
-    def shrunk(self: Octree, o: Any, d: Any, *, t_min: Any, t_max: Any) -> Any:
+    def shrunk(self: Octree, o: Any, d: Any, *, t_min: Any, t_max: Any = np.inf) -> Any:
         return sound(self, o, d, t_min=np.nextafter(t_min, np.inf), t_max=t_max)
 
     monkeypatch.setattr(Octree, "closest_hit", shrunk)
