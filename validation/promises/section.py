@@ -14,6 +14,7 @@ from validation.promises.hits.builds import check_builds
 from validation.promises.hits.errors import check_errors
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
+from validation.promises.hits.starts import check_starts
 from validation.promises.hits.trees import check_trees
 from validation.promises.pictures.bounces import check_bounces
 from validation.promises.pictures.cameras import check_cameras
@@ -43,6 +44,7 @@ HITS: dict[str, Callable[[], Rows]] = {
     "places of hits": lambda: check_places(_random(), _RAYS),
     "bounds of rays": lambda: check_bounds(_random(), _RAYS),
     "errors of t": check_errors,
+    "starts": lambda: check_starts(_random()),
     "sizes of batches": check_batches,
     "refits": check_refits,
     "trees": lambda: check_trees(_random()),

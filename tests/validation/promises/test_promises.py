@@ -16,7 +16,7 @@ from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
 from renderer.trace.layout import Tree
 from renderer.tree import refit
-from validation.promises.hits import batches, bounds, builds, errors, outlines, places, trees
+from validation.promises.hits import batches, bounds, builds, errors, outlines, places, starts, trees
 from validation.promises.hits.ways import ways
 from validation.promises.pictures import bounces, cameras, floors, nesting, openings, placing
 
@@ -24,6 +24,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
     "bounds": lambda: bounds.check_bounds(np.random.default_rng(5), 256),
     "errors": errors.check_errors,
+    "starts": lambda: starts.check_starts(np.random.default_rng(5)),
     "batches": lambda: batches.check_batches((17, 1025)),
     "refits": batches.check_refits,
     "trees": lambda: trees.check_trees(np.random.default_rng(5)),
@@ -83,6 +84,16 @@ def test_a_bound_without_the_last_rounding_is_found(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(Octree, "all_hits", narrow)
     assert broken("errors") == {"t_error bounds"}
+
+
+def test_a_start_on_its_face_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Octree.all_hits
+
+    def unmoved(self: Octree, *given: Any, leaving: Any, **options: Any) -> Any:
+        return sound(self, *given, **options)
+
+    monkeypatch.setattr(Octree, "all_hits", unmoved)
+    assert broken("starts") == {"a ray"}
 
 
 def test_a_row_of_another_ray_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
