@@ -27,6 +27,7 @@ from validation.promises.queries.inside import check_inside
 from validation.promises.queries.nearest import check_nearest
 from validation.promises.queries.piles import check_piles
 from validation.promises.queries.series import check_series
+from validation.promises.queries.signed import check_signed
 
 _SEED = 2031
 _RAYS = 4096
@@ -57,6 +58,7 @@ QUERIES: dict[str, Callable[[], Rows]] = {
     "sides of a half": lambda: check_halves(_random()),
     "series": lambda: check_series(_random()),
     "nearest faces": lambda: check_nearest(_random()),
+    "signed distances": lambda: check_signed(_random()),
     "piles of hits": lambda: check_piles(_random()),
 }
 PICTURES: dict[str, Callable[[], Rows]] = {

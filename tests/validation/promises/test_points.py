@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from renderer.octree import Octree
-from validation.promises.queries import angles, inside, nearest, piles, series, whole
+from validation.promises.queries import angles, inside, nearest, piles, series, signed, whole
 
 CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
     "inside": inside.check_inside,
@@ -16,6 +16,7 @@ CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
     "halves": angles.check_halves,
     "series": series.check_series,
     "nearest": nearest.check_nearest,
+    "signed": signed.check_signed,
     "piles": piles.check_piles,
 }
 
@@ -125,3 +126,13 @@ def test_whole_numbers_know_a_corner_an_edge_and_a_face() -> None:
     # Above a corner with a right angle, from outside: an eighth of all directions at most.
     assert angles.turns(np.array([0.0, 0.0, 1e-300]), face) == pytest.approx(-0.125)
     assert angles.turns(np.array([0.25, 0.25, 0.0]), face) == 0.0
+
+
+def test_a_sign_that_is_lost_beyond_the_limit_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed(monkeypatch, "signed_distance", lambda found: np.where(np.isinf(found), np.inf, found))
+    assert broken("signed") == {"beyond its limit"}
+
+
+def test_the_other_sign_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed(monkeypatch, "signed_distance", lambda found: -found)
+    assert "a signed distance" in broken("signed")
