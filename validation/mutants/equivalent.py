@@ -24,4 +24,9 @@ EQUIVALENT: dict[str, str] = {
         "a bound is larger than any error, so a value as large as its bound has its sign too",
     "validation.oracle.distance.squared_distance #0: _from_side(point, p, q) -> _from_side(point, q, p)":
         "a side is the same from either end, and nothing is rounded",
+    "renderer.inside.crossings._cross_exactly #0: s0 != 0 or s1 != 0 or s2 != 0 -> "
+    "(s0 != 0) and (s1 != 0) and (s2 != 0)":
+        "a point in a face's plane that lies within the outline seen along one axis, whose area is not 0, lies on the face",
+    "renderer.points.signs.volume_sign #2: 0 -> 1":
+        "any power of two turns no sign, and what leaves the range then is answered in rational arithmetic",
 }  # fmt: skip
