@@ -26,7 +26,7 @@ EQUIVALENT: dict[str, str] = {
         "a side is the same from either end, and nothing is rounded",
     "renderer.inside.crossings._cross_exactly #0: s0 != 0 or s1 != 0 or s2 != 0 -> "
     "(s0 != 0) and (s1 != 0) and (s2 != 0)":
-        "a point in a face's plane that lies within the outline seen along one axis, whose area is not 0, lies on the face",
+        "a point in the plane of a face, within its outline as seen along an axis along which it has an area, is on it",
     "renderer.points.signs.volume_sign #2: 0 -> 1":
         "any power of two turns no sign, and what leaves the range then is answered in rational arithmetic",
 }  # fmt: skip
