@@ -28,6 +28,7 @@ from validation.promises.queries.nearest import check_nearest
 from validation.promises.queries.piles import check_piles
 from validation.promises.queries.series import check_series
 from validation.promises.queries.signed import check_signed
+from validation.promises.queries.views import check_views
 
 _SEED = 2031
 _RAYS = 4096
@@ -59,6 +60,7 @@ QUERIES: dict[str, Callable[[], Rows]] = {
     "series": lambda: check_series(_random()),
     "nearest faces": lambda: check_nearest(_random()),
     "signed distances": lambda: check_signed(_random()),
+    "views": lambda: check_views(_random()),
     "piles of hits": lambda: check_piles(_random()),
 }
 PICTURES: dict[str, Callable[[], Rows]] = {

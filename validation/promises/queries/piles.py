@@ -22,6 +22,10 @@ _NEAR = 2.0**-45
 _RIM = np.array([(4, 0), (4, 4), (0, 4), (-4, 4), (-4, 0), (-4, -4), (0, -4), (4, -4)], np.float64)
 # So the rays go: four down for each step aside.
 _WAY = np.array([1.0, 2.0, -4.0])
+# t_min, t_max, the most hits, and how far back a ray starts: so far that float32 cannot hold where it ends.
+_FAR = 2.0**25 + 1.0
+_BOUNDS = ((0.0, np.inf, None, 0.0), (3.0, 32.0, None, 0.0), (0.0, np.inf, 1, 0.0), (2.0, 40.0, 7, 0.0),
+           (2.0, 36.0, None, _FAR), (3.0, 248.0, None, _FAR))  # fmt: skip
 
 
 def check_piles(rng: Generator) -> list[dict[str, Any]]:
@@ -34,12 +38,13 @@ def check_piles(rng: Generator) -> list[dict[str, Any]]:
         mesh, origins = _pile(t, times)
         mesh, origins = Mesh(np.roll(mesh.vertices, axis, axis=1), mesh.faces), np.roll(origins, axis, axis=1)
         for asked, contacts in product((Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)), (True, False)):
-            rays = origins, np.roll(_WAY, axis)
-            for least, most, kept in ((0.0, np.inf, None), (3.0, count - 1.0, None), (0.0, np.inf, 1), (2.0, 40.0, 7)):
-                hits = asked.all_hits(*rays, least, most, contacts=contacts, max_hits=kept)
-                number = asked.count_hits(*rays, least, most, contacts=contacts)
-                right = _right(hits, number, _expected(t, contacts, least, most) * times, kept)
-                places = origins[hits.ray] + hits.t[:, None] * rays[1]
+            for least, most, kept, back in _BOUNDS:
+                way = np.roll(_WAY, axis)
+                rays, limits = (origins - back * way, way), (least + back, most + back)
+                hits = asked.all_hits(*rays, *limits, contacts=contacts, max_hits=kept)
+                number = asked.count_hits(*rays, *limits, contacts=contacts)
+                right = _right(hits, number, _expected(t + back, contacts, *limits) * times, kept)
+                places = rays[0][hits.ray] + hits.t[:, None] * rays[1]
                 near = np.abs(hits.points - places).max(axis=1) <= _NEAR * np.abs(mesh.vertices).max()
                 found[contacts] += [right, near]
     return [

@@ -1,0 +1,49 @@
+"""What points see of each other around a ball: everything from its centre, nothing through it."""
+
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere
+from renderer.octree import BruteForce, Octree
+from validation.promises.row import row
+
+_COUNT = 2000
+# Sizes of the ball and how far away it lies: rounding has moved points off their faces.
+_BALLS = ((1.0, 0.0), (100.0, 0.0), (1e-3, 1.0), (1.0, 1e4), (1e6, 1e6))
+
+
+def check_views(rng: Generator) -> list[dict[str, Any]]:
+    """Points of a ball's faces from its centre, and points on either side of it from each other, both ways round."""
+    seen, hidden = [], []
+    for size, away in _BALLS:
+        ball = icosphere(3)
+        middle = away * np.array([1.0, -0.7, 0.4])
+        mesh = Mesh(ball.vertices * size + middle, ball.faces)
+        face, weights = rng.integers(0, len(mesh.faces), _COUNT), rng.dirichlet([1.0, 1.0, 1.0], _COUNT)
+        points = (mesh.triangles[face] * weights[:, :, None]).sum(axis=1)
+        for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+            for faces in (None, face):
+                seen += [tracer.visible(middle, points, reaching=faces), tracer.visible(points, middle, leaving=faces)]
+            beyond = 3.0 * (points - middle)
+            hidden += [~tracer.visible(middle + beyond, middle - beyond), ~tracer.visible(middle, middle + beyond)]
+    return [
+        row(
+            "a ball's centre and each point of its surface see each other",
+            "a ball is convex",
+            np.concatenate(seen),
+        ),
+        row("nothing is seen through a ball", "a ball is closed", np.concatenate(hidden)),
+        row("corners at 0.0 and -0.0 are at one place", "a box is closed", _closed()),
+    ]
+
+
+def _closed() -> NDArray[np.bool_]:
+    """A box of corners of its own for each face, with both zeros."""
+    corners = box((0.0, -1.0, -1.0), (1.0, 1.0, 1.0)).triangles.reshape(-1, 3)
+    corners[::2][corners[::2] == 0.0] = -0.0
+    mesh = Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+    return np.array([len(mesh.open_edges) == 0, len(mesh.odd_edges) == 0])
