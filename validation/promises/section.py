@@ -22,6 +22,7 @@ from validation.promises.pictures.floors import check_floors
 from validation.promises.pictures.nesting import check_nesting
 from validation.promises.pictures.openings import check_openings
 from validation.promises.pictures.placing import check_placing
+from validation.promises.pictures.shining import check_shining
 from validation.promises.queries.angles import check_angles, check_halves
 from validation.promises.queries.inside import check_inside
 from validation.promises.queries.nearest import check_nearest
@@ -68,6 +69,7 @@ PICTURES: dict[str, Callable[[], Rows]] = {
     "objects placed": lambda: check_placing(_random(), _PLACED),
     "floors and samples": check_floors,
     "bounces": check_bounces,
+    "lights": check_shining,
     "nested media": check_nesting,
     "boxes shown": lambda: check_openings(_random(), _OPENED),
 }

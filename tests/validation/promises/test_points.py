@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from renderer.octree import Octree
-from validation.promises.queries import angles, inside, nearest, piles, series, signed, whole
+from validation.promises.queries import angles, inside, nearest, piles, series, signed, views, whole
 
 CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
     "inside": inside.check_inside,
@@ -17,6 +17,7 @@ CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
     "series": series.check_series,
     "nearest": nearest.check_nearest,
     "signed": signed.check_signed,
+    "views": views.check_views,
     "piles": piles.check_piles,
 }
 
@@ -136,3 +137,11 @@ def test_a_sign_that_is_lost_beyond_the_limit_is_found(monkeypatch: pytest.Monke
 def test_the_other_sign_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, "signed_distance", lambda found: -found)
     assert "a signed distance" in broken("signed")
+
+
+def test_a_ball_that_hides_itself_and_one_that_hides_nothing_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        changed(patch, "visible", lambda found: found & False)
+        assert broken("views") == {"a ball's centre"}
+    changed(monkeypatch, "visible", lambda found: found | True)
+    assert broken("views") == {"nothing is seen"}

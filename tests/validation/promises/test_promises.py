@@ -10,7 +10,7 @@ import pytest
 from renderer.inspect import tree_boxes
 from renderer.mesh import ears, obj, polygons
 from renderer.octree import Octree
-from renderer.picture import prepare
+from renderer.picture import pack, prepare
 from renderer.scene import scene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
@@ -18,7 +18,7 @@ from renderer.trace.layout import Tree
 from renderer.tree import refit
 from validation.promises.hits import batches, bounds, builds, errors, outlines, places, starts, trees
 from validation.promises.hits.ways import ways
-from validation.promises.pictures import bounces, cameras, floors, nesting, openings, placing
+from validation.promises.pictures import bounces, cameras, floors, nesting, openings, placing, shining
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
@@ -36,6 +36,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "floors": floors.check_floors,
     "bounces": bounces.check_bounces,
     "nesting": nesting.check_nesting,
+    "shining": shining.check_shining,
 }
 
 
@@ -231,3 +232,15 @@ def test_each_way_asks_rays_once_and_streams_ask_neighbours_apart() -> None:
     assert np.array_equal(np.sort(np.concatenate(found["in streams"])), np.arange(1000))
     assert np.abs(np.diff(found["in streams"][0])).min() >= 97 and [len(b) for b in found["one by one"]] == [1] * 200
     assert all(len(b) <= 9 for b in found["nine at a time"]) and len(found["in packets"][0]) == 1000
+
+
+def test_a_light_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = pack.light_rows
+    monkeypatch.setattr(pack, "light_rows", lambda scene, needs: sound(scene, needs) * ([1.0] * 4 + [1.0, 0.0, 0.0]))
+    assert broken("shining") == {"a light"}
+
+
+def test_media_around_the_eye_in_another_order_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = pack.media_around
+    monkeypatch.setattr(pack, "media_around", lambda *given: sound(*given)[::-1].copy())
+    assert broken("nesting") == {"an eye"}

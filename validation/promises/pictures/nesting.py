@@ -16,6 +16,10 @@ Floats = NDArray[np.float64]
 # The index of each medium. The slabs of a pile are named by theirs, so two slabs may be of one medium.
 _INDEX = {"a": 1.3, "b": 1.7, "c": 2.2}
 _PILES = ("aba", "abc", "abab", "aab")
+# Piles, each slab within the one before, around the eye; from the thinnest medium its rays get out of all.
+_AROUND = ("a", "ba", "cba", "bca", "aca")
+# Heights of the eye above the floor: above all slabs, and within them.
+_ABOVE, _WITHIN = 20.0, 5.5
 _STRIPES = 320
 _WIDTH = 32.0
 _SIZE = (96, 2)
@@ -26,7 +30,11 @@ def check_nesting() -> list[dict[str, Any]]:
     """A striped floor seen aslant through piles of slabs; every stripe must be seen where Snell's law shows it."""
     kept = [_kept(pile, order) for pile in _PILES for order in _orders(len(pile))]
     promise = "leaving a medium takes out its innermost entry, in every order of nesting and overlap"
-    return [row(promise, "Snell's law, slab by slab", np.concatenate(kept))]
+    within = [_kept(pile, tuple(range(len(pile)))[::-1], _WITHIN) for pile in _AROUND]
+    return [
+        row(promise, "Snell's law, slab by slab", np.concatenate(kept)),
+        row("an eye within media is in the innermost of them", "Snell's law, slab by slab", np.concatenate(within)),
+    ]
 
 
 def _orders(count: int) -> list[tuple[int, ...]]:
@@ -35,12 +43,12 @@ def _orders(count: int) -> list[tuple[int, ...]]:
     return orders if count < 4 else orders[::5]
 
 
-def _kept(pile: str, order: tuple[int, ...]) -> NDArray[np.bool_]:
+def _kept(pile: str, order: tuple[int, ...], height: float = _ABOVE) -> NDArray[np.bool_]:
     slabs = [(name, 10.0 - i, 4.0 - order.index(i)) for i, name in enumerate(pile)]
-    x = _film_x() + _shift(slabs)
+    x = _film_x() + _shift(slabs, height)
     stripe = (x + _WIDTH / 2) / _WIDTH * _STRIPES
     expected = np.where((np.floor(stripe).astype(int) % 2)[:, None], _DARK, _BRIGHT)
-    radiance = shown(_scene(slabs), _SIZE, max_depth=2 * len(pile))
+    radiance = shown(_scene(slabs, height), _SIZE, max_depth=2 * len(pile))
     clear = np.abs(stripe - np.rint(stripe)) > 1e-6
     kept: NDArray[np.bool_] = (equal(radiance, np.broadcast_to(expected, radiance.shape)) | ~clear).ravel()
     return kept
@@ -57,14 +65,17 @@ def _film_x() -> Floats:
     return (np.arange(width) + 0.5 - width / 2) * pixel * np.hypot(1.0, _SLANT) + 0.0 * height
 
 
-def _shift(slabs: list[tuple[str, float, float]]) -> float:
+def _shift(slabs: list[tuple[str, float, float]], height: float) -> float:
     """How much further along x a ray of the slant meets the floor than it would in a straight line."""
     borders = sorted([(top, name, True) for name, top, _ in slabs] + [(low, name, False) for name, _, low in slabs])[
         ::-1
     ]
     within: list[str] = []
-    sine, y, x = _SLANT / np.hypot(1.0, _SLANT), 20.0, 0.0
+    sine, y, x = _SLANT / np.hypot(1.0, _SLANT), height, 0.0
     for at, name, enters in borders:
+        if at > height:
+            within.append(name)
+            continue
         x += (y - at) * sine / np.sqrt(1.0 - sine * sine)
         y = at
         if enters:
@@ -76,11 +87,11 @@ def _shift(slabs: list[tuple[str, float, float]]) -> float:
             del within[len(within) - 1 - within[::-1].index(name)]
             after = _INDEX[within[-1]] if within else 1.0
         sine *= before / after
-    return float(x + y * sine / np.sqrt(1.0 - sine * sine) - 20.0 * _SLANT)
+    return float(x + y * sine / np.sqrt(1.0 - sine * sine) - height * _SLANT)
 
 
-def _scene(slabs: list[tuple[str, float, float]]) -> Scene:
-    """The slabs above the floor y = 0, seen from 20 above it; the ray in the film's middle aims at x = z = 0."""
+def _scene(slabs: list[tuple[str, float, float]], height: float) -> Scene:
+    """The slabs above the floor y = 0, seen from above it; the ray in the film's middle aims at x = z = 0."""
     far = 200.0
     objects = [
         thing(box(np.array([-far - i, low, -far - i]), np.array([far + i, top, far + i])), name)
@@ -91,7 +102,7 @@ def _scene(slabs: list[tuple[str, float, float]]) -> Scene:
         stripe = square(np.array([left, 0.0, -50.0]), np.array([0.0, 0.0, 100.0]), np.array([right - left, 0.0, 0.0]))
         objects.append(thing(stripe, ("bright", "dark")[k % 2]))
     clear = {name: glowing((0.0, 0.0, 0.0), transmittance=(1.0, 1.0, 1.0), ior=ior) for name, ior in _INDEX.items()}
-    eye = (-20.0 * _SLANT, 20.0, 0.0)
+    eye = (-height * _SLANT, height, 0.0)
     camera = OrthographicCamera(eye=eye, target=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), height=_SIZE[1] / _SIZE[0])
     materials = {**clear, "bright": glowing(_BRIGHT), "dark": glowing(_DARK)}
     return Scene(camera=camera, materials=materials, objects=tuple(objects), ambient=(1.0, 1.0, 1.0))

@@ -1,0 +1,30 @@
+"""Lights of one colour each, directional and point lights, on a surface that scatters all of it."""
+
+from typing import Any
+
+import numpy as np
+
+from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.material import Phong
+from renderer.scene.scene import Scene
+from validation.promises.pictures.glowing import equal, from_above, shown, square, thing
+from validation.promises.row import row
+
+
+def check_shining() -> list[dict[str, Any]]:
+    """One pixel of a white square from above, lit straight from above from a distance of 2."""
+    ground = square(np.array([-4.0, 0.0, -4.0]), np.array([0.0, 0.0, 8.0]), np.array([8.0, 0.0, 0.0]))
+    kept = []
+    for colors in ([(1, 0, 0)], [(0, 1, 0)], [(0, 0, 1)], [(0, 0, 1), (0, 0, 0), (0, 1, 0)]):
+        strengths = [tuple(0.5 * float(c) for c in color) for color in colors]
+        expected = np.full((1, 1, 3), np.sum(strengths, axis=0))
+        for lights in (
+            tuple(DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=s) for s in strengths),
+            tuple(PointLight(position=(0.0, 2.0, 0.0), intensity=tuple(4.0 * c for c in s)) for s in strengths),
+        ):
+            scene = Scene(
+                camera=from_above((0.0, 5.0, 0.0), 1e-6), materials={"white": Phong(diffuse=1.0, specular=0.0)},
+                objects=(thing(ground, "white"),), lights=lights,
+            )  # fmt: skip
+            kept.append(equal(shown(scene, (1, 1)), expected).ravel())
+    return [row("a light of any one colour shines, beside dark ones", "irradiance by hand", np.concatenate(kept))]
