@@ -242,5 +242,7 @@ def test_a_light_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_media_around_the_eye_in_another_order_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = pack.media_around
-    monkeypatch.setattr(pack, "media_around", lambda *given: sound(*given)[::-1].copy())
-    assert broken("nesting") == {"an eye"}
+    for module, promise in ((pack, "an eye"), (prepare, "so is")):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "media_around", lambda *given: sound(*given)[::-1].copy())
+            assert broken("nesting") == {promise}

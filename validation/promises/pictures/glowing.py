@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
+from renderer.picture.prepare import PreparedScene
 from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
@@ -49,7 +50,7 @@ def thing(mesh: Mesh, material: str) -> SceneObject:
     return SceneObject(mesh=mesh, material=material)
 
 
-def shown(scene: Scene, resolution: tuple[int, int], **settings: Any) -> NDArray[np.float32]:
+def shown(scene: Scene | PreparedScene, resolution: tuple[int, int], **settings: Any) -> NDArray[np.float32]:
     """The radiance of a scene."""
     return render(scene, resolution=resolution, **settings).radiance
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.picture.render import prepare
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
 from renderer.scene.scene import Scene
@@ -31,9 +32,15 @@ def check_nesting() -> list[dict[str, Any]]:
     kept = [_kept(pile, order) for pile in _PILES for order in _orders(len(pile))]
     promise = "leaving a medium takes out its innermost entry, in every order of nesting and overlap"
     within = [_kept(pile, tuple(range(len(pile)))[::-1], _WITHIN) for pile in _AROUND]
+    turned = [_kept(pile, tuple(range(len(pile)))[::-1], _WITHIN, _ABOVE) for pile in _AROUND]
     return [
         row(promise, "Snell's law, slab by slab", np.concatenate(kept)),
         row("an eye within media is in the innermost of them", "Snell's law, slab by slab", np.concatenate(within)),
+        row(
+            "so is another camera's, whatever the scene's is in",
+            "Snell's law, slab by slab",
+            np.concatenate(turned),
+        ),
     ]
 
 
@@ -43,12 +50,19 @@ def _orders(count: int) -> list[tuple[int, ...]]:
     return orders if count < 4 else orders[::5]
 
 
-def _kept(pile: str, order: tuple[int, ...], height: float = _ABOVE) -> NDArray[np.bool_]:
+def _kept(
+    pile: str, order: tuple[int, ...], height: float = _ABOVE, prepared: float | None = None
+) -> NDArray[np.bool_]:
+    """Which pixels are right, seen from a height, of a scene prepared for a camera at another, if told."""
     slabs = [(name, 10.0 - i, 4.0 - order.index(i)) for i, name in enumerate(pile)]
     x = _film_x() + _shift(slabs, height)
     stripe = (x + _WIDTH / 2) / _WIDTH * _STRIPES
     expected = np.where((np.floor(stripe).astype(int) % 2)[:, None], _DARK, _BRIGHT)
-    radiance = shown(_scene(slabs, height), _SIZE, max_depth=2 * len(pile))
+    scene, depth = _scene(slabs, height), 2 * len(pile)
+    if prepared is None:
+        radiance = shown(scene, _SIZE, max_depth=depth)
+    else:
+        radiance = shown(prepare(_scene(slabs, prepared)), _SIZE, camera=scene.camera, max_depth=depth)
     clear = np.abs(stripe - np.rint(stripe)) > 1e-6
     kept: NDArray[np.bool_] = (equal(radiance, np.broadcast_to(expected, radiance.shape)) | ~clear).ravel()
     return kept
