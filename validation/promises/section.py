@@ -12,6 +12,7 @@ from validation.promises.hits.batches import check_batches, check_refits
 from validation.promises.hits.bounds import check_bounds
 from validation.promises.hits.builds import check_builds
 from validation.promises.hits.errors import check_errors
+from validation.promises.hits.files import check_files
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
 from validation.promises.hits.starts import check_starts
@@ -52,6 +53,7 @@ HITS: dict[str, Callable[[], Rows]] = {
     "refits": check_refits,
     "trees": lambda: check_trees(_random()),
     "builds": lambda: check_builds(_random()),
+    "files": check_files,
     "polygons": lambda: check_outlines(_random(), _POLYGONS),
 }
 QUERIES: dict[str, Callable[[], Rows]] = {

@@ -3,10 +3,13 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from renderer.mesh.mesh import Mesh
+from renderer.picture.render import render
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Phong
-from renderer.scene.scene import Scene
+from renderer.scene.scene import Scene, SceneObject
 from validation.promises.pictures.glowing import equal, from_above, shown, square, thing
 from validation.promises.row import row
 
@@ -27,4 +30,22 @@ def check_shining() -> list[dict[str, Any]]:
                 objects=(thing(ground, "white"),), lights=lights,
             )  # fmt: skip
             kept.append(equal(shown(scene, (1, 1)), expected).ravel())
-    return [row("a light of any one colour shines, beside dark ones", "irradiance by hand", np.concatenate(kept))]
+    return [
+        row("a light of any one colour shines, beside dark ones", "irradiance by hand", np.concatenate(kept)),
+        row("where smooth normals cancel the face's own counts", "irradiance by hand", _flat(ground)),
+    ]
+
+
+def _flat(ground: Mesh) -> NDArray[np.bool_]:
+    """A square whose vertex normals are 0, and one whose normals cancel in the middle."""
+    up, kept = np.array([0.0, 1.0, 0.0]), []
+    for normals in (np.zeros((4, 3)), np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0)])):
+        mesh = Mesh(ground.vertices, ground.faces, normals)
+        scene = Scene(
+            camera=from_above((0.0, 5.0, 0.0), 1e-6), materials={"white": Phong(diffuse=1.0, specular=0.0)},
+            objects=(SceneObject(mesh=mesh, material="white", normals="smooth"),),
+            lights=(DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 0.5, 0.25)),),
+        )  # fmt: skip
+        image = render(scene, resolution=(1, 1))
+        kept += [equal(image.radiance, np.array([[[1.0, 0.5, 0.25]]])).ravel(), (image.normal[0] == up).all(axis=1)]
+    return np.concatenate(kept)

@@ -1,0 +1,102 @@
+"""What files keep: a stored tree's repairs and counts, OBJ normals, PLY strips; and what blocks keep: each digit."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh.load import load_mesh
+from renderer.mesh.mesh import Mesh
+from renderer.octree import Octree
+from validation.promises.row import row
+
+_JUDGE = "meshes by hand"
+_CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 0 1\nvn 0 1 0\n"
+_STRIPS = """ply
+format ascii 1.0
+element vertex 10
+property float x
+property float y
+property float z
+element tristrips 1
+property list int int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+1 1 0
+0 2 0
+5 0 0
+6 0 0
+5 1 0
+6 1 0
+5 2 0
+"""
+
+
+def check_files() -> list[dict[str, Any]]:
+    """Each is written to a folder of its own and read again."""
+    with TemporaryDirectory(prefix="promises-") as name:
+        folder = Path(name)
+        return [
+            row("a loaded tree has the repairs and counts of the one that was saved", _JUDGE, _stored(folder)),
+            row("an OBJ file's normals are kept where each corner of each face has one", _JUDGE, _normals(folder)),
+            row("every second triangle of a PLY strip is turned, after a restart too", _JUDGE, _strips(folder)),
+            row("blocks are float32 only where that holds every vertex", _JUDGE, _digits()),
+        ]
+
+
+def _stored(folder: Path) -> NDArray[np.bool_]:
+    """Of five faces, two of which a repair drops."""
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (np.nan, 0, 0)])
+    octree = Octree(vertices, [[0, 1, 2], [0, 1, 4], [0, 1, 3], [4, 2, 3], [0, 2, 3]], repair=True)
+    octree.save(folder / "a.octree")
+    kept = []
+    for one in (octree, Octree.load(folder / "a.octree")):
+        repairs = one.repairs
+        known = (
+            repairs is not None and repairs.dropped_faces.tolist() == [1, 3] and repairs.bad_vertices.tolist() == [4]
+        )
+        kept += [known, one.stats.faces == 3, one.stats.references == 3]
+    return np.array(kept)
+
+
+def _normals(folder: Path) -> NDArray[np.bool_]:
+    kept = []
+    for faces, has in (("f 1//1 2//1 3//1\nf 2//1 4//1 3//1\n", True), ("f 1//1 2//1 3//1\nf 2 4 3\n", False),
+                       ("f 1 2 3\nf 2//1 4//1 3//1\n", False), ("f 1 2 3\nf 2 4 3\n", False)):  # fmt: skip
+        path = folder / "a.obj"
+        path.write_text(_CORNERS + faces, encoding="ascii")
+        found = load_mesh(path).normals
+        kept.append((found == [0.0, 0.0, 1.0]).all() if has and found is not None else (found is None) != has)
+    return np.array(kept)
+
+
+def _strips(folder: Path) -> NDArray[np.bool_]:
+    """Strips of three and of two triangles, which all look up, whichever is first."""
+    kept = []
+    for strips in ("0 1 2 3 4 -1 5 6 7 8 9", "0 1 2 3 -1 5 6 7 8 9", "-1 0 1 2 3 4 -1 -1 5 6 7 8"):
+        path = folder / "a.ply"
+        path.write_text(f"{_STRIPS}{len(strips.split())} {strips}\n", encoding="ascii")
+        mesh = load_mesh(path)
+        count = sum(max(0, len(one.split()) - 2) for one in strips.split("-1"))
+        kept += [len(mesh.faces) == count, bool((mesh.face_normals() == [0.0, 0.0, 1.0]).all())]
+    return np.array(kept)
+
+
+def _digits() -> NDArray[np.bool_]:
+    """A row of triangles of which a single vertex, each in turn, is not a float32 number; a ray meets it there."""
+    x = np.arange(8.0)
+    corners = np.stack(
+        [np.stack([x, 0 * x, 0 * x], 1), np.stack([x + 0.5, 0 * x, 0 * x], 1), np.stack([x, 0 * x + 1, 0 * x], 1)], 1
+    )
+    vertices, kept = corners.reshape(-1, 3), []
+    for k in range(len(vertices)):
+        moved = vertices.copy()
+        moved[k, 2] = 1.0 / 3.0
+        octree = Octree.from_mesh(Mesh(moved, np.arange(len(moved), dtype=np.int32).reshape(-1, 3)))
+        hits = octree.closest_hit(moved[k] + [0.0, 0.0, 2.0], [0.0, 0.0, -1.0])
+        kept.append(hits.face == k // 3 and abs(hits.t - 2.0) <= 2.0**-51)
+    return np.array(kept)
