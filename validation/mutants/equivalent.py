@@ -29,4 +29,5 @@ EQUIVALENT: dict[str, str] = {
         "a point in the plane of a face, within its outline as seen along an axis along which it has an area, is on it",
     "renderer.points.signs.volume_sign #2: 0 -> 1":
         "any power of two turns no sign, and what leaves the range then is answered in rational arithmetic",
+    "renderer.contacts.gather.gather_chunk #4: 1 -> 2": "any row below 0 says that no ray is out of range",
 }  # fmt: skip
