@@ -17,6 +17,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -143,15 +144,14 @@ def closest_hits(
 
     # Scale to integers; without the filter test every face.
     query = _Scaled(points, o, d)
-    named = [(face, i, j, k) for face, (i, j, k) in enumerate(triangles.tolist())]
+    named, boxes = _sorted_out(points.tobytes(), triangles.tobytes())
     if not filtered:
         return [query.closest(ray, named, t_min, t_max) for ray in range(len(o))]
-    if not len(triangles):
+    if boxes is None:
         return [None] * len(o)
 
     # Filter the faces for many rays at once, then test each ray's candidates exactly.
     hits: list[ExactHit | None] = []
-    boxes = _BoxTree(points[triangles])
     for start in range(0, len(o), _RAYS_AT_ONCE):
         rows = slice(start, start + _RAYS_AT_ONCE)
         ray, face = boxes.candidates(o[rows], d[rows], t_min, t_max)
@@ -161,6 +161,14 @@ def closest_hits(
         for i in range(len(o[rows])):
             hits.append(query.closest(start + i, [named[f] for f in listed[ends[i] : ends[i + 1]]], t_min, t_max))
     return hits
+
+
+@lru_cache(maxsize=2)
+def _sorted_out(vertices: bytes, faces: bytes) -> tuple[list[tuple[int, int, int, int]], "_BoxTree | None"]:
+    """Each face with its number, and the boxes, None without faces; kept, as many families of rays meet one mesh."""
+    points, triangles = np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(faces, np.int64).reshape(-1, 3)
+    named = [(face, i, j, k) for face, (i, j, k) in enumerate(triangles.tolist())]
+    return named, _BoxTree(points[triangles]) if named else None
 
 
 def possible_faces(

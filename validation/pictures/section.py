@@ -143,7 +143,7 @@ def check_scene(
 
 def scenes_of(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
     """Names, descriptions, files and efforts of a user's scenes, or else of the suite's own."""
-    size, lower = (256, 128) if job.quick else (512, 256)
+    size, lower = (192, 128) if job.quick else (512, 256)
     if not job.own:
         stems = Counter(path.stem for path in job.scenes)
         names = [path.stem if stems[path.stem] == 1 else str(path) for path in job.scenes]
