@@ -125,6 +125,16 @@ HITS = (
             "nodes[at + 16 * axis] = low\n"
             "if axis < 2:\n"
             "    nodes[at + 16 * axis + 8] = high"),
+    _python("hits", "a refit counts in the units of the old size", "_Accelerator.refit",
+            "refit_tree(tree, scaled, moved.faces, scale, self.threads)",
+            "refit_tree(tree, scaled, moved.faces, tree.scale, self.threads)"),
+    _python("hits", "bounds of t lose the dimensions of the rays", "Hits.shaped",
+            "Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error)",
+            "Hits(t, self.face.reshape(shape), u, v, self._mesh, self.t_error)"),
+    _python("hits", "a loaded tree forgets its repairs", "Octree.load",
+            "octree.repairs = stored.repairs", "octree.repairs = None"),
+    _python("hits", "normals of OBJ files of which some corners have one", "obj._mesh",
+            "(normal >= 0).all()", "(normal >= 0).any()"),
 )  # fmt: skip
 
 QUERIES = (
@@ -185,6 +195,12 @@ QUERIES = (
     _python("queries", "the drop-in lists each face at an edge", "RayMeshIntersector._hits",
             "it.octree.all_hits(origins, directions, max_hits=max_hits)",
             "it.octree.all_hits(origins, directions, max_hits=max_hits, contacts=False)"),
+    _python("queries", "a limited distance loses its sign", "signed.signed_distance",
+            "inside & (distance > 0.0)", "inside & (distance > 0.0) & (distance < np.inf)"),
+    _python("queries", "views leave room by where they begin alone", "visible._between",
+            "np.maximum(np.abs(start.points), np.abs(stop.points))", "np.abs(start.points)"),
+    _python("queries", "-0.0 is another place than 0.0", "edges.sides",
+            "np.ascontiguousarray(vertices + 0.0)", "np.ascontiguousarray(vertices)"),
 )  # fmt: skip
 
 PICTURES = (
@@ -336,6 +352,12 @@ PICTURES = (
             "largest = largest_component(weight)", "largest = (weight[0] + weight[1] + weight[2]) / 3.0"),
     _kernel("pictures", "leaving a medium forgets its outermost entry", "_enter_or_leave",
             "range(count - 1, -1, -1)", "range(count)"),
+    _python("pictures", "an eye within media is in the outermost", "media_around",
+            "sorted(around, reverse=True)", "sorted(around)"),
+    _python("pictures", "lights that are not red do not shine", "needs.examine",
+            "any(light.row()[4:])", "light.row()[4] > 0.0"),
+    _python("pictures", "another camera's eye is in the media of the scene's", "PreparedScene.picture",
+            "self.needs.refraction and camera is not self.scene.camera", "False"),
 )  # fmt: skip
 
 DEFECTS = HITS + QUERIES + PICTURES
