@@ -15,6 +15,7 @@ from validation.promises.hits.errors import check_errors
 from validation.promises.hits.files import check_files
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
+from validation.promises.hits.planes import check_planes
 from validation.promises.hits.starts import check_starts
 from validation.promises.hits.trees import check_trees
 from validation.promises.pictures.bounces import check_bounces
@@ -47,6 +48,7 @@ def _random() -> np.random.Generator:
 HITS: dict[str, Callable[[], Rows]] = {
     "places of hits": lambda: check_places(_random(), _RAYS),
     "bounds of rays": lambda: check_bounds(_random(), _RAYS),
+    "planes from afar": check_planes,
     "errors of t": check_errors,
     "starts": lambda: check_starts(_random()),
     "sizes of batches": check_batches,

@@ -16,7 +16,7 @@ from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
 from renderer.trace.layout import Tree
 from renderer.tree import refit
-from validation.promises.hits import batches, bounds, builds, errors, files, outlines, places, starts, trees
+from validation.promises.hits import batches, bounds, builds, errors, files, outlines, places, planes, starts, trees
 from validation.promises.hits.ways import ways
 from validation.promises.pictures import bounces, cameras, floors, nesting, openings, placing, shining
 
@@ -24,6 +24,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
     "bounds": lambda: bounds.check_bounds(np.random.default_rng(5), 256),
     "errors": errors.check_errors,
+    "planes": planes.check_planes,
     "files": files.check_files,
     "starts": lambda: starts.check_starts(np.random.default_rng(5)),
     "batches": lambda: batches.check_batches((17, 1025)),
@@ -262,3 +263,9 @@ def test_a_tree_that_forgets_and_files_that_are_read_otherwise_are_found(monkeyp
         files, "load_mesh", lambda path: replace(read(path), normals=None, faces=read(path).faces[::, ::-1])
     )
     assert broken("files") == {"a loaded", "an OBJ", "every second"}
+
+
+def test_a_hole_in_a_plane_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Octree.any_hit
+    monkeypatch.setattr(Octree, "any_hit", lambda *given: sound(*given) & (np.arange(len(given[2])) != 9))
+    assert broken("planes") == {"no ray"}

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
+from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box
 from renderer.octree import BruteForce, Octree
 from validation.promises.row import row
@@ -29,7 +30,13 @@ def check_signed(rng: Generator) -> list[dict[str, Any]]:
     for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
         plain.append(tracer.signed_distance(points) == expected)
         cut.append(tracer.signed_distance(points, limit) == limited)
+    pair = Mesh.concatenate([box((0.0, 0.0, 0.0), (2.0, 2.0, 2.0)), box((1.0, 1.0, 1.0), (3.0, 3.0, 3.0))])
+    both = np.array([(1.5, 1.5, 1.5), (0.5, 0.5, 0.5), (2.5, 2.5, 2.5), (-0.5, 0.5, 0.5)])
+    octree = Octree.from_mesh(pair)
+    by_rule = [octree.signed_distance(both) == [-0.5, -0.5, -0.5, 0.5],
+               octree.signed_distance(both, rule="even-odd") == [0.5, -0.5, -0.5, 0.5]]  # fmt: skip
     return [
+        row("the rule tells the sign where boxes overlap", _JUDGE, np.concatenate(by_rule)),
         row("a signed distance is below 0 within, 0 on the surface, above 0 outside", _JUDGE, np.concatenate(plain)),
         row("beyond its limit a signed distance is infinite, with its sign", _JUDGE, np.concatenate(cut)),
     ]
