@@ -1,4 +1,4 @@
-"""A plane of many faces is met wherever a ray aims at it, from near and from where its leaves are as thin as rounding."""
+"""A plane of many faces is met wherever a ray aims, from near and from where its leaves are as thin as rounding."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from renderer.mesh.shapes import lattice_faces
 from renderer.octree import Octree
 from validation.promises.row import row
 
-_SIDE, _PIXELS = 400, 256
+_SIDE, _PIXELS = 400, 128
 _EYES = ((1000.3, 500.2, 2000.7), (30.3, -10.2, 50.7), (-3.3, 2.2, 5.7), (7.3e4, 2.2e4, 1e5))
 
 
