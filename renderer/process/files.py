@@ -21,7 +21,7 @@ def as_path(argument: str, value: object) -> Path:
         os.fsencode(path)
     except UnicodeEncodeError as error:
         raise ValueError(
-            f"{argument}: expected a path that the file system's {error.encoding} can spell, got {str(path)!r}"
+            f"{path}: {argument}: expected a path that the file system's {error.encoding} can spell"
         ) from None
     return path
 

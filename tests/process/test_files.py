@@ -256,5 +256,5 @@ def test_a_private_file_is_private_while_it_is_written(tmp_path: Path) -> None:
 def test_a_name_that_no_file_can_have_is_refused_with_its_argument(tmp_path: Path) -> None:
     path = tmp_path / "\ud800.png"
     for ask in (lambda: render(load_scene(STAIRS), resolution=(2, 2)).save(path), lambda: load_scene(path)):
-        with pytest.raises(ValueError, match=r"path: expected a path that .* can spell, got .*ud800.png"):
+        with pytest.raises(ValueError, match=r"\ud800\.png: path: expected a path that .* can spell"):
             ask()
