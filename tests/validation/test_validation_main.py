@@ -281,6 +281,8 @@ def test_mutants_are_judged_listed_and_drawn(
             judged.append(one.key)
             keep(one, Verdict("hits: a: b" if one.kernel else None, True, "fails" if one.kernel else None, 1.0))
 
+    # One room of the renderer: all of it takes seconds to look through.
+    monkeypatch.setattr(mutants, "files", lambda _, root: sorted((root / "renderer" / "points").rglob("*.py")))
     monkeypatch.setattr(mutants, "_judge_all", judge)
     monkeypatch.setattr(mutants, "_touched", lambda *_: {})
     monkeypatch.setattr(mutants, "Workshop", lambda *_: None)
