@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from meshes import answers, make_mesh, rays_at
 from numpy.typing import NDArray
+from signatures import SIGNATURES
 
 from renderer import Mesh, Octree, octree, queries
 from renderer.mesh.shapes import icosphere
@@ -206,18 +207,10 @@ def base(array: NDArray[Any]) -> NDArray[Any]:
 
 # In a process of its own, where no other test has called a kernel.
 COMPILED = """
-import sys
 import numpy as np
 from renderer import Octree
 from renderer.inspect.tree_boxes import visited
-from renderer.kernels.compiler import Kernel
 from renderer.mesh.shapes import icosphere
-
-def signatures():
-    modules = [module for name, module in sys.modules.items() if name.startswith("renderer.")]
-    kernels = {id(value): value for module in modules for value in vars(module).values() if isinstance(value, Kernel)}
-    entries = {k.py_func.__qualname__: vars(k)["entry"] for k in kernels.values() if "entry" in vars(k)}
-    return {(name, str(types)) for name, entry in entries.items() for types in entry.signatures}
 
 def use(octree):
     for _ in range(2):
@@ -242,7 +235,7 @@ print(len(before), *(signatures() - before))
 
 
 def test_no_kernel_is_compiled_for_other_types(path: Path) -> None:
-    command = [sys.executable, "-c", COMPILED, str(path)]
+    command = [sys.executable, "-c", SIGNATURES + COMPILED, str(path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
     count, *new = done.stdout.split(maxsplit=1)
     assert int(count) > 10 and not new

@@ -74,9 +74,9 @@ _DARK: Color = (0.0, 0.25, 0.5)
 
 def _film_x() -> Floats:
     """Where rays in a straight line would meet the floor."""
-    width, height = _SIZE
-    pixel = 1.0 / width
-    return (np.arange(width) + 0.5 - width / 2) * pixel * np.hypot(1.0, _SLANT) + 0.0 * height
+    width = _SIZE[0]
+    across: Floats = (np.arange(width) + 0.5 - width / 2) / width * np.hypot(1.0, _SLANT)
+    return across
 
 
 def _shift(slabs: list[tuple[str, float, float]], height: float) -> float:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation.promises.queries.whole import Face, dot, heaps, relative, volume
+from validation.oracle.distance import dot
+from validation.promises.queries.whole import Face, heaps, relative, volume
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
-from validation.promises.queries.whole import Corner, Face, cross, dot, heaps, relative, volume
+from validation.oracle.distance import cross, dot
+from validation.promises.queries.whole import Corner, Face, heaps, relative, volume
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]

@@ -1,14 +1,16 @@
 """Points and triangles in whole numbers, and meshes whose corners and points meet in lines and planes exactly."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from validation.oracle.distance import cross, difference, dot
+
 Floats = NDArray[np.float64]
-Corner = tuple[int, int, int]
+Corner = Sequence[int]
 Face = tuple[Corner, Corner, Corner]
 
 
@@ -21,21 +23,6 @@ def relative(point: Floats, triangles: Floats) -> tuple[list[Face], int]:
     return list(zip(corners[::3], corners[1::3], corners[2::3], strict=True)), unit
 
 
-def less(a: Corner, b: Corner) -> Corner:
-    """a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def dot(a: Corner, b: Corner) -> int:
-    """The scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Corner, b: Corner) -> Corner:
-    """The vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
 def volume(face: Face) -> int:
     """The determinant of a face's corners: 0 where the origin lies in its plane."""
     a, b, c = face
@@ -45,10 +32,10 @@ def volume(face: Face) -> int:
 def squared_distance(face: Face) -> Fraction:
     """The squared distance of a face from the origin."""
     a, b, c = face
-    normal, sides = cross(less(b, a), less(c, a)), ((a, b), (b, c), (c, a))
-    if any(normal) and all(dot(cross(less(q, p), normal), p) >= 0 for p, q in sides):
+    normal, sides = cross(difference(b, a), difference(c, a)), ((a, b), (b, c), (c, a))
+    if any(normal) and all(dot(cross(difference(q, p), normal), p) >= 0 for p, q in sides):
         return Fraction(volume(face) ** 2, dot(normal, normal))
-    return min(_from_side(p, less(q, p)) for p, q in sides)
+    return min(_from_side(p, difference(q, p)) for p, q in sides)
 
 
 def _from_side(start: Corner, side: Corner) -> Fraction:
@@ -57,7 +44,7 @@ def _from_side(start: Corner, side: Corner) -> Fraction:
     if 0 < along < square:
         across = cross(start, side)
         return Fraction(dot(across, across), square)
-    corner = start if along <= 0 else less(side, less((0, 0, 0), start))
+    corner = start if along <= 0 else difference(side, difference((0, 0, 0), start))
     return Fraction(dot(corner, corner))
 
 
