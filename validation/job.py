@@ -17,6 +17,7 @@ class Job:
     step        called with the name of each step as it begins; a section's ``steps(job)`` is the number of calls
     scenes      a user's scene files, to be judged instead of the suite's own
     meshes      a user's mesh files, to be judged instead of the suite's own
+    processes   how many processes may share the tasks of which no time is measured; 1 for this one alone
     """
 
     quick: bool
@@ -25,6 +26,7 @@ class Job:
     step: Callable[[str], None]
     scenes: tuple[Path, ...] = ()
     meshes: tuple[Path, ...] = ()
+    processes: int = 1
 
     @property
     def own(self) -> bool:

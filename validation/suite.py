@@ -13,6 +13,7 @@ from typing import Any
 
 from renderer.mesh.load import load_mesh
 from renderer.process.files import write_atomically
+from renderer.process.parallel import available_threads
 from renderer.scene.scene import load_scene
 from validation import environment
 from validation.gates import Gate
@@ -60,7 +61,7 @@ def run(request: Request) -> dict[str, Any]:
     with TemporaryDirectory(dir=request.output, prefix=".run-") as folder:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()
-        job = Job(request.quick, thresholds, pictures, lambda _: None, request.scenes, request.meshes)
+        job = Job(request.quick, thresholds, pictures, lambda _: None, request.scenes, request.meshes, _processes())
         records, gates = _sections(chosen, job)
 
         # Collect the metrics and write the report.
@@ -80,6 +81,11 @@ def run(request: Request) -> dict[str, Any]:
         metrics["seconds"] = time.perf_counter() - began
         write(metrics, request.output, pictures)
     return metrics
+
+
+def _processes() -> int:
+    """As many as there are processors, up to 4: a task may need some GB."""
+    return min(4, available_threads())
 
 
 def _open(request: Request) -> None:

@@ -71,7 +71,7 @@ def extreme(first: int, last: int) -> Callable[[Job], Iterator[Gate]]:
     def check(job: Job) -> Iterator[Gate]:
         for case in CASES:
             if first <= case.number <= last and case.number != _LARGE:
-                yield check_case(case, job)[1]
+                yield check_case(case, job.quick)[1]
 
     return check
 
@@ -90,8 +90,7 @@ def sweep(job: Job) -> list[Gate]:
 
 def curves(job: Job) -> list[Gate]:
     """Error of t against offset, scale, angle and sliver height."""
-    _, found = sweeps.run(job.quick, job.step)
-    return found
+    return [gate for index in range(len(sweeps.SWEEPS)) for gate in sweeps.curve(index, job.quick)[1]]
 
 
 def hits(job: Job) -> Iterator[Gate]:

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from typing import Any, Literal, NamedTuple
 
@@ -84,7 +85,7 @@ class LeakCount(NamedTuple):
 
 
 QUICK = LeakEffort(rays=100_000, builds=1, embree=500)
-FULL = LeakEffort(rays=1_000_000, builds=9, embree=5_000)
+FULL = LeakEffort(rays=1_000_000, builds=3, embree=5_000)
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,7 @@ def embree_leaks(embree: Embree, rays: RayFamily) -> int:
     return int(np.count_nonzero(embree.closest_hit(rays.origins, rays.directions)[1] < 0))
 
 
+@cache
 def closed_meshes() -> tuple[ClosedMesh, ...]:
     """The closed meshes: convex and not, a knot, and a box of which every number is an integer."""
     balls = (ClosedMesh(f"icosphere {level}", icosphere(level), _cube(0.0, 0.4)) for level in (3, 4, 5, 6))
@@ -196,30 +198,39 @@ def placements(closed: ClosedMesh) -> Iterator[Placement]:
         yield Placement(closed, turned, offset, scale)
 
 
-def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:
-    """Run the sweep; returns a record for JSON and a gate for each mesh and kind of ray."""
-    effort = QUICK if quick else FULL
-    counts: list[LeakCount] = []
-    left_out = []
+class MeshLeaks(NamedTuple):
+    """All leaks of one mesh, and the placements that were left out."""
+
+    counts: list[LeakCount]
+    left_out: list[dict[str, object]]
+
+
+def sweep(index: int, quick: bool) -> MeshLeaks:
+    """Shoot at one of ``closed_meshes()`` in all placements."""
+    effort, found = QUICK if quick else FULL, MeshLeaks([], [])
     meshes = closed_meshes()
     share = effort.rays / effort.builds / sum(p.weight for closed in meshes for p in placements(closed))
-    for index, closed in enumerate(meshes):
-        step(f"watertight: {closed.name}")
-        for place, placement in enumerate(placements(closed)):
-            if not placement.keeps_sides(placement.vertices()):
-                left_out.append(placement.record())
-                continue
-            # Seeded by placement, so that leaving one out changes no other.
-            rng = np.random.default_rng([SEED, index, place])
-            counts += shoot(placement, builds(place, effort.builds), share, rng)
-            # For information only: a quick run asks it in every other placement.
-            if not (quick and place % 2):
-                counts += shoot_embree(placement, effort.embree, rng)
+    for place, placement in enumerate(placements(meshes[index])):
+        if not placement.keeps_sides(placement.vertices()):
+            found.left_out.append(placement.record())
+            continue
+        # Seeded by placement, so that leaving one out changes no other.
+        rng = np.random.default_rng([SEED, index, place])
+        found.counts.extend(shoot(placement, builds(place, effort.builds), share, rng))
+        # For information only: a quick run asks it in every other placement.
+        if not (quick and place % 2):
+            found.counts.extend(shoot_embree(placement, effort.embree, rng))
+    return found
+
+
+def summary(meshes: Sequence[MeshLeaks]) -> tuple[dict[str, object], list[Gate]]:
+    """The sweeps of all meshes: a record for JSON and a gate for each mesh and kind of ray."""
+    counts = [count for mesh in meshes for count in mesh.counts]
     record = {
         "meshes": sums(counts, "mesh", "kind"),
         "places": sums(counts, "offset", "scale"),
         "builds": sums([c for c in counts if c.kernel == "ours"], "split", "leaf_size", "max_depth"),
-        "left_out": left_out,
+        "left_out": [placement for mesh in meshes for placement in mesh.left_out],
         "seed": SEED,
     }
     return record, gates(counts)
@@ -255,7 +266,7 @@ def sums(counts: Sequence[LeakCount], *keys: str) -> list[dict[str, Any]]:
 
 
 def builds(place: int, count: int) -> list[BuildOptions]:
-    """``count`` builds for a mesh's placement: with 1 each mesh gets all of them, with 9 at each offset and scale."""
+    """``count`` builds for a mesh's placement: with 1 each mesh gets all of them, with 3 at least three times."""
     # The two orientations are half the placements apart, and must take builds of different parity.
     first = place - place // (len(OFFSETS) * len(SCALES))
     return [BUILDS[(first + 2 * i) % len(BUILDS)] for i in range(count)]

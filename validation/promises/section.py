@@ -11,8 +11,11 @@ from validation.promises.contract import table
 from validation.promises.hits.batches import check_batches, check_refits
 from validation.promises.hits.bounds import check_bounds
 from validation.promises.hits.builds import check_builds
+from validation.promises.hits.counts import check_counts
 from validation.promises.hits.errors import check_errors
 from validation.promises.hits.files import check_files
+from validation.promises.hits.limits import check_limits
+from validation.promises.hits.meshes import check_meshes
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
 from validation.promises.hits.planes import check_planes
@@ -20,12 +23,14 @@ from validation.promises.hits.starts import check_starts
 from validation.promises.hits.trees import check_trees
 from validation.promises.pictures.bounces import check_bounces
 from validation.promises.pictures.cameras import check_cameras
+from validation.promises.pictures.codes import check_codes
 from validation.promises.pictures.floors import check_floors
 from validation.promises.pictures.nesting import check_nesting
 from validation.promises.pictures.openings import check_openings
 from validation.promises.pictures.placing import check_placing
 from validation.promises.pictures.shining import check_shining
 from validation.promises.queries.angles import check_angles, check_halves
+from validation.promises.queries.edges import check_edges
 from validation.promises.queries.inside import check_inside
 from validation.promises.queries.nearest import check_nearest
 from validation.promises.queries.piles import check_piles
@@ -49,17 +54,21 @@ HITS: dict[str, Callable[[], Rows]] = {
     "places of hits": lambda: check_places(_random(), _RAYS),
     "bounds of rays": lambda: check_bounds(_random(), _RAYS),
     "planes from afar": check_planes,
-    "errors of t": check_errors,
+    "errors of t": lambda: check_errors(_random()),
+    "ends of float64": check_limits,
     "starts": lambda: check_starts(_random()),
     "sizes of batches": check_batches,
     "refits": check_refits,
     "trees": lambda: check_trees(_random()),
     "builds": lambda: check_builds(_random()),
+    "counts": lambda: check_counts(_random()),
     "files": check_files,
+    "changed meshes": check_meshes,
     "polygons": lambda: check_outlines(_random(), _POLYGONS),
 }
 QUERIES: dict[str, Callable[[], Rows]] = {
     "points inside": lambda: check_inside(_random()),
+    "open edges": lambda: check_edges(_random()),
     "winding numbers": lambda: check_angles(_random()),
     "sides of a half": lambda: check_halves(_random()),
     "series": lambda: check_series(_random()),
@@ -75,6 +84,7 @@ PICTURES: dict[str, Callable[[], Rows]] = {
     "bounces": check_bounces,
     "lights": check_shining,
     "nested media": check_nesting,
+    "codes": check_codes,
     "boxes shown": lambda: check_openings(_random(), _OPENED),
 }
 _COVERED = "what nobody judges may be broken unseen"

@@ -4,7 +4,7 @@ Three kernels trace the same rays: ours in float64, and Embree's default and rob
 float32, as for all their users. Each error is against the exact hit of the float64 input.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -63,20 +63,30 @@ QUICK = SweepEffort(rays=60, leaks=20_000)
 FULL = SweepEffort(rays=200, leaks=200_000)
 
 
-def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, object], list[Gate]]:
-    """Measure all curves; returns a record for JSON and two gates for each, on ours alone."""
-    effort = QUICK if quick else FULL
-    record: dict[str, object] = {"rays": effort.rays, "seed": SEED}
-    gates: list[Gate] = []
-    for index, sweep in enumerate(SWEEPS):
-        step(f"stability: error against {sweep.name}")
-        seeded = ((x, np.random.default_rng([SEED, index, i])) for i, x in enumerate(sweep.xs))
-        points = [point(sweep, x, effort.rays, rng) for x, rng in seeded]
-        record[sweep.name] = {"label": sweep.label, "points": [p.record() for p in points]}
-        gates += judge(sweep.name, points)
-    step("stability: leaks")
-    record["leaks"] = [leak_row(level, effort.leaks) for level in (3, 4, 5, 6)]
-    return record, gates
+def curve(index: int, quick: bool) -> tuple[dict[str, object], list[Gate]]:
+    """Measure one of SWEEPS; returns its record for JSON and two gates, on ours alone."""
+    sweep, rays = SWEEPS[index], _effort(quick).rays
+    seeded = ((x, np.random.default_rng([SEED, index, i])) for i, x in enumerate(sweep.xs))
+    points = [point(sweep, x, rays, rng) for x, rng in seeded]
+    return {"label": sweep.label, "points": [p.record() for p in points]}, judge(sweep.name, points)
+
+
+def leak_rows(quick: bool) -> list[dict[str, object]]:
+    """Leaks of spheres of four sizes, by kernel."""
+    return [leak_row(level, _effort(quick).leaks) for level in (3, 4, 5, 6)]
+
+
+def summary(
+    curves: Sequence[tuple[dict[str, object], list[Gate]]], leaks: list[dict[str, object]], quick: bool
+) -> tuple[dict[str, object], list[Gate]]:
+    """All curves, in the order of SWEEPS, and the leaks: a record for JSON and the gates."""
+    named = {sweep.name: record for sweep, (record, _) in zip(SWEEPS, curves, strict=True)}
+    record = {"rays": _effort(quick).rays, "seed": SEED, **named, "leaks": leaks}
+    return record, [gate for _, gates in curves for gate in gates]
+
+
+def _effort(quick: bool) -> SweepEffort:
+    return QUICK if quick else FULL
 
 
 @dataclass(frozen=True)

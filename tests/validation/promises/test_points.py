@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation.promises.queries import angles, inside, nearest, piles, series, signed, views, whole
+from validation.promises.queries import angles, edges, inside, nearest, piles, series, signed, views, whole
 
 CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
     "inside": inside.check_inside,
+    "edges": edges.check_edges,
     "angles": angles.check_angles,
     "halves": angles.check_halves,
     "series": series.check_series,
@@ -52,7 +54,7 @@ def test_one_point_on_the_wrong_side_is_found(monkeypatch: pytest.MonkeyPatch) -
         return answers
 
     changed(monkeypatch, "contains", wrong)
-    assert broken("inside") == {"inside is told"} and broken("halves") == {"inside a mesh"}
+    assert broken("inside") == {"inside is told", "points a float32"} and broken("halves") == {"inside a mesh"}
 
 
 def test_winding_numbers_a_little_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,6 +144,17 @@ def test_the_other_sign_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_ball_that_hides_itself_and_one_that_hides_nothing_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         changed(patch, "visible", lambda found: found & False)
-        assert broken("views") == {"a ball's centre"}
+        assert broken("views") == {"a ball's centre", "what is in"}
     changed(monkeypatch, "visible", lambda found: found | True)
-    assert broken("views") == {"nothing is seen"}
+    assert broken("views") == {"nothing is seen", "what is in"}
+
+
+def test_edges_that_are_counted_otherwise_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(Mesh, "is_closed", lambda mesh: not len(mesh.open_edges))
+        assert broken("edges") == {"a mesh is"}
+    with monkeypatch.context() as patch:
+        patch.setattr(Mesh, "open_edges", property(lambda mesh: mesh.odd_edges))
+        assert "open and odd" in broken("edges")
+    monkeypatch.setattr(Octree, "contains", lambda *given, **options: np.zeros(1, np.bool_))
+    assert broken("edges") == {"contains refuses a"}

@@ -7,23 +7,42 @@ from typing import Any
 import numpy as np
 import pytest
 
+from renderer import octree
 from renderer.inspect import tree_boxes
 from renderer.mesh import ears, obj, polygons
 from renderer.octree import Octree
-from renderer.picture import pack, prepare
+from renderer.picture import image, pack, prepare
 from renderer.scene import scene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
 from renderer.trace.layout import Tree
 from renderer.tree import refit
-from validation.promises.hits import batches, bounds, builds, errors, files, outlines, places, planes, starts, trees
+from validation.promises.hits import (
+    batches,
+    bounds,
+    builds,
+    counts,
+    errors,
+    files,
+    limits,
+    meshes,
+    outlines,
+    places,
+    planes,
+    starts,
+    trees,
+)
 from validation.promises.hits.ways import ways
-from validation.promises.pictures import bounces, cameras, floors, nesting, openings, placing, shining
+from validation.promises.pictures import bounces, cameras, codes, floors, nesting, openings, placing, shining
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
     "bounds": lambda: bounds.check_bounds(np.random.default_rng(5), 256),
-    "errors": errors.check_errors,
+    "errors": lambda: errors.check_errors(np.random.default_rng(5)),
+    "limits": limits.check_limits,
+    "counts": lambda: counts.check_counts(np.random.default_rng(5)),
+    "meshes": meshes.check_meshes,
+    "codes": codes.check_codes,
     "planes": planes.check_planes,
     "files": files.check_files,
     "starts": lambda: starts.check_starts(np.random.default_rng(5)),
@@ -229,8 +248,8 @@ def test_samples_at_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_each_way_asks_rays_once_and_streams_ask_neighbours_apart() -> None:
-    octree: Any = "octree"
-    found = {name: batches_ for name, _, batches_ in ways(octree, octree, 1000)}
+    nobody: Any = "octree"
+    found = {name: batches_ for name, _, batches_ in ways(nobody, nobody, 1000)}
     assert np.array_equal(np.sort(np.concatenate(found["in streams"])), np.arange(1000))
     assert np.abs(np.diff(found["in streams"][0])).min() >= 97 and [len(b) for b in found["one by one"]] == [1] * 200
     assert all(len(b) <= 9 for b in found["nine at a time"]) and len(found["in packets"][0]) == 1000
@@ -269,3 +288,52 @@ def test_a_hole_in_a_plane_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = Octree.any_hit
     monkeypatch.setattr(Octree, "any_hit", lambda *given: sound(*given) & (np.arange(len(given[2])) != 9))
     assert broken("planes") == {"no ray"}
+
+
+def test_counts_of_places_and_of_padding_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = counts.BruteForce.count_steps
+
+    def padded(self: Any, *given: Any) -> Any:
+        steps = sound(self, *given)
+        return replace(steps, triangles=-(-steps.triangles // 4) * 4)
+
+    stats = Octree.stats.fget  # type: ignore[attr-defined]
+    monkeypatch.setattr(counts.BruteForce, "count_steps", padded)
+    monkeypatch.setattr(Octree, "stats", property(lambda self: replace(stats(self), leaves=8)))
+    assert broken("counts") == {"stats counts", "brute force"}
+
+
+def test_a_direction_that_is_refused_and_a_hit_at_infinity_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Octree.closest_hit
+
+    def strict(self: Any, origins: Any, directions: Any) -> Any:
+        if np.abs(directions).max() == 2.0**-300:
+            raise ValueError("directions: too short")
+        return sound(self, origins, directions)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Octree, "closest_hit", strict)
+        assert broken("limits") == {"directions are"}
+    monkeypatch.setattr(Octree, "any_hit", lambda self, origins, directions: np.ones(len(origins), np.bool_))
+    assert broken("limits") == {"a face"}
+
+
+def test_a_tree_over_the_callers_arrays_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(octree, "_checked_mesh", lambda mesh: mesh)
+    assert broken("meshes") == {"a tree"}
+
+
+def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = image.srgb
+    monkeypatch.setattr(codes, "srgb", lambda linear: sound(np.asarray(linear, np.float64) * (1.0 + 1e-9)))
+    assert broken("codes") == {"sRGB codes"}
+    monkeypatch.setattr(codes, "srgb", lambda linear: sound(np.asarray(linear, np.float64) * (
+        1.0 + 1e-7 * (getattr(linear, "dtype", None) == np.float32))))  # fmt: skip
+    assert broken("codes") == {"float32 numbers"}
+
+
+def test_vertices_that_are_rounded_by_the_extent_of_the_file_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = scene._place
+    monkeypatch.setattr(scene, "_place", lambda mesh, matrix: replace(
+        sound(mesh, matrix), vertices=sound(mesh, matrix).vertices.astype(np.float32)))  # fmt: skip
+    assert "placed float32" in broken("placing")

@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
@@ -18,9 +19,10 @@ _TIMES = (*range(-4, 5), *range(-1028, -1010, 2))
 # Shorter and longer directions are refused.
 _SHORTEST, _LONGEST = -298, 697
 _PLANES = 24
+_ALONG = 600
 
 
-def check_errors() -> list[dict[str, Any]]:
+def check_errors(rng: Generator) -> list[dict[str, Any]]:
     """Rays with directions so long that t is denormal, on meshes that the tree counts in other units too."""
     corners = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
     heights = 1.0 + np.arange(_PLANES) / 7.0
@@ -31,7 +33,10 @@ def check_errors() -> list[dict[str, Any]]:
         times = [time for time in _TIMES if _SHORTEST <= size - time <= _LONGEST]
         for tracer in (Octree.from_mesh(scaled), BruteForce.from_mesh(scaled)):
             kept += [_bounded(tracer, np.ldexp(heights, size), math.ldexp(3.0, size - time)) for time in times]
-    return [row("t_error bounds the error of t, of denormal t too", "quotients in whole numbers", np.concatenate(kept))]
+    return [
+        row("t_error bounds the error of t, of denormal t too", "quotients in whole numbers", np.concatenate(kept)),
+        row("t_error of a ray in a face's plane reaches to both ends of its box", "whole numbers", _along(rng)),
+    ]
 
 
 def _bounded(tracer: Octree | BruteForce, heights: NDArray[np.float64], long: float) -> NDArray[np.bool_]:
@@ -44,3 +49,34 @@ def _bounded(tracer: Octree | BruteForce, heights: NDArray[np.float64], long: fl
         for t, whole, error in zip(found.t, exact, found.t_error, strict=True)
     ]
     return np.array([*near, len(near) == len(heights)])
+
+
+def _along(rng: Generator) -> NDArray[np.bool_]:
+    """Rays in the planes of faces with whole coordinates, which meet them if at all within the faces' boxes."""
+    kept = []
+    for _ in range(_ALONG):
+        a, b, c = rng.integers(-9, 10, (3, 3)).astype(np.float64)
+        i, j, k = rng.integers(-9, 10, 3)
+        direction = i * (b - a) + j * (c - a)
+        if not np.cross(b - a, c - a).any() or not direction.any():
+            continue
+        corners = np.array([a, b, c])
+        origin = a - 20.0 * direction + (k % 3) * (b - a)
+        hit = Octree(corners, [[0, 1, 2]]).closest_hit(origin, direction, t_error=True)
+        if hit.hit:
+            assert hit.t_error is not None
+            first, last = _passage(corners, origin, direction)
+            t, error = Fraction(float(hit.t)), Fraction(float(hit.t_error))
+            kept += [t - error <= first, last <= t + error]
+    return np.array(kept)
+
+
+def _passage(corners: NDArray[np.float64], origin: NDArray[np.float64], direction: NDArray[np.float64]
+             ) -> tuple[Fraction, Fraction]:  # fmt: skip
+    """Where a ray of whole numbers enters a face's box and leaves it."""
+    ways = [
+        sorted(Fraction(int(end - o), int(d)) for end in (side.min(), side.max()))
+        for side, o, d in zip(corners.T, origin, direction, strict=True)
+        if d
+    ]
+    return max(way[0] for way in ways), min(way[1] for way in ways)

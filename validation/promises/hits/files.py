@@ -1,4 +1,4 @@
-"""What files keep: a stored tree's repairs and counts, OBJ normals, PLY strips; and what blocks keep: each digit."""
+"""What files keep: a stored tree's repairs and counts, what OBJ corners name, PLY strips; and each digit in blocks."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -43,6 +43,7 @@ def check_files() -> list[dict[str, Any]]:
         return [
             row("a loaded tree has the repairs and counts of the one that was saved", _JUDGE, _stored(folder)),
             row("an OBJ file's normals are kept where each corner of each face has one", _JUDGE, _normals(folder)),
+            row("an OBJ file's corners without texture coordinates get (0, 0)", _JUDGE, _texcoords(folder)),
             row("every second triangle of a PLY strip is turned, after a restart too", _JUDGE, _strips(folder)),
             row("blocks are float32 only where that holds every vertex", _JUDGE, _digits()),
         ]
@@ -71,6 +72,21 @@ def _normals(folder: Path) -> NDArray[np.bool_]:
         path.write_text(_CORNERS + faces, encoding="ascii")
         found = load_mesh(path).normals
         kept.append((found == [0.0, 0.0, 1.0]).all() if has and found is not None else (found is None) != has)
+    return np.array(kept)
+
+
+def _texcoords(folder: Path) -> NDArray[np.bool_]:
+    kept = []
+    for faces, count in (("f 1/1 2/2 3/3\nf 2/2 4/1 3/3\n", 0), ("f 1/1 2/2 3/3\nf 2 4 3\n", 3), ("f 1 2 3\n", None)):
+        path = folder / "a.obj"
+        path.write_text(f"{_CORNERS}vt 0.5 0.25\nvt 0.75 0.5\nvt 1 1\n{faces}", encoding="ascii")
+        mesh = load_mesh(path)
+        given = None if mesh.texcoords is None else mesh.texcoords[mesh.faces].reshape(-1, 2)
+        if given is None or count is None:
+            kept.append(given is None and count is None)
+        else:
+            named = given[:3].tolist() == [[0.5, 0.25], [0.75, 0.5], [1.0, 1.0]]
+            kept.append(named and (given == 0.0).all(axis=1).sum() == count)
     return np.array(kept)
 
 

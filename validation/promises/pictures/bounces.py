@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
+from renderer.scene.material import Dielectric
 from renderer.scene.scene import Scene
 from validation.promises.pictures.glowing import BLACK, equal, glowing, shown, square, thing
 from validation.promises.row import row
@@ -29,7 +30,24 @@ def check_bounces() -> list[dict[str, Any]]:
         kept = [_kept(scene, 20, bound) for bound in _BOUNDS]
         promise = f"a ray ends where its largest weight is below min_weight, {name}"
         found.append(row(promise, "the sum of the weights", np.concatenate(kept)))
-    return found
+    glass = "glass that lets no light through reflects Fresnel's share"
+    return [*found, row(glass, "Fresnel's formula at 0 degrees", _black_glass())]
+
+
+def _black_glass() -> NDArray[np.bool_]:
+    """A pane of glass from straight in front, before a bright background, with transmittance of one colour or none."""
+    kept = []
+    for ior in (1.25, 1.5, 3.0):
+        for color in (BLACK, (0.0, 0.5, 0.0)):
+            glass = Dielectric(ior=ior, transmittance=color)
+            x, y = np.array([8.0, 0.0, 0.0]), np.array([0.0, 8.0, 0.0])
+            pane = thing(square(np.array([-4.0, -4.0, 0.0]), x, y), "glass")
+            camera = OrthographicCamera(eye=(0.1, 0.2, 1.0), target=(0.1, 0.2, 0.0), height=1.0)
+            scene = Scene(camera=camera, materials={"glass": glass}, objects=(pane,), background=(1.0, 0.5, 0.25))
+            share = ((ior - 1.0) / (ior + 1.0)) ** 2
+            weight = share + (1.0 - share) * np.array(color)
+            kept.append(equal(shown(scene, (1, 1)), np.full((1, 1, 3), weight * [1.0, 0.5, 0.25])).ravel())
+    return np.concatenate(kept)
 
 
 def _kept(scene: Scene, depth: int, bound: float) -> NDArray[np.bool_]:

@@ -42,8 +42,22 @@ def check_placing(rng: Generator, count: int) -> list[dict[str, Any]]:
     return [
         row("objects are scaled, turned about x, y, z, then moved", _JUDGE, np.concatenate(corners)),
         row("vertex normals stay perpendicular and outside", "numpy's inverse transpose", np.concatenate(normals)),
+        row("placed float32 vertices are rounded by 2^-22 of the placed extent", _JUDGE, _rounded(rng, count)),
         row("an object's outside stays outside, mirrored or not", "trimesh's volume", np.concatenate(outside)),
     ]
+
+
+def _rounded(rng: Generator, count: int) -> NDArray[np.bool_]:
+    """A float32 mesh, made larger or smaller and moved by up to 100 of its new sizes."""
+    sphere = icosphere(1)
+    mesh, kept = Mesh(sphere.vertices.astype(np.float32), sphere.faces), []
+    for _ in range(count):
+        scale = 10.0 ** rng.uniform(-7.0, 7.0)
+        move = rng.choice([-1.0, 1.0], 3) * scale * 10.0 ** rng.uniform(-2.0, 7.0, 3)
+        placed = _placed(mesh, np.full(3, scale), np.zeros(3), move).mesh
+        off = np.abs(placed.vertices - (mesh.vertices * scale + move)).max(axis=1)
+        kept.append(off <= (2.0**-22 + 2.0**-40) * np.max(placed.extent) + np.spacing(np.abs(move).max()))
+    return np.concatenate(kept)
 
 
 def _expected(scale: Floats, angles: Floats, move: Floats) -> Floats:

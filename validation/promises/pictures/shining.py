@@ -1,5 +1,6 @@
 """Lights of one colour each, directional and point lights, on a surface that scatters all of it."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -32,8 +33,27 @@ def check_shining() -> list[dict[str, Any]]:
             kept.append(equal(shown(scene, (1, 1)), expected).ravel())
     return [
         row("a light of any one colour shines, beside dark ones", "irradiance by hand", np.concatenate(kept)),
+        row("highlights of the largest exponents keep their width", "cos^k by hand", _narrow(ground)),
         row("where smooth normals cancel the face's own counts", "irradiance by hand", _flat(ground)),
     ]
+
+
+def _narrow(ground: Mesh) -> NDArray[np.bool_]:
+    """Light from so little beside the eye that the highlight is e^-1/2 of its middle, for exponents up to 1e14."""
+    kept = []
+    for power in range(2, 8):
+        beside = 10.0**-power
+        shininess = 1.0 / math.tan(beside) ** 2
+        light = DirectionalLight(direction=(-math.sin(beside), -math.cos(beside), 0.0), irradiance=(1.0, 1.0, 1.0))
+        scene = Scene(
+            camera=from_above((0.0, 5.0, 0.0), 1e-6),
+            materials={"shiny": Phong(diffuse=0.0, specular=1.0, shininess=shininess)},
+            objects=(thing(ground, "shiny"),), lights=(light,),
+        )  # fmt: skip
+        # cos(x)^k, of which the cosine alone would lose all digits.
+        expected = math.exp(shininess * 0.5 * math.log1p(-(math.sin(beside) ** 2)))
+        kept.append(equal(shown(scene, (1, 1)), np.full((1, 1, 3), expected)).ravel())
+    return np.concatenate(kept)
 
 
 def _flat(ground: Mesh) -> NDArray[np.bool_]:

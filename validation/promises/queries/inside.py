@@ -1,5 +1,6 @@
 """Points in, on and beside closed solids whose coordinates are of all sizes: each solid alone, in whole numbers."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,11 @@ from renderer.octree import BruteForce, Octree
 from validation.oracle.distance import cross, dot
 from validation.promises.queries.whole import Corner, Face, heaps, relative, volume
 from validation.promises.row import row
+from validation.promises.squares import squares
 
 Floats = NDArray[np.float64]
+# Squares along each side of a box, and points beside its sides.
+_SQUARES, _BESIDE = 20, 400
 
 
 def check_inside(rng: Generator) -> list[dict[str, Any]]:
@@ -29,7 +33,38 @@ def check_inside(rng: Generator) -> list[dict[str, Any]]:
                 asked.contains(points, boundary=False, rule="even-odd") == ((winding % 2 == 1) & ~on),
             ]
     promise = "inside is told exactly, whatever the sizes of coordinates"
-    return [row(promise, "each tetrahedron in whole numbers", np.concatenate(found))]
+    return [
+        row(promise, "each tetrahedron in whole numbers", np.concatenate(found)),
+        row("points a float32 step or less beside a flat side are told apart", "the box's ends", _slabs(rng)),
+    ]
+
+
+def _slabs(rng: Generator) -> NDArray[np.bool_]:
+    """Boxes of which each side is a grid, so that nodes of the tree are flat, and points beside their sides."""
+    kept = []
+    for axis, turn in product(range(3), (1.0, -1.0)):
+        mesh = _grid_box(_SQUARES)
+        size = np.roll([8.25, _SQUARES, _SQUARES], axis) / _SQUARES
+        start = np.roll([1.75, 0.0, 0.0], axis)
+        vertices = turn * (mesh.vertices * size + start)
+        octree = Octree.from_mesh(Mesh(vertices, mesh.faces if turn > 0 else mesh.faces[:, ::-1]))
+        points = start + size * rng.uniform(0.15, 0.85, (_BESIDE, 3)) * _SQUARES
+        off = 2.0 ** -rng.uniform(22.0, 50.0, _BESIDE) * rng.choice([-1.0, 1.0], _BESIDE)
+        end = rng.integers(0, 2, _BESIDE)
+        points[:, axis] = np.where(end, 10.0, 1.75) + off
+        kept.append(octree.contains(turn * points) == (off > 0.0) ^ (end == 1))
+    return np.concatenate(kept)
+
+
+def _grid_box(count: int) -> Mesh:
+    """The box [0, count]^3 of unit squares."""
+    row, column = np.divmod(np.arange(count**2), count)
+    u, v = row + np.array([[0], [1], [1], [0]]), column + np.array([[0], [0], [1], [1]])
+    sides = []
+    for axis, end in product(range(3), (0, 1)):
+        corners = np.roll(np.stack([np.full(u.shape, count * end), u, v], axis=-1), axis, axis=-1)
+        sides.append(np.moveaxis(corners, 0, 1)[:, :: 1 if end else -1])
+    return squares(np.concatenate(sides).astype(np.float64))
 
 
 def _told(faces: list[Face]) -> tuple[int, bool]:

@@ -37,6 +37,7 @@ def check_views(rng: Generator) -> list[dict[str, Any]]:
             np.concatenate(seen),
         ),
         row("nothing is seen through a ball", "a ball is closed", np.concatenate(hidden)),
+        row("what is in front of a face, however near, hides what stands on it", "planes by hand", _covered()),
         row("corners at 0.0 and -0.0 are at one place", "a box is closed", _closed()),
     ]
 
@@ -47,3 +48,16 @@ def _closed() -> NDArray[np.bool_]:
     corners[::2][corners[::2] == 0.0] = -0.0
     mesh = Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
     return np.array([len(mesh.open_edges) == 0, len(mesh.odd_edges) == 0])
+
+
+def _covered() -> NDArray[np.bool_]:
+    """A face over another and below a third: hidden and hiding, closer than 2^-40 of the coordinates too."""
+    below, above = np.array([(-1.0, -1.0, 0.0), (3.0, -1.0, 0.0), (-1.0, 3.0, 0.0)]), np.array([0.0, 0.0, 1.0])
+    kept = []
+    for height in 2.0 ** -np.arange(2.0, 43.0):
+        corners = np.concatenate([below, (below + above)[::-1], below + height * above])
+        for tracer in (Octree, BruteForce):
+            built = tracer(corners, np.arange(9).reshape(-1, 3))
+            kept += [not built.visible(np.zeros(3), above, leaving=0, reaching=1)]
+            kept += [bool(built.visible(height * above, above, leaving=2, reaching=1))]
+    return np.array(kept)

@@ -110,7 +110,7 @@ def _coincident(quick: bool) -> Outcome:
 
 
 def _fan(quick: bool) -> Outcome:
-    rng, count, shots = np.random.default_rng(SEED), 100_000, 500 if quick else 5_000
+    rng, count, shots = np.random.default_rng(SEED), 100_000, 500 if quick else 2_000
     angle = np.arange(count) * (2 * np.pi / count)
     rim = np.column_stack([np.cos(angle), np.sin(angle), 0.1 * np.sin(40 * angle)])
     corner = np.arange(count, dtype=np.int32)

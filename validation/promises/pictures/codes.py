@@ -1,0 +1,51 @@
+"""The 8-bit codes of sRGB: each begins at the least number that the standard's formula rounds to it."""
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from renderer.picture.image import srgb
+from validation.promises.row import row
+
+# Rounding of a power in float64, in units of the last place of the number: how far a code's start may be off.
+_ULPS = 16
+
+
+def check_codes() -> list[dict[str, Any]]:
+    """The numbers at each start, below and above it, in float64 and in float32."""
+    starts = np.array([float(_start(code)) for code in range(1, 256)])
+    codes = np.arange(1, 256)
+    off = _ULPS * np.spacing(starts)
+    below, above = starts - off, starts + off
+    wide = (srgb(above) == codes) & (srgb(below) == codes - 1)
+    # The nearest float32 on either side of what float64 says are told apart as float64 tells them.
+    single = np.concatenate([starts.astype(np.float32) + k * np.spacing(starts.astype(np.float32)) for k in (-1, 0, 1)])
+    first = np.array([_first(below[i], above[i], codes[i]) for i in range(255)])
+    expected = np.tile(codes - 1, 3) + (single.astype(np.float64) >= np.tile(first, 3))
+    return [
+        row("sRGB codes begin where the standard's formula says", "IEC 61966-2-1 in whole numbers", wide),
+        row("float32 numbers get the codes of the same float64", "the first float64 of each code",
+            srgb(single.astype(np.float32)) == expected),
+    ]  # fmt: skip
+
+
+def _start(code: int) -> Fraction:
+    """The least linear value that is encoded as ``code``, within 2^-80: bisection of y^5 = x^12, without a power."""
+    encoded = (Fraction(code) - Fraction(1, 2)) / 255
+    if encoded <= Fraction("12.92") * Fraction("0.0031308"):
+        return encoded / Fraction("12.92")
+    base = ((encoded + Fraction("0.055")) / Fraction("1.055")) ** 12
+    low, high = 0, 1 << 80
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if Fraction(middle, 1 << 80) ** 5 <= base else (low, middle)
+    return Fraction(low, 1 << 80)
+
+
+def _first(below: float, above: float, code: int) -> float:
+    """The first float64 of a code, between two numbers of which the upper has it."""
+    while np.nextafter(below, above) < above:
+        middle = below + (above - below) / 2
+        below, above = (below, middle) if srgb(middle) >= code else (middle, above)
+    return above

@@ -1,0 +1,75 @@
+"""Which edges are open: piles of faces, some doubled, tripled or turned, counted edge by edge."""
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box
+from renderer.octree import Octree
+from validation.promises.row import row
+
+_JUDGE = "edges counted one by one"
+_PILES, _FACES, _PLACES = 150, 8, 5
+Edge = tuple[int, int]
+
+
+def check_edges(rng: Generator) -> list[dict[str, Any]]:
+    """Random faces of few places, so that edges are shared by none to many; and copies of a closed box."""
+    closed, opened, asked = [], [], []
+    for faces in (*_piles(rng), *_boxes()):
+        places = rng.normal(size=(int(faces.max()) + 1, 3))
+        mesh = Mesh(places, faces)
+        passed = Counter((int(a), int(b)) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True))
+        closed.append(mesh.is_closed() == _bounds(passed))
+        odd, one_way = _open(passed)
+        opened += [_edges(mesh.odd_edges) == odd, _edges(mesh.open_edges) == one_way]
+        octree = Octree.from_mesh(mesh)
+        asked += [_answers(octree, "even-odd") == (not odd), _answers(octree, "nonzero") == (not one_way)]
+    return [
+        row("a mesh is closed where each edge is passed once either way", _JUDGE, np.array(closed)),
+        row("open and odd edges are those that faces leave open", _JUDGE, np.array(opened)),
+        row("contains refuses a surface that its rule finds open", _JUDGE, np.array(asked)),
+    ]
+
+
+def _piles(rng: Generator) -> list[NDArray[np.int64]]:
+    """Faces of three different places; the first is there once to four times."""
+    found = []
+    for number in range(_PILES):
+        faces = np.array([rng.permutation(_PLACES)[:3] for _ in range(rng.integers(1, _FACES))])
+        found.append(np.concatenate([faces, np.repeat(faces[:1], number % 4, axis=0)]))
+    return found
+
+
+def _boxes() -> list[NDArray[np.int64]]:
+    """A closed box, twice and three times the same, turned, and twice with one turned."""
+    faces = np.asarray(box().faces, np.int64)
+    turned = faces[:, ::-1]
+    return [faces, turned, *(np.concatenate(some) for some in ((faces, faces), (faces, turned), (faces,) * 3))]
+
+
+def _bounds(passed: Counter[Edge]) -> bool:
+    return all(number == 1 and passed[b, a] == 1 for (a, b), number in tuple(passed.items()))
+
+
+def _open(passed: Counter[Edge]) -> tuple[set[Edge], set[Edge]]:
+    """The edges that an odd number of faces has, and those that are not passed as often one way as the other."""
+    edges = {(min(edge), max(edge)) for edge in passed}
+    odd = {(a, b) for a, b in edges if (passed[a, b] + passed[b, a]) % 2}
+    return odd, {(a, b) for a, b in edges if passed[a, b] != passed[b, a]}
+
+
+def _edges(rows: NDArray[np.int64]) -> set[Edge]:
+    return {(min(a, b), max(a, b)) for a, b in rows.tolist()}
+
+
+def _answers(octree: Octree, rule: Any) -> bool:
+    try:
+        octree.contains([[9.0, 9.0, 9.0]], rule=rule)
+    except ValueError:
+        return False
+    return True
