@@ -1,9 +1,10 @@
 """The job of one run: its options, thresholds and folder, and the callback by which sections report progress."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from validation.processes import Workers
 from validation.thresholds import Thresholds
 
 
@@ -17,7 +18,7 @@ class Job:
     step        called with the name of each step as it begins; a section's ``steps(job)`` is the number of calls
     scenes      a user's scene files, to be judged instead of the suite's own
     meshes      a user's mesh files, to be judged instead of the suite's own
-    processes   how many processes may share the tasks of which no time is measured; 1 for this one alone
+    workers     the processes for tasks of which no time is measured
     """
 
     quick: bool
@@ -26,7 +27,7 @@ class Job:
     step: Callable[[str], None]
     scenes: tuple[Path, ...] = ()
     meshes: tuple[Path, ...] = ()
-    processes: int = 1
+    workers: Workers = field(default_factory=Workers)
 
     @property
     def own(self) -> bool:

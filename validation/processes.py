@@ -7,33 +7,63 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import active_children, connection, get_context, parent_process
-from typing import TypeVar
+from types import TracebackType
+from typing import Self, TypeVar
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
-def each(
-    work: Callable[[Task], Result], tasks: Sequence[Task], processes: int, step: Callable[[Task], None]
-) -> list[Result]:
-    """``work(task)`` of each task, in their order; ``step`` is called with each as it begins.
-
-    With one process it is this one. Raises what ``work`` raises, and ``RuntimeError`` where a process ends; no process
-    is left behind.
+class Workers:
+    """So many processes, which the first tasks start; with one it is this one. Used in a ``with`` statement, after
+    which none is left.
     """
-    if processes == 1:
-        return [_one(work, task, step) for task in tasks]
-    others = active_children()
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_begin) as pool:
+
+    def __init__(self, processes: int = 1) -> None:
+        self._processes, self._pool = processes, None if processes == 1 else _pool(processes)
+        self._others = active_children()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pool is not None:
+            if error is not None:
+                for child in active_children():
+                    if child not in self._others:
+                        child.kill()
+            self._pool.shutdown()
+
+    def each(self, work: Callable[[Task], Result], tasks: Sequence[Task], step: Callable[[Task], None]) -> list[Result]:
+        """``work(task)`` of each task, in their order; ``step`` is called with each as it begins.
+
+        Raises what ``work`` raises, and ``RuntimeError`` where a process ends.
+        """
+        if self._pool is None:
+            return [_one(work, task, step) for task in tasks]
         try:
-            return _all(work, tasks, pool, processes, step)
-        except BaseException as error:
-            for child in active_children():
-                if child not in others:
-                    child.kill()
-            if isinstance(error, BrokenProcessPool):
-                raise RuntimeError(f"a process for {work.__name__} ended before its task did") from error
-            raise
+            return self._all(self._pool, work, tasks, step)
+        except BrokenProcessPool as error:
+            raise RuntimeError(f"a process for {work.__qualname__} ended before its task did") from error
+
+    def _all(
+        self, pool: ProcessPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task],
+        step: Callable[[Task], None],
+    ) -> list[Result]:  # fmt: skip
+        """No task is handed over before a process is free for it, so that ``step`` tells which have begun."""
+        waiting = list(enumerate(tasks))[::-1]
+        running: dict[Future[Result], int] = {}
+        results: dict[int, Result] = {}
+        while waiting or running:
+            while waiting and len(running) < self._processes:
+                index, task = waiting.pop()
+                step(task)
+                running[pool.submit(work, task)] = index
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                results[running.pop(future)] = future.result()
+        return [results[index] for index in range(len(tasks))]
 
 
 def _one(work: Callable[[Task], Result], task: Task, step: Callable[[Task], None]) -> Result:
@@ -41,22 +71,8 @@ def _one(work: Callable[[Task], Result], task: Task, step: Callable[[Task], None
     return work(task)
 
 
-def _all(
-    work: Callable[[Task], Result], tasks: Sequence[Task], pool: ProcessPoolExecutor, processes: int,
-    step: Callable[[Task], None],
-) -> list[Result]:  # fmt: skip
-    """No task is handed over before a process is free for it, so that ``step`` tells which have begun."""
-    waiting = list(enumerate(tasks))[::-1]
-    running: dict[Future[Result], int] = {}
-    results: dict[int, Result] = {}
-    while waiting or running:
-        while waiting and len(running) < processes:
-            index, task = waiting.pop()
-            step(task)
-            running[pool.submit(work, task)] = index
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            results[running.pop(future)] = future.result()
-    return [results[index] for index in range(len(tasks))]
+def _pool(processes: int) -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_begin)
 
 
 def _begin() -> None:

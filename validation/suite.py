@@ -18,6 +18,7 @@ from renderer.scene.scene import load_scene
 from validation import environment
 from validation.gates import Gate
 from validation.job import Job
+from validation.processes import Workers
 from validation.progress import steps
 from validation.report import baseline, junit, page, schema, summary
 from validation.scenes import SCENES
@@ -58,10 +59,10 @@ def run(request: Request) -> dict[str, Any]:
 
     # Run the sections, with pictures in a temporary folder.
     request.output.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=request.output, prefix=".run-") as folder:
+    with TemporaryDirectory(dir=request.output, prefix=".run-") as folder, Workers(_processes()) as workers:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()
-        job = Job(request.quick, thresholds, pictures, lambda _: None, request.scenes, request.meshes, _processes())
+        job = Job(request.quick, thresholds, pictures, lambda _: None, request.scenes, request.meshes, workers)
         records, gates = _sections(chosen, job)
 
         # Collect the metrics and write the report.

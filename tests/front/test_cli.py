@@ -1,6 +1,7 @@
 """The command line: what it writes, and one line and an exit code for everything that can go wrong."""
 
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.cli import main
+from renderer.cli import _choose_processor, main
 from renderer.picture.render import render
 from renderer.precompile import compile_ahead
 from renderer.scene.scene import load_scene
@@ -286,12 +287,19 @@ def test_compile_fails_where_nothing_can_be_kept(tmp_path: Path) -> None:
 
 
 def test_kernels_for_another_architecture_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    import platform
-
     other = "x86-64-v3" if platform.machine() in ("aarch64", "arm64") else "aarch64"
     said = fails(capsys, "compile", "--level", other, "-o", tmp_path / "kernels")
     assert said.startswith("--level: expected one of this processor's, ")
     assert not (tmp_path / "kernels").exists()
+
+
+def test_a_level_is_what_numba_will_compile_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    level, name = ("aarch64", "generic") if platform.machine().lower() in ("aarch64", "arm64") else ("x86-64-v2",) * 2
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    for variable in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"):
+        monkeypatch.setenv(variable, "another")
+    _choose_processor(level, tmp_path)
+    assert (os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"]) == (name, "")
 
 
 @pytest.mark.skipif(sys.getfilesystemencoding() == "ascii", reason="no file can have such a name")

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from renderer.trimesh_ray.trees import Traced
+
 ROOT = Path(__file__).parents[2]
 SCRIPT = Path(__file__).with_name("answers.py")
 DROP_IN = ("-m", "renderer.trimesh_ray")
@@ -99,3 +101,12 @@ def test_a_script_has_its_own_options(tmp_path: Path, option: str) -> None:
     script = tmp_path / "s.py"
     script.write_text("import sys, trimesh.proximity as p; print(sys.argv[1:], p.closest_point.__module__)")
     assert ran(*DROP_IN, str(script), "x", option).stdout == f"['x', '{option}'] trimesh.proximity\n"
+
+
+def test_a_tree_keeps_the_faces_that_it_was_built_from() -> None:
+    vertices = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (np.nan, 0.0, 0.0)])
+    for count in (1, 2):
+        faces = np.array([(0, 1, 2), (0, 1, 3)])[:count]
+        traced = Traced(vertices, faces)
+        faces[0] = (2, 1, 0)
+        assert traced.faces[0].tolist() == [0, 1, 2]

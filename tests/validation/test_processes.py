@@ -10,7 +10,7 @@ from multiprocessing import active_children
 import pytest
 
 from renderer.process import child
-from validation.processes import each
+from validation.processes import Workers
 
 
 def square(number):
@@ -33,7 +33,8 @@ def wait_for_long(folder):
 @pytest.mark.parametrize("processes", [1, 2])
 def test_results_come_in_the_order_of_the_tasks(processes):
     begun = []
-    found = each(square, list(range(7)), processes, begun.append)
+    with Workers(processes) as workers:
+        found = workers.each(square, list(range(7)), begun.append)
     assert [value for value, _ in found] == [0, 1, 4, 9, 16, 25, 36]
     assert begun == list(range(7))
     others = {process for _, process in found} - {os.getpid()}
@@ -42,14 +43,14 @@ def test_results_come_in_the_order_of_the_tasks(processes):
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_an_error_is_raised_here(processes):
-    with pytest.raises(KeyError, match="3"):
-        each(fail, [3], processes, lambda task: None)
+    with pytest.raises(KeyError, match="3"), Workers(processes) as workers:
+        workers.each(fail, [3], lambda task: None)
     assert not active_children()
 
 
 def test_the_end_of_a_process_is_an_error():
-    with pytest.raises(RuntimeError, match="a process for crash ended"):
-        each(crash, [1, 2], 2, lambda task: None)
+    with pytest.raises(RuntimeError, match="a process for crash ended"), Workers(2) as workers:
+        workers.each(crash, [1, 2], lambda task: None)
     assert not active_children()
 
 
@@ -58,9 +59,10 @@ _SCRIPT = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {home!r})
-from test_processes import each, wait_for_long
+from test_processes import Workers, wait_for_long
 if __name__ == "__main__":
-    each(wait_for_long, [Path({folder!r})] * 2, 2, lambda task: None)
+    with Workers(2) as workers:
+        workers.each(wait_for_long, [Path({folder!r})] * 2, lambda task: None)
 """
 
 

@@ -55,7 +55,7 @@ class PictureTimingEffort:
     runs: int
 
 
-QUICK = PictureTimingEffort(size=48, theirs=(1, 4, 16, 64), truth=256, runs=1)
+QUICK = PictureTimingEffort(size=32, theirs=(1, 4, 16, 64), truth=256, runs=1)
 FULL = PictureTimingEffort(size=64, theirs=(1, 4, 16, 64, 256), truth=576, runs=3)
 
 

@@ -13,6 +13,12 @@ EQUIVALENT: dict[str, str] = {
         "a ray that has its hit is tested on in vain: more work, the same answers",
     "renderer.distance.block_distance #1: -48 -> (48)":
         "the bound from above is so loose that it leaves out no face: more work, the same answers",
+    "renderer.tree.midpoint.octant_room #1: 8 -> 9": "scratch for a ninth octant is never written nor read",
+    **{
+        f"renderer.trace.packet.enter_beam #{n}: a {sign} b -> (a) {sign}= (b)":
+            "of two equal numbers either may be taken"
+        for n in (0, 1) for sign in "<>"
+    },
     "validation.oracle.exact._BoxTree.__init__ #0: range(depth) -> range(depth - 1)":
         "the faces of the last level stay unsorted: wider boxes and more candidates, the same answers",
     "validation.oracle.star #0: 1 -> 2": "points are judged one by one, however many are taken together",

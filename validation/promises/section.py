@@ -87,18 +87,20 @@ PICTURES: dict[str, Callable[[], Rows]] = {
     "codes": check_codes,
     "boxes shown": lambda: check_openings(_random(), _OPENED),
 }
+_CHECKS = {**HITS, **QUERIES, **PICTURES}
 _COVERED = "what nobody judges may be broken unseen"
 _REASON = "a promise holds each time that it is asked"
 
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step``: one for each check."""
-    return len(HITS) + len(QUERIES) + len(PICTURES)
+    return len(_CHECKS)
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask everything; returns a record for JSON, and a gate for each promise that it was never broken."""
-    rows, promises = judge({**HITS, **QUERIES, **PICTURES}, job), table.read()
+    parts = job.workers.each(_asked, [*_CHECKS], lambda name: job.step(_step(name)))
+    rows, promises = [row for part in parts for row in part], table.read()
     missing = table.unjudged(promises)
     covered = Gate("promises", "the public contract", "pieces without a judge", len(missing), "at most", 0.0, _COVERED)
     record = {
@@ -114,9 +116,17 @@ def judge(checks: dict[str, Callable[[], Rows]], job: Job) -> Rows:
     """The rows of some checks."""
     rows: Rows = []
     for name, check in checks.items():
-        job.step(f"promises: {name}")
+        job.step(_step(name))
         rows += check()
     return rows
+
+
+def _asked(name: str) -> Rows:
+    return _CHECKS[name]()
+
+
+def _step(name: str) -> str:
+    return f"promises: {name}"
 
 
 def gates(rows: Rows) -> list[Gate]:

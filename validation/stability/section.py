@@ -6,7 +6,6 @@ from typing import Any, Literal
 from validation.gates import Gate
 from validation.hits import watertight
 from validation.job import Job
-from validation.processes import each
 from validation.stability import sweeps
 from validation.stability.cases import hits, shading
 from validation.stability.cases.case import ExtremeCase
@@ -57,7 +56,7 @@ def steps(job: Job) -> int:
 def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
     """Run all cases and sweeps; returns a record for JSON and the gates, one for each case among them."""
     tasks = _tasks(job.quick)
-    results = each(Task.do, tasks, job.processes, lambda task: job.step(task.name))
+    results = job.workers.each(Task.do, tasks, lambda task: job.step(task.name))
     of: dict[str, list[Any]] = {}
     for task, result in zip(tasks, results, strict=True):
         of.setdefault(task.kind, []).append(result)

@@ -84,7 +84,7 @@ def differing(mesh: Mesh, rays: RayFamily, t_max: float | np.ndarray = np.inf) -
 
 
 def _order(quick: bool) -> Outcome:
-    mesh, rays = sheets(2000), beside_sheets(80 if quick else 120)
+    mesh, rays = sheets(2000), beside_sheets(48 if quick else 120)
     differs, hits, names = differing(mesh, rays)
     # Half of the limits cut the hit off by less than its error, half keep it.
     close = np.where(hits.hit, hits.t, 1.0) * np.where(np.arange(len(rays)) % 2, 1 - 1e-9, 1 + 1e-9)
