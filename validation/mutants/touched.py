@@ -32,7 +32,8 @@ def read(folder: Path, root: Path) -> Touched:
 
 
 def touching(mutant: Mutant, touched: Touched) -> list[str]:
-    """The test files that run a mutant's code: those in the folder of its module first, then the shortest."""
+    """The test files that run a mutant's code: those in the folder of its module first, then the shortest;
+    at last the others in that folder."""
     package, *folders = Path(mutant.file).parent.parts
     room = Path("tests", *folders if package == "renderer" else (package, *folders)).as_posix()
 
@@ -43,9 +44,11 @@ def touching(mutant: Mutant, touched: Touched) -> list[str]:
     exact = [test for test in near if mutant.file in usable[test]["kernels"]
              or mutant.line in usable[test]["lines"].get(mutant.file, [])]  # fmt: skip
     # What stands at a module's top runs once, in whichever test imports it first; so does what is called from there.
-    return sorted(
-        near if mutant.at_top or not exact else exact,
-        key=lambda test: (Path(test).parent.as_posix() != room, touched[test]["seconds"]),
+    some = near if mutant.at_top or not exact else exact
+    # What runs in other processes is not measured; the tests in the module's own folder may start them.
+    own = [test for test in usable if Path(test).parent.as_posix() == room and test not in some]
+    return sorted(some, key=lambda test: (Path(test).parent.as_posix() != room, touched[test]["seconds"])) + sorted(
+        own, key=lambda test: touched[test]["seconds"]
     )
 
 

@@ -35,7 +35,8 @@ def test_the_tests_of_a_mutant_run_its_line_and_its_own_room_comes_first() -> No
     own, far, kernel = "tests/trace/test_own.py", "tests/tree/test_far.py", "tests/shade/test_kernel.py"
     assert touching(mutant(), TOUCHED) == [own, far, kernel]
     assert touching(mutant(line=2), TOUCHED) == [own, kernel]
-    assert touching(mutant(line=99), TOUCHED) == [kernel]
+    # Nobody measured that the own room's tests run that line, but they may start a process that does.
+    assert touching(mutant(line=99), TOUCHED) == [kernel, own]
     assert touching(mutant(line=99, at_top=True), TOUCHED) == [own, far, kernel]
 
 
