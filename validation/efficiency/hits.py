@@ -51,7 +51,7 @@ class HitTimingEffort:
 
 
 QUICK = HitTimingEffort(level=4, rays=50_000, judged=1000, leaks=20_000, runs=3)
-FULL = HitTimingEffort(level=5, rays=200_000, judged=5000, leaks=100_000, runs=5)
+FULL = HitTimingEffort(level=5, rays=200_000, judged=3000, leaks=100_000, runs=5)
 
 _COMPARED = ("embree_default", "embree_robust", "igl", "mitsuba", "trimesh")
 

@@ -60,7 +60,7 @@ class SweepEffort:
 
 
 QUICK = SweepEffort(rays=60, leaks=20_000)
-FULL = SweepEffort(rays=200, leaks=200_000)
+FULL = SweepEffort(rays=200, leaks=100_000)
 
 
 def curve(index: int, quick: bool) -> tuple[dict[str, object], list[Gate]]:
