@@ -229,7 +229,8 @@ def stored_mutants(output: Path) -> dict[str, Any]:
     from validation.mutants.record import summary as mutants_of
     from validation.mutants.targets import TARGETS, record_of
 
-    found = {target: mutants_of(record_of(target, output)) for target in TARGETS}
+    root = Path(__file__).resolve().parents[1]
+    found = {target: mutants_of(record_of(target, output), root) for target in TARGETS}
     return {target: one for target, one in found.items() if one is not None}
 
 

@@ -13,6 +13,8 @@ from validation.mutants.sites import Mutant
 from validation.mutants.verdict import Verdict
 
 SCHEMA = 1
+# What is kept of each: the mutant, the verdict, and the digests of its file and of its judges.
+_COLUMNS = ("key", "file", "line", "operator", "kernel", "by", "gate", "how", "seconds", "source", "judges")
 Row = dict[str, Any]
 
 
@@ -43,18 +45,15 @@ class Record:
 
     def add(self, mutant: Mutant, verdict: Verdict) -> None:
         """Add a verdict."""
-        state = {"source": self._source(mutant), "judges": self._judges}
-        self._rows[mutant.key] = {"key": mutant.key, **asdict(mutant), **asdict(verdict), **state}
+        state = {"key": mutant.key, "source": self._source(mutant), "judges": self._judges}
+        whole = {**asdict(mutant), **asdict(verdict), **state}
+        self._rows[mutant.key] = {column: whole[column] for column in _COLUMNS}
 
     def write(self, seed: int, asked: Sequence[Mutant]) -> None:
-        """Write the file: all verdicts, and which mutants this run asked for."""
-        whole = {
-            "schema": SCHEMA,
-            "seed": seed,
-            "asked": [mutant.key for mutant in asked],
-            "mutants": list(self._rows.values()),
-        }
-        text = json.dumps(whole, indent=1, ensure_ascii=False) + "\n"
+        """Write the file: all verdicts, a line each, and which mutants this run asked for."""
+        rows = ",\n".join(json.dumps(row, ensure_ascii=False) for row in self._rows.values())
+        keys = ",\n".join(json.dumps(mutant.key, ensure_ascii=False) for mutant in asked)
+        text = f'{{"schema": {SCHEMA}, "seed": {seed}, "asked": [\n{keys}\n], "mutants": [\n{rows}\n]}}\n'
         write_atomically(self.path, lambda file: file.write(text.encode()))
 
     def _source(self, mutant: Mutant) -> str:
@@ -65,14 +64,16 @@ def digest(files: Sequence[Path]) -> str:
     """SHA-256 of files' names and contents."""
     found = hashlib.sha256()
     for file in sorted(files):
-        found.update(str(file.name).encode() + b"\0" + file.read_bytes() + b"\0")
+        content = file.read_bytes() if file.exists() else b""
+        found.update(str(file.name).encode() + b"\0" + content + b"\0")
     return found.hexdigest()
 
 
-def summary(path: Path) -> dict[str, Any] | None:
+def summary(path: Path, root: Path) -> dict[str, Any] | None:
     """What the last run found, for the report; None where there was none.
 
-    ``seed``, ``asked`` (how many) and ``judged``; for ``kernels`` and ``python`` the counts of all, equivalent, killed,
+    ``seed``, ``asked`` (how many), ``judged``, and ``changed``, of how many of these the file in ``root`` has changed
+    since; for ``kernels`` and ``python`` the counts of all, equivalent, killed,
     killed by a gate, hung and crashed, and the survivors' rows; ``operators``, a row each; and ``equivalent``, mutants
     that change no answer, with the proofs.
     """
@@ -86,6 +87,7 @@ def summary(path: Path) -> dict[str, Any] | None:
         "seed": stored["seed"],
         "asked": len(stored["asked"]),
         "judged": len(rows),
+        "changed": sum(row["source"] != digest([root / row["file"]]) for row in rows),
         "kernels": _counts([row for row in rows if row["kernel"]]),
         "python": _counts([row for row in rows if not row["kernel"]]),
         "operators": [

@@ -51,7 +51,7 @@ def run(target: str, count: int, seed: int, output: Path, step: Callable[[str], 
             shops = [Workshop(ROOT, _made(Path(folder) / str(number))) for number in range(workers)]
             touched = _touched(shops[0], output / "touched.json", step)
             _judge_all(waiting, shops, touched, keep, step)
-    found = summary(path)
+    found = summary(path, ROOT)
     assert found is not None  # it was just written
     return found
 

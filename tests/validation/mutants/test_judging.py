@@ -150,15 +150,19 @@ def test_a_summary_counts_what_changes_an_answer(root: Path, monkeypatch: pytest
         "other": (mutant(nth=4), Verdict(None, False, None, 1.0)),
     }
     path = root / "mutants.json"
-    assert summary(path) is None
+    assert summary(path, root) is None
     stored = Record(path, root)
     for one, verdict in verdicts.values():
         stored.add(one, verdict)
     asked = [one for name, (one, _) in verdicts.items() if name != "other"] + [mutant(nth=9)]
     stored.write(7, asked)
     monkeypatch.setattr(record, "EQUIVALENT", {verdicts["same"][0].key: "the same either way"})
-    found = summary(path)
+    found = summary(path, root)
     assert found is not None and (found["seed"], found["asked"], found["judged"]) == (7, 5, 4)
+    assert found["changed"] == 0
+    (root / "renderer" / "trace" / "a.py").write_text("x = a + b + c\n")
+    changed = summary(path, root)
+    assert changed is not None and changed["changed"] == 4
     assert found["kernels"] == {
         "mutants": 3, "equivalent": 1, "killed": 2, "by_gates": 1, "hung": 1, "crashed": 0, "survivors": [],
     }  # fmt: skip
