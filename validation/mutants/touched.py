@@ -35,8 +35,8 @@ def touching(mutant: Mutant, touched: Touched) -> list[str]:
     """The test files that run a mutant's code: those in the folder of its module first, then the shortest;
     at last the others in that folder."""
     package, *folders = Path(mutant.file).parent.parts
-    room = Path("tests", *folders if package == "renderer" else (package, *folders)).as_posix()
-
+    # The front door's modules are in no room.
+    room = Path("tests", *(folders or ["front"]) if package == "renderer" else (package, *folders)).as_posix()
     usable = {test: found for test, found in touched.items() if not test.startswith(_READERS)}
     near = [
         test for test, found in usable.items() if mutant.file in found["kernels"] or found["lines"].get(mutant.file)
