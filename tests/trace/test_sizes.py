@@ -6,7 +6,7 @@ import pytest
 from renderer import BruteForce, MeshError, Octree
 from renderer.limits import SHORTEST
 from renderer.mesh.shapes import box, icosphere
-from renderer.octree import _LEAST_SIDE
+from renderer.octree import _LEAST_SIDE, _ROWS
 from validation.oracle import exact
 
 BALL = icosphere(2)
@@ -61,6 +61,18 @@ def test_a_refit_to_such_faces_is_refused_and_changes_nothing():
     with pytest.raises(MeshError, match="second longest side"):
         octree.refit(beside_a_triangle(1e-165)[0])
     assert octree.closest_hit([0, 0, 0], directions()).hit.all()
+
+
+@pytest.mark.parametrize("count", [_ROWS, _ROWS + 1, _ROWS + 2])
+def test_one_small_corner_is_found_wherever_it_is_listed(count):
+    """Vertices are looked through in pieces, of which the last may be a single row."""
+    for row in (0, count // 2, count - 1):
+        vertices = np.ones((count, 3))
+        vertices[[1, 2]] = 0.0
+        vertices[row] = [1e-200, 1e-200, 0.0]
+        assert row not in (1, 2)
+        with pytest.raises(MeshError, match=r"second longest side .* in row 0"):
+            Octree(vertices, [[1, 2, row]])
 
 
 def test_the_bound_is_where_it_says():

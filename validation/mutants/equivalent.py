@@ -38,5 +38,7 @@ EQUIVALENT: dict[str, str] = {
         "a point in the plane of a face, within its outline as seen along an axis along which it has an area, is on it",
     "renderer.points.signs.volume_sign #2: 0 -> 1":
         "any power of two turns no sign, and what leaves the range then is answered in rational arithmetic",
+    "renderer.inside.crossings._moved_sign #0: a[1] > b[1] -> (a[1]) >= (b[1])": "there the two are not equal",
+    "renderer.inside.crossings._moved_sign #0: b[0] > a[0] -> (b[0]) >= (a[0])": "there the two are not equal",
     "renderer.contacts.gather.gather_chunk #4: 1 -> 2": "any row below 0 says that no ray is out of range",
 }  # fmt: skip
