@@ -337,3 +337,17 @@ def test_vertices_that_are_rounded_by_the_extent_of_the_file_are_found(monkeypat
     monkeypatch.setattr(scene, "_place", lambda mesh, matrix: replace(
         sound(mesh, matrix), vertices=sound(mesh, matrix).vertices.astype(np.float32)))  # fmt: skip
     assert "placed float32" in broken("placing")
+
+
+def test_errors_of_another_ray_and_rays_too_many_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound, drawn = Octree.all_hits, bounces.render
+
+    def other(self: Any, *given: Any, **options: Any) -> Any:
+        found = sound(self, *given, **options)
+        return replace(found, t_error=found.t_error[::-1])
+
+    monkeypatch.setattr(Octree, "all_hits", other)
+    assert "t_error is" in broken("errors")
+    monkeypatch.setattr(bounces, "render", lambda *given, **options: replace(
+        drawn(*given, **options), rays=drawn(*given, **options).rays + 1))  # fmt: skip
+    assert broken("bounces") == {"rays are"}

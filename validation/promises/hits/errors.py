@@ -19,14 +19,14 @@ _TIMES = (*range(-4, 5), *range(-1028, -1010, 2))
 # Shorter and longer directions are refused.
 _SHORTEST, _LONGEST = -298, 697
 _PLANES = 24
+_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 _ALONG = 600
 
 
 def check_errors(rng: Generator) -> list[dict[str, Any]]:
     """Rays with directions so long that t is denormal, on meshes that the tree counts in other units too."""
-    corners = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
     heights = 1.0 + np.arange(_PLANES) / 7.0
-    mesh = squares(np.array([[(x, y, z) for x, y in corners] for z in heights]))
+    mesh = squares(np.array([[(x, y, z) for x, y in _CORNERS] for z in heights]))
     kept = []
     for size in _SIZES:
         scaled = Mesh(np.ldexp(mesh.vertices, size), mesh.faces)
@@ -35,6 +35,7 @@ def check_errors(rng: Generator) -> list[dict[str, Any]]:
             kept += [_bounded(tracer, np.ldexp(heights, size), math.ldexp(3.0, size - time)) for time in times]
     return [
         row("t_error bounds the error of t, of denormal t too", "quotients in whole numbers", np.concatenate(kept)),
+        row("t_error is that of the hit's own ray", "quotients in whole numbers", _own()),
         row("t_error of a ray in a face's plane reaches to both ends of its box", "whole numbers", _along(rng)),
     ]
 
@@ -49,6 +50,35 @@ def _bounded(tracer: Octree | BruteForce, heights: NDArray[np.float64], long: fl
         for t, whole, error in zip(found.t, exact, found.t_error, strict=True)
     ]
     return np.array([*near, len(near) == len(heights)])
+
+
+def _own() -> NDArray[np.bool_]:
+    """Rays one after another, short and long, which meet several planes, or none: some sizes of t's error apart."""
+    heights = 1.0 + np.arange(_PLANES) / 7.0
+    mesh = squares(np.array([[(x, y, z) for x, y in _CORNERS] for z in heights]))
+    long = np.ldexp(3.0, np.arange(40) * 37 % 101 - 50)
+    aside = np.arange(40) % 5 == 2
+    origins = np.stack([0.125 + 9.0 * aside, np.full(40, 0.25), np.zeros(40)], 1)
+    directions = np.stack([np.zeros(40), np.zeros(40), long], 1)
+    kept = []
+    for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+        every = tracer.all_hits(origins, directions, contacts=False, t_error=True)
+        first = tracer.closest_hit(origins, directions, t_error=True)
+        assert every.t_error is not None and first.t_error is not None
+        kept.append(_near(every.t, every.t_error, heights[every.face // 2], long[every.ray]))
+        kept.append(_near(first.t[~aside], first.t_error[~aside], heights[first.face[~aside] // 2], long[~aside]))
+        kept.append(np.array([len(every.t) == _PLANES * np.count_nonzero(~aside)]))
+    return np.concatenate(kept)
+
+
+def _near(
+    t: NDArray[np.float64], error: NDArray[np.float64], height: NDArray[np.float64], long: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether each t is the quotient within its error, and the error not a thousand roundings."""
+    off = [abs(Fraction(a) - Fraction(h) / Fraction(d)) for a, h, d in zip(t, height, long, strict=True)]
+    bounded = [x <= Fraction(e) for x, e in zip(off, error, strict=True)]
+    kept: NDArray[np.bool_] = np.array(bounded) & (error <= 1e3 * np.spacing(t))
+    return kept
 
 
 def _along(rng: Generator) -> NDArray[np.bool_]:

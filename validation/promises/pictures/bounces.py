@@ -1,14 +1,17 @@
 """How many bounces a ray makes, and where its weight ends it: sums between two mirrors, and through panes, by hand."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
-from renderer.scene.material import Dielectric
-from renderer.scene.scene import Scene
+from renderer.scene.light import PointLight
+from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.scene.scene import Scene, SceneObject
 from validation.promises.pictures.glowing import BLACK, equal, glowing, shown, square, thing
 from validation.promises.row import row
 
@@ -19,6 +22,17 @@ _WEIGHT: Color = (0.125, 0.5, 0.25)
 _GLOW: tuple[Color, Color] = ((0.25, 0.5, 1.0), (1.0, 0.125, 0.5))
 _DEPTHS = (0, 1, 2, 3, 6, 11)
 _BOUNDS = (0.0, 0.5**3, float(np.nextafter(0.5**3, 1.0)), float(np.nextafter(0.5**3, 0.0)), 0.3, 0.07)
+_CAMERA = OrthographicCamera(eye=(0.1, 0.2, 1.0), target=(0.1, 0.2, 0.0), height=1.0)
+# How many rays a pixel needs that shows one of two squares that face each other, beside one light, at a depth.
+_NEEDED: tuple[tuple[Material, Callable[[int], int]], ...] = (
+    (Mirror(), lambda depth: 1 + depth),
+    (Phong(diffuse=0.5, specular=0.0), lambda depth: 2),
+    (Phong(diffuse=0.0, specular=0.5), lambda depth: 2),
+    (Phong(diffuse=0.0, specular=0.0), lambda depth: 1),
+    (Phong(diffuse=0.5, reflectance=0.5), lambda depth: 2 * (1 + depth)),
+    (Phong(diffuse=0.0, specular=0.0, reflectance=0.5), lambda depth: 1 + depth),
+    (Dielectric(reflectance=0.0, ior=1.5), lambda depth: 1 + min(depth, 1)),
+)
 
 
 def check_bounces() -> list[dict[str, Any]]:
@@ -31,7 +45,25 @@ def check_bounces() -> list[dict[str, Any]]:
         promise = f"a ray ends where its largest weight is below min_weight, {name}"
         found.append(row(promise, "the sum of the weights", np.concatenate(kept)))
     glass = "glass that lets no light through reflects Fresnel's share"
-    return [*found, row(glass, "Fresnel's formula at 0 degrees", _black_glass())]
+    return [
+        *found,
+        row(glass, "Fresnel's formula at 0 degrees", _black_glass()),
+        row("rays are counted, and none is traced that shows nothing", "counted by hand", _counted()),
+    ]
+
+
+def _counted() -> NDArray[np.bool_]:
+    """Pictures of each material of _NEEDED."""
+    kept = []
+    for material, number in _NEEDED:
+        scene = Scene(
+            camera=_CAMERA, materials={"any": material}, objects=(_wall(0.0, 1.0, "any"), _wall(2.0, -1.0, "any")),
+            lights=(PointLight(position=(0.5, 0.5, 0.75), intensity=1.0),),
+        )  # fmt: skip
+        for depth in (0, 1, 4):
+            rays = render(scene, resolution=(3, 2), max_depth=depth).rays
+            kept.append((rays == number(depth)).ravel())
+    return np.concatenate(kept)
 
 
 def _black_glass() -> NDArray[np.bool_]:
@@ -40,10 +72,12 @@ def _black_glass() -> NDArray[np.bool_]:
     for ior in (1.25, 1.5, 3.0):
         for color in (BLACK, (0.0, 0.5, 0.0)):
             glass = Dielectric(ior=ior, transmittance=color)
-            x, y = np.array([8.0, 0.0, 0.0]), np.array([0.0, 8.0, 0.0])
-            pane = thing(square(np.array([-4.0, -4.0, 0.0]), x, y), "glass")
-            camera = OrthographicCamera(eye=(0.1, 0.2, 1.0), target=(0.1, 0.2, 0.0), height=1.0)
-            scene = Scene(camera=camera, materials={"glass": glass}, objects=(pane,), background=(1.0, 0.5, 0.25))
+            scene = Scene(
+                camera=_CAMERA,
+                materials={"glass": glass},
+                objects=(_wall(0.0, 1.0, "glass"),),
+                background=(1.0, 0.5, 0.25),
+            )
             share = ((ior - 1.0) / (ior + 1.0)) ** 2
             weight = share + (1.0 - share) * np.array(color)
             kept.append(equal(shown(scene, (1, 1)), np.full((1, 1, 3), weight * [1.0, 0.5, 0.25])).ravel())
@@ -67,14 +101,16 @@ def _expected(depth: int, bound: float) -> Floats:
 
 def _scene(objects: list[tuple[float, float, str]], reflectance: Color, transmittance: Color) -> Scene:
     """Squares (z, which way they face, material), seen from z = 1 along -z."""
-    x, y = np.array([8.0, 0.0, 0.0]), np.array([0.0, 8.0, 0.0])
-    squares = [
-        thing(square(np.array([-4.0, -4.0, z]), *((x, y) if facing > 0 else (y, x))), name)
-        for z, facing, name in objects
-    ]
     materials = {name: glowing(glow, reflectance, transmittance) for name, glow in zip("ab", _GLOW, strict=True)}
-    camera = OrthographicCamera(eye=(0.1, 0.2, 1.0), target=(0.1, 0.2, 0.0), height=1.0)
-    return Scene(camera=camera, materials=materials, objects=tuple(squares), ambient=(1.0, 1.0, 1.0))
+    return Scene(
+        camera=_CAMERA, materials=materials, objects=tuple(_wall(*one) for one in objects), ambient=(1.0, 1.0, 1.0)
+    )
+
+
+def _wall(z: float, facing: float, material: str) -> SceneObject:
+    """A square across the view, which faces +z or -z."""
+    x, y = np.array([8.0, 0.0, 0.0]), np.array([0.0, 8.0, 0.0])
+    return thing(square(np.array([-4.0, -4.0, z]), *((x, y) if facing > 0.0 else (y, x))), material)
 
 
 def _mirrors() -> Scene:
