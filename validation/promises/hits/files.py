@@ -13,6 +13,8 @@ from renderer.octree import Octree
 from validation.promises.row import row
 
 _JUDGE = "meshes by hand"
+# Triangles with more vertices than are looked at together.
+_MANY = 30_000
 _CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 0 1\nvn 0 1 0\n"
 _STRIPS = """ply
 format ascii 1.0
@@ -42,6 +44,8 @@ def check_files() -> list[dict[str, Any]]:
         folder = Path(name)
         return [
             row("a loaded tree has the repairs and counts of the one that was saved", _JUDGE, _stored(folder)),
+            row("a loaded tree's mesh has all that the saved one had", _JUDGE, _whole(folder)),
+            row("an OBJ file's corners with other normals or coordinates are other vertices", _JUDGE, _split(folder)),
             row("an OBJ file's normals are kept where each corner of each face has one", _JUDGE, _normals(folder)),
             row("an OBJ file's corners without texture coordinates get (0, 0)", _JUDGE, _texcoords(folder)),
             row("every second triangle of a PLY strip is turned, after a restart too", _JUDGE, _strips(folder)),
@@ -62,6 +66,42 @@ def _stored(folder: Path) -> NDArray[np.bool_]:
         )
         kept += [known, one.stats.faces == 3, one.stats.references == 3]
     return np.array(kept)
+
+
+def _whole(folder: Path) -> NDArray[np.bool_]:
+    """Of a mesh with every array, and of one with none but the needed."""
+    kept = []
+    for more in ({}, {"normals": np.eye(3), "colors": np.eye(3) / 2.0, "texcoords": np.eye(3)[:, :2] / 4.0}):
+        mesh = Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32), name="three", **more)
+        Octree.from_mesh(mesh).save(folder / "a.octree")
+        found = Octree.load(folder / "a.octree").mesh
+        kept += [found.name == "three", np.array_equal(found.vertices, np.eye(3)), found.faces.tolist() == [[0, 1, 2]]]
+        for name in ("normals", "colors", "texcoords"):
+            given = getattr(found, name)
+            kept.append(given is None if name not in more else np.array_equal(given, more[name]))
+    return np.array(kept)
+
+
+def _split(folder: Path) -> NDArray[np.bool_]:
+    """Two faces at an edge, whose corners there have the same normal or coordinates in both faces, or not."""
+    kept, path = [], folder / "a.obj"
+    for faces, count in (("1//1 2//1 3//1|2//1 4//1 3//1", 4), ("1//1 2//1 3//1|2//2 4//2 3//2", 6),
+                         ("1//1 2//1 3//1|2//2 4//1 3//1", 5), ("1/1 2/1 3/1|2/2 4/2 3/1", 5)):  # fmt: skip
+        lines = "".join(f"f {face}\n" for face in faces.split("|"))
+        path.write_text(f"{_CORNERS}vt 0 0\nvt 1 1\n{lines}", encoding="ascii")
+        mesh = load_mesh(path)
+        kept += [len(mesh.vertices) == count, _is_of(mesh, faces)]
+    return np.array(kept)
+
+
+def _is_of(mesh: Mesh, faces: str) -> bool:
+    """Whether each corner of each face has the normal or the coordinates that its file names."""
+    given = [[int(one) for one in corner.split("/") if one] for face in faces.split("|") for corner in face.split()]
+    if mesh.normals is not None:
+        return bool((mesh.normals[mesh.faces.ravel()] == [[(0, 0, 1), (0, 1, 0)][n - 1] for _, n in given]).all())
+    if mesh.texcoords is None:
+        return False
+    return bool((mesh.texcoords[mesh.faces.ravel()] == [[n - 1, n - 1] for _, n in given]).all())
 
 
 def _normals(folder: Path) -> NDArray[np.bool_]:
@@ -115,4 +155,14 @@ def _digits() -> NDArray[np.bool_]:
         octree = Octree.from_mesh(Mesh(moved, np.arange(len(moved), dtype=np.int32).reshape(-1, 3)))
         hits = octree.closest_hit(moved[k] + [0.0, 0.0, 2.0], [0.0, 0.0, -1.0])
         kept.append(hits.face == k // 3 and abs(hits.t - 2.0) <= 2.0**-51)
-    return np.array(kept)
+    return np.array([*kept, *_last_digit()])
+
+
+def _last_digit() -> list[bool]:
+    """The same of the last of very many triangles alone."""
+    x = np.repeat(np.arange(_MANY, dtype=np.float64), 3)
+    vertices = np.stack([x, np.tile([0.0, 1.0, 0.0], _MANY), np.tile([0.0, 0.0, 1.0], _MANY)], 1)
+    vertices[-3:, 0] += 1.0 / 3.0
+    octree = Octree(vertices, np.arange(3 * _MANY).reshape(-1, 3))
+    hits = octree.closest_hit([_MANY + 1.0, 0.25, 0.25], [-1.0, 0.0, 0.0])
+    return [bool(hits.t == _MANY + 1.0 - vertices[-1, 0]), bool(hits.face == _MANY - 1)]

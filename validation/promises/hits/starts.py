@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
@@ -26,4 +27,24 @@ def check_starts(rng: Generator) -> list[dict[str, Any]]:
         found = tracer.all_hits(points, directions, leaving=face, contacts=False)
         again = found.ray[found.face == face[found.ray]]
         kept.append(~np.isin(np.arange(len(face)), again))
-    return [row("a ray does not meet the face that it leaves, however thin", "which face it is", np.concatenate(kept))]
+    return [
+        row("a ray does not meet the face that it leaves, however thin", "which face it is", np.concatenate(kept)),
+        row("each query leaves a face", "a single face", _alone()),
+    ]
+
+
+def _alone() -> NDArray[np.bool_]:
+    """Rays off a triangle's own points, up and down, of which none meets anything; and -1 leaves nothing."""
+    corners = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+    points, kept = np.full((40, 3), 0.25) * [1.0, 1.0, 0.0], []
+    directions = np.tile([[0.125, 0.25, 1.0], [0.5, 0.0, -1.0]], (20, 1))
+    for tracer in (Octree(corners, [[0, 1, 2]]), BruteForce(corners, [[0, 1, 2]])):
+        for count, leaving in ((1, 0), (40, 0), (1, -1), (40, -1)):
+            rays, met = (points[:count], directions[:count]), leaving < 0
+            kept += [
+                (tracer.closest_hit(*rays, leaving=leaving).hit == met).all(),
+                (tracer.any_hit(*rays, leaving=leaving) == met).all(),
+                (tracer.count_hits(*rays, leaving=leaving) == met).all(),
+                len(tracer.all_hits(*rays, leaving=leaving).t) == count * met,
+            ]
+    return np.array(kept)

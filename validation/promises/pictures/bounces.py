@@ -1,17 +1,19 @@
 """How many bounces a ray makes, and where its weight ends it: sums between two mirrors, and through panes, by hand."""
 
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.picture.render import render
+from renderer.picture.prepare import PreparedScene
+from renderer.picture.render import prepare, render
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
 from renderer.scene.light import PointLight
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
-from renderer.scene.scene import Scene, SceneObject
+from renderer.scene.scene import RenderSettings, Scene, SceneObject
 from validation.promises.pictures.glowing import BLACK, equal, glowing, shown, square, thing
 from validation.promises.row import row
 
@@ -44,12 +46,22 @@ def check_bounces() -> list[dict[str, Any]]:
         kept = [_kept(scene, 20, bound) for bound in _BOUNDS]
         promise = f"a ray ends where its largest weight is below min_weight, {name}"
         found.append(row(promise, "the sum of the weights", np.concatenate(kept)))
+    found.append(row("a prepared scene is drawn at any max_depth", "the sum of the weights", _prepared()))
     glass = "glass that lets no light through reflects Fresnel's share"
     return [
         *found,
         row(glass, "Fresnel's formula at 0 degrees", _black_glass()),
         row("rays are counted, and none is traced that shows nothing", "counted by hand", _counted()),
     ]
+
+
+def _prepared() -> NDArray[np.bool_]:
+    """Scenes whose own max_depth is 0 or 1, prepared once."""
+    kept = []
+    for scene, own in product((_mirrors(), _panes()), (0, 1)):
+        ready = prepare(scene.model_copy(update={"render": RenderSettings(max_depth=own)}))
+        kept += [_kept(ready, depth, 0.0) for depth in _DEPTHS]
+    return np.concatenate(kept)
 
 
 def _counted() -> NDArray[np.bool_]:
@@ -84,7 +96,7 @@ def _black_glass() -> NDArray[np.bool_]:
     return np.concatenate(kept)
 
 
-def _kept(scene: Scene, depth: int, bound: float) -> NDArray[np.bool_]:
+def _kept(scene: Scene | PreparedScene, depth: int, bound: float) -> NDArray[np.bool_]:
     radiance = shown(scene, (5, 3), max_depth=depth, min_weight=bound)
     return equal(radiance, _expected(depth, bound)).ravel()
 

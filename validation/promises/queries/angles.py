@@ -67,6 +67,8 @@ def check_halves(rng: Generator) -> list[dict[str, Any]]:
         points = np.concatenate([rng.uniform(0.2, 0.8, (160, 2)), 1.0 + height[:, None]], axis=1)
         points = np.roll(points, axis + 1, axis=1)
         sides.append(octree.contains(points, winding=True) == (height < 0.0))
+        flat = np.roll(np.concatenate([rng.uniform(0.2, 0.8, (9, 2)), np.zeros((9, 1))], axis=1), axis + 1, axis=1)
+        sides += [octree.contains(flat, boundary=on, winding=True) == on for on in (True, False)]
         points = rng.uniform(-1.0, 2.0, (20, 3))
         exact = np.array([turns(point, _large(axis)) for point in points])
         near += [np.abs(octree.winding_number(points, most) - exact) <= most for most in _TOLERANCES]

@@ -19,14 +19,19 @@ Edge = tuple[int, int]
 
 def check_edges(rng: Generator) -> list[dict[str, Any]]:
     """Random faces of few places, so that edges are shared by none to many; and copies of a closed box."""
-    closed, opened, asked = [], [], []
-    for faces in (*_piles(rng), *_boxes()):
-        places = rng.normal(size=(int(faces.max()) + 1, 3))
+    closed: list[bool] = []
+    opened: list[bool] = []
+    asked: list[bool] = []
+    for number, faces in enumerate((*_piles(rng), *_boxes())):
+        last, at = int(faces.max()), faces
+        places = rng.normal(size=(last + 1, 3))
+        closed.append(Mesh(places, faces).is_closed() == _bounds(_passed(faces)))
+        # Edges are told by position: every other time the last vertex is where the first one is.
+        if number % 2:
+            places[last], at = places[0], np.where(faces == last, 0, faces)
         mesh = Mesh(places, faces)
-        passed = Counter((int(a), int(b)) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True))
-        closed.append(mesh.is_closed() == _bounds(passed))
-        odd, one_way = _open(passed)
-        opened += [_edges(mesh.odd_edges) == odd, _edges(mesh.open_edges) == one_way]
+        odd, one_way = _open(_passed(at))
+        opened += [_edges(mesh.odd_edges, at, faces) == odd, _edges(mesh.open_edges, at, faces) == one_way]
         octree = Octree.from_mesh(mesh)
         asked += [_answers(octree, "even-odd") == (not odd), _answers(octree, "nonzero") == (not one_way)]
     return [
@@ -34,6 +39,12 @@ def check_edges(rng: Generator) -> list[dict[str, Any]]:
         row("open and odd edges are those that faces leave open", _JUDGE, np.array(opened)),
         row("contains refuses a surface that its rule finds open", _JUDGE, np.array(asked)),
     ]
+
+
+def _passed(faces: NDArray[np.int64]) -> Counter[Edge]:
+    """How often each edge is passed each way; one from a place to itself bounds nothing."""
+    pairs = ((int(a), int(b)) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True))
+    return Counter(pair for pair in pairs if pair[0] != pair[1])
 
 
 def _piles(rng: Generator) -> list[NDArray[np.int64]]:
@@ -63,8 +74,10 @@ def _open(passed: Counter[Edge]) -> tuple[set[Edge], set[Edge]]:
     return odd, {(a, b) for a, b in edges if passed[a, b] != passed[b, a]}
 
 
-def _edges(rows: NDArray[np.int64]) -> set[Edge]:
-    return {(min(a, b), max(a, b)) for a, b in rows.tolist()}
+def _edges(rows: NDArray[np.int64], at: NDArray[np.int64], faces: NDArray[np.int64]) -> set[Edge]:
+    """Edges of vertices as edges of the places that the vertices are at."""
+    place = dict(zip(faces.ravel().tolist(), at.ravel().tolist(), strict=True))
+    return {(min(place[a], place[b]), max(place[a], place[b])) for a, b in rows.tolist()}
 
 
 def _answers(octree: Octree, rule: Any) -> bool:
