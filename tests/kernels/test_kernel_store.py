@@ -184,8 +184,8 @@ store.write_atomically = refuse
 from renderer.middle import doubled
 assert doubled(3) == 16
 """
-    done = start(package, full + RUN)
-    assert done.stdout.split() == COMPILED
+    done = start(package, full + RUN + "print(store.lost())\n")
+    assert done.stdout.split() == [*COMPILED, "2"]
     said = [line for line in done.stderr.splitlines() if "cannot be kept" in line]
     assert len(said) == 1 and said[0].endswith("No space left on device") and "__pycache__" in said[0]
 

@@ -40,5 +40,9 @@ EQUIVALENT: dict[str, str] = {
         "any power of two turns no sign, and what leaves the range then is answered in rational arithmetic",
     "renderer.inside.crossings._moved_sign #0: a[1] > b[1] -> (a[1]) >= (b[1])": "there the two are not equal",
     "renderer.inside.crossings._moved_sign #0: b[0] > a[0] -> (b[0]) >= (a[0])": "there the two are not equal",
+    "renderer.contacts.gather._compare_corners #0: range(0, 12, 4) -> range(0, 12 - 1, 4)": "the rows are 0, 4 and 8",
+    "renderer.inside.winding._search_in_order #0: 3 -> 4": "an array of no triangles is not looked into",
+    "renderer.distance.rational._candidates #0: np.maximum(away.min(axis=1), -away.max(axis=1)) -> "
+    "np.maximum(-away.max(axis=1), away.min(axis=1))": "the larger of two numbers is the larger in either order",
     "renderer.contacts.gather.gather_chunk #4: 1 -> 2": "any row below 0 says that no ray is out of range",
 }  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 from validation.gates import Gate
 from validation.job import Job
 from validation.promises.contract import table
+from validation.promises.hits.alone import check_alone
 from validation.promises.hits.batches import check_batches, check_refits
 from validation.promises.hits.bounds import check_bounds
 from validation.promises.hits.builds import check_builds
@@ -58,6 +59,7 @@ HITS: dict[str, Callable[[], Rows]] = {
     "ends of float64": check_limits,
     "starts": lambda: check_starts(_random()),
     "sizes of batches": check_batches,
+    "rays alone": lambda: check_alone(_random()),
     "refits": check_refits,
     "trees": lambda: check_trees(_random()),
     "builds": lambda: check_builds(_random()),

@@ -18,6 +18,7 @@ from renderer.trace import hits
 from renderer.trace.layout import Tree
 from renderer.tree import refit
 from validation.promises.hits import (
+    alone,
     batches,
     bounds,
     builds,
@@ -41,6 +42,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "errors": lambda: errors.check_errors(np.random.default_rng(5)),
     "limits": limits.check_limits,
     "counts": lambda: counts.check_counts(np.random.default_rng(5)),
+    "alone": lambda: alone.check_alone(np.random.default_rng(5)),
     "meshes": meshes.check_meshes,
     "codes": codes.check_codes,
     "planes": planes.check_planes,
@@ -351,3 +353,14 @@ def test_errors_of_another_ray_and_rays_too_many_are_found(monkeypatch: pytest.M
     monkeypatch.setattr(bounces, "render", lambda *given, **options: replace(
         drawn(*given, **options), rays=drawn(*given, **options).rays + 1))  # fmt: skip
     assert broken("bounces") == {"rays are"}
+
+
+def test_another_last_bit_in_a_batch_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Octree.closest_hit
+
+    def off(self: Any, origins: Any, directions: Any) -> Any:
+        found = sound(self, origins, directions)
+        return replace(found, t=np.nextafter(found.t, np.inf)) if np.ndim(origins) == 2 else found
+
+    monkeypatch.setattr(Octree, "closest_hit", off)
+    assert broken("alone") == {"a ray"}
