@@ -29,6 +29,7 @@ from validation.promises.pictures.floors import check_floors
 from validation.promises.pictures.nesting import check_nesting
 from validation.promises.pictures.openings import check_openings
 from validation.promises.pictures.placing import check_placing
+from validation.promises.pictures.refraction import check_refraction
 from validation.promises.pictures.shining import check_shining
 from validation.promises.queries.angles import check_angles, check_halves
 from validation.promises.queries.edges import check_edges
@@ -44,6 +45,7 @@ _RAYS = 4096
 _PLACED = 60
 _POLYGONS = 4000
 _OPENED = 40
+_REFRACTED = 1000
 Rows = list[dict[str, Any]]
 
 
@@ -86,6 +88,7 @@ PICTURES: dict[str, Callable[[], Rows]] = {
     "bounces": check_bounces,
     "lights": check_shining,
     "nested media": check_nesting,
+    "refraction": lambda: check_refraction(_random(), _REFRACTED),
     "codes": check_codes,
     "boxes shown": lambda: check_openings(_random(), _OPENED),
 }

@@ -34,7 +34,17 @@ from validation.promises.hits import (
     trees,
 )
 from validation.promises.hits.ways import ways
-from validation.promises.pictures import bounces, cameras, codes, floors, nesting, openings, placing, shining
+from validation.promises.pictures import (
+    bounces,
+    cameras,
+    codes,
+    floors,
+    nesting,
+    openings,
+    placing,
+    refraction,
+    shining,
+)
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
@@ -60,6 +70,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "bounces": bounces.check_bounces,
     "nesting": nesting.check_nesting,
     "shining": shining.check_shining,
+    "refraction": lambda: refraction.check_refraction(np.random.default_rng(5), 100),
 }
 
 
@@ -364,3 +375,11 @@ def test_another_last_bit_in_a_batch_is_found(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(Octree, "closest_hit", off)
     assert broken("alone") == {"a ray"}
+
+
+def test_a_cosine_without_its_last_digits_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lossy(d: Any, n: Any, n1: float, n2: float) -> Any:
+        return np.sqrt(max(1e-300, 1.0 - (n1 / n2) ** 2 * d[0] ** 2)), None
+
+    monkeypatch.setattr(refraction, "refract", lossy)
+    assert broken("refraction") == {"the cosine"}

@@ -20,6 +20,7 @@ _JUDGE = "solid angles in whole numbers"
 _BITS = 1200
 # Of a turn, for each face: what ``solid_angle`` says that its angle errs by.
 _OF_A_FACE = 2.0**-44
+_SINGLE, _PLACES = 12, 40
 _TOLERANCES = (0.3, 1e-2, 1e-3, 1e-5, 1e-8, 1e-11)
 
 
@@ -35,7 +36,23 @@ def check_angles(rng: Generator) -> list[dict[str, Any]]:
         for tolerance in (0.0, 1e-9):
             off = np.abs(octree.winding_number(points, tolerance) - exact)
             kept.append(off <= tolerance + _OF_A_FACE * len(some))
-    return [row("winding numbers near faces, on their edges and in their planes", _JUDGE, np.concatenate(kept))]
+    return [
+        row("winding numbers near faces, on their edges and in their planes", _JUDGE, np.concatenate(kept)),
+        row("winding numbers beside edges, from near to far", _JUDGE, _beside(rng)),
+    ]
+
+
+def _beside(rng: Generator) -> NDArray[np.bool_]:
+    """Single faces, and points beside their edges at distances of all powers of ten."""
+    kept = []
+    for _ in range(_SINGLE):
+        face = rng.normal(size=(1, 3, 3))
+        share, across = rng.uniform(-0.1, 1.1, (_PLACES, 1)), rng.normal(size=(_PLACES, 3))
+        points = face[0, 0] + share * (face[0, 1] - face[0, 0]) + 10.0 ** rng.uniform(-12.0, 0.0, (_PLACES, 1)) * across
+        exact = np.array([turns(point, face) for point in points])
+        given = Octree(face[0], [[0, 1, 2]]).winding_number(points, 0.0)
+        kept.append(np.abs(given - exact) <= _OF_A_FACE)
+    return np.concatenate(kept)
 
 
 def turns(point: Floats, triangles: Floats) -> float:

@@ -31,6 +31,18 @@ _CORNER = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 _ABOVE = np.array([0.0, 0.0, 1.0])
 _LARGE, _LEAST = 2.0**59 * np.stack([_CORNER, _CORNER + _ABOVE]), 2.0**-1074
 
+# A large face and a small one nearly in its plane, and a point before both: their distances differ by an ulp, and the
+# bounds by which faces are left out err by more.
+_LEANING = np.array([
+    [(-33.045207447741646, -5.013606521600748, -84.77900009878255),
+     (32.77017724576062, 4.072627005254626, 81.9440398516141),
+     (-19.68169045633817, 228.4636867949619, -98.12259778035029)],
+    [(-0.1375151009905126, -0.4704897581730612, -1.4174801235842267),
+     (-0.1355058600102527, -0.4702123696438687, -1.4123903293699733),
+     (-0.1387084073346819, -0.4565117519225552, -1.423384636223686)],
+])  # fmt: skip
+_BEFORE = np.array([-0.03553295781744778, -0.47430636909892143, -1.4574451842178437])
+
 
 def check_nearest(rng: Generator) -> list[dict[str, Any]]:
     """Distances, faces and nearest points."""
@@ -42,6 +54,7 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
     heap.append(
         _kept(Octree.from_mesh(_mesh(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
     )
+    heap.append(_kept(Octree.from_mesh(_mesh(_LEANING)), _LEANING, _BEFORE + np.spacing(_BEFORE) * _steps(rng)))
     for _ in range(_SHELLS):
         faces = _shell(rng)
         shell.append(_kept(Octree.from_mesh(_mesh(faces)), faces, np.zeros((1, 3))))
@@ -50,6 +63,11 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
         row("the nearest of faces that are as near but for some ulp", _JUDGE, np.concatenate(shell)),
         row("of two faces whose edge is nearest the lower has it", "wedges of two faces", _edges_kept(rng)),
     ]
+
+
+def _steps(rng: Generator) -> NDArray[np.int64]:
+    """No step, and some small ones."""
+    return np.concatenate([np.zeros((1, 3), np.int64), rng.integers(-3, 4, (60, 3))])
 
 
 def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[np.bool_]:
