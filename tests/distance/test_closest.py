@@ -8,6 +8,7 @@ from meshes import make_mesh
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.distance import closest
+from renderer.distance.face_distance import _rounded
 from renderer.distance.nearest import LISTED
 from renderer.distance.rational import nearest_exactly
 from renderer.inside import contains as inside
@@ -276,3 +277,12 @@ def test_faces_whose_squared_distances_vanish_are_told_apart(points, unit):
     for accelerator in (Octree, BruteForce):
         found = accelerator(vertices, faces).closest_point([0.0, 0.0, 0.0])
         assert found.distance == pytest.approx(least, rel=1e-15)
+
+
+@pytest.mark.parametrize(("head", "steps"), [(1.0 + 2.0**-52, 1), (1.0 + 2.0**-51, 0)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_is_halfway_but_for_lost_digits_goes_to_the_even_neighbour(head: float, steps: int, side: float) -> None:
+    """Two faces in one plane may have such a distance, and the digits that they lose differ."""
+    for lost in (0.0, 2.0**-150, 2.0**-144):
+        assert _rounded((head, side * (2.0**-53 - lost))) == head + side * steps * 2.0**-52
+    assert _rounded((head, side * (2.0**-53 - 2.0**-80))) == head

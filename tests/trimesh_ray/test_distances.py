@@ -10,6 +10,8 @@ import trimesh
 
 from renderer.trimesh_ray import installed
 from renderer.trimesh_ray.distances import closest_point, signed_distance
+from renderer.trimesh_ray.trees import Traced
+from renderer.trimesh_ray.within import _VOTES, points_within
 from validation.oracle.distance import nearest
 
 # A tetrahedron with an acute edge from (-1, 0.5, 0) to (1, 0.5, 0).
@@ -172,3 +174,14 @@ def test_at_slanted_edges_it_is_the_face_turned_to_the_point() -> None:
             for a, b, facing in ((0.1, 1, j), (1, 0.1, i)):
                 points = ends[0] * t + ends[1] * (1 - t) + a * normals[i] + b * normals[j]
                 assert (normals[closest_point(mesh, points)[2]] @ normals[facing] > 0.9).all()
+
+
+def test_a_ray_that_leaves_a_torn_mesh_ends_the_vote() -> None:
+    """Behind the point the first direction passes one face, ahead none; the second would pass one either way."""
+    first, second = _VOTES
+    corners = np.array([-first, second, -second])[:, None] + 0.1 * (np.eye(3) - 1.0 / 3.0)
+    # Two faces that pass an edge the same way: the mesh is turned neither one way nor the other.
+    torn = np.array([[(4.0, 0.0, 0.0), (4.0, 1.0, 0.0), (4.0, 0.0, side)] for side in (1.0, -1.0)])
+    vertices = np.concatenate([corners, torn]).reshape(-1, 3)
+    traced = Traced(vertices, np.arange(len(vertices)).reshape(-1, 3))
+    assert not points_within(traced, np.zeros((1, 3))).any()

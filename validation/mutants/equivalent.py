@@ -44,5 +44,10 @@ EQUIVALENT: dict[str, str] = {
     "renderer.inside.winding._search_in_order #0: 3 -> 4": "an array of no triangles is not looked into",
     "renderer.distance.rational._candidates #0: np.maximum(away.min(axis=1), -away.max(axis=1)) -> "
     "np.maximum(-away.max(axis=1), away.min(axis=1))": "the larger of two numbers is the larger in either order",
+    "renderer.trace.traverse._trace_on #0: rounds > _WORK -> (rounds) >= (_WORK)":
+        "a call that ends earlier is called again: the same answers",
+    "renderer.trace.traverse.make_memory #0: 1 -> 2": "memory behind the last stack is never written nor read",
+    "renderer.kernels.compiler.probe #0: True -> False": "a kernel answers alike whether what it calls is inlined",
+    "renderer.trace.stream._go_on #0: _prefetch_child(tree, child) -> pass": "a prefetch changes no answer",
     "renderer.contacts.gather.gather_chunk #4: 1 -> 2": "any row below 0 says that no ray is out of range",
 }  # fmt: skip
