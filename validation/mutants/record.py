@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from renderer.process.files import write_atomically
-from validation.mutants.equivalent import EQUIVALENT
+from validation.mutants.equivalent import EQUIVALENT, LEFT
 from validation.mutants.sites import Mutant
 from validation.mutants.verdict import Verdict
 
@@ -73,9 +73,9 @@ def summary(path: Path, root: Path) -> dict[str, Any] | None:
     """What the last run found, for the report; None where there was none.
 
     ``seed``, ``asked`` (how many), ``judged``, and ``changed``, of how many of these the file in ``root`` has changed
-    since; for ``kernels`` and ``python`` the counts of all, equivalent, killed,
-    killed by a gate, hung and crashed, and the survivors' rows; ``operators``, a row each; and ``equivalent``, mutants
-    that change no answer, with the proofs.
+    since; for ``kernels`` and ``python`` the counts of all, equivalent, killed, killed by a gate, hung and crashed, and
+    the survivors' rows with the reasons why they are left, None where there is none; ``operators``, a row each; and
+    ``equivalent``, mutants that change no answer, with the proofs.
     """
     stored = _stored(path)
     if not stored["asked"]:
@@ -107,7 +107,11 @@ def _counts(rows: Sequence[Row]) -> dict[str, Any]:
         "by_gates": sum(bool(row["by"]) and row["gate"] for row in real),
         "hung": sum(row["how"] == "hangs" for row in real),
         "crashed": sum(row["how"] == "crashes" for row in real),
-        "survivors": [{name: row[name] for name in ("key", "file", "line")} for row in real if not row["by"]],
+        "survivors": [
+            {name: row[name] for name in ("key", "file", "line")} | {"reason": LEFT.get(row["key"])}
+            for row in real
+            if not row["by"]
+        ],
     }
 
 

@@ -157,6 +157,7 @@ def test_a_summary_counts_what_changes_an_answer(root: Path, monkeypatch: pytest
     asked = [one for name, (one, _) in verdicts.items() if name != "other"] + [mutant(nth=9)]
     stored.write(7, asked)
     monkeypatch.setattr(record, "EQUIVALENT", {verdicts["same"][0].key: "the same either way"})
+    monkeypatch.setattr(record, "LEFT", {verdicts["lost"][0].key: "no promise"})
     found = summary(path, root)
     assert found is not None and (found["seed"], found["asked"], found["judged"]) == (7, 5, 4)
     assert found["changed"] == 0
@@ -167,7 +168,9 @@ def test_a_summary_counts_what_changes_an_answer(root: Path, monkeypatch: pytest
         "mutants": 3, "equivalent": 1, "killed": 2, "by_gates": 1, "hung": 1, "crashed": 0, "survivors": [],
     }  # fmt: skip
     lost = verdicts["lost"][0]
-    assert found["python"]["survivors"] == [{"key": lost.key, "file": lost.file, "line": lost.line}]
+    assert found["python"]["survivors"] == [
+        {"key": lost.key, "file": lost.file, "line": lost.line, "reason": "no promise"}
+    ]
     assert [row["operator"] for row in found["operators"]] == ["arithmetic"]
     assert found["equivalent"] == [{"key": verdicts["same"][0].key, "proof": "the same either way"}]
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from validation.mutants.equivalent import EQUIVALENT
+from validation.mutants.equivalent import EQUIVALENT, LEFT
 from validation.mutants.sites import Mutant, chosen, mutants, text_of
 from validation.mutants.targets import TARGETS, files
 
@@ -88,7 +88,7 @@ def test_equal_code_in_one_place_is_told_apart(package: Path) -> None:
 
 def test_mutants_that_change_no_answer_are_mutants() -> None:
     keys = {mutant.key for target in TARGETS for mutant in mutants(files(target, ROOT), ROOT)}
-    assert set(EQUIVALENT) <= keys
+    assert set(EQUIVALENT) <= keys and set(LEFT) <= keys and not set(EQUIVALENT) & set(LEFT)
 
 
 def test_a_key_outlives_edits_elsewhere_and_names_code_that_went(package: Path) -> None:
