@@ -49,6 +49,8 @@ EQUIVALENT: dict[str, str] = {
     "renderer.trace.traverse.make_memory #0: 1 -> 2": "memory behind the last stack is never written nor read",
     "renderer.kernels.compiler.probe #0: True -> False": "a kernel answers alike whether what it calls is inlined",
     "renderer.trace.stream._go_on #0: _prefetch_child(tree, child) -> pass": "a prefetch changes no answer",
+    "renderer.shade.whitted._meet_surfaces #0: times(row3(bundle.weights, i), row3(scene.colors, 1)) -> "
+    "times(row3(scene.colors, 1), row3(bundle.weights, i))": "a product is the same in either order",
     "renderer.contacts.gather.gather_chunk #4: 1 -> 2": "any row below 0 says that no ray is out of range",
 }  # fmt: skip
 
