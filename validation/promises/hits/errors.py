@@ -92,11 +92,11 @@ def _along(rng: Generator) -> NDArray[np.bool_]:
             continue
         corners = np.array([a, b, c])
         origin = a - 20.0 * direction + (k % 3) * (b - a)
-        hit = Octree(corners, [[0, 1, 2]]).closest_hit(origin, direction, t_error=True)
-        if hit.hit:
+        hit = Octree(corners, [[0, 1, 2]]).closest_hit([origin], [direction], t_error=True)
+        if hit.hit[0]:
             assert hit.t_error is not None
             first, last = _passage(corners, origin, direction)
-            t, error = Fraction(float(hit.t)), Fraction(float(hit.t_error))
+            t, error = Fraction(hit.t[0]), Fraction(hit.t_error[0])
             kept += [t - error <= first, last <= t + error]
     return np.array(kept)
 
