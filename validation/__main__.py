@@ -54,7 +54,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=(__doc__ or "").partition("\n\n")[2],
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--quick", action="store_true", help="fewer rays and smaller pictures, under 3 minutes")
+    parser.add_argument("--quick", action="store_true", help="fewer rays and smaller pictures, a minute and a half")
     parser.add_argument("--only", type=_sections, default=NAMES, metavar="A,B", help=f"of {', '.join(NAMES)}")
     add_output(parser, "folder of the report")
     parser.add_argument("--gate", type=Path, metavar="FILE", help="TOML file that moves thresholds")
