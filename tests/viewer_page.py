@@ -22,8 +22,8 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 # Software GL, so that the tests need no graphics card; the last keeps Chromium from calling home.
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
 MODELS = Path(__file__).parent.parent / "scenes" / "models"
-# Milliseconds. A first picture of another kind may compile its kernels.
-PATIENCE = 60_000
+# Milliseconds. A first picture of another kind may compile its kernels, on a machine with much other work.
+PATIENCE = 240_000
 
 SCENE = f"""
 ambient = 0.1
@@ -100,6 +100,7 @@ class Viewer:
     def __init__(self, browser: Any, url: str, **options: Any) -> None:
         self.context = browser.new_context(**{"viewport": {"width": 800, "height": 420}, **options})
         self.page = self.context.new_page()
+        self.page.set_default_timeout(PATIENCE)
         self.page.on("console", lambda m: self.faults.append(m.text) if m.type in ("error", "warning") else None)
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("request", self._check_request)
@@ -112,7 +113,7 @@ class Viewer:
 
     def open(self) -> "Viewer":
         self.page.goto(self.url)
-        self.page.wait_for_selector("body[data-ready]", timeout=PATIENCE)
+        self.page.wait_for_selector("body[data-ready]")
         self.settled("octree")
         return self
 
@@ -148,7 +149,7 @@ class Viewer:
             const { viewer } = window;
             return dataset.mode === mode && dataset.last === "1" && Number(dataset.seq) === viewer.seq && !viewer.dirty;
         }"""
-        self.page.wait_for_function(shown, arg=mode, timeout=PATIENCE)
+        self.page.wait_for_function(shown, arg=mode)
         return self.page.evaluate("() => ({ ...document.querySelector('#stage').dataset })")
 
     def choose(self, mode: str) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image as Pillow
-from viewer_page import CHROMIUM, FLAGS, PATIENCE, SCENE, Viewer, served
+from viewer_page import CHROMIUM, FLAGS, SCENE, Viewer, served
 
 from renderer import load_scene, render
 from renderer.inspect.face_phong import face_colors
@@ -353,15 +353,15 @@ def test_a_setting_changes_the_picture(viewer: Viewer, name: str) -> None:
 def test_another_scene_and_a_broken_one(viewer: Viewer) -> None:
     before = viewer.pixels("picture")
     viewer.page.select_option("[name=file]", "broken.toml")
-    viewer.page.locator("#notices p", has_text="fov").wait_for(timeout=PATIENCE)
+    viewer.page.locator("#notices p", has_text="fov").wait_for()
     assert np.array_equal(viewer.pixels("picture"), before)
     assert viewer.page.input_value("[name=file]") == "blocks.toml"
     viewer.page.select_option("[name=file]", "other.toml")
-    viewer.page.wait_for_function("() => document.querySelector('#name').textContent === 'other'", timeout=PATIENCE)
+    viewer.page.wait_for_function("() => document.querySelector('#name').textContent === 'other'")
     # The old picture stands until the new one comes.
     viewer.wait_until(lambda: np.array_equal(viewer.pixels("picture")[0, 0, :3], srgb([0.9, 0.5, 0.1])))
     viewer.page.select_option("[name=file]", "blocks.toml")
-    viewer.page.wait_for_function("() => document.querySelector('#name').textContent === 'blocks'", timeout=PATIENCE)
+    viewer.page.wait_for_function("() => document.querySelector('#name').textContent === 'blocks'")
     viewer.settled("octree")
 
 

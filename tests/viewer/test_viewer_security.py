@@ -36,6 +36,9 @@ HANDSHAKE = {
     "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
 }
 
+# Seconds for an answer that should come at once: what a machine with other work may take.
+_PATIENCE = 120.0
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -77,7 +80,7 @@ def asked(
     port: int, path: str, headers: dict[str, str] | None = None, method: str = "GET", address: str = "127.0.0.1"
 ) -> HTTPResponse:
     """The answer to exactly this path and these headers; Host is the server's own unless given."""
-    connection = HTTPConnection(address, port, timeout=30)
+    connection = HTTPConnection(address, port, timeout=_PATIENCE)
     try:
         connection.putrequest(method, path, skip_host=True)
         for name, value in {"Host": f"127.0.0.1:{port}", **(headers or {})}.items():
@@ -97,7 +100,7 @@ def opening(port: int, path: str = "/ws", **headers: str) -> int:
 
 
 def connected(port: int) -> Any:
-    return connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}", open_timeout=30)
+    return connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}", open_timeout=_PATIENCE)
 
 
 def told(port: int, text: str) -> dict[str, Any]:

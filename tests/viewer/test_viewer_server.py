@@ -693,7 +693,7 @@ def test_the_command_prints_its_address_and_control_c_ends_it_in_the_middle_of_a
             client.told("progress")
             sent = time.monotonic()
             running.send_signal(signal.SIGINT)
-            _, err = running.communicate(timeout=30)
+            _, err = running.communicate(timeout=PATIENCE)
         waited = time.monotonic() - sent
     finally:
         running.kill()
