@@ -15,11 +15,13 @@ from validation.promises.hits.builds import check_builds
 from validation.promises.hits.counts import check_counts
 from validation.promises.hits.errors import check_errors
 from validation.promises.hits.files import check_files
+from validation.promises.hits.kept import check_kept
 from validation.promises.hits.limits import check_limits
 from validation.promises.hits.meshes import check_meshes
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
 from validation.promises.hits.planes import check_planes
+from validation.promises.hits.shapes import check_shapes
 from validation.promises.hits.starts import check_starts
 from validation.promises.hits.trees import check_trees
 from validation.promises.pictures.bounces import check_bounces
@@ -29,6 +31,7 @@ from validation.promises.pictures.floors import check_floors
 from validation.promises.pictures.nesting import check_nesting
 from validation.promises.pictures.openings import check_openings
 from validation.promises.pictures.placing import check_placing
+from validation.promises.pictures.planes import check_planes as check_picture_planes
 from validation.promises.pictures.refraction import check_refraction
 from validation.promises.pictures.shining import check_shining
 from validation.promises.queries.angles import check_angles, check_halves
@@ -68,6 +71,8 @@ HITS: dict[str, Callable[[], Rows]] = {
     "counts": lambda: check_counts(_random()),
     "files": check_files,
     "changed meshes": check_meshes,
+    "kept arrays": lambda: check_kept(_random()),
+    "shapes of rays": lambda: check_shapes(_random()),
     "polygons": lambda: check_outlines(_random(), _POLYGONS),
 }
 QUERIES: dict[str, Callable[[], Rows]] = {
@@ -87,6 +92,7 @@ PICTURES: dict[str, Callable[[], Rows]] = {
     "floors and samples": check_floors,
     "bounces": check_bounces,
     "lights": check_shining,
+    "planes of pictures": lambda: check_picture_planes(_random()),
     "nested media": check_nesting,
     "refraction": lambda: check_refraction(_random(), _REFRACTED),
     "codes": check_codes,

@@ -25,11 +25,13 @@ from validation.promises.hits import (
     counts,
     errors,
     files,
+    kept,
     limits,
     meshes,
     outlines,
     places,
     planes,
+    shapes,
     starts,
     trees,
 )
@@ -45,6 +47,7 @@ from validation.promises.pictures import (
     refraction,
     shining,
 )
+from validation.promises.pictures import planes as pictures
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
@@ -53,6 +56,8 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "limits": limits.check_limits,
     "counts": lambda: counts.check_counts(np.random.default_rng(5)),
     "alone": lambda: alone.check_alone(np.random.default_rng(5)),
+    "kept": lambda: kept.check_kept(np.random.default_rng(5)),
+    "shapes": lambda: shapes.check_shapes(np.random.default_rng(5)),
     "meshes": meshes.check_meshes,
     "codes": codes.check_codes,
     "planes": planes.check_planes,
@@ -70,6 +75,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "bounces": bounces.check_bounces,
     "nesting": nesting.check_nesting,
     "shining": shining.check_shining,
+    "pictures": lambda: pictures.check_planes(np.random.default_rng(5)),
     "refraction": lambda: refraction.check_refraction(np.random.default_rng(5), 100),
 }
 
@@ -383,3 +389,30 @@ def test_a_cosine_without_its_last_digits_is_found(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(refraction, "refract", lossy)
     assert broken("refraction") == {"the cosine"}
+
+
+def test_arrays_that_get_lost_and_rays_in_another_order_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(kept.pickle, "loads", lambda stored: kept._mesh(np.random.default_rng(1), False))
+        patch.setattr(Octree, "refit", lambda self, vertices: None)
+        patch.setattr(kept, "_is_refused", lambda path: False)
+        assert broken("kept") == {"a mesh", "a refit", "damage anywhere"}
+    sound = Octree.closest_hit
+
+    def turned(self: Any, origins: Any, directions: Any, **bounds: Any) -> Any:
+        found = sound(self, origins, directions, **bounds)
+        return replace(found, t=found.t.T.reshape(found.t.shape))
+
+    monkeypatch.setattr(Octree, "closest_hit", turned)
+    assert broken("shapes") == {"rays of"}
+
+
+def test_planes_that_show_something_else_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = pictures.render
+
+    def other(scene: Any, **given: Any) -> Any:
+        image = sound(scene, **{name: value for name, value in given.items() if value})
+        return replace(image, normal=np.abs(image.normal), rays=image.rays + 1, cut=1, depth=image.depth * 2.0)
+
+    monkeypatch.setattr(pictures, "render", other)
+    assert {"a picture's", "a picture", "what render", "pixels are", "an EXR"} <= broken("pictures")

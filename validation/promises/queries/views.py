@@ -10,6 +10,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from renderer.octree import BruteForce, Octree
 from validation.promises.row import row
+from validation.promises.squares import squares
 
 _COUNT = 2000
 # Sizes of the ball and how far away it lies: rounding has moved points off their faces.
@@ -38,6 +39,7 @@ def check_views(rng: Generator) -> list[dict[str, Any]]:
         ),
         row("nothing is seen through a ball", "a ball is closed", np.concatenate(hidden)),
         row("what is in front of a face, however near, hides what stands on it", "planes by hand", _covered()),
+        row("each pair of points has the room of its own coordinates", "a square by hand", _far()),
         row("corners at 0.0 and -0.0 are at one place", "a box is closed", _closed()),
     ]
 
@@ -61,3 +63,14 @@ def _covered() -> NDArray[np.bool_]:
             kept += [not built.visible(np.zeros(3), above, leaving=0, reaching=1)]
             kept += [bool(built.visible(height * above, above, leaving=2, reaching=1))]
     return np.array(kept)
+
+
+def _far() -> NDArray[np.bool_]:
+    """Pairs before and behind a square, and in one batch with them pairs as far away as can be."""
+    mesh = squares(np.array([[(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)]]))
+    below = np.array([[0.25, 0.125, -1.0], [5.0, 0.0, -1.0], [1e13, 0.0, -1e13]])
+    seen, rows = np.array([False, True, True]), np.arange(60) % 3
+    kept = []
+    for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+        kept.append(tracer.visible(below[rows], below[rows] * [1.0, 1.0, -1.0]) == seen[rows])
+    return np.concatenate(kept)

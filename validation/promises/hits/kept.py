@@ -1,0 +1,93 @@
+"""What copies of meshes and trees keep: every array when a mesh is moved, copied, pickled, or a tree is stored."""
+
+import copy
+import pickle
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.octree import Octree
+from validation.promises.row import row
+
+_JUDGE = "the arrays that were given"
+_ARRAYS = ("vertices", "faces", "normals", "colors", "texcoords")
+# So large and small that the tree counts in units of its own.
+_SIZES = (1.0, 2.0**200, 2.0**-200)
+_COUNT = 40
+
+
+def check_kept(rng: Generator) -> list[dict[str, Any]]:
+    """Meshes with every array and with none but the needed."""
+    copies, moved = [], []
+    for more in (False, True):
+        mesh = _mesh(rng, more)
+        for other in (copy.copy(mesh), copy.deepcopy(mesh), pickle.loads(pickle.dumps(mesh))):
+            copies += [_equal(mesh, other, _ARRAYS), other.name == mesh.name]
+        octree = Octree.from_mesh(mesh)
+        octree.refit(mesh.vertices[::-1])
+        moved += [_equal(mesh, octree.mesh, _ARRAYS[1:]), np.array_equal(octree.mesh.vertices, mesh.vertices[::-1])]
+    with TemporaryDirectory(prefix="promises-") as name:
+        stored = _stored(rng, Path(name) / "a.octree")
+        damaged = _damaged(rng, Path(name) / "b.octree")
+    return [
+        row("a mesh that is copied or pickled keeps every array", _JUDGE, np.array(copies)),
+        row("a refit keeps normals, colours and texture coordinates", _JUDGE, np.array(moved)),
+        row("a loaded tree gives the bits of the saved one, in any units", "the tree before it was saved", stored),
+        row("damage anywhere in a stored tree is noticed", "a bit that was turned", damaged),
+    ]
+
+
+def _mesh(rng: Generator, more: bool) -> Mesh:
+    points = rng.normal(size=(3 * _COUNT, 3))
+    faces = np.arange(3 * _COUNT, dtype=np.int32).reshape(-1, 3)
+    if not more:
+        return Mesh(points, faces)
+    colors, texcoords = rng.uniform(size=points.shape), rng.uniform(size=(len(points), 2))
+    return Mesh(points, faces, rng.normal(size=points.shape), colors, texcoords, "all")
+
+
+def _equal(one: Mesh, other: Mesh, names: tuple[str, ...]) -> bool:
+    pairs = [(getattr(one, name), getattr(other, name)) for name in names]
+    return all(b is None if a is None else b is not None and np.array_equal(a, b) for a, b in pairs)
+
+
+def _stored(rng: Generator, path: Path) -> NDArray[np.bool_]:
+    kept = []
+    for size in _SIZES:
+        mesh = _mesh(rng, False)
+        octree = Octree(mesh.vertices * size, mesh.faces)
+        octree.save(path)
+        origins, directions = 3.0 * size * rng.normal(size=(60, 3)), rng.normal(size=(60, 3))
+        directions -= origins / (3.0 * size)
+        found = [one.closest_hit(origins, directions) for one in (octree, Octree.load(path))]
+        near = [one.closest_point(origins) for one in (octree, Octree.load(path))]
+        kept += [
+            found[0].hit.any(),
+            np.array_equal(found[0].t, found[1].t),
+            np.array_equal(found[0].face, found[1].face),
+        ]
+        kept.append(np.array_equal(near[0].distance, near[1].distance))
+    return np.array(kept)
+
+
+def _damaged(rng: Generator, path: Path) -> NDArray[np.bool_]:
+    Octree.from_mesh(_mesh(rng, True)).save(path)
+    whole = path.read_bytes()
+    kept = []
+    for place in np.linspace(0, len(whole) - 1, 60).astype(int).tolist():
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        kept.append(_is_refused(path))
+    return np.array(kept)
+
+
+def _is_refused(path: Path) -> bool:
+    try:
+        Octree.load(path)
+    except ValueError:
+        return True
+    return False

@@ -1,0 +1,150 @@
+"""The planes of a picture beside its colours: which normals it shows, how many rays it counts, and what files keep."""
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import trimesh
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.picture.render import render
+from renderer.scene.light import DirectionalLight
+from renderer.scene.material import Mirror, Phong
+from renderer.scene.scene import RenderSettings, Scene, SceneObject
+from validation.promises.pictures.glowing import equal, from_above, glowing, square, thing
+from validation.promises.row import row
+
+Bools = NDArray[np.bool_]
+_CAMERA = from_above((0.0, 5.0, 0.0), 2.0)
+_SIZE = 3, 2
+_ACROSS, _ALONG = np.array([0.0, 0.0, 8.0]), np.array([8.0, 0.0, 0.0])
+# Sums of angles by two programs, in units of the last place of 1.
+_ROUNDING = 1e-14
+
+
+def check_planes(rng: Generator) -> list[dict[str, Any]]:
+    """Squares from above, of which one is seen from its back, and one covers half of the picture."""
+    checks: dict[tuple[str, str], Callable[[], Bools]] = {
+        ("a picture's normals are those of the winding, whichever side is seen", "a square"): _sides,
+        ("a picture counts the rays of all samples of a pixel", "the number of samples"): _samples,
+        ("what render is given counts before what the scene says, 0 and False too", "the sum of the light"): _given,
+        ("pixels are cut where max_rays ends what would go on, and nowhere else", "two mirrors"): _cut,
+        ("an EXR file has the depth, infinite where nothing is", "OpenEXR's reader"): _depth,
+        ("smooth objects have the normals of their files", "the normals that were given"): _smooth,
+        ("a light's direction has no length", "irradiance by hand"): _lengths,
+    }
+    found = [row(promise, judge, check()) for (promise, judge), check in checks.items()]
+    return [*found, row("vertex normals weigh faces by their angles", "trimesh's weights", _weighed(rng))]
+
+
+def _ground(up: bool = True) -> Mesh:
+    return square(np.array([-4.0, 0.0, -4.0]), *((_ACROSS, _ALONG) if up else (_ALONG, _ACROSS)))
+
+
+def _scene(mesh: Mesh, material: Any, **more: Any) -> Scene:
+    return Scene(camera=_CAMERA, materials={"any": material}, objects=(thing(mesh, "any"),), **more)
+
+
+def _sides() -> Bools:
+    kept = []
+    for up in (True, False):
+        image = render(_scene(_ground(up), Phong()), resolution=_SIZE)
+        kept.append((image.normal == [0.0, 1.0 if up else -1.0, 0.0]).ravel())
+    return np.concatenate(kept)
+
+
+def _samples() -> Bools:
+    scene = _scene(_ground(), Mirror())
+    return np.concatenate(
+        [(render(scene, resolution=_SIZE, samples=k, max_depth=1).rays == 2 * k).ravel() for k in (1, 4, 9)]
+    )
+
+
+def _given() -> Bools:
+    """A light behind a screen, and a mirror under a glowing sky."""
+    light = DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0))
+    screen = square(np.array([-4.0, 9.0, -4.0]), _ACROSS, _ALONG)
+    lit = Scene(
+        camera=_CAMERA, materials={"any": Phong(diffuse=0.5, specular=0.0)}, lights=(light,),
+        objects=(thing(_ground(), "any"), thing(screen, "any")), render=RenderSettings(shadows=True),
+    )  # fmt: skip
+    mirror = _scene(
+        _ground(), glowing((0.25, 0.25, 0.25), reflectance=(0.5, 0.5, 0.5)), ambient=(1.0, 1.0, 1.0),
+        background=(1.0, 1.0, 1.0), render=RenderSettings(max_depth=3, min_weight=0.75),
+    )  # fmt: skip
+    cases: tuple[tuple[Scene, dict[str, Any], float], ...] = (
+        (lit, {}, 0.0), (lit, {"shadows": False}, 0.5),
+        (mirror, {}, 0.25), (mirror, {"min_weight": 0.0}, 0.75), (mirror, {"min_weight": 0.0, "max_depth": 0}, 0.25),
+    )  # fmt: skip
+    kept = [equal(render(scene, resolution=_SIZE, **more).radiance, np.full(3, shade)) for scene, more, shade in cases]
+    return np.concatenate(kept).ravel()
+
+
+def _cut() -> Bools:
+    """Two mirrors would go on, one alone and a surface that reflects nothing end by themselves."""
+    above = square(np.array([-4.0, 9.0, -4.0]), _ALONG, _ACROSS)
+    kept = []
+    for material, meshes, number in ((Mirror(), 2, 6), (Mirror(), 1, 0), (Phong(), 2, 0)):
+        objects = tuple(thing(mesh, "any") for mesh in (_ground(), above)[:meshes])
+        scene = Scene(camera=_CAMERA, materials={"any": material}, objects=objects)
+        most = 2 if meshes == 1 else 1 if number == 0 else 3
+        kept.append(_quietly(scene, most) == number)
+    return np.array(kept)
+
+
+def _quietly(scene: Scene, most: int) -> int:
+    """The number of cut pixels, without the warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return render(scene, resolution=_SIZE, max_rays=most, max_depth=9).cut
+
+
+def _depth() -> Bools:
+    half = square(np.array([0.0, 0.0, -4.0]), _ACROSS, _ALONG)
+    with TemporaryDirectory(prefix="promises-") as folder:
+        path = Path(folder) / "a.exr"
+        image = render(_scene(half, Phong()), resolution=(8, 4))
+        image.save(path)
+        with OpenEXR.File(str(path)) as file:
+            z = np.array(file.channels()["Z"].pixels)
+    expected = np.where(np.arange(8) >= 4, 5.0, np.inf)
+    kept: Bools = (z == expected).ravel() & (image.depth == expected).ravel()
+    return kept
+
+
+def _smooth() -> Bools:
+    normals = np.tile([0.6, 0.8, 0.0], (4, 1))
+    mesh = Mesh(_ground().vertices, _ground().faces, normals)
+    kept = []
+    for how, expected in (("smooth", (0.6, 0.8, 0.0)), ("flat", (0.0, 1.0, 0.0))):
+        one = SceneObject.model_validate({"mesh": mesh, "material": "any", "normals": how})
+        image = render(Scene(camera=_CAMERA, materials={"any": Phong()}, objects=(one,)), resolution=_SIZE)
+        kept.append((np.abs(image.normal - expected) <= 2.0**-23).ravel())
+    return np.concatenate(kept)
+
+
+def _lengths() -> Bools:
+    kept = []
+    for long in (1e-3, 0.5, 1.0, 7.0, 1e6):
+        light = DirectionalLight(direction=(0.0, -long, 0.0), irradiance=(0.5, 0.25, 1.0))
+        scene = _scene(_ground(), Phong(diffuse=1.0, specular=0.0), lights=(light,))
+        kept.append(equal(render(scene, resolution=_SIZE).radiance, np.array([0.5, 0.25, 1.0])).ravel())
+    return np.concatenate(kept)
+
+
+def _weighed(rng: Generator) -> Bools:
+    """Random faces of few vertices, so that each vertex has some of them."""
+    points = rng.normal(size=(12, 3))
+    faces = np.array([rng.permutation(12)[:3] for _ in range(40)], np.int32)
+    body = trimesh.Trimesh(points, faces, process=False)
+    weighted = np.zeros((12, 3))
+    np.add.at(weighted, faces, body.face_normals[:, None] * body.face_angles[:, :, None])
+    expected = weighted / np.linalg.norm(weighted, axis=1)[:, None]
+    found: Bools = (np.abs(Mesh(points, faces).vertex_normals() - expected) <= _ROUNDING).all(axis=1)
+    return found
