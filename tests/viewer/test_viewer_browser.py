@@ -214,6 +214,9 @@ def test_brute_force_shows_the_same_picture_and_can_be_cancelled(viewer: Viewer)
     viewer.page.wait_for_selector("#progress:not([hidden])")
     viewer.page.click("#cancel")
     viewer.page.wait_for_selector("#progress[hidden]", state="attached")
+    # One that was on its way when the button was pressed showed the bar again, for ever.
+    viewer.page.evaluate("() => window.viewer.told({ type: 'progress', seq: window.viewer.seq, done: 0.5 })")
+    assert viewer.page.is_hidden("#progress")
     viewer.page.select_option("[name=size]", "0.5")
     viewer.choose("octree")
 

@@ -307,7 +307,8 @@ class Viewer {
 
   told(message) {
     const acts = {
-      progress: ({ seq, done }) => seq === this.seq && this.mode === "brute" && this.progress.show(done),
+      // Not after a cancel, which this may have crossed on the way.
+      progress: ({ seq, done }) => seq === this.seq && this.progress.shown && this.progress.show(done),
       pick: (pick) => this.rays.show(pick, this.scene),
       legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
       scene: () => this.otherScene(),
