@@ -91,8 +91,10 @@ def _cut() -> Bools:
     above = square(np.array([-4.0, 9.0, -4.0]), _ALONG, _ACROSS)
     kept = []
     for material, meshes, number in ((Mirror(), 2, 6), (Mirror(), 1, 0), (Phong(), 2, 0)):
-        objects = tuple(thing(mesh, "any") for mesh in (_ground(), above)[:meshes])
-        scene = Scene(camera=_CAMERA, materials={"any": material}, objects=objects)
+        # A mirror that nobody sees, so that every picture may have bounces.
+        aside = thing(square(np.array([90.0, 0.0, 90.0]), _ACROSS, _ALONG), "mirror")
+        objects = (*(thing(mesh, "any") for mesh in (_ground(), above)[:meshes]), aside)
+        scene = Scene(camera=_CAMERA, materials={"any": material, "mirror": Mirror()}, objects=objects)
         most = 2 if meshes == 1 else 1 if number == 0 else 3
         kept.append(_quietly(scene, most) == number)
     return np.array(kept)
