@@ -47,8 +47,9 @@ def touching(mutant: Mutant, touched: Touched) -> list[str]:
     some = near if mutant.at_top or not exact else exact
     # What runs in other processes is not measured; the tests in the module's own folder may start them.
     own = [test for test in usable if Path(test).parent.as_posix() == room and test not in some]
-    return sorted(some, key=lambda test: (Path(test).parent.as_posix() != room, touched[test]["seconds"])) + sorted(
-        own, key=lambda test: touched[test]["seconds"]
+    return sorted(
+        [*some, *own],
+        key=lambda test: (test not in some, Path(test).parent.as_posix() != room, touched[test]["seconds"]),
     )
 
 

@@ -28,10 +28,10 @@ from validation.promises.pictures.bounces import check_bounces
 from validation.promises.pictures.cameras import check_cameras
 from validation.promises.pictures.codes import check_codes
 from validation.promises.pictures.floors import check_floors
+from validation.promises.pictures.images import check_images
 from validation.promises.pictures.nesting import check_nesting
 from validation.promises.pictures.openings import check_openings
 from validation.promises.pictures.placing import check_placing
-from validation.promises.pictures.planes import check_planes as check_picture_planes
 from validation.promises.pictures.refraction import check_refraction
 from validation.promises.pictures.shining import check_shining
 from validation.promises.queries.angles import check_angles, check_halves
@@ -92,7 +92,7 @@ PICTURES: dict[str, Callable[[], Rows]] = {
     "floors and samples": check_floors,
     "bounces": check_bounces,
     "lights": check_shining,
-    "planes of pictures": lambda: check_picture_planes(_random()),
+    "planes of pictures": lambda: check_images(_random()),
     "nested media": check_nesting,
     "refraction": lambda: check_refraction(_random(), _REFRACTED),
     "codes": check_codes,

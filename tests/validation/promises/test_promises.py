@@ -41,13 +41,13 @@ from validation.promises.pictures import (
     cameras,
     codes,
     floors,
+    images,
     nesting,
     openings,
     placing,
     refraction,
     shining,
 )
-from validation.promises.pictures import planes as pictures
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
@@ -75,7 +75,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "bounces": bounces.check_bounces,
     "nesting": nesting.check_nesting,
     "shining": shining.check_shining,
-    "pictures": lambda: pictures.check_planes(np.random.default_rng(5)),
+    "images": lambda: images.check_images(np.random.default_rng(5)),
     "refraction": lambda: refraction.check_refraction(np.random.default_rng(5), 100),
 }
 
@@ -395,7 +395,7 @@ def test_arrays_that_get_lost_and_rays_in_another_order_are_found(monkeypatch: p
     with monkeypatch.context() as patch:
         patch.setattr(kept.pickle, "loads", lambda stored: kept._mesh(np.random.default_rng(1), False))
         patch.setattr(Octree, "refit", lambda self, vertices: None)
-        patch.setattr(kept, "_is_refused", lambda path: False)
+        patch.setattr(kept, "refuses", lambda *given: False)
         assert broken("kept") == {"a mesh", "a refit", "damage anywhere"}
     sound = Octree.closest_hit
 
@@ -408,11 +408,11 @@ def test_arrays_that_get_lost_and_rays_in_another_order_are_found(monkeypatch: p
 
 
 def test_planes_that_show_something_else_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = pictures.render
+    sound = images.render
 
     def other(scene: Any, **given: Any) -> Any:
         image = sound(scene, **{name: value for name, value in given.items() if value})
         return replace(image, normal=np.abs(image.normal), rays=image.rays + 1, cut=1, depth=image.depth * 2.0)
 
-    monkeypatch.setattr(pictures, "render", other)
-    assert {"a picture's", "a picture", "what render", "pixels are", "an EXR"} <= broken("pictures")
+    monkeypatch.setattr(images, "render", other)
+    assert {"a picture's", "a picture", "what render", "pixels are", "an EXR"} <= broken("images")

@@ -25,8 +25,7 @@ _ALONG = 600
 
 def check_errors(rng: Generator) -> list[dict[str, Any]]:
     """Rays with directions so long that t is denormal, on meshes that the tree counts in other units too."""
-    heights = 1.0 + np.arange(_PLANES) / 7.0
-    mesh = squares(np.array([[(x, y, z) for x, y in _CORNERS] for z in heights]))
+    mesh, heights = _pile()
     kept = []
     for size in _SIZES:
         scaled = Mesh(np.ldexp(mesh.vertices, size), mesh.faces)
@@ -52,10 +51,15 @@ def _bounded(tracer: Octree | BruteForce, heights: NDArray[np.float64], long: fl
     return np.array([*near, len(near) == len(heights)])
 
 
+def _pile() -> tuple[Mesh, NDArray[np.float64]]:
+    """Squares above each other, and their heights, of which few are binary fractions."""
+    heights = 1.0 + np.arange(_PLANES) / 7.0
+    return squares(np.array([[(x, y, z) for x, y in _CORNERS] for z in heights])), heights
+
+
 def _own() -> NDArray[np.bool_]:
     """Rays one after another, short and long, which meet several planes, or none: some sizes of t's error apart."""
-    heights = 1.0 + np.arange(_PLANES) / 7.0
-    mesh = squares(np.array([[(x, y, z) for x, y in _CORNERS] for z in heights]))
+    mesh, heights = _pile()
     long = np.ldexp(3.0, np.arange(40) * 37 % 101 - 50)
     aside = np.arange(40) % 5 == 2
     origins = np.stack([0.125 + 9.0 * aside, np.full(40, 0.25), np.zeros(40)], 1)

@@ -44,7 +44,6 @@ def check_files() -> list[dict[str, Any]]:
         folder = Path(name)
         return [
             row("a loaded tree has the repairs and counts of the one that was saved", _JUDGE, _stored(folder)),
-            row("a loaded tree's mesh has all that the saved one had", _JUDGE, _whole(folder)),
             row("an OBJ file's corners with other normals or coordinates are other vertices", _JUDGE, _split(folder)),
             row("an OBJ file's normals are kept where each corner of each face has one", _JUDGE, _normals(folder)),
             row("an OBJ file's corners without texture coordinates get (0, 0)", _JUDGE, _texcoords(folder)),
@@ -65,20 +64,6 @@ def _stored(folder: Path) -> NDArray[np.bool_]:
             repairs is not None and repairs.dropped_faces.tolist() == [1, 3] and repairs.bad_vertices.tolist() == [4]
         )
         kept += [known, one.stats.faces == 3, one.stats.references == 3]
-    return np.array(kept)
-
-
-def _whole(folder: Path) -> NDArray[np.bool_]:
-    """Of a mesh with every array, and of one with none but the needed."""
-    kept = []
-    for more in ({}, {"normals": np.eye(3), "colors": np.eye(3) / 2.0, "texcoords": np.eye(3)[:, :2] / 4.0}):
-        mesh = Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32), name="three", **more)
-        Octree.from_mesh(mesh).save(folder / "a.octree")
-        found = Octree.load(folder / "a.octree").mesh
-        kept += [found.name == "three", np.array_equal(found.vertices, np.eye(3)), found.faces.tolist() == [[0, 1, 2]]]
-        for name in ("normals", "colors", "texcoords"):
-            given = getattr(found, name)
-            kept.append(given is None if name not in more else np.array_equal(given, more[name]))
     return np.array(kept)
 
 

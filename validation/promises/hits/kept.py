@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from validation.promises.refused import refuses
 from validation.promises.row import row
 
 _JUDGE = "the arrays that were given"
@@ -23,22 +24,20 @@ _COUNT = 40
 
 def check_kept(rng: Generator) -> list[dict[str, Any]]:
     """Meshes with every array and with none but the needed."""
-    copies, moved = [], []
+    copies, loaded, moved = [], [], []
     for more in (False, True):
         mesh = _mesh(rng, more)
-        for other in (copy.copy(mesh), copy.deepcopy(mesh), pickle.loads(pickle.dumps(mesh))):
-            copies += [_equal(mesh, other, _ARRAYS), other.name == mesh.name]
         octree = Octree.from_mesh(mesh)
+        copies += [_same(mesh, copy.copy(mesh)), _same(mesh, copy.deepcopy(mesh)), _same(mesh, _pickled(mesh))]
+        loaded.append(_same(mesh, _stored(octree).mesh))
         octree.refit(mesh.vertices[::-1])
         moved += [_equal(mesh, octree.mesh, _ARRAYS[1:]), np.array_equal(octree.mesh.vertices, mesh.vertices[::-1])]
-    with TemporaryDirectory(prefix="promises-") as name:
-        stored = _stored(rng, Path(name) / "a.octree")
-        damaged = _damaged(rng, Path(name) / "b.octree")
     return [
         row("a mesh that is copied or pickled keeps every array", _JUDGE, np.array(copies)),
+        row("a loaded tree's mesh has all that the saved one had", _JUDGE, np.array(loaded)),
         row("a refit keeps normals, colours and texture coordinates", _JUDGE, np.array(moved)),
-        row("a loaded tree gives the bits of the saved one, in any units", "the tree before it was saved", stored),
-        row("damage anywhere in a stored tree is noticed", "a bit that was turned", damaged),
+        row("a loaded tree gives the bits of the saved one, in any units", "the tree before it was saved", _asked(rng)),
+        row("damage anywhere in a stored tree is noticed", "a bit that was turned", _damaged(rng)),
     ]
 
 
@@ -56,38 +55,48 @@ def _equal(one: Mesh, other: Mesh, names: tuple[str, ...]) -> bool:
     return all(b is None if a is None else b is not None and np.array_equal(a, b) for a, b in pairs)
 
 
-def _stored(rng: Generator, path: Path) -> NDArray[np.bool_]:
+def _same(one: Mesh, other: Mesh) -> bool:
+    return _equal(one, other, _ARRAYS) and one.name == other.name
+
+
+def _pickled(mesh: Mesh) -> Mesh:
+    found: Mesh = pickle.loads(pickle.dumps(mesh))
+    return found
+
+
+def _stored(octree: Octree) -> Octree:
+    """The octree as it is after it was saved and loaded."""
+    with TemporaryDirectory(prefix="promises-") as folder:
+        octree.save(Path(folder) / "a.octree")
+        return Octree.load(Path(folder) / "a.octree")
+
+
+def _asked(rng: Generator) -> NDArray[np.bool_]:
     kept = []
     for size in _SIZES:
         mesh = _mesh(rng, False)
         octree = Octree(mesh.vertices * size, mesh.faces)
-        octree.save(path)
+        pair = octree, _stored(octree)
         origins, directions = 3.0 * size * rng.normal(size=(60, 3)), rng.normal(size=(60, 3))
         directions -= origins / (3.0 * size)
-        found = [one.closest_hit(origins, directions) for one in (octree, Octree.load(path))]
-        near = [one.closest_point(origins) for one in (octree, Octree.load(path))]
+        found = [one.closest_hit(origins, directions) for one in pair]
+        near = [one.closest_point(origins) for one in pair]
         kept += [
             found[0].hit.any(),
             np.array_equal(found[0].t, found[1].t),
             np.array_equal(found[0].face, found[1].face),
+            np.array_equal(near[0].distance, near[1].distance),
         ]
-        kept.append(np.array_equal(near[0].distance, near[1].distance))
     return np.array(kept)
 
 
-def _damaged(rng: Generator, path: Path) -> NDArray[np.bool_]:
-    Octree.from_mesh(_mesh(rng, True)).save(path)
-    whole = path.read_bytes()
+def _damaged(rng: Generator) -> NDArray[np.bool_]:
     kept = []
-    for place in np.linspace(0, len(whole) - 1, 60).astype(int).tolist():
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
-        kept.append(_is_refused(path))
+    with TemporaryDirectory(prefix="promises-") as folder:
+        path = Path(folder) / "a.octree"
+        Octree.from_mesh(_mesh(rng, True)).save(path)
+        whole = path.read_bytes()
+        for place in np.linspace(0, len(whole) - 1, 60).astype(int).tolist():
+            path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+            kept.append(refuses(Octree.load, path))
     return np.array(kept)
-
-
-def _is_refused(path: Path) -> bool:
-    try:
-        Octree.load(path)
-    except ValueError:
-        return True
-    return False

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.octree import BruteForce, Octree
+from validation.promises.refused import refuses
 from validation.promises.row import row
 
 # Powers of two of directions: those that are taken at last and those that are refused next.
@@ -17,13 +18,13 @@ _BATCHES = (1, 9, 64)
 
 
 def check_limits() -> list[dict[str, Any]]:
-    """Rays along -z, and along the other axes, at one face, whose t is a power of two."""
+    """Rays along -z at one face, whose t is a power of two."""
     lengths, overflows = [], []
     for tracer in (Octree, BruteForce):
         usual, huge = tracer(_CORNERS, [[0, 1, 2]]), tracer(np.ldexp(_CORNERS, 900), [[0, 1, 2]])
         for count in _BATCHES:
             lengths += [_taken(usual, power, count) for power in (_SHORTEST, _LONGEST)]
-            lengths += [_refused(usual, long, count) for long in _beyond()]
+            lengths += [refuses(usual.closest_hit, *_rays(1.0, long, count)) for long in _beyond()]
             overflows += [_met(huge, power, count) for power in (-120, -123, -124, -125, -200, -250)]
     return [
         row("directions are taken from 2^-300 to 2^700 long, ends included", _JUDGE, np.array(lengths)),
@@ -45,14 +46,6 @@ def _taken(tracer: Octree | BruteForce, power: int, count: int) -> bool:
     except ValueError:
         return False
     return bool((found.t == 2.0**-power).all() and (found.face == 0).all())
-
-
-def _refused(tracer: Octree | BruteForce, long: float, count: int) -> bool:
-    try:
-        tracer.closest_hit(*_rays(1.0, long, count))
-    except ValueError:
-        return True
-    return False
 
 
 def _met(tracer: Octree | BruteForce, power: int, count: int) -> bool:

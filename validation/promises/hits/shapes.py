@@ -7,6 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.octree import BruteForce, Octree
+from validation.promises.refused import refuses
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -71,15 +72,5 @@ def _refused(tracer: Octree | BruteForce) -> list[bool]:
                 for which in range(2):
                     rays = [np.ones((count, 3)), np.ones((count, 3))]
                     rays[which][row_of, axis] = bad
-                    kept.append(_raises(tracer, *rays))
+                    kept += [refuses(ask, *rays) for ask in (tracer.closest_hit, tracer.any_hit, tracer.count_hits)]
     return kept
-
-
-def _raises(tracer: Octree | BruteForce, origins: Floats, directions: Floats) -> bool:
-    for ask in (tracer.closest_hit, tracer.any_hit, tracer.count_hits):
-        try:
-            ask(origins, directions)
-        except ValueError:
-            continue
-        return False
-    return True

@@ -28,7 +28,7 @@ _ACROSS, _ALONG = np.array([0.0, 0.0, 8.0]), np.array([8.0, 0.0, 0.0])
 _ROUNDING = 1e-14
 
 
-def check_planes(rng: Generator) -> list[dict[str, Any]]:
+def check_images(rng: Generator) -> list[dict[str, Any]]:
     """Squares from above, of which one is seen from its back, and one covers half of the picture."""
     checks: dict[tuple[str, str], Callable[[], Bools]] = {
         ("a picture's normals are those of the winding, whichever side is seen", "a square"): _sides,
