@@ -1,7 +1,9 @@
 """The section on numerical stability: extreme cases, the watertight sweep, the error curves."""
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable
+from functools import partial
+from itertools import chain, islice
+from typing import Any, NamedTuple
 
 from validation.gates import Gate
 from validation.hits import watertight
@@ -16,68 +18,55 @@ CASES = (*hits.CASES, *shading.CASES)
 JUDGES = ("exact arithmetic", "analytic", "Embree robust", "Embree default", "brute force")
 
 
-@dataclass(frozen=True)
-class Task:
-    """One step of the section: a case, a closed mesh or a sweep by its place in its table, or the leaks."""
+class Task(NamedTuple):
+    """One step of the section: what a progress bar shows, and a call whose result can be sent to another process."""
 
-    kind: Literal["case", "mesh", "sweep", "leaks"]
-    index: int
-    quick: bool
-
-    @property
-    def name(self) -> str:
-        """What a progress bar shows."""
-        match self.kind:
-            case "case":
-                return _subject(CASES[self.index])
-            case "mesh":
-                return f"watertight: {watertight.closed_meshes()[self.index].name}"
-            case "sweep":
-                return f"stability: error against {sweeps.SWEEPS[self.index].name}"
-        return "stability: leaks"
-
-    def do(self) -> Any:
-        """The task's result, which can be sent to another process."""
-        match self.kind:
-            case "case":
-                return check_case(CASES[self.index], self.quick)
-            case "mesh":
-                return watertight.sweep(self.index, self.quick)
-            case "sweep":
-                return sweeps.curve(self.index, self.quick)
-        return sweeps.leak_rows(self.quick)
+    name: str
+    do: Callable[[], Any]
 
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step`` in ``run``: one for each case, closed mesh and sweep, and one for the leaks."""
-    return len(_tasks(job.quick))
+    return sum(map(len, _tasks(job.quick)))
 
 
 def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
     """Run all cases and sweeps; returns a record for JSON and the gates, one for each case among them."""
     tasks = _tasks(job.quick)
-    results = job.workers.each(Task.do, tasks, lambda task: job.step(task.name))
-    of: dict[str, list[Any]] = {}
-    for task, result in zip(tasks, results, strict=True):
-        of.setdefault(task.kind, []).append(result)
-    sweep, sweep_gates = watertight.summary(of["mesh"])
-    curves, curve_gates = sweeps.summary(of["sweep"], of["leaks"][0], job.quick)
+    results = iter(job.workers.each(_done, [*chain(*tasks)], lambda task: job.step(task.name)))
+    cases, meshes, curves, leaks = ([*islice(results, len(some))] for some in tasks)
+    sweep, sweep_gates = watertight.summary(meshes)
+    curve_record, curve_gates = sweeps.summary(curves, leaks[0], job.quick)
     record: dict[str, object] = {
-        "cases": [row for row, _ in of["case"]],
+        "cases": [row for row, _ in cases],
         "watertight": sweep,
-        "curves": curves,
+        "curves": curve_record,
         "costs": dict.fromkeys(JUDGES),
     }
-    return record, [*(gate for _, gate in of["case"]), *sweep_gates, *curve_gates]
+    return record, [*(gate for _, gate in cases), *sweep_gates, *curve_gates]
 
 
-def _tasks(quick: bool) -> list[Task]:
-    """All tasks; none of the last takes long, so that no process waits long for another at the end."""
-    lengths: dict[Literal["case", "mesh", "sweep"], int] = {
-        "case": len(CASES), "mesh": len(watertight.closed_meshes()), "sweep": len(sweeps.SWEEPS),
-    }  # fmt: skip
-    some = [Task(kind, index, quick) for kind, length in lengths.items() for index in range(length)]
-    return [*some, Task("leaks", 0, quick)]
+def _tasks(quick: bool) -> tuple[list[Task], list[Task], list[Task], list[Task]]:
+    """Cases, closed meshes, sweeps, and the leaks; none of the last takes long, so that no process waits long for
+    another at the end.
+    """
+    return (
+        [Task(_subject(case), partial(_case, index, quick)) for index, case in enumerate(CASES)],
+        [Task(f"watertight: {closed.name}", partial(watertight.sweep, index, quick))
+         for index, closed in enumerate(watertight.closed_meshes())],
+        [Task(f"stability: error against {sweep.name}", partial(sweeps.curve, index, quick))
+         for index, sweep in enumerate(sweeps.SWEEPS)],
+        [Task("stability: leaks", partial(sweeps.leak_rows, quick))],
+    )  # fmt: skip
+
+
+def _done(task: Task) -> Any:
+    return task.do()
+
+
+def _case(index: int, quick: bool) -> tuple[dict[str, object], Gate]:
+    """A case by its place: functions within one cannot all be sent to another process."""
+    return check_case(CASES[index], quick)
 
 
 def check_case(case: ExtremeCase, quick: bool) -> tuple[dict[str, object], Gate]:
