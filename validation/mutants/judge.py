@@ -23,7 +23,7 @@ _RUNS: dict[str, tuple[str, ...]] = {
 # A process that takes this many times as long as with the sound renderer, and what compiling takes, hangs.
 _TIMES, _COMPILING = 6.0, 150.0
 # Seconds of tests, as long as the sound renderer takes for them, that are tried on a mutant.
-_TESTS = 150.0
+_TESTS = 240.0
 
 
 def groups_of(mutant: Mutant) -> tuple[str, ...]:
