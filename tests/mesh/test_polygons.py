@@ -1,5 +1,6 @@
 """Polygons cut into triangles: right over notches, and the fan wherever that is right or nothing is."""
 
+import itertools
 import time
 from typing import Any
 
@@ -206,6 +207,17 @@ def test_a_pentagram_is_told_by_its_crossings(monkeypatch: pytest.MonkeyPatch) -
     assert cut(crossing) == fan(len(crossing))
     monkeypatch.setattr(ears, "is_simple", lambda outline, order: True)
     assert cut(crossing) != fan(len(crossing))
+
+
+def test_an_outline_that_folds_back_onto_its_edge_is_not_simple() -> None:
+    """Its corner touches the edge before last, as no other pair of edges shows; from each corner, turned, mirrored."""
+    folded = np.array([(0, 0), (4, 0), (2, 0), (2, 1), (3, 2), (0, 3)], np.float64)
+    for turn, flip, begin, back in itertools.product(range(4), (1, -1), range(6), (1, -1)):
+        outline = np.ascontiguousarray(np.roll(folded * [flip, 1.0], begin, axis=0)[::back])
+        for _ in range(turn):
+            outline = np.ascontiguousarray(outline[:, ::-1] * [-1.0, 1.0])
+        order = np.argsort(np.minimum(outline, np.roll(outline, -1, axis=0))[:, 0])
+        assert not ears.is_simple(outline, order)
 
 
 def test_bent_polygons_keep_their_fan_slightly_bent_ones_are_cut() -> None:

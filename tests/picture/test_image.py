@@ -64,6 +64,19 @@ def test_png_holds_the_srgb_codes_with_row_zero_at_the_top(tmp_path: Path) -> No
     assert PIL.Image.open(io.BytesIO(picture._repr_png_())).size == (7, 5)
 
 
+@pytest.mark.parametrize("height", [1, 64, 65, 129])
+def test_each_row_of_a_png_is_written_and_looked_at(height: int) -> None:
+    """Rows are taken 64 at a time: the last few, or one alone, count too."""
+    picture = image(np.full((height, 2, 3), 1.0))
+    with PIL.Image.open(io.BytesIO(picture._repr_png_())) as file:
+        assert (np.asarray(file) == 255).all() and file.size == (2, height)
+    for row in (0, height - 1):
+        spoilt = picture.radiance.copy()
+        spoilt[row, 1, 2] = np.nan
+        with pytest.raises(ValueError, match="radiance: expected numbers that have a colour, got nan"):
+            image(spoilt)._repr_png_()
+
+
 def test_png_is_of_8_bits_without_alpha_or_a_curve_of_its_own(tmp_path: Path) -> None:
     """Its bytes, unpacked by the specification: what says nothing of its curve is shown as sRGB."""
     picture = image()

@@ -7,6 +7,16 @@ EQUIVALENT: dict[str, str] = {
         "ends ordered downwards bring the same hits together as ends ordered upwards, and nothing else asks for them",
     "renderer.octree._scaled #0: _SMALLEST <= largest <= _LARGEST -> (_SMALLEST) <= (largest) < (_LARGEST)":
         "a mesh whose largest coordinate is exactly 2^60 is scaled by a power of two, which changes no answer",
+    "renderer.octree._scaled #0: _SMALLEST <= largest <= _LARGEST -> (_SMALLEST) < (largest) <= (_LARGEST)":
+        "a mesh whose largest coordinate is exactly 2^-60 is scaled by a power of two, which changes no answer",
+    "renderer.inside.crossings #0: -53 -> (53)":
+        "every sign is found in exact arithmetic then: more work, the same answers",
+    "renderer.distance.nearest._search_blocks #0: listed == LISTED -> (listed) != (LISTED)":
+        "each face is looked at as soon as it is listed: the same answers in more calls",
+    "renderer.trace.steps._count_chunk #0: work > _WORK -> not (work > _WORK)":
+        "a call that ends earlier is called again: the same counts",
+    "renderer.trace.doubt._meet_line #0: dot_pairs(cross_pairs(face.first, face.along), across) -> "
+    "dot_pairs(across, cross_pairs(face.first, face.along))": "a scalar product of pairs has the same bits either way",
     "renderer.distance.rational #0: 48 -> 49":
         "a subtraction and two sums change a bound by at most 4 * 2^-53 of it, and 2^-49 is still more",
     "renderer.trace.packet._test_leaf #0: put(rays.floats, LIMIT + r, np.float32(-np.inf)) -> pass":
@@ -61,4 +71,12 @@ LEFT: dict[str, str] = {
     "renderer.distance.face_distance._precedes #0: a[1] == b[1] and a[2] < b[2] -> (a[1] == b[1]) or (a[2] < b[2])":
         "from either end an edge's distance is within 2^-98 and is rounded as if from one end; 64,000 points beside "
         "edges found none that differs",
+    "renderer.trimesh_ray.within #0: -0.6210395307 -> (0.6210395307)":
+        "the second pair of rays stands for a random one: any direction keeps what is promised of it",
+    "renderer.kernels.compiler._link_all #0: isinstance(library, _PieceLibrary) -> "
+    "not (isinstance(library, _PieceLibrary))":
+        "the same functions are linked from another module of theirs: slower to compile, the same answers",
+    "renderer.kernels.digest.source_digest #0: found.stat().st_mtime > loaded.AT -> "
+    "(found.stat().st_mtime) >= (loaded.AT)":
+        "a file written in the very instant in which the package was loaded may count as either",
 }  # fmt: skip

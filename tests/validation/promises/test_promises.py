@@ -322,6 +322,17 @@ def test_counts_of_places_and_of_padding_are_found(monkeypatch: pytest.MonkeyPat
     assert broken("counts") == {"stats counts", "brute force"}
 
 
+def test_a_box_too_many_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Octree.count_steps
+
+    def more(self: Any, *given: Any) -> Any:
+        steps = sound(self, *given)
+        return replace(steps, nodes=steps.nodes + (steps.nodes > 1))
+
+    monkeypatch.setattr(Octree, "count_steps", more)
+    assert broken("counts") == {"a ray"}
+
+
 def test_a_direction_that_is_refused_and_a_hit_at_infinity_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = Octree.closest_hit
 
@@ -359,7 +370,7 @@ def test_vertices_that_are_rounded_by_the_extent_of_the_file_are_found(monkeypat
 
 
 def test_errors_of_another_ray_and_rays_too_many_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound, drawn = Octree.all_hits, bounces.render
+    sound, first, drawn = Octree.all_hits, Octree.closest_hit, bounces.render
 
     def other(self: Any, *given: Any, **options: Any) -> Any:
         found = sound(self, *given, **options)
@@ -367,6 +378,14 @@ def test_errors_of_another_ray_and_rays_too_many_are_found(monkeypatch: pytest.M
 
     monkeypatch.setattr(Octree, "all_hits", other)
     assert "t_error is" in broken("errors")
+
+    def wider(self: Any, *given: Any, **options: Any) -> Any:
+        found = first(self, *given, **options)
+        found.t_error = 2.0 * found.t_error + 1.0
+        return found
+
+    monkeypatch.setattr(Octree, "closest_hit", wider)
+    assert "t_error of" in broken("errors")
     monkeypatch.setattr(bounces, "render", lambda *given, **options: replace(
         drawn(*given, **options), rays=drawn(*given, **options).rays + 1))  # fmt: skip
     assert broken("bounces") == {"rays are"}
@@ -415,4 +434,4 @@ def test_planes_that_show_something_else_are_found(monkeypatch: pytest.MonkeyPat
         return replace(image, normal=np.abs(image.normal), rays=image.rays + 1, cut=1, depth=image.depth * 2.0)
 
     monkeypatch.setattr(images, "render", other)
-    assert {"a picture's", "a picture", "what render", "pixels are", "an EXR"} <= broken("images")
+    assert {"a picture's", "a picture", "only surfaces", "what render", "pixels are", "an EXR"} <= broken("images")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.picture.render import render
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Mirror, Phong
+from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import RenderSettings, Scene, SceneObject
 from validation.promises.pictures.glowing import equal, from_above, glowing, square, thing
 from validation.promises.row import row
@@ -33,6 +33,7 @@ def check_images(rng: Generator) -> list[dict[str, Any]]:
     checks: dict[tuple[str, str], Callable[[], Bools]] = {
         ("a picture's normals are those of the winding, whichever side is seen", "a square"): _sides,
         ("a picture counts the rays of all samples of a pixel", "the number of samples"): _samples,
+        ("only surfaces that show direct light send shadow rays", "the kinds of materials"): _shadowed,
         ("what render is given counts before what the scene says, 0 and False too", "the sum of the light"): _given,
         ("pixels are cut where max_rays ends what would go on, and nowhere else", "two mirrors"): _cut,
         ("an EXR file has the depth, infinite where nothing is", "OpenEXR's reader"): _depth,
@@ -64,6 +65,20 @@ def _samples() -> Bools:
     return np.concatenate(
         [(render(scene, resolution=_SIZE, samples=k, max_depth=1).rays == 2 * k).ravel() for k in (1, 4, 9)]
     )
+
+
+def _shadowed() -> Bools:
+    """Half of the picture is lit, the other shows no light of a lamp."""
+    halves = [square(np.array([x, 0.0, -4.0]), _ACROSS, _ALONG / 2.0) for x in (-4.0, 0.0)]
+    sun = DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0))
+    kept = []
+    for dark in (Mirror(), Dielectric(type="dielectric"), Phong(diffuse=0.0, specular=0.0)):
+        scene = Scene(
+            camera=_CAMERA, materials={"dark": dark, "lit": Phong()}, lights=(sun,),
+            objects=(thing(halves[0], "dark"), thing(halves[1], "lit")), render=RenderSettings(max_depth=0),
+        )  # fmt: skip
+        kept.append((render(scene, resolution=(8, 4)).rays == np.where(np.arange(8) >= 4, 2, 1)).ravel())
+    return np.concatenate(kept)
 
 
 def _given() -> Bools:

@@ -35,6 +35,7 @@ def check_shining() -> list[dict[str, Any]]:
         row("a light of any one colour shines, beside dark ones", "irradiance by hand", np.concatenate(kept)),
         row("highlights of the largest exponents keep their width", "cos^k by hand", _narrow(ground)),
         row("where smooth normals cancel the face's own counts", "irradiance by hand", _flat(ground)),
+        row("light beyond float64 leaves a dark channel dark, and is the largest float32", "by hand", _endless(ground)),
     ]
 
 
@@ -68,4 +69,17 @@ def _flat(ground: Mesh) -> NDArray[np.bool_]:
         )  # fmt: skip
         image = render(scene, resolution=(1, 1))
         kept += [equal(image.radiance, np.array([[[1.0, 0.5, 0.25]]])).ravel(), (image.normal[0] == up).all(axis=1)]
+    return np.concatenate(kept)
+
+
+def _endless(ground: Mesh) -> NDArray[np.bool_]:
+    """Point lights so near that the irradiance of some channels overflows, on surfaces that lack some channels."""
+    light = PointLight(position=(0.0, 1e-3, 0.0), intensity=(1e308, 1e308, 0.0))
+    largest, kept = float(np.finfo(np.float32).max), []
+    for diffuse, expected in (((1.0, 0.0, 1.0), (largest, 0.0, 0.0)), ((0.0, 1.0, 0.5), (0.0, largest, 0.0))):
+        scene = Scene(
+            camera=from_above((0.0, 5.0, 0.0), 1e-6), materials={"any": Phong(diffuse=diffuse, specular=0.0)},
+            objects=(thing(ground, "any"),), lights=(light,),
+        )  # fmt: skip
+        kept.append((shown(scene, (1, 1)) == np.array(expected)).ravel())
     return np.concatenate(kept)
