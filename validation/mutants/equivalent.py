@@ -15,6 +15,11 @@ EQUIVALENT: dict[str, str] = {
         "each face is looked at as soon as it is listed: the same answers in more calls",
     "renderer.trace.steps._count_chunk #0: work > _WORK -> not (work > _WORK)":
         "a call that ends earlier is called again: the same counts",
+    "renderer.trace.packet._most #0: a > b -> (a) >= (b)": "of two equal numbers either may be taken",
+    "renderer.trace.packet._middle_entry #0: load8(nodes, base + near) - "
+    "splat8(get(floats, NEAR_ORIGIN + axis * WIDTH + middle)) -> (load8(nodes, base + near)) + "
+    "(splat8(get(floats, NEAR_ORIGIN + axis * WIDTH + middle)))":
+        "octants are taken in another order: more work, the same answers",
     "renderer.trace.doubt._meet_line #0: dot_pairs(cross_pairs(face.first, face.along), across) -> "
     "dot_pairs(across, cross_pairs(face.first, face.along))": "a scalar product of pairs has the same bits either way",
     "renderer.distance.rational #0: 48 -> 49":
