@@ -1,13 +1,18 @@
-"""Whether something is refused as invalid."""
+"""Whether something is refused as invalid, and what is said then."""
 
 from collections.abc import Callable
 from typing import Any
 
 
-def refuses(ask: Callable[..., Any], *given: Any, **options: Any) -> bool:
-    """Whether a call raises ``ValueError``."""
+def refused(ask: Callable[..., Any], *given: Any, **options: Any) -> str | None:
+    """What a call's ``ValueError`` says; None where it is answered."""
     try:
         ask(*given, **options)
-    except ValueError:
-        return True
-    return False
+    except ValueError as error:
+        return str(error)
+    return None
+
+
+def refuses(ask: Callable[..., Any], *given: Any, **options: Any) -> bool:
+    """Whether a call raises ``ValueError``."""
+    return refused(ask, *given, **options) is not None

@@ -21,6 +21,7 @@ from validation.promises.hits.meshes import check_meshes
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
 from validation.promises.hits.planes import check_planes
+from validation.promises.hits.refusals import check_refusals
 from validation.promises.hits.shapes import check_shapes
 from validation.promises.hits.starts import check_starts
 from validation.promises.hits.trees import check_trees
@@ -73,6 +74,7 @@ HITS: dict[str, Callable[[], Rows]] = {
     "changed meshes": check_meshes,
     "kept arrays": lambda: check_kept(_random()),
     "shapes of rays": lambda: check_shapes(_random()),
+    "refusals": lambda: check_refusals(_random()),
     "polygons": lambda: check_outlines(_random(), _POLYGONS),
 }
 QUERIES: dict[str, Callable[[], Rows]] = {

@@ -31,6 +31,7 @@ from validation.promises.hits import (
     outlines,
     places,
     planes,
+    refusals,
     shapes,
     starts,
     trees,
@@ -58,6 +59,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "alone": lambda: alone.check_alone(np.random.default_rng(5)),
     "kept": lambda: kept.check_kept(np.random.default_rng(5)),
     "shapes": lambda: shapes.check_shapes(np.random.default_rng(5)),
+    "refusals": lambda: refusals.check_refusals(np.random.default_rng(5)),
     "meshes": meshes.check_meshes,
     "codes": codes.check_codes,
     "planes": planes.check_planes,
@@ -435,3 +437,22 @@ def test_planes_that_show_something_else_are_found(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(images, "render", other)
     assert {"a picture's", "a picture", "only surfaces", "what render", "pixels are", "an EXR"} <= broken("images")
+
+
+def test_what_is_not_refused_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    moved, asked = Octree.refit, Octree.count_hits
+
+    def quiet(self: Any, *given: Any, **options: Any) -> Any:
+        try:
+            return asked(self, *given, **options)
+        except ValueError:
+            return None
+
+    def anyhow(self: Octree, vertices: Any) -> None:
+        moved(self, self.mesh.vertices * 2.0)
+        moved(self, vertices)
+
+    monkeypatch.setattr(Octree, "count_hits", quiet)
+    assert broken("refusals") == {"a ray", "bounds that"}
+    monkeypatch.setattr(Octree, "refit", anyhow)
+    assert broken("refusals") == {"a ray", "bounds that", "vertices that"}

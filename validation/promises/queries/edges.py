@@ -43,7 +43,19 @@ def check_edges(rng: Generator) -> list[dict[str, Any]]:
         row("a mesh is closed where each edge is passed once either way", _JUDGE, np.array(closed)),
         row("open and odd edges are those that faces leave open", _JUDGE, np.array(opened)),
         row("contains refuses a surface that its rule finds open", _JUDGE, np.array(asked)),
+        row("no rule but its own is taken beside winding, and nothing that is none", "what was given", _ruled()),
     ]
+
+
+def _ruled() -> NDArray[np.bool_]:
+    octree, kept = Octree.from_mesh(box()), []
+    for ask in (octree.contains, octree.signed_distance):
+        for rule, winding, taken in (
+            ("nonzero", True, True), ("even-odd", True, False), ("even-odd", False, True), ("nonzero", False, True),
+            ("odd", False, False), ("odd", True, False), ("nonzero", 1, False), (None, False, False),
+        ):  # fmt: skip
+            kept.append(refuses(ask, _ANYWHERE, rule=rule, winding=winding) != taken)
+    return np.array(kept)
 
 
 def _passed(faces: NDArray[np.int64]) -> Counter[Edge]:

@@ -62,7 +62,21 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
         row("the nearest face and its distance, whatever the sizes of coordinates", _JUDGE, np.concatenate(heap)),
         row("the nearest of faces that are as near but for some ulp", _JUDGE, np.concatenate(shell)),
         row("of two faces whose edge is nearest the lower has it", "wedges of two faces", _edges_kept(rng)),
+        row("beyond max_distance nothing is told", "distances to a plane", _beyond(rng)),
     ]
+
+
+def _beyond(rng: Generator) -> NDArray[np.bool_]:
+    """Points above a face, another is far away, with limits a little above and below their heights, one a point and one for all."""
+    heights = rng.uniform(1.0, 2.0, _PLACES)
+    points = np.stack([np.full(_PLACES, 0.25), np.full(_PLACES, 0.25), heights], 1)
+    octree, kept = Octree.from_mesh(_mesh(np.stack([_CORNER, _CORNER + 1e3]))), []
+    for limit in (heights * rng.choice([0.5, 0.999, 1.001], _PLACES), *rng.uniform(1.0, 2.0, 3)):
+        found = octree.closest_point(points, limit)
+        told = [~np.isnan(found.u), ~np.isnan(found.v), ~np.isnan(found.points).any(axis=1), found.face == 0]
+        kept += [(flags == (heights <= limit)) for flags in (*told, found.found, np.isfinite(found.distance))]
+        kept.append(np.isinf(found.distance) | (found.distance == heights))
+    return np.concatenate(kept)
 
 
 def _steps(rng: Generator) -> NDArray[np.int64]:
