@@ -40,8 +40,21 @@ def check_views(rng: Generator) -> list[dict[str, Any]]:
         row("nothing is seen through a ball", "a ball is closed", np.concatenate(hidden)),
         row("what is in front of a face, however near, hides what stands on it", "planes by hand", _covered()),
         row("each pair of points has the room of its own coordinates", "a square by hand", _far()),
+        row("a point sees what is in its own place", "nothing lies between", _same(rng)),
         row("corners at 0.0 and -0.0 are at one place", "a box is closed", _closed()),
     ]
+
+
+def _same(rng: Generator) -> NDArray[np.bool_]:
+    """Corners, points of faces and points anywhere, each from itself; in a batch with others that see nothing."""
+    ball = icosphere(2)
+    points = np.concatenate([ball.vertices, ball.triangles.mean(axis=1), rng.uniform(-2.0, 2.0, (200, 3))])
+    across = np.tile([[0.0, 0.0, -3.0], [0.0, 0.0, 3.0]], (len(points), 1, 1))
+    ends, kept = np.stack([across, np.repeat(points[:, None], 2, axis=1)], axis=1), []
+    for tracer in (Octree.from_mesh(ball), BruteForce.from_mesh(ball)):
+        seen = tracer.visible(ends[:, :, 0], ends[:, :, 1])
+        kept += [~seen[:, 0], seen[:, 1], tracer.visible(points, points)]
+    return np.concatenate(kept)
 
 
 def _closed() -> NDArray[np.bool_]:
