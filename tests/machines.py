@@ -7,7 +7,7 @@ Each is a run of pytest with other orders, loads, processors and surroundings:
   sixteen     as many processors as it is told; another random order
   elsewhere   no UTF-8 by default, a time zone 14 hours ahead, no file for others, no kernels kept, an empty HOME
 
-Prints a line each; exit 1 where one fails.
+Prints a line each; exit 1 where one fails, 2 for a name that is none.
 """
 
 import os
@@ -63,6 +63,10 @@ MACHINES = {
 
 def main(names: list[str]) -> int:
     """Run the suite on the named machines, or on all."""
+    unknown = [name for name in names if name not in MACHINES]
+    if unknown:
+        print(f"machines: expected some of {', '.join(MACHINES)}, got {unknown[0]!r}", file=sys.stderr)
+        return 2
     failed = 0
     for name in names or MACHINES:
         began = time.monotonic()

@@ -4,7 +4,7 @@
 
 Exit codes:
   0    every gate holds
-  1    a gate fails, or nothing was judged
+  1    a gate fails, nothing was judged, or nothing notices a mutant that has no reason to be left
   2    a bad argument, a bad file (scene, mesh, thresholds, baseline), or a missing reference
   130  Ctrl-C; the report that was there before is untouched
 """
@@ -64,16 +64,28 @@ def make_parser() -> argparse.ArgumentParser:
             help=f"judge this {name} and not the suite's own, in the section {section}; may be given again",
         )  # fmt: skip
     parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about half an hour")
-    parser.add_argument("--mutants", type=_count, metavar="N", help="only judge N random small faults, hours; goes on")
-    parser.add_argument("--of", choices=("renderer", "judges"), default="renderer", help="what the mutants break")
-    parser.add_argument("--seed", type=int, default=1, help="of the mutants, 1 unless given")
+    parser.add_argument(
+        "--mutants", type=_count, metavar="N",
+        help="only put N small faults into the source, one at a time, and see what notices each: hours; "
+        "what an earlier run judged is not judged again",
+    )  # fmt: skip
+    parser.add_argument(
+        "--of", choices=("renderer", "judges"), default="renderer", help="what the mutants break; default: renderer"
+    )
+    parser.add_argument("--seed", type=_seed, default=1, metavar="S", help="by which mutants are chosen; default: 1")
     parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
     return parser
 
 
 def _count(text: str) -> int:
-    if not (text.isdigit() and int(text)):
+    if not (text.isdecimal() and int(text)):
         raise argparse.ArgumentTypeError(f"expected a positive integer, got {text!r}")
+    return int(text)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"expected an integer from 0, got {text!r}")
     return int(text)
 
 
@@ -95,8 +107,12 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
         alone = given[0]
         others = [f"--{kind}" for kind in sorted(kinds)] + ["--gate"] * (options.gate is not None)
         others += ["--only"] * (options.only != NAMES) + given[1:]
+        others += ["--quick"] * (options.quick and not options.defects)
         if others:
-            parser.error(f"{alone} goes with --output alone{' and --quick' * options.defects}, got {others[0]} too")
+            fitting = {"--defects": "--output and --quick", "--mutants": "--output, --of and --seed"}
+            parser.error(f"{alone} goes with {fitting.get(alone, '--output')} alone, got {others[0]} too")
+    if not options.mutants and (options.of, options.seed) != ("renderer", 1):
+        parser.error("--of and --seed are those of --mutants N, got no --mutants")
     chosen, left_out = choose(options.only, kinds)
     if not chosen:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
@@ -145,14 +161,15 @@ def _defects_verdict(gates: Sequence["Gate"], request: "Request") -> int:
 
 
 def _mutants_verdict(found: Mapping[str, Any], request: "Request") -> int:
-    """Print the mutants that nothing noticed and a line of counts; returns the exit code."""
+    """Print the mutants that nothing noticed and a line of counts; returns the exit code: 1 where one of them has no
+    reason to be left."""
     survivors = 0
     for kind in (kind for kind in ("kernels", "python") if found[kind]["mutants"]):
         counts = found[kind]
         real = counts["mutants"] - counts["equivalent"]
-        survivors += len(counts["survivors"])
         for row in counts["survivors"]:
-            print(f"SURVIVED {row['file']}:{row['line']}: {row['key']}")
+            survivors += row["reason"] is None
+            print(f"SURVIVED {row['file']}:{row['line']}: {row['key']}: {row['reason'] or 'no reason is known'}")
         print(
             f"validation: mutants in {kind}: {counts['killed']} of {real} noticed, {counts['by_gates']} by a gate; "
             f"{counts['equivalent']} change no answer; {counts['hung']} hung, {counts['crashed']} crashed"

@@ -58,7 +58,7 @@ def run(request: Request) -> dict[str, Any]:
     stored_baseline = baseline.read(request.output / "baseline.json")
 
     # Run the sections, with pictures in a temporary folder.
-    request.output.mkdir(parents=True, exist_ok=True)
+    _make_folder(request.output)
     with TemporaryDirectory(dir=request.output, prefix=".run-") as folder, Workers(_processes()) as workers:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()
@@ -171,6 +171,13 @@ def _check_folder(output: Path) -> None:
         raise ValueError(f"{expected} a file called pictures")
 
 
+def _make_folder(output: Path) -> None:
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"--output: expected a folder that can be made, got {output}: {error.strerror}") from None
+
+
 def run_defects(request: Request) -> list[Gate]:
     """Inject the seeded defects, store the results as ``defects.json`` and return the gates.
 
@@ -183,7 +190,7 @@ def run_defects(request: Request) -> list[Gate]:
     sources = environment.sources_sha256()
     chosen = [d for d in DEFECTS if not (request.quick and d.kernel)]
     _check_folder(request.output)
-    request.output.mkdir(parents=True, exist_ok=True)
+    _make_folder(request.output)
     with steps(len(chosen) + 1) as step:
         record, gates = defects.run(request.quick, step)
     record |= {
@@ -207,7 +214,7 @@ def run_mutants(request: Request, target: str, count: int, seed: int) -> dict[st
     from validation.mutants import run as mutants
 
     _check_folder(request.output)
-    request.output.mkdir(parents=True, exist_ok=True)
+    _make_folder(request.output)
     with steps() as step:
         found = mutants.run(target, count, seed, request.output, step)
     _draw_again(request.output)
@@ -249,7 +256,10 @@ def stored_defects(output: Path) -> dict[str, Any] | None:
 
 def write_baseline(output: Path) -> Path:
     """Make ``baseline.json`` from the ``metrics.json`` beside it; ``baseline.summary`` says what is refused."""
-    text = baseline.text(schema.read(output / "metrics.json"))
+    stored = output / "metrics.json"
+    if not stored.exists():
+        raise ValueError(f"--write-baseline: expected {stored}, which a whole run writes, got no such file")
+    text = baseline.text(schema.read(stored))
     path = output / "baseline.json"
     _write(path, text)
     return path

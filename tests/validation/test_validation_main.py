@@ -156,6 +156,11 @@ class TestUserFiles:
         (["--mutants", "5", "--only", "hits"], "got --only too"),
         (["--mutants", "5", "--of", "scenes"], "invalid choice: 'scenes'"),
         (["--mutants", "5", "--defects"], "got --mutants too"),
+        (["--mutants", "²"], "expected a positive integer, got '²'"),
+        (["--mutants", "5", "--quick"], "--mutants goes with --output, --of and --seed alone, got --quick too"),
+        (["--mutants", "5", "--seed", "-1"], "expected an integer from 0, got '-1'"),
+        (["--only", "hits", "--seed", "5"], "--of and --seed are those of --mutants N"),
+        (["--defects", "--of", "judges"], "--of and --seed are those of --mutants N"),
         (["--write-baseline", "--gate", "a.toml"], "got --gate too"),
     ],
 )
@@ -169,7 +174,7 @@ def test_arguments_at_odds_are_refused(arguments: list[str], words: str, capsys:
 def test_help_documents_the_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         command.main(["--help"])
-    assert "1    a gate fails, or nothing was judged" in capsys.readouterr().out
+    assert "1    a gate fails, nothing was judged, or nothing notices a mutant" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -270,6 +275,17 @@ assert suite._outcome({}, [], Path("nowhere"))["gates"] == [] and table.unjudged
     subprocess.run([sys.executable, "-c", program], cwd=SCENE.parents[1], check=True)
 
 
+def test_a_folder_that_cannot_be_made_and_a_run_that_is_missing_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    for more in (["--only", "hits"], ["--defects"], ["--mutants", "3"]):
+        assert command.main([*more, "--output", str(tmp_path / "file" / "below")]) == 2
+        assert "--output: expected a folder that can be made, got " in capsys.readouterr().err
+    assert command.main(["--write-baseline", "--output", str(tmp_path)]) == 2
+    assert "--write-baseline: expected " in capsys.readouterr().err
+
+
 def test_mutants_are_judged_listed_and_drawn(
     tmp_path: Path, sections: dict[str, Fake], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -294,6 +310,11 @@ def test_mutants_are_judged_listed_and_drawn(
         assert "mutants in kernels: 3 of 3 noticed, 3 by a gate" in printed
         assert "mutants in python: 0 of 3 noticed" in printed and printed.count("SURVIVED renderer/") == 3
         assert len(judged) == 6
+    # Fewer leave the record as it is; it is one of a seed.
+    assert command.main(["--mutants", "2", "--seed", "3", *output]) == 1
+    assert "mutants in kernels: 3 of 3 noticed" in capsys.readouterr().out and len(judged) == 6
+    assert command.main(["--mutants", "6", "--seed", "4", *output]) == 2
+    assert "--seed: expected 3, as in " in capsys.readouterr().err
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "6 of 6 mutants by seed 3 are judged" in page and "Nothing noticed these in Python: 3" in page
     # One that is proved to change no answer is not run.

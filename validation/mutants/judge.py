@@ -2,6 +2,7 @@
 
 import json
 import re
+import signal
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -92,10 +93,16 @@ def noticed_by_gates(ended: Ended, group: str) -> tuple[str | None, How | None]:
     if ended.code is None:
         return f"the checks of {group}", "hangs"
     if ended.code != 0 or said is None:
-        last = (ended.output.strip().splitlines() or [""])[-1]
-        return f"the checks of {group}: {last[:200]}", "crashes"
+        return f"the checks of {group}: {_last_words(ended)[:200]}", "crashes"
     red = json.loads(said[1])
     return (red, "fails") if red is not None else (None, None)
+
+
+def _last_words(ended: Ended) -> str:
+    """The last line of a process that crashed, or the signal that ended it."""
+    if ended.code is not None and ended.code < 0:
+        return f"ended by {signal.Signals(-ended.code).name}"
+    return (ended.output.strip().splitlines() or [f"exit code {ended.code}"])[-1]
 
 
 def _noticed_by_tests(ended: Ended) -> tuple[str | None, How | None]:

@@ -27,16 +27,14 @@ class Record:
 
     def __init__(self, path: Path, root: Path) -> None:
         self.path, self._root = path, root
-        self._judges = digest([*(root / "tests").rglob("*.py"), *(root / "validation").rglob("*.py")])
-        self._rows = {row["key"]: row for row in _stored(path)["mutants"]}
+        self._judges, stored = _judges(root), _stored(path)
+        self._rows = {row["key"]: row for row in stored["mutants"]}
+        self.seed, self.asked = stored["seed"], len(stored["asked"])
 
     def row(self, mutant: Mutant) -> Row | None:
         """The stored row of a mutant, None where its verdict holds no longer."""
         row = self._rows.get(mutant.key)
-        if row is None or row["source"] != self._source(mutant):
-            return None
-        settled = row["gate"] if mutant.kernel else bool(row["by"])
-        return row if settled or row["judges"] == self._judges else None
+        return row if row is not None and _holds(row, self._source(mutant), self._judges) else None
 
     def forget(self, mutants: Sequence[Mutant]) -> None:
         """Leave out what is stored of some mutants."""
@@ -69,25 +67,35 @@ def digest(files: Sequence[Path]) -> str:
     return found.hexdigest()
 
 
+def _judges(root: Path) -> str:
+    return digest([*(root / "tests").rglob("*.py"), *(root / "validation").rglob("*.py")])
+
+
+def _holds(row: Row, source: str, judges: str) -> bool:
+    """Whether a verdict holds with the mutant's file and what judges it as they are."""
+    settled = row["gate"] if row["kernel"] else bool(row["by"])
+    return bool(row["source"] == source and (settled or _changes_nothing(row) or row["judges"] == judges))
+
+
 def summary(path: Path, root: Path) -> dict[str, Any] | None:
     """What the last run found, for the report; None where there was none.
 
-    ``seed``, ``asked`` (how many), ``judged``, and ``changed``, of how many of these the file in ``root`` has changed
-    since; for ``kernels`` and ``python`` the counts of all, equivalent, killed, killed by a gate, hung and crashed, and
-    the survivors' rows with the reasons why they are left, None where there is none; ``operators``, a row each; and
-    ``equivalent``, mutants that change no answer, with the proofs.
+    ``seed``, ``asked`` (how many), ``judged``, and ``outdated``, how many verdicts do not hold for the checkout in
+    ``root``; for ``kernels`` and ``python`` the counts of all, equivalent, killed, killed by a gate, hung and crashed,
+    and the survivors' rows with the reasons why they are left, None where there is none; ``operators``, a row each;
+    and ``equivalent``, mutants that change no answer, with the proofs.
     """
     stored = _stored(path)
     if not stored["asked"]:
         return None
     by_key = {row["key"]: row for row in stored["mutants"]}
     rows = [by_key[key] for key in stored["asked"] if key in by_key]
-    same = [row for row in rows if _changes_nothing(row)]
+    same, judges = [row for row in rows if _changes_nothing(row)], _judges(root)
     return {
         "seed": stored["seed"],
         "asked": len(stored["asked"]),
         "judged": len(rows),
-        "changed": sum(row["source"] != digest([root / row["file"]]) for row in rows),
+        "outdated": sum(not _holds(row, digest([root / row["file"]]), judges) for row in rows),
         "kernels": _counts([row for row in rows if row["kernel"]]),
         "python": _counts([row for row in rows if not row["kernel"]]),
         "operators": [

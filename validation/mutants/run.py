@@ -28,12 +28,16 @@ def run(target: str, count: int, seed: int, output: Path, step: Callable[[str], 
     """Judge ``count`` mutants of a target, chosen by ``seed``; those that its record in ``output`` has are not judged
     again, and those that are proved to change no answer not at all.
 
-    The file is written after each, so that a run that is cut off loses nothing. Returns ``record.summary``.
+    The file is written after each, so that a run that is cut off loses nothing. Fewer mutants than in an earlier run
+    are the first of that run's, whose others stay in the record. Returns ``record.summary``. Raises ``ValueError``
+    where the record is one of another seed.
     """
-    some = chosen(mutants(files(target, ROOT), ROOT), count, seed)
     path = record_of(target, output)
     record = Record(path, ROOT)
-    waiting = [mutant for mutant in some if record.row(mutant) is None]
+    if record.seed not in (None, seed):
+        raise ValueError(f"--seed: expected {record.seed}, as in {path}, or another --output, got {seed}")
+    some = chosen(mutants(files(target, ROOT), ROOT), max(count, record.asked), seed)
+    waiting = [mutant for mutant in some[:count] if record.row(mutant) is None]
 
     def keep(mutant: Mutant, verdict: Verdict) -> None:
         record.add(mutant, verdict)

@@ -83,7 +83,7 @@ GREEN = Ended(0, "red: null\n", 2.0)
     [
         ([GREEN, Ended(0, 'noise\nred: "hits: cube: wrong"\n', 3.0)], None, "hits: cube: wrong", True, "fails"),
         ([Ended(None, "", 9.0)], None, "the checks of hits", True, "hangs"),
-        ([Ended(-11, "", 9.0)], None, "the checks of hits: ", True, "crashes"),
+        ([Ended(-11, "a warning", 9.0)], None, "the checks of hits: ended by SIGSEGV", True, "crashes"),
         ([Ended(1, "Trace\nKeyError: 3\n", 9.0)], None, "the checks of hits: KeyError: 3", True, "crashes"),
         ([GREEN] * 3, Ended(1, "F\nFAILED tests/a.py::test_b - x\n", 4.0), "tests/a.py::test_b", False, "fails"),
         ([GREEN] * 3, Ended(None, "..", 4.0), "the tests", False, "hangs"),
@@ -160,10 +160,13 @@ def test_a_summary_counts_what_changes_an_answer(root: Path, monkeypatch: pytest
     monkeypatch.setattr(record, "LEFT", {verdicts["lost"][0].key: "no promise"})
     found = summary(path, root)
     assert found is not None and (found["seed"], found["asked"], found["judged"]) == (7, 5, 4)
-    assert found["changed"] == 0
+    assert found["outdated"] == 0
+    (root / "tests" / "test_new.py").write_text("")
+    # What only a test noticed in a kernel, and what nothing did; not what is proved to change nothing.
+    assert summary(path, root)["outdated"] == 2  # type: ignore[index]
     (root / "renderer" / "trace" / "a.py").write_text("x = a + b + c\n")
     changed = summary(path, root)
-    assert changed is not None and changed["changed"] == 4
+    assert changed is not None and changed["outdated"] == 4
     assert found["kernels"] == {
         "mutants": 3, "equivalent": 1, "killed": 2, "by_gates": 1, "hung": 1, "crashed": 0, "survivors": [],
     }  # fmt: skip

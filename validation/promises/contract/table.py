@@ -1,5 +1,6 @@
 """The table of promises: for each piece of the public contract, the tests and gates that would notice it broken."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,16 @@ def read() -> list[dict[str, Any]]:
     """The rows in the file's order.
 
     Each has ``where`` and ``says``; a promise has ``judges``, tests by their ids and gates as "section: subject:
-    quantity", and ``against``, what these compare with. Words, which no program can check, have ``why`` instead.
+    quantity", see ``names_gate``, and ``against``, what these compare with. Words, which no program
+    can check, have ``why`` instead.
     """
     table = tomllib.loads(TABLE.read_text(encoding="utf-8"))
     return [*table["promise"], *table["words"]]
+
+
+def names_gate(judge: str, gate: str) -> bool:
+    """Whether a judge of the table names a gate; ``*`` stands for any part of a name."""
+    return re.fullmatch(".*".join(map(re.escape, judge.split("*"))), gate) is not None
 
 
 def unjudged(rows: list[dict[str, Any]]) -> list[Piece]:

@@ -67,7 +67,7 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
 
 
 def _beyond(rng: Generator) -> NDArray[np.bool_]:
-    """Points above a face, another is far away, with limits a little above and below their heights, one a point and one for all."""
+    """Points above a face, another is far away, with limits near their heights: one a point, and one for all."""
     heights = rng.uniform(1.0, 2.0, _PLACES)
     points = np.stack([np.full(_PLACES, 0.25), np.full(_PLACES, 0.25), heights], 1)
     octree, kept = Octree.from_mesh(_mesh(np.stack([_CORNER, _CORNER + 1e3]))), []
