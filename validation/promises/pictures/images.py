@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from itertools import combinations, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.picture.render import render
+from renderer.scene.camera import OrthographicCamera
 from renderer.scene.light import DirectionalLight
 from renderer.scene.material import Dielectric, Mirror, Phong
-from renderer.scene.scene import RenderSettings, Scene, SceneObject
+from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject
 from validation.promises.pictures.glowing import equal, from_above, glowing, square, thing
 from validation.promises.row import row
 
@@ -24,6 +26,7 @@ Bools = NDArray[np.bool_]
 _CAMERA = from_above((0.0, 5.0, 0.0), 2.0)
 _SIZE = 3, 2
 _ACROSS, _ALONG = np.array([0.0, 0.0, 8.0]), np.array([8.0, 0.0, 0.0])
+_BEGINNINGS = {"png": b"\x89PNG\r\n", "exr": b"\x76\x2f\x31\x01", "npy": b"\x93NUMPY"}
 # Sums of angles by two programs, in units of the last place of 1.
 _ROUNDING = 1e-14
 
@@ -36,6 +39,9 @@ def check_images(rng: Generator) -> list[dict[str, Any]]:
         ("only surfaces that show direct light send shadow rays", "the kinds of materials"): _shadowed,
         ("what render is given counts before what the scene says, 0 and False too", "the sum of the light"): _given,
         ("pixels are cut where max_rays ends what would go on, and nowhere else", "two mirrors"): _cut,
+        ("a floor faces up, from wherever it is seen", "its normal"): _floor,
+        ("each plane that is asked for is kept, whatever others are", "the picture with all planes"): _some,
+        ("a picture is saved as the kind of file that its suffix names", "the first bytes of each kind"): _kinds,
         ("an EXR file has the depth, infinite where nothing is", "OpenEXR's reader"): _depth,
         ("smooth objects have the normals of their files", "the normals that were given"): _smooth,
         ("a light's direction has no length", "irradiance by hand"): _lengths,
@@ -120,6 +126,39 @@ def _quietly(scene: Scene, most: int) -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return render(scene, resolution=_SIZE, max_rays=most, max_depth=9).cut
+
+
+def _floor() -> Bools:
+    floor, kept = Floor(min=(-9.0, -9.0), max=(9.0, 9.0), materials=("any",)), []
+    for height in (5.0, -5.0):
+        camera = OrthographicCamera(eye=(0.1, height, 0.2), target=(0.1, 0.0, 0.2), up=(0.0, 0.0, -1.0), height=2.0)
+        image = render(Scene(camera=camera, materials={"any": Phong()}, floor=floor), resolution=_SIZE)
+        kept.append((image.normal == [0.0, 1.0, 0.0]).ravel())
+    return np.concatenate(kept)
+
+
+def _some() -> Bools:
+    """A square that covers half of the picture, so that no plane is alike everywhere."""
+    scene, kept = _scene(square(np.array([0.0, 0.0, -4.0]), _ACROSS, _ALONG), Mirror()), []
+    whole = render(scene, resolution=_SIZE)
+    names = ("depth", "normal", "face", "rays")
+    for planes in (some for k in range(5) for some in combinations(names, k)):
+        image = render(scene, resolution=_SIZE, planes=planes)
+        for name in names:
+            plane = getattr(image, name)
+            kept.append(np.array_equal(plane, getattr(whole, name)) if name in planes else plane.size == 0)
+    return np.array(kept)
+
+
+def _kinds() -> Bools:
+    image, kept = render(_scene(_ground(), Phong()), resolution=_SIZE), []
+    with TemporaryDirectory(prefix="promises-") as folder:
+        for name, begin in product(("a.{}", "B.PNG.{}", "c.d.{}"), _BEGINNINGS.items()):
+            for suffix in (begin[0], begin[0].upper(), begin[0].title()):
+                path = Path(folder) / name.format(suffix)
+                image.save(path)
+                kept.append(path.read_bytes().startswith(begin[1]))
+    return np.array(kept)
 
 
 def _depth() -> Bools:

@@ -10,9 +10,11 @@ from renderer.mesh.mesh import Mesh
 from renderer.picture.render import render
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Phong
-from renderer.scene.scene import Scene, SceneObject
+from renderer.scene.scene import RenderSettings, Scene, SceneObject
 from validation.promises.pictures.glowing import equal, from_above, shown, square, thing
 from validation.promises.row import row
+
+_LIT = (24, 24)
 
 
 def check_shining() -> list[dict[str, Any]]:
@@ -36,6 +38,7 @@ def check_shining() -> list[dict[str, Any]]:
         row("highlights of the largest exponents keep their width", "cos^k by hand", _narrow(ground)),
         row("where smooth normals cancel the face's own counts", "irradiance by hand", _flat(ground)),
         row("light beyond float64 leaves a dark channel dark, and is the largest float32", "by hand", _endless(ground)),
+        row("what a lamp stands on does not hide it", "every place below it is lit", _lamps(ground)),
     ]
 
 
@@ -69,6 +72,23 @@ def _flat(ground: Mesh) -> NDArray[np.bool_]:
         )  # fmt: skip
         image = render(scene, resolution=(1, 1))
         kept += [equal(image.radiance, np.array([[[1.0, 0.5, 0.25]]])).ravel(), (image.normal[0] == up).all(axis=1)]
+    return np.concatenate(kept)
+
+
+def _lamps(ground: Mesh) -> NDArray[np.bool_]:
+    """Lamps on a ceiling of whole numbers, at places that float64 rounds, and turned ceilings whose lamps it rounds."""
+    kept, up = [], np.array([0.0, 1.0, 0.0])
+    for place in ((0.3, 0.2), (-1.1, 0.7), (1.0 / 3.0, 2.0 / 3.0)):
+        for tilt in (0.0, 0.1):
+            across, along = np.array([0.0, 0.0, 3.0]), np.array([3.0, 3.0 * tilt, 0.0])
+            corner = 2.0 * up - 0.5 * across - 0.5 * along
+            lamp = corner + (place[0] / 4.0 + 0.5) * along + (place[1] / 4.0 + 0.5) * across
+            scene = Scene(
+                camera=from_above((0.0, 1.0, 0.0), 2.0), materials={"any": Phong(diffuse=0.5)},
+                objects=(thing(ground, "any"), thing(square(corner, along, across), "any")),
+                lights=(PointLight(position=(lamp[0], lamp[1], lamp[2])),), render=RenderSettings(shadows=True),
+            )  # fmt: skip
+            kept.append((shown(scene, _LIT) > 0.0).all(axis=-1).ravel())
     return np.concatenate(kept)
 
 
