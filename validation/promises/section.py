@@ -15,6 +15,7 @@ from validation.promises.hits.builds import check_builds
 from validation.promises.hits.counts import check_counts
 from validation.promises.hits.errors import check_errors
 from validation.promises.hits.files import check_files
+from validation.promises.hits.formats import check_formats
 from validation.promises.hits.kept import check_kept
 from validation.promises.hits.limits import check_limits
 from validation.promises.hits.meshes import check_meshes
@@ -71,6 +72,7 @@ HITS: dict[str, Callable[[], Rows]] = {
     "builds": lambda: check_builds(_random()),
     "counts": lambda: check_counts(_random()),
     "files": check_files,
+    "formats": lambda: check_formats(_random()),
     "changed meshes": check_meshes,
     "kept arrays": lambda: check_kept(_random()),
     "shapes of rays": lambda: check_shapes(_random()),

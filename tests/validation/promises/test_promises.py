@@ -25,6 +25,7 @@ from validation.promises.hits import (
     counts,
     errors,
     files,
+    formats,
     kept,
     limits,
     meshes,
@@ -60,6 +61,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "kept": lambda: kept.check_kept(np.random.default_rng(5)),
     "shapes": lambda: shapes.check_shapes(np.random.default_rng(5)),
     "refusals": lambda: refusals.check_refusals(np.random.default_rng(5)),
+    "formats": lambda: formats.check_formats(np.random.default_rng(5)),
     "meshes": meshes.check_meshes,
     "codes": codes.check_codes,
     "planes": planes.check_planes,
@@ -456,3 +458,15 @@ def test_what_is_not_refused_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert broken("refusals") == {"a ray", "bounds that"}
     monkeypatch.setattr(Octree, "refit", anyhow)
     assert broken("refusals") == {"a ray", "bounds that", "vertices that"}
+
+
+def test_files_that_are_understood_otherwise_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = formats.load_mesh
+
+    def other(path: Any) -> Any:
+        mesh = sound(path)
+        colors = None if mesh.colors is None else mesh.colors * np.float32(255 / 256)
+        return replace(mesh, faces=mesh.faces[:, [1, 0, 2]], colors=colors)
+
+    monkeypatch.setattr(formats, "load_mesh", other)
+    assert broken("formats") == {"an index", "colours of"}

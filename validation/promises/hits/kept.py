@@ -2,6 +2,8 @@
 
 import copy
 import pickle
+import struct
+import zlib
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -38,6 +40,7 @@ def check_kept(rng: Generator) -> list[dict[str, Any]]:
         row("a refit keeps normals, colours and texture coordinates", _JUDGE, np.array(moved)),
         row("a loaded tree gives the bits of the saved one, in any units", "the tree before it was saved", _asked(rng)),
         row("damage anywhere in a stored tree is noticed", "a bit that was turned", _damaged(rng)),
+        row("files of other lengths, versions and orders of bytes are refused", "the file that was saved", _other(rng)),
     ]
 
 
@@ -100,3 +103,26 @@ def _damaged(rng: Generator) -> NDArray[np.bool_]:
             path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
             kept.append(refuses(Octree.load, path))
     return np.array(kept)
+
+
+def _other(rng: Generator) -> NDArray[np.bool_]:
+    """Files of other lengths, versions and orders of bytes, whose checksums are right; mapped and read."""
+    kept = []
+    with TemporaryDirectory(prefix="promises-") as folder:
+        path = Path(folder) / "a.octree"
+        Octree.from_mesh(_mesh(rng, True)).save(path)
+        whole = path.read_bytes()
+        files = [(whole, False), (_with(whole, 1, 1), False)]
+        files += [(file, True) for file in (whole + b"\0", whole + bytes(64), whole + whole, whole[:-1], whole[:-64])]
+        files += [(_with(whole, order, version), True) for order, version in ((1, 0), (1, 2), (1, 1 << 31), (-1, 1))]
+        for file, bad in files:
+            path.write_bytes(file)
+            kept += [refuses(Octree.load, path, mmap=mapped) == bad for mapped in (False, True)]
+    return np.array(kept)
+
+
+def _with(whole: bytes, order: int, version: int) -> bytes:
+    """A file of the given version, or with the bytes that tell the order turned, as ``tree/store.py`` has them."""
+    told = whole[8:12][::order] + struct.pack("<I", version) + whole[16:20]
+    text = whole[24 : 24 + struct.unpack("<I", whole[16:20])[0]]
+    return whole[:8] + told + struct.pack("<I", zlib.crc32(whole[:8] + told + text)) + whole[24:]

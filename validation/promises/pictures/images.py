@@ -39,6 +39,7 @@ def check_images(rng: Generator) -> list[dict[str, Any]]:
         ("only surfaces that show direct light send shadow rays", "the kinds of materials"): _shadowed,
         ("what render is given counts before what the scene says, 0 and False too", "the sum of the light"): _given,
         ("pixels are cut where max_rays ends what would go on, and nowhere else", "two mirrors"): _cut,
+        ("a picture's faces are those of the objects joined, in one plane too", "squares by number"): _faces,
         ("a floor faces up, from wherever it is seen", "its normal"): _floor,
         ("each plane that is asked for is kept, whatever others are", "the picture with all planes"): _some,
         ("a picture is saved as the kind of file that its suffix names", "the first bytes of each kind"): _kinds,
@@ -126,6 +127,33 @@ def _quietly(scene: Scene, most: int) -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return render(scene, resolution=_SIZE, max_rays=most, max_depth=9).cut
+
+
+def _faces() -> Bools:
+    """Squares side by side in one plane, one an object and three of another, and the two triangles of each."""
+    columns = [square(np.array([x, 0.0, -4.0]), _ACROSS, _ALONG / 8.0) for x in (-2.0, -1.0, 0.0, 1.0)]
+    joined = Mesh(
+        np.concatenate([mesh.vertices for mesh in columns[1:]]),
+        np.concatenate([mesh.faces + 4 * k for k, mesh in enumerate(columns[1:])]),
+    )
+    scene = Scene(
+        camera=from_above((0.0, 5.0, 0.0), 1.0), materials={"any": Phong()},
+        objects=(thing(columns[0], "any"), thing(joined, "any")),
+    )  # fmt: skip
+    face = render(scene, resolution=(40, 10)).face
+    side = _side(columns[0])
+    kept: Bools = (face == 2 * (np.arange(40) // 10) + side).ravel()
+    return kept
+
+
+def _side(mesh: Mesh) -> NDArray[np.int64]:
+    """Which of a column's two triangles each pixel of it shows, as often as there are columns: (10, 40)."""
+    x, z = np.meshgrid(-2.0 + (np.arange(10) + 0.5) / 10.0, -0.5 + (np.arange(10) + 0.5) / 10.0)
+    (a, _, c), _ = mesh.triangles[:, :, [0, 2]]
+    first = mesh.triangles[0, 1, [0, 2]]
+    way, to = c - a, first - a
+    across = (way[0] * (z - a[1]) - way[1] * (x - a[0])) * (way[0] * to[1] - way[1] * to[0])
+    return np.tile(np.where(across > 0.0, 0, 1), 4)
 
 
 def _floor() -> Bools:
