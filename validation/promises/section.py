@@ -35,6 +35,7 @@ from validation.promises.pictures.nesting import check_nesting
 from validation.promises.pictures.openings import check_openings
 from validation.promises.pictures.placing import check_placing
 from validation.promises.pictures.refraction import check_refraction
+from validation.promises.pictures.saved import check_saved
 from validation.promises.pictures.shining import check_shining
 from validation.promises.queries.angles import check_angles, check_halves
 from validation.promises.queries.edges import check_edges
@@ -97,6 +98,7 @@ PICTURES: dict[str, Callable[[], Rows]] = {
     "bounces": check_bounces,
     "lights": check_shining,
     "planes of pictures": lambda: check_images(_random()),
+    "files of pictures": check_saved,
     "nested media": check_nesting,
     "refraction": lambda: check_refraction(_random(), _REFRACTED),
     "codes": check_codes,

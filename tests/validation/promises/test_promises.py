@@ -48,6 +48,7 @@ from validation.promises.pictures import (
     openings,
     placing,
     refraction,
+    saved,
     shining,
 )
 
@@ -62,6 +63,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "shapes": lambda: shapes.check_shapes(np.random.default_rng(5)),
     "refusals": lambda: refusals.check_refusals(np.random.default_rng(5)),
     "formats": lambda: formats.check_formats(np.random.default_rng(5)),
+    "saved": saved.check_saved,
     "meshes": meshes.check_meshes,
     "codes": codes.check_codes,
     "planes": planes.check_planes,
@@ -438,7 +440,9 @@ def test_planes_that_show_something_else_are_found(monkeypatch: pytest.MonkeyPat
         return replace(image, normal=np.abs(image.normal), rays=image.rays + 1, cut=1, depth=image.depth * 2.0)
 
     monkeypatch.setattr(images, "render", other)
-    assert {"a picture's", "a picture", "only surfaces", "what render", "pixels are", "an EXR"} <= broken("images")
+    assert {"a picture's", "a picture", "only surfaces", "what render", "pixels are"} <= broken("images")
+    monkeypatch.setattr(saved, "render", other)
+    assert broken("saved") == {"an EXR"}
 
 
 def test_what_is_not_refused_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

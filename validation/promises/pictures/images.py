@@ -1,14 +1,11 @@
-"""The planes of a picture beside its colours: which normals it shows, how many rays it counts, and what files keep."""
+"""The planes of a picture beside its colours: which normals and faces it shows, and how many rays it counts."""
 
 import warnings
 from collections.abc import Callable
-from itertools import combinations, product
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from itertools import combinations
 from typing import Any
 
 import numpy as np
-import OpenEXR
 import trimesh
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -26,7 +23,6 @@ Bools = NDArray[np.bool_]
 _CAMERA = from_above((0.0, 5.0, 0.0), 2.0)
 _SIZE = 3, 2
 _ACROSS, _ALONG = np.array([0.0, 0.0, 8.0]), np.array([8.0, 0.0, 0.0])
-_BEGINNINGS = {"png": b"\x89PNG\r\n", "exr": b"\x76\x2f\x31\x01", "npy": b"\x93NUMPY"}
 # Sums of angles by two programs, in units of the last place of 1.
 _ROUNDING = 1e-14
 
@@ -42,8 +38,6 @@ def check_images(rng: Generator) -> list[dict[str, Any]]:
         ("a picture's faces are those of the objects joined, in one plane too", "squares by number"): _faces,
         ("a floor faces up, from wherever it is seen", "its normal"): _floor,
         ("each plane that is asked for is kept, whatever others are", "the picture with all planes"): _some,
-        ("a picture is saved as the kind of file that its suffix names", "the first bytes of each kind"): _kinds,
-        ("an EXR file has the depth, infinite where nothing is", "OpenEXR's reader"): _depth,
         ("smooth objects have the normals of their files", "the normals that were given"): _smooth,
         ("a light's direction has no length", "irradiance by hand"): _lengths,
     }
@@ -176,30 +170,6 @@ def _some() -> Bools:
             plane = getattr(image, name)
             kept.append(np.array_equal(plane, getattr(whole, name)) if name in planes else plane.size == 0)
     return np.array(kept)
-
-
-def _kinds() -> Bools:
-    image, kept = render(_scene(_ground(), Phong()), resolution=_SIZE), []
-    with TemporaryDirectory(prefix="promises-") as folder:
-        for name, begin in product(("a.{}", "B.PNG.{}", "c.d.{}"), _BEGINNINGS.items()):
-            for suffix in (begin[0], begin[0].upper(), begin[0].title()):
-                path = Path(folder) / name.format(suffix)
-                image.save(path)
-                kept.append(path.read_bytes().startswith(begin[1]))
-    return np.array(kept)
-
-
-def _depth() -> Bools:
-    half = square(np.array([0.0, 0.0, -4.0]), _ACROSS, _ALONG)
-    with TemporaryDirectory(prefix="promises-") as folder:
-        path = Path(folder) / "a.exr"
-        image = render(_scene(half, Phong()), resolution=(8, 4))
-        image.save(path)
-        with OpenEXR.File(str(path)) as file:
-            z = np.array(file.channels()["Z"].pixels)
-    expected = np.where(np.arange(8) >= 4, 5.0, np.inf)
-    kept: Bools = (z == expected).ravel() & (image.depth == expected).ravel()
-    return kept
 
 
 def _smooth() -> Bools:
