@@ -1,7 +1,9 @@
 """Settings that all tests share."""
 
 import signal
+from types import ModuleType
 
+import pytest
 from hypothesis import settings
 
 from validation import timing
@@ -15,3 +17,14 @@ timing.REST = 0.0
 
 # A job in the background inherits SIGINT ignored, and would hand that on to the processes that tests interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def mitsuba() -> ModuleType:
+    """Mitsuba in its scalar variant. On one processor its reader of EXR would wait for ever for a second thread."""
+    import drjit
+    import mitsuba
+
+    mitsuba.set_variant("scalar_rgb")
+    drjit.set_thread_count(max(2, drjit.thread_count()))
+    return mitsuba

@@ -367,13 +367,10 @@ def test_prepare_refuses_what_it_does_not_know_and_names_it(argument: str, value
 # Commands
 
 
-def test_the_command_writes_an_exr_file_of_the_librarys_bits(tmp_path: Path) -> None:
-    import mitsuba as mi
-
-    mi.set_variant("scalar_rgb")
+def test_the_command_writes_an_exr_file_of_the_librarys_bits(tmp_path: Path, mitsuba: Any) -> None:
     path = tmp_path / "a.exr"
     assert main(["render", str(GLASS), "--resolution", "24x16", "-o", str(path), "--quiet"]) == 0
-    read, image = mi.Bitmap(str(path)), render(load_scene(GLASS), resolution=SIZE)
+    read, image = mitsuba.Bitmap(str(path)), render(load_scene(GLASS), resolution=SIZE)
     channels = {field.name: np.array(read)[..., i] for i, field in enumerate(read.struct_())}
     assert np.array_equal(np.stack([channels[name] for name in "RGB"], -1), image.radiance)
     assert np.array_equal(channels["Z"], image.depth.astype(np.float32)) and len(channels) == 7

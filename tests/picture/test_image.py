@@ -95,15 +95,12 @@ def test_png_is_of_8_bits_without_alpha_or_a_curve_of_its_own(tmp_path: Path) ->
     assert len(zlib.decompress(chunks[b"IDAT"])) == 5 * (1 + 3 * 7)
 
 
-def test_png_is_read_by_mitsuba(tmp_path: Path) -> None:
+def test_png_is_read_by_mitsuba(tmp_path: Path, mitsuba: Any) -> None:
     """Another reader than the package that wrote it."""
-    import mitsuba as mi
-
-    mi.set_variant("scalar_rgb")
     picture = image()
     picture.save(tmp_path / "a.png")
-    read = mi.Bitmap(str(tmp_path / "a.png"))
-    assert read.pixel_format() == mi.Bitmap.PixelFormat.RGB and read.srgb_gamma()
+    read = mitsuba.Bitmap(str(tmp_path / "a.png"))
+    assert read.pixel_format() == mitsuba.Bitmap.PixelFormat.RGB and read.srgb_gamma()
     assert np.array(read).dtype == np.uint8 and np.array_equal(np.array(read), srgb(picture.radiance))
 
 
@@ -139,14 +136,11 @@ def test_a_pipe_gets_the_whole_file(tmp_path: Path, name: str) -> None:
     os.close(reader)
 
 
-def test_exr_holds_the_radiance_and_its_layers(tmp_path: Path) -> None:
+def test_exr_holds_the_radiance_and_its_layers(tmp_path: Path, mitsuba: Any) -> None:
     """Read back by Mitsuba's reader, which is not the package that wrote it."""
-    import mitsuba as mi
-
-    mi.set_variant("scalar_rgb")
     picture = image()
     picture.save(tmp_path / "a.exr")
-    read = mi.Bitmap(str(tmp_path / "a.exr"))
+    read = mitsuba.Bitmap(str(tmp_path / "a.exr"))
     channels = {field.name: np.array(read)[..., i] for i, field in enumerate(read.struct_())}
     assert all(np.array_equal(channels[name], picture.radiance[..., i]) for i, name in enumerate("RGB"))
     assert all(np.array_equal(channels[f"normal.{name}"], picture.normal[..., i]) for i, name in enumerate("XYZ"))

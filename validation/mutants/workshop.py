@@ -3,7 +3,9 @@
 The tests' own child processes get the fault too, which a fault injected into one process would not reach.
 """
 
+import math
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -86,6 +88,7 @@ class Workshop:
                 [sys.executable, *arguments], cwd=self.root, env=own, stdin=subprocess.DEVNULL,
                 stdout=output, stderr=subprocess.STDOUT, start_new_session=True,
             )  # fmt: skip
+            _limit(process, patience)
             try:
                 code: int | None = process.wait(patience)
             except subprocess.TimeoutExpired:
@@ -102,6 +105,14 @@ class Workshop:
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir()
         return scratch
+
+
+def _limit(process: "subprocess.Popen[bytes]", patience: float) -> None:
+    """Have the system end an endless loop too: nobody else would where this process is killed."""
+    if hasattr(resource, "prlimit"):
+        seconds = math.ceil(patience * (os.cpu_count() or 1))
+        with suppress(ProcessLookupError):
+            resource.prlimit(process.pid, resource.RLIMIT_CPU, (seconds, seconds + 1))
 
 
 def _end_all(process: "subprocess.Popen[bytes]") -> None:

@@ -202,3 +202,6 @@ def test_a_workshop_breaks_one_file_and_mends_it(tmp_path: Path) -> None:
         assert ended.code == 3 and str(shop.root) in ended.output
     assert (shop.root / one.file).read_bytes() == sound
     assert shop.run(["-c", "while True: pass"], 0.5).code is None
+    # A limit of its own ends it where nobody is left to do so.
+    limited = "import resource as r\nwhile r.getrlimit(r.RLIMIT_CPU)[0] == r.RLIM_INFINITY: pass"
+    assert shop.run(["-c", limited], 60.0).code == 0
