@@ -1,11 +1,23 @@
 """The job of one run: its options, thresholds and folder, and the callback by which sections report progress."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from validation.processes import Workers
 from validation.thresholds import Thresholds
+
+
+class Task(NamedTuple):
+    """One step of a section: what a progress bar shows, and a call whose result can be sent to another process."""
+
+    name: str
+    do: Callable[[], Any]
+
+
+def _done(task: Task) -> Any:
+    return task.do()
 
 
 @dataclass(frozen=True)
@@ -18,7 +30,7 @@ class Job:
     step        called with the name of each step as it begins; a section's ``steps(job)`` is the number of calls
     scenes      a user's scene files, to be judged instead of the suite's own
     meshes      a user's mesh files, to be judged instead of the suite's own
-    workers     the processes for tasks of which no time is measured
+    workers     the processes for tasks whose time is at most reported, as a cost
     """
 
     quick: bool
@@ -33,3 +45,7 @@ class Job:
     def own(self) -> bool:
         """Whether the run judges the suite's own scenes and meshes and not a user's files."""
         return not (self.scenes or self.meshes)
+
+    def each(self, tasks: Sequence[Task]) -> list[Any]:
+        """The results of tasks, in their order, several at once in the job's processes; a step for each."""
+        return self.workers.each(_done, tasks, lambda task: self.step(task.name))

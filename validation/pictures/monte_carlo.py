@@ -7,7 +7,6 @@ the remaining error is no more than the paths' own scatter explains.
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -26,7 +25,6 @@ from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba import whitted as mitsuba_whitted
 
 PATHS = "random paths of Mitsuba's native path integrator (scalar_rgb)"
-STEPS = 2
 
 # Paths a pixel; each number uses the paths of those before it.
 _COUNTS = (4, 16, 64, 256)
@@ -84,7 +82,7 @@ def can_judge(scene: Scene) -> str | None:
     return "nothing is random without a dielectric; one path a ray is the picture"
 
 
-def run(scene: Scene, name: str, quick: bool, step: Callable[[str], None]) -> tuple[dict[str, Any], list[Gate]]:
+def run(scene: Scene, name: str, quick: bool) -> tuple[dict[str, Any], list[Gate]]:
     """Judge our picture of the glass in ``scene``; returns a record for JSON and the gates, none for too little glass.
 
     Raises ``ValueError`` if ``can_judge`` gives a reason.
@@ -93,10 +91,8 @@ def run(scene: Scene, name: str, quick: bool, step: Callable[[str], None]) -> tu
     if fault is not None:
         raise ValueError(f"{name}: expected a scene with glass, got one where {fault}")
     counts = _QUICK_COUNTS if quick else _COUNTS
-    step(f"monte carlo: {name}, which pixels show glass")
     judged, left_out = _without_transmission(scene)
     size, shown, steady = _glass(judged)
-    step(f"monte carlo: {name}, {counts[-1]} random paths a pixel")
     record: dict[str, Any] = {"name": name, "size": size, "pixels": int(steady.sum()), "left_out": left_out}
     if shown.sum() < _PIXELS:
         few = f"glass is seen in {shown.sum()} pixels of {size} x {size}, and the error's slope needs {_PIXELS}"

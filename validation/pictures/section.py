@@ -6,8 +6,9 @@ and compare it with every reference that can judge it. A rung that none can judg
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -15,7 +16,7 @@ from renderer.picture.image import Image, srgb
 from renderer.picture.render import render
 from renderer.scene.scene import UNLIMITED_RAYS, Scene, load_scene
 from validation.gates import Gate
-from validation.job import Job
+from validation.job import Job, Task
 from validation.pictures import aovs, check, ladder, monte_carlo, placement
 from validation.pictures.check import Pair, Rule
 from validation.pictures.compare import Picture, fragile_pixels
@@ -84,8 +85,7 @@ class _Plan(NamedTuple):
 
     @property
     def steps(self) -> int:
-        random = monte_carlo.STEPS if self.paths else 0
-        return (self.fault is None) + random + sum(1 + len(task.references) for task in self.tasks)
+        return (self.fault is None) + self.paths + sum(1 + len(task.references) for task in self.tasks)
 
 
 def steps(job: Job) -> int:
@@ -126,19 +126,45 @@ def check_scene(
         "fault": plan.fault,
     }
     record["objects"], found = placement.check(name, scene)
+    theirs = _theirs(name, scene, plan, job)
     if plan.fault is None:
-        job.step(f"pictures: {name}, AOVs")
-        record["aovs"], passed = _check_aovs(name, scene, plan.tasks[-1].resolution, job)
+        record["aovs"], passed = _check_aovs(name, scene, plan.tasks[-1].resolution, job, theirs[AOVS])
         found += passed
     record["rungs"] = []
     for task in plan.tasks:
-        rung, passed = _check_rung(name, task, job)
+        rung, passed = _check_rung(name, task, job, theirs)
         record["rungs"].append(rung)
         found += passed
     if plan.paths:
-        record["paths"], passed = monte_carlo.run(scene, name, job.quick, job.step)
+        record["paths"], passed = theirs[monte_carlo.PATHS]
         found += passed
     return record, found
+
+
+def _theirs(name: str, scene: Scene, plan: _Plan, job: Job) -> dict[Any, Any]:
+    """What references make of a scene, which takes long: of each rung and reference, (rung's name, reference's key),
+    the picture and its seconds; of AOVS the same; of random paths the verdict. What takes longest comes first.
+    """
+    tasks: dict[Any, Task] = {}
+    if plan.paths:
+        whole = partial(monte_carlo.run, scene, name, job.quick)
+        tasks[monte_carlo.PATHS] = Task(f"monte carlo: {name}, random paths", whole)
+    for task in reversed(plan.tasks):
+        for reference in task.references:
+            subject = f"pictures: {name}, {task.rung.name}, {reference.key}"
+            depth = task.rung.scene.render.max_depth
+            make = partial(reference.picture, task.rung.scene, *task.resolution, max_depth=depth)
+            tasks[task.rung.name, reference.key] = Task(subject, partial(_timed, make))
+    if plan.fault is None:
+        hits = partial(mitsuba_whitted.aovs, scene, *plan.tasks[-1].resolution)
+        tasks[AOVS] = Task(f"pictures: {name}, AOVs", partial(_timed, hits))
+    return dict(zip(tasks, job.each([*tasks.values()]), strict=True))
+
+
+def _timed(make: Callable[[], Any]) -> tuple[Any, float]:
+    """What is made, and the seconds that it took."""
+    began = time.perf_counter()
+    return make(), time.perf_counter() - began
 
 
 def scenes_of(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
@@ -184,22 +210,22 @@ def _resolution(scene: Scene, size: int) -> tuple[int, int]:
     return max(_SMALLEST, round(width * scale)), max(_SMALLEST, round(height * scale))
 
 
-def _check_aovs(name: str, scene: Scene, resolution: tuple[int, int], job: Job) -> tuple[dict[str, Any], list[Gate]]:
-    """Compare the camera's rays with those of Mitsuba's own sensor, and then their hits."""
+def _check_aovs(
+    name: str, scene: Scene, resolution: tuple[int, int], job: Job, made: tuple[Any, float]
+) -> tuple[dict[str, Any], list[Gate]]:
+    """Compare the camera's rays with those of Mitsuba's own sensor, and then their hits, which Mitsuba has ``made``."""
     shift = mitsuba_camera.largest_distance(scene.camera, max(resolution))
     limit, reason = job.thresholds.pictures.camera_pixels, "our primary rays are Mitsuba's; both pictures use ours"
     camera = Gate("images", f"{name}, camera", "pixels between rays", shift, "at most", limit, reason)
-    began = time.perf_counter()
-    theirs = mitsuba_whitted.aovs(scene, *resolution)
-    seconds = time.perf_counter() - began
+    theirs, seconds = made
     ours = render(scene, resolution=resolution, samples=1, max_depth=0)
     record, found = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
-    made = {"reference_name": AOVS, "reference_seconds": seconds, "size": list(resolution), "camera_pixels": shift}
-    return made | record, [camera, *found]
+    told = {"reference_name": AOVS, "reference_seconds": seconds, "size": list(resolution), "camera_pixels": shift}
+    return told | record, [camera, *found]
 
 
-def _check_rung(name: str, task: _Task, job: Job) -> tuple[dict[str, Any], list[Gate]]:
-    """Compare one rung under both rules with its references."""
+def _check_rung(name: str, task: _Task, job: Job, theirs: Mapping[Any, Any]) -> tuple[dict[str, Any], list[Gate]]:
+    """Compare one rung under both rules with its references' pictures."""
     scene, size, subject = task.rung.scene, task.resolution, f"{name}, {task.rung.name}"
     job.step(f"pictures: {subject}, ours")
     images = {rule: _ours(scene, size, offset) for rule, offset in _RULES.items()}
@@ -208,10 +234,7 @@ def _check_rung(name: str, task: _Task, job: Job) -> tuple[dict[str, Any], list[
     found = [Gate("images", subject, "references that judge it", len(task.references), "at least", 1.0, reason)]
     comparisons = []
     for reference in task.references:
-        job.step(f"pictures: {subject}, {reference.key}")
-        began = time.perf_counter()
-        radiance = reference.picture(scene, *size, max_depth=scene.render.max_depth)
-        seconds = time.perf_counter() - began
+        radiance, seconds = theirs[task.rung.name, reference.key]
         made = {"reference": reference.key, "reference_name": reference.name, "reference_seconds": seconds}
         for rule, image in images.items():
             # The report shows our own rule, which users get, beside the first reference.

@@ -1,12 +1,13 @@
 """The section on promises: rules of the contract that random rays and pictures may miss, each judged by itself."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from validation.gates import Gate
-from validation.job import Job
+from validation.job import Job, Task
 from validation.promises.contract import table
 from validation.promises.hits.alone import check_alone
 from validation.promises.hits.batches import check_batches, check_refits
@@ -116,7 +117,7 @@ def steps(job: Job) -> int:
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask everything; returns a record for JSON, and a gate for each promise that it was never broken."""
-    parts = job.workers.each(_asked, [*_CHECKS], lambda name: job.step(_step(name)))
+    parts = job.each([Task(_step(name), partial(_asked, name)) for name in _CHECKS])
     rows, promises = [row for part in parts for row in part], table.read()
     missing = table.unjudged(promises)
     covered = Gate("promises", "the public contract", "pieces without a judge", len(missing), "at most", 0.0, _COVERED)

@@ -1,13 +1,11 @@
 """The section on numerical stability: extreme cases, the watertight sweep, the error curves."""
 
-from collections.abc import Callable
 from functools import partial
 from itertools import chain, islice
-from typing import Any, NamedTuple
 
 from validation.gates import Gate
 from validation.hits import watertight
-from validation.job import Job
+from validation.job import Job, Task
 from validation.stability import sweeps
 from validation.stability.cases import hits, shading
 from validation.stability.cases.case import ExtremeCase
@@ -18,13 +16,6 @@ CASES = (*hits.CASES, *shading.CASES)
 JUDGES = ("exact arithmetic", "analytic", "Embree robust", "Embree default", "brute force")
 
 
-class Task(NamedTuple):
-    """One step of the section: what a progress bar shows, and a call whose result can be sent to another process."""
-
-    name: str
-    do: Callable[[], Any]
-
-
 def steps(job: Job) -> int:
     """Number of calls of ``job.step`` in ``run``: one for each case, closed mesh and sweep, and one for the leaks."""
     return sum(map(len, _tasks(job.quick)))
@@ -33,7 +24,7 @@ def steps(job: Job) -> int:
 def run(job: Job) -> tuple[dict[str, object], list[Gate]]:
     """Run all cases and sweeps; returns a record for JSON and the gates, one for each case among them."""
     tasks = _tasks(job.quick)
-    results = iter(job.workers.each(_done, [*chain(*tasks)], lambda task: job.step(task.name)))
+    results = iter(job.each([*chain(*tasks)]))
     cases, meshes, curves, leaks = ([*islice(results, len(some))] for some in tasks)
     sweep, sweep_gates = watertight.summary(meshes)
     curve_record, curve_gates = sweeps.summary(curves, leaks[0], job.quick)
@@ -58,10 +49,6 @@ def _tasks(quick: bool) -> tuple[list[Task], list[Task], list[Task], list[Task]]
          for index, sweep in enumerate(sweeps.SWEEPS)],
         [Task("stability: leaks", partial(sweeps.leak_rows, quick))],
     )  # fmt: skip
-
-
-def _done(task: Task) -> Any:
-    return task.do()
 
 
 def _case(index: int, quick: bool) -> tuple[dict[str, object], Gate]:

@@ -105,13 +105,12 @@ def judged(patch: pytest.MonkeyPatch, ours: Scene) -> tuple[dict[str, Any], list
         return picture(ours if offset == "mitsuba" else scene, size, offset)
 
     patch.setattr(monte_carlo, "_picture", other)
-    return monte_carlo.run(GLASS, "glass", True, lambda _: None)
+    return monte_carlo.run(GLASS, "glass", True)
 
 
 def test_a_sound_picture_passes_and_its_record_is_drawn() -> None:
-    steps: list[str] = []
-    record, gates = monte_carlo.run(GLASS, "glass", True, steps.append)
-    assert [gate.passed for gate in gates] == [True, True, True] and len(steps) == monte_carlo.STEPS
+    record, gates = monte_carlo.run(GLASS, "glass", True)
+    assert [gate.passed for gate in gates] == [True, True, True]
     assert (
         record["size"] == 64
         and record["paths"] == [4, 16, 64]
@@ -145,7 +144,7 @@ def test_a_defect_of_the_glass_turns_gates_red(monkeypatch: pytest.MonkeyPatch, 
 
 def test_too_little_glass_is_left_out_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(monte_carlo, "_PIXELS", 5000)
-    record, gates = monte_carlo.run(GLASS, "a", True, str)
+    record, gates = monte_carlo.run(GLASS, "a", True)
     assert gates == [] and record["paths"] == []
     assert "of 96 x 96, and the error's slope needs 5000" in record["left_out"][0]
 
@@ -162,4 +161,4 @@ def test_a_scene_without_glass_is_refused() -> None:
     assert monte_carlo.can_judge(GLASS) is None
     assert "nothing is random" in (monte_carlo.can_judge(mirrors) or "")
     with pytest.raises(ValueError, match="a: expected a scene with glass"):
-        monte_carlo.run(mirrors, "a", True, str)
+        monte_carlo.run(mirrors, "a", True)

@@ -420,8 +420,8 @@ def test_arrays_that_get_lost_and_rays_in_another_order_are_found(monkeypatch: p
     with monkeypatch.context() as patch:
         patch.setattr(kept.pickle, "loads", lambda stored: kept._mesh(np.random.default_rng(1), False))
         patch.setattr(Octree, "refit", lambda self, vertices: None)
-        patch.setattr(kept, "refuses", lambda *given: False)
-        assert broken("kept") == {"a mesh", "a refit", "damage anywhere"}
+        patch.setattr(kept, "refuses", lambda *given, **options: False)
+        assert broken("kept") == {"a mesh", "a refit", "damage anywhere", "files of"}
     sound = Octree.closest_hit
 
     def turned(self: Any, origins: Any, directions: Any, **bounds: Any) -> Any:
