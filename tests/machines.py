@@ -93,7 +93,9 @@ def _made(folder: str, name: str) -> str:
 @contextmanager
 def _busy(count: int) -> Iterator[None]:
     """While some processes do nothing but compute."""
-    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+    # A loop ends with this process too, however that ends.
+    code = "import os\nparent = os.getppid()\nwhile os.getppid() == parent: pass"
+    loops = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(count)]
     try:
         yield
     finally:
@@ -103,4 +105,6 @@ def _busy(count: int) -> Iterator[None]:
 
 
 if __name__ == "__main__":
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)  # as Ctrl-C, which ends the tests too
     sys.exit(main(sys.argv[1:]))

@@ -5,7 +5,8 @@
 Exit codes:
   0    every gate holds
   1    a gate fails, nothing was judged, or nothing notices a mutant that has no reason to be left
-  2    a bad argument, a bad file (scene, mesh, thresholds, baseline), or a missing reference
+  2    a bad argument, a bad file (scene, mesh, thresholds, baseline, a record), a missing reference, or a process
+       that was ended from outside
   130  Ctrl-C; the report that was there before is untouched
 """
 
@@ -174,6 +175,9 @@ def _mutants_verdict(found: Mapping[str, Any], request: "Request") -> int:
             f"validation: mutants in {kind}: {counts['killed']} of {real} noticed, {counts['by_gates']} by a gate; "
             f"{counts['equivalent']} change no answer; {counts['hung']} hung, {counts['crashed']} crashed"
         )
+    if found["outdated"]:
+        anew = f"a run of {found['asked']} judges them anew"
+        print(f"validation: {found['outdated']} verdicts are older than the sources; {anew}")
     print(f"validation: see {request.output}")
     return int(survivors > 0)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import active_children, connection, get_context, parent_process
+from pickle import dumps, loads
 from types import TracebackType
 from typing import Self, TypeVar
 
@@ -39,14 +40,14 @@ class Workers:
     def each(self, work: Callable[[Task], Result], tasks: Sequence[Task], step: Callable[[Task], None]) -> list[Result]:
         """``work(task)`` of each task, in their order; ``step`` is called with each as it begins.
 
-        Raises what ``work`` raises, and ``RuntimeError`` where a process ends.
+        Raises what ``work`` raises, and ``ChildProcessError`` where a process ends.
         """
         if self._pool is None:
             return [_one(work, task, step) for task in tasks]
         try:
             return self._all(self._pool, work, tasks, step)
         except BrokenProcessPool as error:
-            raise RuntimeError(f"a process for {work.__qualname__} ended before its task did") from error
+            raise ChildProcessError(f"a process for {work.__qualname__} ended before its task did") from error
 
     def _all(
         self, pool: ProcessPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task],
@@ -60,7 +61,7 @@ class Workers:
             while waiting and len(running) < self._processes:
                 index, task = waiting.pop()
                 step(task)
-                running[pool.submit(work, task)] = index
+                running[pool.submit(_sent, work, task)] = index
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 results[running.pop(future)] = future.result()
         return [results[index] for index in range(len(tasks))]
@@ -69,6 +70,18 @@ class Workers:
 def _one(work: Callable[[Task], Result], task: Task, step: Callable[[Task], None]) -> Result:
     step(task)
     return work(task)
+
+
+def _sent(work: Callable[[Task], Result], task: Task) -> Result:
+    """``work(task)`` in a child. An error that could not be sent is told in words: the pool would lose them."""
+    try:
+        return work(task)
+    except Exception as error:
+        try:
+            loads(dumps(error))
+        except Exception:
+            raise RuntimeError(f"{type(error).__name__}: {error}") from None
+        raise
 
 
 def _pool(processes: int) -> ProcessPoolExecutor:

@@ -57,8 +57,11 @@ def run(request: Request) -> dict[str, Any]:
     chosen, left_out = choose(request.only, given)
     stored_baseline = baseline.read(request.output / "baseline.json")
 
-    # Run the sections, with pictures in a temporary folder.
     _make_folder(request.output)
+    # Read once more for the report: they may grow meanwhile.
+    stored_defects(request.output), stored_mutants(request.output)
+
+    # Run the sections, with pictures in a temporary folder.
     with TemporaryDirectory(dir=request.output, prefix=".run-") as folder, Workers(_processes()) as workers:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()

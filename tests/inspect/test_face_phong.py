@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from renderer.inspect import face_phong
 from renderer.inspect.face_phong import face_colors
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, torus
@@ -157,6 +158,14 @@ class TestStandIns:
 def test_the_same_bits_for_any_number_of_threads() -> None:
     what = scene((icosphere(5), SHINY))  # three chunks
     np.testing.assert_array_equal(colors_of(what, threads=1), colors_of(what, threads=3))
+
+
+def test_as_many_threads_as_asked_for_share_large_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr(face_phong, "for_chunks", lambda work, count, size, threads: asked.append((size, threads)))
+    colors_of(scene((box(), MATTE)), threads=3)
+    [(size, threads)] = asked
+    assert threads == 3 and size >= 1000
 
 
 def test_more_ready_than_needed_changes_nothing() -> None:

@@ -614,6 +614,13 @@ def test_obj_both_readers_agree_on_each_odd_statement(odd: str) -> None:
                     pytest.fail(f"taken by one, refused by the other: {error}")
 
 
+def test_obj_a_byte_that_belongs_in_no_face_makes_a_file_no_common_one() -> None:
+    """No byte is passed over or read as the end of the numbers."""
+    vertices = b"v 1 2 3\nv 3 4 6\nv 1 0 0\n"
+    for byte in sorted({*range(256)} - {*b"0123456789/ \t\r\n"}):
+        assert obj._read_common(vertices + b"f 1 2 3%c\n" % byte) is None, byte
+
+
 @settings(deadline=None, max_examples=200)
 @given(
     st.lists(st.sampled_from(COMMON), max_size=20),

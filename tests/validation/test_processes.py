@@ -21,6 +21,17 @@ def fail(number):
     raise KeyError(number)
 
 
+class UnsendableError(Exception):
+    """An error that pickle writes and cannot read."""
+
+    def __init__(self, number, text):
+        super().__init__(f"{text} {number}")
+
+
+def fail_unsendably(number):
+    raise UnsendableError(number, "the true words of")
+
+
 def crash(number):
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -48,8 +59,13 @@ def test_an_error_is_raised_here(processes):
     assert not active_children()
 
 
+def test_an_error_that_cannot_be_sent_is_told_in_words():
+    with pytest.raises(RuntimeError, match="UnsendableError: the true words of 3"), Workers(2) as workers:
+        workers.each(fail_unsendably, [3], lambda task: None)
+
+
 def test_the_end_of_a_process_is_an_error():
-    with pytest.raises(RuntimeError, match="a process for crash ended"), Workers(2) as workers:
+    with pytest.raises(ChildProcessError, match="a process for crash ended"), Workers(2) as workers:
         workers.each(crash, [1, 2], lambda task: None)
     assert not active_children()
 

@@ -13,4 +13,4 @@ def answer(task: str) -> None:
     from validation.defects.checks import one_by_one
 
     red = next((name_of(gate) for gate in one_by_one(tuple(json.loads(task))) if not gate.passed), None)
-    print(MARK + json.dumps(red))
+    print(f"\n{MARK}{json.dumps(red)}")  # on a line of its own, whatever was printed before

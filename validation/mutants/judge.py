@@ -3,8 +3,9 @@
 import json
 import re
 import signal
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from validation.mutants.answer import MARK
@@ -37,40 +38,41 @@ def judge(mutant: Mutant, workshop: Workshop, touched: Touched, sound: dict[str,
     """Break the workshop's copy, and try gates and tests until one notices; ``sound`` is each group's seconds.
 
     The gates come first for a kernel, whose share they must notice alone; for other code the tests do, which are
-    quicker there.
+    quicker there. Raises ``ChildProcessError`` where a process crashes that crashes in the sound copy too.
     """
-
-    def by_gates() -> Verdict:
-        return _by_gates(mutant, workshop, sound)
-
-    def by_tests() -> Verdict:
-        return _by_tests(mutant, workshop, touched)
-
     spent = 0.0
     with workshop.broken(mutant):
-        for tried in (by_gates, by_tests) if mutant.kernel else (by_tests, by_gates):
+        for tried in _ways(mutant, workshop, touched, sound):
             found = tried()
             spent += found.seconds
             if found.how is not None:
                 break
+    if found.how == "crashes":
+        control = tried()
+        if control.how is not None:
+            raise ChildProcessError(f"mutants: expected the sound renderer to pass, got {control.by}")
     return replace(found, seconds=spent)
 
 
-def _by_gates(mutant: Mutant, workshop: Workshop, sound: dict[str, float]) -> Verdict:
-    """What the gates of the broken copy say."""
-    spent = 0.0
-    for group in groups_of(mutant):
-        ended = gates(workshop, (group,), _COMPILING + _TIMES * sound[group])
-        spent += ended.seconds
-        by, how = noticed_by_gates(ended, group)
-        if how is not None:
-            return Verdict(by, True, how, spent)
-    return Verdict(None, False, None, spent)
-
-
-def _by_tests(mutant: Mutant, workshop: Workshop, touched: Touched) -> Verdict:
-    """What the tests of the broken copy say."""
+def _ways(
+    mutant: Mutant, workshop: Workshop, touched: Touched, sound: dict[str, float]
+) -> Iterator[Callable[[], Verdict]]:
+    """The processes that may notice a mutant, one after the other."""
     tests = _affordable(touching(mutant, touched), touched)
+    by_gates = [partial(_by_gates, group, workshop, sound) for group in groups_of(mutant)]
+    by_tests = [partial(_by_tests, tests, workshop, touched)]
+    yield from [*by_gates, *by_tests] if mutant.kernel else [*by_tests, *by_gates]
+
+
+def _by_gates(group: str, workshop: Workshop, sound: dict[str, float]) -> Verdict:
+    """What the gates of a group say of the copy."""
+    ended = gates(workshop, (group,), _COMPILING + _TIMES * sound[group])
+    by, how = noticed_by_gates(ended, group)
+    return Verdict(by, how is not None, how, ended.seconds)
+
+
+def _by_tests(tests: Sequence[str], workshop: Workshop, touched: Touched) -> Verdict:
+    """What the tests say of the copy."""
     if not tests:
         return Verdict(None, False, None, 0.0)
     own = sum(touched[test]["seconds"] for test in tests)
@@ -101,14 +103,17 @@ def noticed_by_gates(ended: Ended, group: str) -> tuple[str | None, How | None]:
 def _last_words(ended: Ended) -> str:
     """The last line of a process that crashed, or the signal that ended it."""
     if ended.code is not None and ended.code < 0:
-        return f"ended by {signal.Signals(-ended.code).name}"
+        known = {number.value: number.name for number in signal.Signals}
+        return f"ended by {known.get(-ended.code, f'signal {-ended.code}')}"
     return (ended.output.strip().splitlines() or [f"exit code {ended.code}"])[-1]
 
 
 def _noticed_by_tests(ended: Ended) -> tuple[str | None, How | None]:
     if ended.code == 0:
         return None, None
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", ended.output, re.MULTILINE)
+    # What the tests print may look like a verdict; the summary comes last.
+    said = ended.output.rpartition("short test summary info")[2]
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", said, re.MULTILINE)
     if ended.code is None:
         return "the tests", "hangs"
     return (failed[1], "fails") if failed else (f"the tests: exit code {ended.code}", "crashes")

@@ -4,15 +4,16 @@ import json
 import os
 import queue
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from renderer.process.files import write_atomically
 from validation.mutants.equivalent import EQUIVALENT
 from validation.mutants.judge import GROUPS, gates, judge, noticed_by_gates
-from validation.mutants.record import Record, digest, summary
+from validation.mutants.record import Record, digest, judging_files, summary
 from validation.mutants.sites import Mutant, chosen, mutants
 from validation.mutants.targets import files, record_of
 from validation.mutants.touched import Touched, read
@@ -30,13 +31,15 @@ def run(target: str, count: int, seed: int, output: Path, step: Callable[[str], 
 
     The file is written after each, so that a run that is cut off loses nothing. Fewer mutants than in an earlier run
     are the first of that run's, whose others stay in the record. Returns ``record.summary``. Raises ``ValueError``
-    where the record is one of another seed.
+    where the record is one of another seed, and ``ChildProcessError`` where the sound renderer is not found sound.
     """
     path = record_of(target, output)
     record = Record(path, ROOT)
     if record.seed not in (None, seed):
         raise ValueError(f"--seed: expected {record.seed}, as in {path}, or another --output, got {seed}")
-    some = chosen(mutants(files(target, ROOT), ROOT), max(count, record.asked), seed)
+    every = mutants(files(target, ROOT), ROOT)
+    # Sources that have shrunk may have fewer than were asked for once.
+    some = chosen(every, max(count, min(record.asked, len(every))), seed)
     waiting = [mutant for mutant in some[:count] if record.row(mutant) is None]
 
     def keep(mutant: Mutant, verdict: Verdict) -> None:
@@ -68,7 +71,7 @@ def _judge_all(
     step: Callable[[str], None],
 ) -> None:
     """Judge mutants, one in each workshop at a time; ``keep`` is called by this thread."""
-    with ThreadPoolExecutor(len(shops)) as pool:
+    with ThreadPoolExecutor(len(shops)) as pool, _stopped(shops):
         sounds = list(pool.map(lambda shop: _sound(shop, step), shops))
         free: queue.SimpleQueue[tuple[Workshop, dict[str, float]]] = queue.SimpleQueue()
         for pair in zip(shops, sounds, strict=True):
@@ -91,6 +94,17 @@ def _judge_all(
                 future.cancel()
 
 
+@contextmanager
+def _stopped(shops: Sequence[Workshop]) -> Iterator[None]:
+    """Ends what the workshops run where an exception, Ctrl-C too, ends the work; none is waited for."""
+    try:
+        yield
+    except BaseException:
+        for shop in shops:
+            shop.stop()
+        raise
+
+
 def _made(folder: Path) -> Path:
     folder.mkdir()
     return folder
@@ -98,8 +112,9 @@ def _made(folder: Path) -> Path:
 
 def _touched(shop: Workshop, stored: Path, step: Callable[[str], None]) -> Touched:
     """Which tests touch what, measured by a run of all tests unless ``stored`` has it for these sources."""
-    sources = digest([file for name in ("renderer", "validation", "tests") for file in (ROOT / name).rglob("*.py")])
-    if stored.exists():
+    sources = digest([*judging_files(ROOT), *(ROOT / "renderer").rglob("*.py")], ROOT)
+    # What cannot be read is measured anew.
+    with suppress(OSError, ValueError, KeyError, TypeError):
         found = json.loads(stored.read_text(encoding="utf-8"))
         if found["sources"] == sources:
             return dict(found["touched"])
@@ -110,7 +125,9 @@ def _touched(shop: Workshop, stored: Path, step: Callable[[str], None]) -> Touch
             _PATIENCE, **{TOUCHED: folder},
         )  # fmt: skip
         if ended.code != 0:
-            raise RuntimeError(f"mutants: expected the sound renderer's tests to pass, got\n{ended.output[-2000:]}")
+            raise ChildProcessError(
+                f"mutants: expected the sound renderer's tests to pass, got\n{ended.output[-2000:]}"
+            )
         touched = read(Path(folder), shop.root)
     text = json.dumps({"sources": sources, "touched": touched})
     write_atomically(stored, lambda file: file.write(text.encode()))
@@ -125,7 +142,7 @@ def _sound(shop: Workshop, step: Callable[[str], None]) -> dict[str, float]:
         for _ in range(2):  # the first compiles
             ended = gates(shop, (group,), _PATIENCE)
         if noticed_by_gates(ended, group)[1] is not None:
-            raise RuntimeError(f"mutants: expected no red gate of {group}, got\n{ended.output[-2000:]}")
+            raise ChildProcessError(f"mutants: expected no red gate of {group}, got\n{ended.output[-2000:]}")
         seconds[group] = ended.seconds
     shop.run(["-m", "renderer", "compile"], _PATIENCE)
     shop.keep()

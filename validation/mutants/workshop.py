@@ -26,6 +26,8 @@ _FILES = ("pyproject.toml", "Makefile", "README.md", "requirements.lock", "LICEN
 
 # The variable that names the folder where the plugin of pytest writes, a file for each process of the run.
 TOUCHED = "TOUCHED_FOLDER"
+# Bytes that a file of the broken copy may have, and bytes of what it prints that are read: an endless loop may print.
+_LARGEST, _READ = 1 << 30, 1 << 20
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class Workshop:
             shutil.copy(root / name, self.root / name)
         self._cache, self._sound = folder / "cache", folder / "sound"
         self._cache.mkdir()
+        self._running: subprocess.Popen[bytes] | None = None
+        self._stopped = False
 
     def keep(self) -> None:
         """Keep the kernels compiled so far as those of the sound renderer."""
@@ -89,15 +93,26 @@ class Workshop:
                 stdout=output, stderr=subprocess.STDOUT, start_new_session=True,
             )  # fmt: skip
             _limit(process, patience)
+            self._running = process
+            if self._stopped:
+                _end_all(process)
             try:
                 code: int | None = process.wait(patience)
             except subprocess.TimeoutExpired:
                 code = None
             finally:
                 _end_all(process)
-            output.seek(0)
+            output.seek(max(0, output.seek(0, os.SEEK_END) - _READ))
             text = output.read().decode(errors="replace")
+        if self._stopped:
+            raise ChildProcessError("mutants: a process was stopped")
         return Ended(code, text, time.perf_counter() - began)
+
+    def stop(self) -> None:
+        """End what runs here, from another thread; what would run next raises ``ChildProcessError``."""
+        self._stopped = True
+        if self._running is not None:
+            _end_all(self._running)
 
     def _scratch(self) -> Path:
         """An empty folder for temporary files: a process that was killed leaves its own."""
@@ -108,11 +123,12 @@ class Workshop:
 
 
 def _limit(process: "subprocess.Popen[bytes]", patience: float) -> None:
-    """Have the system end an endless loop too: nobody else would where this process is killed."""
+    """Have the system end an endless loop too, and one that prints: nobody else would where this process is killed."""
     if hasattr(resource, "prlimit"):
         seconds = math.ceil(patience * (os.cpu_count() or 1))
         with suppress(ProcessLookupError):
             resource.prlimit(process.pid, resource.RLIMIT_CPU, (seconds, seconds + 1))
+            resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (_LARGEST, _LARGEST))
 
 
 def _end_all(process: "subprocess.Popen[bytes]") -> None:

@@ -1,13 +1,17 @@
 """What notices a mutant is told right: a red gate, a failing test, a crash, a process that never ends, or nothing."""
 
 import json
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from validation.mutants import judge as judging
-from validation.mutants import record
+from validation.mutants import record, workshop
 from validation.mutants.record import Record, summary
 from validation.mutants.sites import Mutant, mutants
 from validation.mutants.touched import read, touching
@@ -57,25 +61,32 @@ def test_what_judges_is_judged_by_its_tests_alone_those_beside_it_first() -> Non
 
 
 class Shop:
-    """Stands in for a workshop: answers as it is told."""
+    """Stands in for a workshop: answers as it is told while it is broken, and otherwise that all is well."""
 
-    def __init__(self, gates: list[Ended], tests: Ended) -> None:
+    def __init__(self, gates: list[Ended], tests: Ended, sound: Ended | None = None) -> None:
         self.answers, self.tests, self.asked = gates, tests, 0
+        self.sound, self.is_broken = sound or GREEN, False
 
-    def broken(self, mutant: Mutant) -> Any:
-        return memoryview(b"")  # a context that does nothing
+    @contextmanager
+    def broken(self, mutant: Mutant) -> Iterator[None]:
+        self.is_broken = True
+        yield
+        self.is_broken = False
 
     def call(self, target: str, *arguments: str, patience: float) -> Ended:
         assert json.loads(arguments[0])[0] in judging.groups_of(mutant())
+        if not self.is_broken:
+            return self.sound
         self.asked += 1
         return self.answers.pop(0)
 
     def run(self, arguments: list[str], patience: float) -> Ended:
         assert arguments[-1] == "tests/shade/test_kernel.py"
-        return self.tests
+        return self.tests if self.is_broken else self.sound
 
 
 GREEN = Ended(0, "red: null\n", 2.0)
+SUMMARY = "F\n=== short test summary info ===\n"
 
 
 @pytest.mark.parametrize(
@@ -85,7 +96,10 @@ GREEN = Ended(0, "red: null\n", 2.0)
         ([Ended(None, "", 9.0)], None, "the checks of hits", True, "hangs"),
         ([Ended(-11, "a warning", 9.0)], None, "the checks of hits: ended by SIGSEGV", True, "crashes"),
         ([Ended(1, "Trace\nKeyError: 3\n", 9.0)], None, "the checks of hits: KeyError: 3", True, "crashes"),
-        ([GREEN] * 3, Ended(1, "F\nFAILED tests/a.py::test_b - x\n", 4.0), "tests/a.py::test_b", False, "fails"),
+        ([GREEN] * 3, Ended(1, f"{SUMMARY}FAILED tests/a.py::test_b - x\n", 4.0), "tests/a.py::test_b", False, "fails"),
+        # What a test prints may look like a verdict.
+        ([GREEN] * 3, Ended(1, f"FAILED images: x\n{SUMMARY}FAILED t.py::b - x\n", 4.0), "t.py::b", False, "fails"),
+        ([GREEN, Ended(-40, "", 9.0)], None, "the checks of queries: ended by signal 40", True, "crashes"),
         ([GREEN] * 3, Ended(None, "..", 4.0), "the tests", False, "hangs"),
         ([GREEN] * 3, Ended(-6, "..", 4.0), "the tests: exit code -6", False, "crashes"),
         ([GREEN] * 3, Ended(0, "9 passed", 4.0), None, False, None),
@@ -103,11 +117,26 @@ def test_a_verdict_says_what_noticed_and_how(
 
 @pytest.mark.parametrize(("kernel", "gate"), [(True, True), (False, False)])
 def test_gates_are_asked_first_about_kernels_and_tests_about_other_code(kernel: bool, gate: bool) -> None:
-    red, failed = Ended(0, 'red: "hits: cube: wrong"\n', 3.0), Ended(1, "FAILED tests/a.py::test_b - x\n", 4.0)
+    red, failed = (
+        Ended(0, 'red: "hits: cube: wrong"\n', 3.0),
+        Ended(1, f"{SUMMARY}FAILED tests/a.py::test_b - x\n", 4.0),
+    )
     shop: Any = Shop([red], failed)
     sound = dict.fromkeys(("hits", "queries", "pictures"), 1.0)
     found = judging.judge(mutant(kernel=kernel), shop, TOUCHED, sound)
     assert (found.gate, found.seconds) == (gate, 3.0 if kernel else 4.0)
+
+
+@pytest.mark.parametrize("kernel", [True, False])
+def test_what_crashes_without_a_fault_too_is_no_verdict(kernel: bool) -> None:
+    crash = Ended(4, "pytest: unrecognized arguments: --nosuch\n", 1.0)
+    sound = dict.fromkeys(("hits", "queries", "pictures"), 1.0)
+    shop: Any = Shop([crash], crash, crash)
+    with pytest.raises(ChildProcessError, match="expected the sound renderer to pass, got the"):
+        judging.judge(mutant(kernel=kernel), shop, TOUCHED, sound)
+    # A crash that only the fault brings is one.
+    shop = Shop([crash], crash)
+    assert judging.judge(mutant(kernel=kernel), shop, TOUCHED, sound).how == "crashes"
 
 
 @pytest.fixture
@@ -139,6 +168,69 @@ def test_a_record_goes_on_until_the_code_or_what_judges_it_changes(root: Path) -
     assert again.row(killed) is None
     (root / "renderer" / "trace" / "a.py").write_text("x = a + b + c\n")
     assert Record(path, root).row(killed) is None
+
+
+def test_a_verdict_holds_for_the_text_that_was_judged(root: Path) -> None:
+    path, one = root / "mutants.json", mutant()
+    record = Record(path, root)
+    assert record.row(one) is None
+    (root / "renderer" / "trace" / "a.py").write_text("x = a + b + c\n")  # while it is judged in a copy
+    record.add(one, Verdict("a gate", True, "fails", 1.0))
+    record.write(7, [one])
+    assert Record(path, root).row(one) is None
+
+
+def test_a_test_that_went_notices_nothing(root: Path) -> None:
+    path, one, test = root / "mutants.json", mutant(), root / "tests" / "test_a.py"
+    record = Record(path, root)
+    record.add(one, Verdict("tests/test_a.py::TestIt::test_b[x::y]", False, "fails", 1.0))
+    record.write(7, [one])
+    for text, holds in (("def test_b(self):\n", True), ("def test_bc(self):\n", False)):
+        test.write_text(text)
+        assert (Record(path, root).row(one) is not None) == holds
+        assert summary(path, root)["outdated"] == (not holds)  # type: ignore[index]
+
+
+def test_two_runs_at_once_keep_the_verdicts_of_both(root: Path) -> None:
+    path, all_ = root / "mutants.json", [mutant(nth=n) for n in range(3)]
+    first, second = Record(path, root), Record(path, root)
+    first.add(all_[0], Verdict("a gate", True, "fails", 1.0))
+    first.write(7, all_)
+    second.add(all_[1], Verdict("a gate", True, "fails", 1.0))
+    second.write(7, all_)
+    again = Record(path, root)
+    assert [again.row(one) is not None for one in all_] == [True, True, False]
+    again.forget(all_[:1])
+    again.write(7, all_)
+    assert Record(path, root).row(all_[0]) is None
+
+
+@pytest.mark.parametrize("text", ["", '{"schema": 1, "se', "[]", '{"schema": 1}', '{"schema": 2, "seed": 9}',
+                                  '{"schema": 1, "seed": 1, "asked": [], "mutants": [{"key": "a"}]}'])  # fmt: skip
+def test_a_file_that_is_no_record_is_refused_and_stays(root: Path, text: str) -> None:
+    path = root / "mutants.json"
+    path.write_text(text)
+    for read_it in (lambda: Record(path, root), lambda: summary(path, root)):
+        with pytest.raises(ValueError, match=r"mutants\.json: expected"):
+            read_it()
+    assert path.read_text() == text
+
+
+def test_reasons_to_leave_mutants_make_no_verdict_older(root: Path) -> None:
+    path, one = root / "mutants.json", mutant()
+    record = Record(path, root)
+    record.add(one, Verdict(None, False, None, 1.0))
+    record.write(7, [one])
+    (root / "validation" / "equivalent.py").write_text("LEFT = {}\n")
+    assert Record(path, root).row(one) is not None
+    (root / "validation" / "moved.py").write_text("")
+    assert Record(path, root).row(one) is None
+    record = Record(path, root)
+    record.add(one, Verdict(None, False, None, 1.0))
+    record.write(7, [one])
+    (root / "validation" / "deeper").mkdir()
+    (root / "validation" / "moved.py").rename(root / "validation" / "deeper" / "moved.py")
+    assert Record(path, root).row(one) is None
 
 
 def test_a_summary_counts_what_changes_an_answer(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,7 +281,7 @@ def test_what_processes_measured_is_merged_and_kernels_bring_what_they_import(tm
     assert {"renderer/trace/leaf.py", "renderer/trace/intersect.py"} <= set(one["kernels"])
 
 
-def test_a_workshop_breaks_one_file_and_mends_it(tmp_path: Path) -> None:
+def test_a_workshop_breaks_one_file_and_mends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     root = Path(__file__).parents[3]
     shop = Workshop(root, tmp_path)
     shop.keep()
@@ -203,5 +295,24 @@ def test_a_workshop_breaks_one_file_and_mends_it(tmp_path: Path) -> None:
     assert (shop.root / one.file).read_bytes() == sound
     assert shop.run(["-c", "while True: pass"], 0.5).code is None
     # A limit of its own ends it where nobody is left to do so.
+    monkeypatch.setattr(workshop, "_LARGEST", 1 << 22)
+    printing = shop.run(["-c", "import os\nwhile True: os.write(1, b'x' * (1 << 20))"], 600.0)
+    assert printing.code == 1 and len(printing.output) == 1 << 20
     limited = "import resource as r\nwhile r.getrlimit(r.RLIMIT_CPU)[0] == r.RLIM_INFINITY: pass"
     assert shop.run(["-c", limited], 60.0).code == 0
+
+
+def test_a_workshop_that_is_stopped_ends_what_it_runs(tmp_path: Path) -> None:
+    shop = Workshop(Path(__file__).parents[3], tmp_path)
+    begun = tmp_path / "begun"
+
+    def stop() -> None:
+        while not begun.exists():
+            time.sleep(0.01)
+        shop.stop()
+
+    threading.Thread(target=stop).start()
+    endless = f"import pathlib\npathlib.Path({str(begun)!r}).touch()\nwhile True: pass"
+    for code in (endless, "pass"):
+        with pytest.raises(ChildProcessError, match="stopped"):
+            shop.run(["-c", code], 600.0)
