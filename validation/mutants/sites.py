@@ -90,6 +90,18 @@ def text_of(mutant: Mutant, root: Path) -> str:
     raise ValueError(f"mutant: expected {mutant.before!r} in {mutant.place}, got none")
 
 
+def statement_of(mutant: Mutant, root: Path) -> str:
+    """The first line of the statement that a mutant stands in, as ``ast.unparse`` writes it: of equal faults in one
+    place it tells which this is.
+    """
+    tree = ast.parse((root / mutant.file).read_text(encoding="utf-8"))
+    around = [
+        node for node in ast.walk(tree)
+        if isinstance(node, ast.stmt) and node.lineno <= mutant.line <= (node.end_lineno or node.lineno)
+    ]  # fmt: skip
+    return ast.unparse(min(around, key=lambda node: (node.end_lineno or node.lineno) - node.lineno)).partition("\n")[0]
+
+
 def _of_file(path: Path, root: Path) -> Iterator[tuple[Mutant, Fault]]:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     module = ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")

@@ -1,11 +1,12 @@
 """Mutants are found, chosen and written the same way each time, and named so that other edits do not move them."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from validation.mutants.equivalent import EQUIVALENT, LEFT
-from validation.mutants.sites import Mutant, chosen, mutants, text_of
+from validation.mutants.sites import Mutant, chosen, mutants, statement_of, text_of
 from validation.mutants.targets import TARGETS, files
 
 ROOT = Path(__file__).parents[3]
@@ -86,9 +87,26 @@ def test_equal_code_in_one_place_is_told_apart(package: Path) -> None:
     assert text_of(twice[1], package.parent).endswith("(a + 1) * (((a) - (1)))\n")
 
 
-def test_mutants_that_change_no_answer_are_mutants() -> None:
-    keys = {mutant.key for target in TARGETS for mutant in mutants(files(target, ROOT), ROOT)}
-    assert set(EQUIVALENT) <= keys and set(LEFT) <= keys and not set(EQUIVALENT) & set(LEFT)
+def test_what_is_left_with_a_proof_or_a_reason_stands_where_it_stood() -> None:
+    """A key counts equal faults of a function, so an edit may give it to another one: then the proof must be thought
+    through again, and ``statements.json`` says where the fault stands now.
+    """
+    every = {mutant.key: mutant for target in TARGETS for mutant in mutants(files(target, ROOT), ROOT)}
+    stood = json.loads((Path(__file__).parent / "statements.json").read_text(encoding="utf-8"))
+    assert stood == {key: statement_of(every[key], ROOT) for key in [*EQUIVALENT, *LEFT]}
+    assert not set(EQUIVALENT) & set(LEFT)
+
+
+def test_a_fault_that_has_moved_to_another_statement_is_told(package: Path) -> None:
+    def statement() -> str:
+        [one] = (m for m in every(package) if m.before == "1" and m.nth == 0 and m.place.endswith(".f"))
+        return statement_of(one, package.parent)
+
+    path = package / "module.py"
+    path.write_text("def f(a):\n    if a:\n        return a + 1\n", encoding="utf-8")
+    assert statement() == "return a + 1"
+    path.write_text("def f(a):\n    if a > 1:\n        return a + 1\n", encoding="utf-8")
+    assert statement() == "if a > 1:"
 
 
 def test_a_key_outlives_edits_elsewhere_and_names_code_that_went(package: Path) -> None:
