@@ -4,13 +4,14 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import llvmlite.binding as llvm
 import pytest
 from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, copy_package, run, start, write_package
 
 from renderer.kernels.levels import FEATURES, LEVELS
-from renderer.kernels.store import runnable_levels
+from renderer.kernels.store import _user_cache, runnable_levels
 
 TELL = """
 import logging, sys
@@ -289,3 +290,14 @@ def test_a_pipe_in_the_place_of_a_kernel_is_not_waited_for(package):
     path.unlink()
     os.mkfifo(path)
     assert run(package) == COMPILED
+
+
+@pytest.mark.parametrize(
+    ("system", "folder"), [("linux", ".cache"), ("darwin", "Library/Caches"), ("win32", "AppData/Local")]
+)
+def test_the_user_s_own_folder_is_where_each_system_has_it(monkeypatch, tmp_path, system, folder):
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    assert _user_cache() == tmp_path / folder

@@ -64,6 +64,20 @@ def test_a_ray_that_leaves_a_thin_face_starts_there(width):
     assert float(hits.t) == pytest.approx(2.0 / direction[2], rel=2.0**-29)
 
 
+@pytest.mark.parametrize("turn", range(3))
+@pytest.mark.parametrize("axes", [(0, 1), (1, 0)])
+def test_a_ray_beside_an_edge_by_less_than_its_products_hold_is_on_one_side_of_it(turn, axes):
+    """The products of 1e-200 vanish, so the edge function is 0 as rounded; the ray passes it by 1e-400."""
+    for far, hit in ((-1.0, True), (1.0, False)):
+        corners = np.roll([(1e-200, -1.0), (0.0, 1e-200), (far, 0.5)], turn, axis=0)[:, axes]
+        for mirror in (1.0, -1.0):
+            for order in ([0, 1, 2], [2, 1, 0]):
+                octree = Octree(np.column_stack([corners * [1.0, mirror], np.zeros(3)]), [order])
+                for count in (1, 40):
+                    rays = [[0.0, 0.0, 1.0]] * count, [[0.0, 0.0, -1.0]] * count
+                    assert (octree.closest_hit(*rays).hit == hit).all()
+
+
 def rays_at_thin_faces(seed, count):
     """``count`` faces far apart, so that each ray meets its own alone; their corners, origins and directions."""
     rng = np.random.default_rng(seed)

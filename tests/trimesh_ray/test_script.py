@@ -33,6 +33,13 @@ def test_the_script_runs_as_it_would_by_itself() -> None:
         assert (answers(*command)["name"], answers(*command)["arguments"]) == ("__main__", ["a", "--b"])
 
 
+def test_modules_are_looked_for_as_they_are_for_the_script_itself(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text("import json, sys; print(json.dumps(sys.path))")
+    plain, drop_in = (json.loads(ran(*command, str(script)).stdout) for command in ((), DROP_IN))
+    assert drop_in == plain and plain[0] == str(tmp_path.resolve())
+
+
 def faults(found: dict[str, Any]) -> dict[str, bool]:
     """By the answer, whether it is wrong: the right ones are known without any computation."""
     # The ball's corners are on the axes; between them its faces are flat.
