@@ -1,5 +1,7 @@
 """Sentences of the public docstrings and of the commands' help that no other test asked: one test each."""
 
+import doctest
+import inspect
 import io
 import json
 import struct
@@ -83,6 +85,56 @@ def test_integers_have_64_bits_and_other_numbers_are_float64() -> None:
     ):
         for numbers in (mesh.vertices, mesh.normals, mesh.texcoords, mesh.triangles):
             assert numbers is not None and numbers.dtype == np.float64
+
+
+def test_arrays_have_the_types_and_dimensions_that_they_are_said_to_have() -> None:
+    """Of more rays than go one by one, in two dimensions, some of which miss."""
+    ball, (origins, _) = icosphere(2), through(60)
+    octree, start = Octree.from_mesh(ball), (3.0 * origins).reshape(4, 15, 3)
+    rays = start, [0.0, 0.0, -1.0]
+    hits, rows = octree.closest_hit(*rays, t_error=True), octree.all_hits(*rays, t_error=True)
+    near, found, image = octree.closest_point(start), len(rows.t), render(load_scene(STAIRS), resolution=SIZE)
+    steps, faces, corners = octree.count_steps(*rays), len(ball.faces), len(ball.vertices)
+    assert 0 < found < 120 and hits.t_error is not None and rows.t_error is not None
+    said: dict[type, list[tuple[NDArray[Any], tuple[int, ...]]]] = {
+        np.float64: [
+            *((numbers, (4, 15)) for numbers in (hits.t, hits.u, hits.v, hits.t_error)),
+            *((vectors, (4, 15, 3)) for vectors in (hits.points, hits.normals)),
+            *((numbers, (found,)) for numbers in (rows.t, rows.u, rows.v, rows.t_error)),
+            *((vectors, (found, 3)) for vectors in (rows.points, rows.normals)),
+            *((numbers, (4, 15)) for numbers in (near.distance, near.u, near.v)),
+            *((numbers, (4, 15)) for numbers in (octree.winding_number(start), octree.signed_distance(start))),
+            (near.points, (4, 15, 3)), (ball.vertices, (corners, 3)), (ball.triangles, (faces, 3, 3)),
+            (ball.face_normals(), (faces, 3)), (ball.vertex_normals(), (corners, 3)), (ball.extent, (3,)),
+            *((corner, (3,)) for corner in ball.bounds),
+        ],
+        np.float32: [(image.radiance, (16, 24, 3))],
+        np.int64: [
+            (hits.face, (4, 15)), (rows.offsets, (61,)), (rows.face, (found,)), (rows.ray, (found,)),
+            (rows.counts, (4, 15)), (octree.count_hits(*rays), (4, 15)), (near.face, (4, 15)),
+            (steps.nodes, (4, 15)), (steps.triangles, (4, 15)),
+        ],
+        np.bool_: [
+            (hits.hit, (4, 15)), (octree.any_hit(*rays), (4, 15)), (octree.contains(start), (4, 15)),
+            (octree.visible(start, [0.0, 0.0, 9.0]), (4, 15)), (near.found, (4, 15)),
+        ],
+    }  # fmt: skip
+    for dtype, arrays in said.items():
+        for number, (array, shape) in enumerate(arrays):
+            assert (array.dtype, array.shape) == (dtype, shape), number
+
+
+def test_the_examples_of_all_docstrings_hold() -> None:
+    finder, runner = doctest.DocTestFinder(exclude_empty=True), doctest.DocTestRunner()
+    for name in renderer.__all__:
+        thing = getattr(renderer, name)
+        own = vars(sys.modules[thing.__module__]).copy() if hasattr(thing, "__module__") else {}
+        members = [value for base in getattr(thing, "__mro__", ()) if base.__module__.startswith("renderer.")
+                   for member, value in vars(base).items() if not member.startswith("_")]  # fmt: skip
+        for documented in (thing, *members):
+            for example in finder.find(documented, name, globs=own) if inspect.getdoc(documented) else ():
+                runner.run(example)
+    assert runner.tries > 50 and runner.failures == 0
 
 
 def test_what_is_seen_at_more_than_3_hundredths_of_a_degree_does_not_hide_its_own_points() -> None:
@@ -400,6 +452,58 @@ def test_max_rays_of_the_command_is_that_of_the_library(tmp_path: Path) -> None:
         cut = render(load_scene(GLASS), resolution=SIZE, max_rays=3).radiance
     assert np.array_equal(np.load(path), cut)
     assert not np.array_equal(cut, render(load_scene(GLASS), resolution=SIZE).radiance)
+
+
+def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[dict[str, Any]] = []
+    small = render(load_scene(STAIRS), resolution=(2, 2))
+
+    def noting(scene: Any, **options: Any) -> Any:
+        told.append(options)
+        return small
+
+    monkeypatch.setattr("renderer.picture.render.render", noting)
+    monkeypatch.chdir(tmp_path)
+    command = ["render", str(STAIRS), "--quiet"]
+    given = {"max_depth": 7, "samples": 9, "min_weight": 0.25, "max_rays": 99, "accelerator": "brute", "split": "sah",
+             "threads": 5}  # fmt: skip
+    flags = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", str(value))]
+    assert main(command) == main([*command, *flags, "--resolution", "30X20"]) == 0
+    left = {**dict.fromkeys(given), "accelerator": "auto", "split": "midpoint", "resolution": None}
+    for options, expected in zip(told, (left, {**given, "resolution": (30, 20)}), strict=True):
+        assert {name: options[name] for name in expected} == expected
+    assert [path.name for path in tmp_path.iterdir()] == ["out.png"]
+
+
+@pytest.mark.parametrize("flags", [("--max-depth", "1"), ("--min-weight", "0.3")])
+def test_a_bound_of_the_command_is_that_of_the_library(tmp_path: Path, flags: tuple[str, str]) -> None:
+    path, name = tmp_path / "a.npy", flags[0].strip("-").replace("-", "_")
+    assert main(["render", str(GLASS), "--resolution", "24x16", *flags, "-o", str(path), "--quiet"]) == 0
+    bound: dict[str, Any] = {name: float(flags[1]) if "." in flags[1] else int(flags[1])}
+    expected = render(load_scene(GLASS), resolution=SIZE, **bound).radiance
+    assert np.array_equal(np.load(path), expected)
+    assert not np.array_equal(expected, render(load_scene(GLASS), resolution=SIZE).radiance)
+
+
+def test_the_command_shows_a_scene_on_this_machine_at_any_free_port(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told: list[dict[str, Any]] = []
+
+    def noting(scene: Any, **options: Any) -> Any:
+        told.append(options)
+        raise ValueError("enough is known")
+
+    monkeypatch.setattr("renderer.viewer.view.view", noting)
+    assert main(["view", str(STAIRS)]) == main(["view", str(STAIRS), "--host", "::1", "--port", "8123"]) == 2
+    assert [(options["host"], options["port"]) for options in told] == [("127.0.0.1", 0), ("::1", 8123)]
+
+
+def test_info_cuts_the_octree_at_midpoints_unless_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(STAIRS)]) == 0
+    assert "octree (midpoint): " in capsys.readouterr().out
 
 
 def asked(url: str) -> int:

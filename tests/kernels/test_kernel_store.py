@@ -269,8 +269,11 @@ class TestAhead:
         assert run(package) == LOADED
 
     def test_they_are_not_used_for_other_sources(self, package, folder):
+        before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.iterdir()}
         bottom_of(package).write_text("STEP = 20\n")
         assert run(package, OCTREE_RENDERER_KERNELS=str(folder)) == ["27", "0", "1"]
+        # What a run compiles goes elsewhere.
+        assert {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.iterdir()} == before
 
     def test_they_are_not_used_by_a_machine_that_lacks_the_level(self, package, folder):
         pretend = "import renderer.kernels.store as store\nstore.runnable_levels = tuple\n"

@@ -16,6 +16,7 @@ from renderer.errors import MeshError
 from renderer.mesh import mesh as mesh_module
 from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh, Repairs, RepairWarning
+from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 
 BAD = [np.nan, np.inf, -np.inf]
@@ -71,6 +72,19 @@ def test_right_input_stays_as_it_is(kind: str, seed: int, count: int) -> None:
     mesh, repairs = Mesh.repaired(vertices, faces)
     assert not repairs and repairs.kept_faces.tolist() == list(range(len(faces)))
     assert mesh.vertices.tobytes() == expected.vertices.tobytes() and mesh.faces.tobytes() == expected.faces.tobytes()
+
+
+def test_right_attributes_stay_as_they_are() -> None:
+    rng, ball = np.random.default_rng(3), icosphere(1)
+    count = len(ball.vertices)
+    given = {"normals": rng.normal(size=(count, 3)), "colors": rng.random((count, 3)),
+             "texcoords": rng.random((count, 2)), "name": "ball"}  # fmt: skip
+    expected = Mesh(ball.vertices, ball.faces, **given)  # type: ignore[arg-type]
+    mesh, repairs = Mesh.repaired(ball.vertices, ball.faces, **given)  # type: ignore[arg-type]
+    assert not repairs and mesh.name == "ball"
+    for name in ("vertices", "faces", "normals", "colors", "texcoords"):
+        ours, theirs = getattr(mesh, name), getattr(expected, name)
+        assert ours.dtype == theirs.dtype and ours.tobytes() == theirs.tobytes(), name
 
 
 @given(st.integers(0, 2**20), st.integers(1, 30), st.floats(0, 0.5))

@@ -1,5 +1,6 @@
 """The table of promises covers the public contract, and the judges that it names exist."""
 
+import argparse
 import ast
 import json
 from functools import cache
@@ -7,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pytest
-from pydantic import BaseModel, BeforeValidator, Field, create_model, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, create_model, field_validator, model_validator
 
 from validation.promises.contract import pieces as contract
 from validation.promises.contract import table
@@ -60,7 +61,19 @@ def gates() -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "judge", ["promises: no such promise: times broken", "hits: *: no such quantity", "hits: : leaks", "leaks", "*leak"]
+    "judge",
+    [
+        "promises: no such promise: times broken",
+        "hits: *: no such quantity",
+        "hits: : leaks",
+        "leaks",
+        "*leak",
+        "*",
+        "hits: *",
+        "hits: *: *",
+        "*: *: leaks",
+        "*: leaks",
+    ],
 )
 def test_a_judge_that_is_none_is_told(judge: str) -> None:
     assert not any(table.names_gate(judge, gate) for gate in gates())
@@ -87,6 +100,31 @@ def test_texts_are_cut_into_sentences_and_definitions() -> None:
         Piece("f", "First sentence."), Piece("f", "Second one (see there)."),
         Piece("f", "name what it is, in two lines"), Piece("f", "other, b : and this. It has two."),
     ]  # fmt: skip
+
+
+def test_a_sentence_of_one_word_is_one_and_a_heading_is_none() -> None:
+    assert [piece.says for piece in pieces("f", "Sorted. Sources: A book.")] == ["Sorted.", "A book."]
+
+
+def test_the_texts_and_the_options_of_a_command_are_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    def found(**changes: Any) -> set[str]:
+        parser = argparse.ArgumentParser("p", description="Does it.")
+        command = parser.add_subparsers(metavar="command").add_parser("c", help="short", epilog="Ends. Twice.")
+        option = {"type": int, "default": 3, "choices": None, "required": False, "help": "how many"} | changes
+        command.add_argument("-n", "--number", **option)
+        monkeypatch.setattr(contract.cli, "make_parser", lambda: parser)
+        return {": ".join(piece) for piece in contract._helped()}
+
+    whole = {"p: Does it.", "p c: short", "p c: Ends.", "p c: Twice.", "p c --number: how many"}
+    assert found() == {*whole, "p c --number: int, default 3"}
+    assert found(default=4) == {*whole, "p c --number: int, default 4"}
+    assert found(choices=[3, 4]) == {*whole, "p c --number: 3 or 4, default 3"}
+    assert found(required=True) == {*whole, "p c --number: int, required"}
+    assert "p c --number: int, default 3" in found(help=None)
+
+
+def test_the_package_s_own_words_are_pieces() -> None:
+    assert any(piece.where == "renderer" and "costs nothing" in piece.says for piece in contract.contract())
 
 
 def abs_of(value: Any) -> Any:
@@ -118,6 +156,10 @@ def test_fields_are_described_by_type_range_and_default() -> None:
         (Annotated[float, Field(ge=0.0, lt=2.0, strict=True)], 0.5),
         (Annotated[float, Field(ge=0.0, lt=1.0)], 0.5),
         (Annotated[float, Field(ge=0.0, lt=1.0, strict=True), BeforeValidator(abs_of)], 0.5),
+        (Annotated[float, Field(ge=0.0, lt=1.0, strict=True), AfterValidator(abs_of)], 0.5),
+        (Annotated[float, Field(ge=0.0, lt=1.0, strict=True, multiple_of=0.25)], 0.5),
+        (Annotated[float, Field(ge=0.0, lt=1.0, strict=True, alias="b")], 0.5),
+        (Annotated[float, Field(ge=0.0, lt=1.0, strict=True)], Field(default_factory=lambda: 0.25)),
         (Annotated[int, Field(ge=0.0, lt=1.0, strict=True)], 0.5),
         (Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] | None, 0.5),
     ],

@@ -5,11 +5,12 @@ from collections.abc import Iterable, Iterator
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel, BeforeValidator
+from pydantic import AfterValidator, BaseModel, BeforeValidator
 from pydantic.fields import FieldInfo
 
 # How the limits of a number or of a list are spelled, by the names that pydantic has for them.
-_LIMITS = {"gt": "above", "ge": "from", "lt": "below", "le": "to", "min_length": "at least", "max_length": "at most"}
+_LIMITS = {"gt": "above", "ge": "from", "lt": "below", "le": "to", "min_length": "at least", "max_length": "at most",
+           "multiple_of": "a multiple of", "pattern": "like"}  # fmt: skip
 _FLAGS = {("strict", True): "strict", ("allow_inf_nan", False): "finite", ("discriminator", "type"): "told by type"}
 
 
@@ -19,8 +20,12 @@ def described(model: type[BaseModel]) -> Iterator[tuple[str, str]]:
     checks = {name: found.info.fields for name, found in decorators.field_validators.items()}
     for name, field in model.model_fields.items():
         by = [f"checked by {check.strip('_')}" for check, names in checks.items() if name in names]
+        by += [f"written {field.alias}"] if field.alias else []
         line = [_spelled(field.annotation, [field]), _default(field), *by]
         yield f"{_owner(model, name)}.{name}", "; ".join(line)
+    if "extra" in model.model_config:
+        owner = next(base for base in model.__mro__[::-1] if "extra" in getattr(base, "model_config", {}))
+        yield owner.__name__, f"other fields: {model.model_config['extra']}"
     for name, found in decorators.model_validators.items():
         if found.info.mode == "after":
             yield _owner(model, name), f"its values are checked together by {name.strip('_')}"
@@ -28,7 +33,7 @@ def described(model: type[BaseModel]) -> Iterator[tuple[str, str]]:
 
 def _default(field: FieldInfo) -> str:
     """What stands where the field is left out; of a record that has all its own defaults, its class."""
-    default = field.get_default()
+    default = field.get_default(call_default_factory=True, validated_data={})
     if isinstance(default, BaseModel) and default == type(default)():
         return f"default {type(default).__name__}()"
     return "required" if field.is_required() else f"default {default!r}"
@@ -55,6 +60,8 @@ def _named(kind: Any) -> str:
         return " or ".join(map(repr, parts))
     if get_origin(kind) is dict:
         return f"table of {_named(parts[1])}"
+    if get_origin(kind) is list:
+        return _listed([_named(parts[0])], any_number=True)
     if get_origin(kind) is tuple:
         return _listed([_named(part) for part in parts if part is not Ellipsis], Ellipsis in parts)
     return "None" if kind is NoneType else str(kind.__name__)
@@ -72,6 +79,8 @@ def _words(part: Any) -> Iterator[str]:
     if isinstance(part, BeforeValidator):
         made, given = part.func.__qualname__.partition(".")[0], inspect.getclosurevars(part.func).nonlocals
         yield " ".join(["by", made.strip("_"), *map(str, given.values())])
+    if isinstance(part, AfterValidator):
+        yield f"then by {part.func.__qualname__.strip('_')}"
     if isinstance(part, FieldInfo):
         for inner in part.metadata:
             yield from _words(inner)

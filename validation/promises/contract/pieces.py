@@ -16,6 +16,8 @@ from validation.promises.contract.fields import described
 
 # A line that begins the definition of a name: "t_max   the last ..." or "faces : (F, 3) ...".
 _DEFINITION = re.compile(r"^\s*[\w.]+(?:, [\w.]+)*(?:  +| : )(?=\S)")
+# What stands before citations.
+_HEADINGS = ("Source:", "Sources:")
 _SENTENCE = re.compile(r"(?<=[.:;])\s+(?=[A-Z(`\"])")
 
 
@@ -32,6 +34,7 @@ def contract() -> list[Piece]:
 
 
 def _documented() -> Iterator[Piece]:
+    yield from pieces(renderer.__name__, inspect.getdoc(renderer) or "")
     for name in sorted(renderer.__all__):
         thing = getattr(renderer, name)
         if callable(thing):
@@ -54,16 +57,34 @@ def _members(kind: type) -> Iterator[tuple[str, str, Any]]:
 
 
 def _helped() -> Iterator[Piece]:
-    """The help of each option, from the parser: how it is laid out differs between versions of Python."""
+    """The texts of each command and option, from the parser: how they are laid out differs between versions of Python;
+    and what each option takes.
+    """
     whole = cli.make_parser()
     commands = next(action for action in whole._actions if isinstance(action, argparse._SubParsersAction))
-    for name, command in commands.choices.items():
-        where = f"{whole.prog} {name}"
-        yield from pieces(where, command.description or "")
+    yield from (Piece(f"{whole.prog} {short.dest}", short.help or "") for short in commands._choices_actions)
+    for where, command in [
+        (whole.prog, whole),
+        *((f"{whole.prog} {name}", of) for name, of in commands.choices.items()),
+    ]:
+        yield from (piece for text in (command.description, command.epilog) for piece in pieces(where, text or ""))
         for option in command._actions:
-            if option.help and option.dest != "help":
-                flag = (option.option_strings or [option.dest])[-1]
-                yield Piece(f"{where} {flag}", " ".join(option.help.split()))
+            if option is not commands and option.dest not in ("help", "version"):
+                flag = f"{where} {(option.option_strings or [option.dest])[-1]}"
+                if option.help:
+                    yield Piece(flag, " ".join(option.help.split()))
+                yield Piece(flag, _taken(option))
+
+
+def _taken(option: argparse.Action) -> str:
+    """What an option takes, as in "Path, required", "'a' or 'b', default 'a'" or "a flag"."""
+    if option.choices:
+        kind = " or ".join(map(repr, option.choices))
+    else:
+        kind = "a flag" if option.nargs == 0 else getattr(option.type, "__name__", "text").strip("_")
+    given = f"sets {option.dest} to {option.const!r}" if option.const not in (None, True) else ""
+    default = "required" if option.required else f"default {option.default}"
+    return ", ".join(part for part in (kind, given, default if option.nargs != 0 else "") if part)
 
 
 def pieces(where: str, text: str) -> Iterator[Piece]:
@@ -72,7 +93,7 @@ def pieces(where: str, text: str) -> Iterator[Piece]:
         defined = _DEFINITION.match(paragraph)
         said = " ".join(paragraph.split())
         for part in [said] if defined else _SENTENCE.split(said):
-            if len(part.split()) > 1:
+            if part not in _HEADINGS:
                 yield Piece(where, part)
 
 

@@ -22,7 +22,14 @@ def read() -> list[dict[str, Any]]:
 
 
 def names_gate(judge: str, gate: str) -> bool:
-    """Whether a judge of the table names a gate; ``*`` stands for any part of a name."""
+    """Whether a judge of the table names a gate; ``*`` stands for any part of the name of what is judged.
+
+    The section and the quantity are named in full: else one judge would name gates that have nothing in common.
+    """
+    section, _, rest = judge.partition(": ")
+    subject, _, quantity = rest.rpartition(": ")
+    if not subject or "*" in section + quantity:
+        return False
     return re.fullmatch(".*".join(map(re.escape, judge.split("*"))), gate) is not None
 
 
