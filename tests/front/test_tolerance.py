@@ -224,3 +224,9 @@ class TestGlb:
     def test_what_would_be_read_wrongly_is_refused_by_name(self, tmp_path: Path, changes: Any, told: str) -> None:
         with pytest.raises(MeshError, match=f"GLB: .*{told}"):
             load_mesh(glb(tmp_path, **changes))
+
+
+@pytest.mark.parametrize("split", ["kd", "", None, 3, ["sah"]])
+def test_a_rule_of_splitting_that_is_none_is_refused_by_name(split: Any) -> None:
+    with pytest.raises(ValueError, match=r"^split: expected one of \['midpoint', 'sah'\], got "):
+        Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], split=split)

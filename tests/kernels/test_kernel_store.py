@@ -11,7 +11,7 @@ import pytest
 from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, copy_package, run, start, write_package
 
 from renderer.kernels.levels import FEATURES, LEVELS
-from renderer.kernels.store import _user_cache, runnable_levels
+from renderer.kernels.store import _user_cache, _versions, runnable_levels
 
 TELL = """
 import logging, sys
@@ -304,3 +304,7 @@ def test_the_user_s_own_folder_is_where_each_system_has_it(monkeypatch, tmp_path
     monkeypatch.setattr(sys, "platform", system)
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     assert _user_cache() == tmp_path / folder
+
+
+def test_kernels_of_one_python_are_not_those_of_another():
+    assert sys.implementation.cache_tag and sys.implementation.cache_tag in _versions()

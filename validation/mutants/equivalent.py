@@ -84,11 +84,26 @@ EQUIVALENT: dict[str, str] = {
         "zeros times any power of two are zeros, and 1 is within the range that follows",
     "renderer.trimesh_ray.intersector._asked #0: raise -> pass":
         "the same rays are asked about again, and refused with the same words",
+    "renderer.trace.packet._middle_entry #0: WIDTH // 2 -> (WIDTH) * (2)":
+        "octants are taken in another order: more work, the same answers",
+    "renderer.shade.tile._block_of #0: smaller(x + SIDE, x1) -> smaller(x1, x + SIDE)":
+        "the smaller of two numbers is the same in either order",
+    "renderer.tree.midpoint._sort_octants #1: range(8) -> range(8 - 1)":
+        "on no axis are all centres above the middle of their range, so the last octant never has all",
+    "renderer.mesh.ply._read_rows #0: counts == lengths[0, k] -> (counts) != (lengths[0, k])":
+        "the first row has the length of the first row, so every file is read row by row: more work, the same columns",
+    "renderer.viewer.shown.prepare_shown #0: touch_viewing(prepared) -> pass":
+        "the first question compiles its kernels itself: later, the same answers",
     "renderer.contacts.gather.gather_chunk #4: 1 -> 2": "any row below 0 says that no ray is out of range",
 }  # fmt: skip
 
 # Survivors that break no promise though they may change an answer: they are judged, count as not noticed, and are left.
 LEFT: dict[str, str] = {
+    "renderer.viewer.app.make_app #0: False -> True":
+        "only a server that is told to listen at a name that begins with www. would redirect requests without that",
+    "renderer.distance.face_distance._precedes #0: a[1] < b[1] or (a[1] == b[1] and a[2] < b[2]) -> "
+    "(a[1] < b[1]) and (a[1] == b[1] and a[2] < b[2])":
+        "from either end an edge's distance is within 2^-98 and is rounded as if from one end",
     "renderer.trace.doubt._meet_plane #0: t += minus(numerator, product(determinant, (t, 0.0)))[0] / determinant[0] "
     "-> pass": "t of a hit in doubt is within 2 ulp rather than 1, where 4 ulp are promised",
     "renderer.distance.face_distance #0: -40 -> (40)":
