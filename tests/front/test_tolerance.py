@@ -3,12 +3,14 @@
 import json
 import struct
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from renderer import (
+    BruteForce,
     Dielectric,
     Mesh,
     MeshError,
@@ -230,3 +232,11 @@ class TestGlb:
 def test_a_rule_of_splitting_that_is_none_is_refused_by_name(split: Any) -> None:
     with pytest.raises(ValueError, match=r"^split: expected one of \['midpoint', 'sah'\], got "):
         Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], split=split)
+
+
+def test_what_has_vertices_and_faces_but_is_no_mesh_is_told_how_to_become_one() -> None:
+    for kind in (Octree, BruteForce):
+        with pytest.raises(ValueError, match=r"^mesh: expected a renderer.Mesh, got .*SimpleNamespace, whose arrays "):
+            kind.from_mesh(SimpleNamespace(vertices=[], faces=[]))  # type: ignore[arg-type]
+        with pytest.raises(ValueError, match=r"^mesh: expected a renderer.Mesh, got builtins.int$"):
+            kind.from_mesh(3)  # type: ignore[arg-type]
