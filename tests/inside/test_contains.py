@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.inside.crossings import count_crossings
+from renderer.inside.rational import _on_upright
 from renderer.mesh.shapes import box, torus
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
 from renderer.trace.singly import stack_size
@@ -241,3 +242,12 @@ def test_points_amid_many_solids_keep_control_c_waiting_for_milliseconds(monkeyp
     monkeypatch.setattr("renderer.inside.contains.count_crossings", counted)
     solids.contains(rng.uniform(-1.2, 1.2, (4000, 3)))
     assert len(calls) > 5 and calls[-1] == 4000
+
+
+@pytest.mark.parametrize(
+    ("heights", "on"), [((-1, 1, 2), True), ((0, 1, 2), True), ((1, 2, 3), False), ((0, 0, 0), True)]
+)
+def test_a_point_on_an_upright_face_without_an_area_is_on_it(heights, on):
+    """In rational arithmetic; corners relative to the point."""
+    a, b, c = ((Fraction(0), Fraction(0), Fraction(height)) for height in heights)
+    assert _on_upright(a, b, c) is on
