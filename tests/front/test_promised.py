@@ -87,41 +87,93 @@ def test_integers_have_64_bits_and_other_numbers_are_float64() -> None:
             assert numbers is not None and numbers.dtype == np.float64
 
 
-def test_arrays_have_the_types_and_dimensions_that_they_are_said_to_have() -> None:
-    """Of more rays than go one by one, in two dimensions, some of which miss."""
-    ball, (origins, _) = icosphere(2), through(60)
-    octree, start = Octree.from_mesh(ball), (3.0 * origins).reshape(4, 15, 3)
-    rays = start, [0.0, 0.0, -1.0]
-    hits, rows = octree.closest_hit(*rays, t_error=True), octree.all_hits(*rays, t_error=True)
-    near, found, image = octree.closest_point(start), len(rows.t), render(load_scene(STAIRS), resolution=SIZE)
-    steps, faces, corners = octree.count_steps(*rays), len(ball.faces), len(ball.vertices)
-    assert 0 < found < 120 and hits.t_error is not None and rows.t_error is not None
-    said: dict[type, list[tuple[NDArray[Any], tuple[int, ...]]]] = {
-        np.float64: [
-            *((numbers, (4, 15)) for numbers in (hits.t, hits.u, hits.v, hits.t_error)),
-            *((vectors, (4, 15, 3)) for vectors in (hits.points, hits.normals)),
-            *((numbers, (found,)) for numbers in (rows.t, rows.u, rows.v, rows.t_error)),
-            *((vectors, (found, 3)) for vectors in (rows.points, rows.normals)),
-            *((numbers, (4, 15)) for numbers in (near.distance, near.u, near.v)),
-            *((numbers, (4, 15)) for numbers in (octree.winding_number(start), octree.signed_distance(start))),
-            (near.points, (4, 15, 3)), (ball.vertices, (corners, 3)), (ball.triangles, (faces, 3, 3)),
-            (ball.face_normals(), (faces, 3)), (ball.vertex_normals(), (corners, 3)), (ball.extent, (3,)),
-            *((corner, (3,)) for corner in ball.bounds),
-        ],
-        np.float32: [(image.radiance, (16, 24, 3))],
-        np.int64: [
-            (hits.face, (4, 15)), (rows.offsets, (61,)), (rows.face, (found,)), (rows.ray, (found,)),
-            (rows.counts, (4, 15)), (octree.count_hits(*rays), (4, 15)), (near.face, (4, 15)),
-            (steps.nodes, (4, 15)), (steps.triangles, (4, 15)),
-        ],
-        np.bool_: [
-            (hits.hit, (4, 15)), (octree.any_hit(*rays), (4, 15)), (octree.contains(start), (4, 15)),
-            (octree.visible(start, [0.0, 0.0, 9.0]), (4, 15)), (near.found, (4, 15)),
-        ],
-    }  # fmt: skip
+Said = dict[type, list[tuple[Any, tuple[int, ...]]]]
+
+
+def assert_said(said: Said) -> None:
+    """Each array has the type under which it stands, and its shape; a number of Python's own is no array."""
     for dtype, arrays in said.items():
         for number, (array, shape) in enumerate(arrays):
-            assert (array.dtype, array.shape) == (dtype, shape), number
+            assert isinstance(array, np.ndarray | np.generic), (dtype, number)
+            assert (array.dtype, array.shape) == (dtype, shape), (dtype, number)
+
+
+@pytest.mark.parametrize("kind", [Octree, BruteForce])
+@pytest.mark.parametrize("shape", [(), (5,), (4, 15)])
+def test_arrays_have_the_types_and_dimensions_that_they_are_said_to_have(kind: Any, shape: tuple[int, ...]) -> None:
+    """Of one ray, of a few, which go one by one, and of many, in two dimensions; some of them miss."""
+    count = int(np.prod(shape))
+    start = (3.0 * through(60)[0])[:count].reshape(*shape, 3)
+    rays, target = (start, [0.0, 0.0, -1.0]), kind.from_mesh(icosphere(2))
+    hits, rows = target.closest_hit(*rays, t_error=True), target.all_hits(*rays, t_error=True)
+    steps, found, hit = target.count_steps(*rays), len(rows.t), int(np.count_nonzero(hits.hit))
+    assert count == 1 or 0 < hit < count
+    near, far = target.closest_point(start), target.closest_point(start, 1e-3)
+    assert near.found.all() and not far.found.any()
+    said: Said = {
+        np.float64: [
+            *((numbers, shape) for numbers in (hits.t, hits.u, hits.v, hits.t_error)),
+            *((numbers, (found,)) for numbers in (rows.t, rows.u, rows.v, rows.t_error)),
+            *((vectors, (*shape, 3)) for vectors in (hits.points, hits.normals, near.points, far.points)),
+            *((vectors, (found, 3)) for vectors in (rows.points, rows.normals)),
+            *((numbers, shape) for some in (near, far) for numbers in (some.distance, some.u, some.v)),
+            (target.winding_number(start), shape), (target.signed_distance(start), shape),
+        ],
+        np.int64: [
+            (rows.offsets, (count + 1,)), (rows.face, (found,)), (rows.ray, (found,)), (rows.counts, shape),
+            *((numbers, shape) for numbers in (hits.face, target.count_hits(*rays), near.face, far.face)),
+            (steps.nodes, shape), (steps.triangles, shape),
+        ],
+        np.bool_: [
+            (hits.hit, shape), (target.any_hit(*rays), shape), (target.contains(start), shape),
+            (target.visible(start, [0.0, 0.0, 9.0]), shape), (near.found, shape), (far.found, shape),
+        ],
+    }  # fmt: skip
+    assert_said(said)
+
+
+@pytest.mark.parametrize("corners", [0, 3, None])
+def test_meshes_have_arrays_of_the_types_and_dimensions_that_they_are_said_to_have(corners: int | None) -> None:
+    """A mesh of many faces, one of vertices alone and one of nothing, made from lists, which have no type."""
+    places = icosphere(2).vertices[:corners].tolist()
+    triangles = icosphere(2).faces.tolist() if corners is None else []
+    colors, texcoords = (np.abs(places).reshape(-1, 3)[:, :width].tolist() for width in (3, 2))
+    given: dict[str, Any] = {"normals": places, "colors": colors, "texcoords": texcoords} if places else {}
+    repaired, repairs = Mesh.repaired(places, triangles, **given)
+    count, faces = len(places), len(triangles)
+    for mesh in (Mesh(places, triangles, **given), repaired):
+        said: Said = {
+            np.float64: [
+                *((vectors, (count, 3)) for vectors in (mesh.vertices, mesh.vertex_normals())),
+                (mesh.triangles, (faces, 3, 3)), (mesh.face_normals(), (faces, 3)), (mesh.extent, (3,)),
+                *((corner, (3,)) for corner in mesh.bounds),
+                *([(mesh.normals, (count, 3)), (mesh.texcoords, (count, 2))] if given else []),
+            ],
+            np.float32: [(mesh.colors, (count, 3))] if given else [],
+            np.int32: [(mesh.faces, (faces, 3))],
+            np.int64: [
+                (mesh.open_edges, (0, 2)), (mesh.odd_edges, (0, 2)), (repairs.kept_faces, (faces,)),
+                *((none, (0,)) for none in (repairs.dropped_faces, repairs.bad_vertices, repairs.bad_normals)),
+            ],
+        }  # fmt: skip
+        assert_said(said)
+
+
+def test_pictures_cameras_and_objects_have_arrays_of_the_types_and_dimensions_that_are_said() -> None:
+    scene = load_scene(STAIRS)
+    image, views = render(scene, resolution=SIZE), (scene.camera, load_scene(GLASS).camera)
+    assert [view.type for view in views] == ["orthographic", "perspective"]
+    said: Said = {
+        np.float64: [
+            (image.depth, (16, 24)), *((view.rows(24, 16), (6, 3)) for view in views),
+            *((axis, (3,)) for view in views for axis in view.frame()),
+            *((thing.matrix(), (4, 4)) for thing in scene.objects),
+        ],
+        np.float32: [(image.radiance, (16, 24, 3)), (image.normal, (16, 24, 3))],
+        np.int32: [(image.face, (16, 24)), (image.rays, (16, 24))],
+        np.uint8: [(image.srgb, (16, 24, 3))],
+    }  # fmt: skip
+    assert_said(said)
 
 
 def test_the_examples_of_all_docstrings_hold() -> None:
@@ -469,11 +521,19 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
     command = ["render", str(STAIRS), "--quiet"]
     given = {"max_depth": 7, "samples": 9, "min_weight": 0.25, "max_rays": 99, "accelerator": "brute", "split": "sah",
              "threads": 5}  # fmt: skip
-    flags = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", str(value))]
-    assert main(command) == main([*command, *flags, "--resolution", "30X20"]) == 0
-    left = {**dict.fromkeys(given), "accelerator": "auto", "split": "midpoint", "resolution": None}
-    for options, expected in zip(told, (left, {**given, "resolution": (30, 20)}), strict=True):
-        assert {name: options[name] for name in expected} == expected
+    # The ends of their ranges: 0 is a value like any other, not one that was left out.
+    ends: list[dict[str, Any]] = [{"max_depth": 0, "min_weight": 0.0}, {"max_depth": 64, "min_weight": 1.0}]
+    for options in (given, *ends):
+        flags = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
+        assert main([*command, *flags, "--resolution", "30X20"]) == 0
+    assert main(command) == 0
+    left = {**dict.fromkeys(given), "accelerator": "auto", "split": "midpoint"}
+    expected = [
+        *({**left, **options, "resolution": (30, 20)} for options in (given, *ends)),
+        {**left, "resolution": None},
+    ]
+    for options, said in zip(told, expected, strict=True):
+        assert {name: options[name] for name in said} == said
     assert [path.name for path in tmp_path.iterdir()] == ["out.png"]
 
 
