@@ -12,6 +12,7 @@ import urllib.error
 import urllib.request
 import warnings
 from dataclasses import fields, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -516,7 +517,7 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
         told.append(options)
         return small
 
-    monkeypatch.setattr("renderer.picture.render.render", noting)
+    monkeypatch.setattr(import_module("renderer.picture.render"), "render", noting)
     monkeypatch.chdir(tmp_path)
     command = ["render", str(STAIRS), "--quiet"]
     given = {"max_depth": 7, "samples": 9, "min_weight": 0.25, "max_rays": 99, "accelerator": "brute", "split": "sah",
@@ -556,7 +557,7 @@ def test_the_command_shows_a_scene_on_this_machine_at_any_free_port(
         told.append(options)
         raise ValueError("enough is known")
 
-    monkeypatch.setattr("renderer.viewer.view.view", noting)
+    monkeypatch.setattr(import_module("renderer.viewer.view"), "view", noting)
     assert main(["view", str(STAIRS)]) == main(["view", str(STAIRS), "--host", "::1", "--port", "8123"]) == 2
     assert [(options["host"], options["port"]) for options in told] == [("127.0.0.1", 0), ("::1", 8123)]
 
