@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import renderer
 from renderer.cli import _choose_processor, main
 from renderer.picture.render import render
 from renderer.precompile import compile_ahead
@@ -99,7 +100,8 @@ def test_help_and_version(capsys: pytest.CaptureFixture[str], arguments: list[st
         main(arguments)
     out, err = capsys.readouterr()
     assert caught.value.code == 0 and err == ""
-    assert re.match(r"\d+\.\d+\.\d+\n$" if arguments == ["--version"] else "usage: octree-render", out)
+    assert out == f"{renderer.__version__}\n" if arguments == ["--version"] else out.startswith("usage: octree-render")
+    assert re.fullmatch(r"\d+\.\d+\.\d+", renderer.__version__)
 
 
 @pytest.mark.parametrize(

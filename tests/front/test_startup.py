@@ -277,6 +277,8 @@ print(digest.hexdigest(), compile_seconds())
         (["--level", "x86-64-v3"], "--output: expected a folder, as kernels for a level are not this machine's"),
         (["--level", "x86-64-v9", "-o", "x"], "invalid choice: 'x86-64-v9'"),
         (["--queries", "--pictures"], "not allowed with argument"),
+        (["--pictures", "--all"], "not allowed with argument"),
+        (["--all", "--queries"], "not allowed with argument"),
     ],
 )
 def test_what_compile_does_not_take_is_one_line(arguments, told):

@@ -481,6 +481,12 @@ class TestFromPython:
         with pytest.raises(ValueError, match=r"objects\.0\.material.*'a'"):
             Scene(camera=camera, materials={}, objects=(SceneObject(mesh=box(), material="a"),))
 
+    def test_numbers_and_arrays_of_numpy_are_those_of_python(self) -> None:
+        eye, angle = np.array([0, 0, 5]), np.float32(40.5)
+        camera = PerspectiveCamera(eye=eye, target=(np.float64(0.0), np.int8(1), 0), fov=angle)
+        assert camera == PerspectiveCamera(eye=(0, 0, 5), target=(0, 1, 0), fov=40.5)
+        assert [type(camera.fov), *map(type, camera.eye)] == [float] * 4
+
     def test_scenes_are_frozen(self) -> None:
         scene = Scene(camera=PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0)), materials={})
         with pytest.raises(ValueError, match="frozen"):

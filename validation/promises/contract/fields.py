@@ -2,33 +2,53 @@
 
 import inspect
 from collections.abc import Iterable, Iterator
+from dataclasses import fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, PlainValidator, WrapValidator
 from pydantic.fields import FieldInfo
 
 # How the limits of a number or of a list are spelled, by the names that pydantic has for them.
 _LIMITS = {"gt": "above", "ge": "from", "lt": "below", "le": "to", "min_length": "at least", "max_length": "at most",
-           "multiple_of": "a multiple of", "pattern": "like"}  # fmt: skip
-_FLAGS = {("strict", True): "strict", ("allow_inf_nan", False): "finite", ("discriminator", "type"): "told by type"}
+           "multiple_of": "a multiple of", "pattern": "like", "discriminator": "told by"}  # fmt: skip
+_FLAGS = {("strict", True): "strict", ("allow_inf_nan", False): "finite"}
+_VALIDATORS = {BeforeValidator: "by", AfterValidator: "then by", WrapValidator: "around by", PlainValidator: "only by"}
+# What pydantic keeps beside a field and not among its limits.
+_BESIDE = ("discriminator", "frozen", "exclude", "init", "description")
+_ALIASES = ("alias", "validation_alias", "serialization_alias")
+# Settings that Python's classes need and no file of a scene shows.
+_INNER = ("arbitrary_types_allowed", "ignored_types")
 
 
 def described(model: type[BaseModel]) -> Iterator[tuple[str, str]]:
-    """Where each field is written, such as "Phong.diffuse", and its line; then the checks of the record as a whole."""
+    """Where each field is written, such as "Phong.diffuse", and its line; then what holds for the record as a whole."""
     decorators = model.__pydantic_decorators__
-    checks = {name: found.info.fields for name, found in decorators.field_validators.items()}
+    checks = [(name, found.info) for name, found in decorators.field_validators.items()]
     for name, field in model.model_fields.items():
-        by = [f"checked by {check.strip('_')}" for check, names in checks.items() if name in names]
-        by += [f"written {field.alias}"] if field.alias else []
-        line = [_spelled(field.annotation, [field]), _default(field), *by]
+        by = [f"checked {_mode(info.mode)}by {check.strip('_')}"
+              for check, info in checks if {name, "*"} & set(info.fields)]  # fmt: skip
+        aliases = dict.fromkeys(getattr(field, kind) for kind in _ALIASES if getattr(field, kind) is not None)
+        line = [_spelled(field.annotation, [field]), _default(field), *by, *(f"written {alias}" for alias in aliases)]
         yield f"{_owner(model, name)}.{name}", "; ".join(line)
-    if "extra" in model.model_config:
-        owner = next(base for base in model.__mro__[::-1] if "extra" in getattr(base, "model_config", {}))
-        yield owner.__name__, f"other fields: {model.model_config['extra']}"
+    yield from _settings(model)
     for name, found in decorators.model_validators.items():
-        if found.info.mode == "after":
-            yield _owner(model, name), f"its values are checked together by {name.strip('_')}"
+        yield _owner(model, name), f"its values are checked together {_mode(found.info.mode)}by {name.strip('_')}"
+
+
+def _mode(mode: str) -> str:
+    """When a check is made, where that is not after all others."""
+    return "" if mode == "after" else f"{mode} the others " if mode == "before" else f"{mode} "
+
+
+def _settings(model: type[BaseModel]) -> Iterator[tuple[str, str]]:
+    """Each class that changes settings of the one above it, and all of its settings."""
+    above: dict[str, Any] = {}
+    for base in model.__mro__[::-1]:
+        settings = {**getattr(base, "model_config", {})}
+        if issubclass(base, BaseModel) and settings != above:
+            above = settings
+            yield base.__name__, "; ".join(f"{key}: {value}" for key, value in settings.items() if key not in _INNER)
 
 
 def _default(field: FieldInfo) -> str:
@@ -59,12 +79,13 @@ def _named(kind: Any) -> str:
     if get_origin(kind) is Literal:
         return " or ".join(map(repr, parts))
     if get_origin(kind) is dict:
-        return f"table of {_named(parts[1])}"
+        return f"table of {_named(parts[1])}" + ("" if parts[0] is str else f" by {_named(parts[0])}")
     if get_origin(kind) is list:
         return _listed([_named(parts[0])], any_number=True)
     if get_origin(kind) is tuple:
         return _listed([_named(part) for part in parts if part is not Ellipsis], Ellipsis in parts)
-    return "None" if kind is NoneType else str(kind.__name__)
+    within = f" of ({', '.join(map(_named, parts))})" if parts else ""
+    return "None" if kind is NoneType else f"{kind.__name__}{within}"
 
 
 def _listed(kinds: list[str], any_number: bool) -> str:
@@ -75,14 +96,24 @@ def _listed(kinds: list[str], any_number: bool) -> str:
 
 
 def _words(part: Any) -> Iterator[str]:
-    """The limits and flags in what pydantic keeps beside a type."""
-    if isinstance(part, BeforeValidator):
-        made, given = part.func.__qualname__.partition(".")[0], inspect.getclosurevars(part.func).nonlocals
-        yield " ".join(["by", made.strip("_"), *map(str, given.values())])
-    if isinstance(part, AfterValidator):
-        yield f"then by {part.func.__qualname__.strip('_')}"
+    """The limits, flags and checks in what pydantic keeps beside a type, also those that have no word here."""
     if isinstance(part, FieldInfo):
         for inner in part.metadata:
             yield from _words(inner)
-    yield from (f"{word} {getattr(part, name)}" for name, word in _LIMITS.items() if hasattr(part, name))
-    yield from (word for (name, value), word in _FLAGS.items() if getattr(part, name, None) == value)
+        told = {name: getattr(part, name) for name in _BESIDE}
+    elif type(part) in _VALIDATORS:
+        yield f"{_VALIDATORS[type(part)]} {_checker(part.func)}"
+        return
+    else:
+        told = {f.name: getattr(part, f.name) for f in fields(part)} if is_dataclass(part) else {**vars(part)}
+    for name, value in told.items():
+        if value is not None:
+            yield _FLAGS.get((name, value)) or f"{_LIMITS.get(name, name)} {_checker(value)}"
+
+
+def _checker(value: Any) -> str:
+    """A function by its name, or that of its maker and what this was given; anything else as Python writes it."""
+    if not inspect.isroutine(value):
+        return str(value)
+    given = inspect.getclosurevars(value).nonlocals
+    return " ".join([value.__qualname__.partition(".<locals>")[0].strip("_"), *map(str, given.values())])

@@ -3,6 +3,8 @@ help of its commands.
 """
 
 import argparse
+import ast
+import doctest
 import inspect
 import re
 from collections.abc import Iterator
@@ -18,6 +20,10 @@ from validation.promises.contract.fields import described
 _DEFINITION = re.compile(r"^\s*[\w.]+(?:, [\w.]+)*(?:  +| : )(?=\S)")
 # What stands before citations.
 _HEADINGS = ("Source:", "Sources:")
+# What most options do: a value is kept as it is given, or a flag sets one.
+_USUAL_ACTIONS = (argparse._StoreAction, argparse._StoreConstAction, argparse._SubParsersAction)
+# Words of argparse itself, which may differ between versions of Python.
+_VERSION_HELP = argparse._VersionAction(["--version"]).help
 _SENTENCE = re.compile(r"(?<=[.:;])\s+(?=[A-Z(`\"])")
 
 
@@ -67,29 +73,60 @@ def _helped() -> Iterator[Piece]:
         (whole.prog, whole),
         *((f"{whole.prog} {name}", of) for name, of in commands.choices.items()),
     ]:
-        yield from (piece for text in (command.description, command.epilog) for piece in pieces(where, text or ""))
+        texts = (command.description, command.epilog, *(group.description for group in command._action_groups))
+        yield from (piece for text in texts for piece in pieces(where, text or ""))
         for option in command._actions:
-            if option is not commands and option.dest not in ("help", "version"):
-                flag = f"{where} {(option.option_strings or [option.dest])[-1]}"
-                if option.help:
+            if not isinstance(option, argparse._HelpAction):
+                flag = f"{where} {(option.option_strings or [option.metavar or option.dest])[-1]}"
+                if option.help not in (None, _VERSION_HELP):
                     yield Piece(flag, " ".join(option.help.split()))
-                yield Piece(flag, _taken(option))
+                yield Piece(flag, _taken(option, command))
 
 
-def _taken(option: argparse.Action) -> str:
-    """What an option takes, as in "Path, required", "'a' or 'b', default 'a'" or "a flag"."""
+def _taken(option: argparse.Action, command: argparse.ArgumentParser) -> str:
+    """What an option takes, as in "Path, required, or -o", "'a' or 'b', default 'a'" or "a flag"."""
+    given = f"sets {option.dest} to {option.const!r}" if option.const not in (None, True) else ""
+    if option.required:
+        default = "required"
+    else:
+        silent = option.default == argparse.SUPPRESS or (option.nargs == 0 and option.default is False)
+        default = "" if silent else f"default {_value(option.default)}"
+    others = [other.option_strings[-1] for other in _excluded(option, command)]
+    parts = [
+        _kind(option), given, default, f"or {' or '.join(option.option_strings[:-1])}",
+        f"not with {' or '.join(others)}",
+    ]  # fmt: skip
+    return ", ".join(part for part in parts if part not in ("", "or ", "not with "))
+
+
+def _kind(option: argparse.Action) -> str:
+    """What may stand after an option, and how often."""
+    if isinstance(option, argparse._VersionAction):
+        return f"prints {'__version__' if option.version == renderer.__version__ else repr(option.version)}"
     if option.choices:
         kind = " or ".join(map(repr, option.choices))
+    elif option.nargs == 0:
+        kind = "a flag"
     else:
-        kind = "a flag" if option.nargs == 0 else getattr(option.type, "__name__", "text").strip("_")
-    given = f"sets {option.dest} to {option.const!r}" if option.const not in (None, True) else ""
-    default = "required" if option.required else f"default {option.default}"
-    return ", ".join(part for part in (kind, given, default if option.nargs != 0 else "") if part)
+        kind = "text" if option.type is None else getattr(option.type, "__name__", str(option.type)).strip("_")
+    one = option.nargs in (None, 0, argparse.PARSER)
+    kind = kind if one else f"{option.nargs} of {kind}"
+    return kind if isinstance(option, _USUAL_ACTIONS) else f"{kind} by {type(option).__name__}"
+
+
+def _value(value: object) -> str:
+    return repr(value) if isinstance(value, str) else str(value)
+
+
+def _excluded(option: argparse.Action, command: argparse.ArgumentParser) -> list[argparse.Action]:
+    """The options that may not stand beside one."""
+    groups = [group._group_actions for group in command._mutually_exclusive_groups]
+    return [other for group in groups if option in group for other in group if other is not option]
 
 
 def pieces(where: str, text: str) -> Iterator[Piece]:
     """The pieces of a text, without its examples and headings."""
-    for paragraph in _paragraphs(text):
+    for paragraph in _paragraphs(_prose(text)):
         defined = _DEFINITION.match(paragraph)
         said = " ".join(paragraph.split())
         for part in [said] if defined else _SENTENCE.split(said):
@@ -97,14 +134,42 @@ def pieces(where: str, text: str) -> Iterator[Piece]:
                 yield Piece(where, part)
 
 
+def _prose(text: str) -> str:
+    """A text with an empty line in the place of each example."""
+    parts = doctest.DocTestParser().parse(text)
+    return "".join(part if isinstance(part, str) else f"\n{_after_output(part)}\n" for part in parts)
+
+
+def _after_output(example: doctest.Example) -> str:
+    """What stands directly below the output of an example.
+
+    Doctest takes all lines down to an empty one for output, so a sentence could hide there. Here the output of
+    ``print`` is one line, and any other is an expression of Python, which a sentence is not.
+    """
+    lines = example.want.splitlines()
+    last = ast.parse(example.source).body[-1]
+    if not isinstance(last, ast.Expr):
+        return example.want
+    if isinstance(last.value, ast.Call) and ast.unparse(last.value.func) == "print":
+        return "\n".join(lines[1:])
+    ends = (end for end in range(1, len(lines) + 1) if _is_expression("\n".join(lines[:end])))
+    return "\n".join(lines[next(ends, 0) :])
+
+
+def _is_expression(text: str) -> bool:
+    try:
+        ast.parse(text, mode="eval")
+    except SyntaxError:
+        return False
+    return True
+
+
 def _paragraphs(text: str) -> Iterator[str]:
     """Runs of lines; the definition of a name begins one of its own."""
     lines: list[str] = []
-    example = False
     for line in [*text.splitlines(), ""]:
-        example = line.strip().startswith(">>>") or (example and bool(line.strip()))
-        if lines and (not line.strip() or _DEFINITION.match(line) or example):
+        if lines and (not line.strip() or _DEFINITION.match(line)):
             yield "\n".join(lines)
             lines = []
-        if line.strip() and not example:
+        if line.strip():
             lines.append(line)
