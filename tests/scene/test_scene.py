@@ -17,7 +17,7 @@ from renderer.picture.pack import pack
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Mirror, Phong
-from renderer.scene.scene import Floor, Scene, SceneObject, load_scene
+from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 from renderer.shade.records import MATERIAL_COLUMNS
 
 CAMERA = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n"
@@ -486,6 +486,9 @@ class TestFromPython:
         camera = PerspectiveCamera(eye=eye, target=(np.float64(0.0), np.int8(1), 0), fov=angle)
         assert camera == PerspectiveCamera(eye=(0, 0, 5), target=(0, 1, 0), fov=40.5)
         assert [type(camera.fov), *map(type, camera.eye)] == [float] * 4
+        # These pydantic would refuse, which takes the ones above.
+        assert RenderSettings(samples=np.int64(4)) == RenderSettings(samples=4)
+        assert Phong(diffuse=np.float32(0.5)) == Phong(diffuse=(0.5, 0.5, 0.5))
 
     def test_scenes_are_frozen(self) -> None:
         scene = Scene(camera=PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0)), materials={})

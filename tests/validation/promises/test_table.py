@@ -93,7 +93,7 @@ def gates() -> list[str]:
         "promises: the*: times broken",
         "queries: *: wrong answers",
         "stability: *: holds",
-        "hits: *rays: leaks",
+        "hits: *rays: rays on which we are wrong",
     ],
 )
 def test_a_judge_that_is_none_is_told(judge: str) -> None:
