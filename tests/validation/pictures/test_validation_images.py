@@ -205,7 +205,8 @@ def test_a_rung_that_nobody_judges_is_not_passed(tmp_path: Path, monkeypatch: py
 def test_a_mesh_that_mitsuba_cannot_hold_is_not_passed(tmp_path: Path) -> None:
     far = tuple(thing.model_copy(update={"translate": (1e7, 0.1, 0.0)}) for thing in balls().objects)
     moved = balls().model_copy(update={"objects": far})
-    del moved.__dict__["instances"]
+    # They were placed already if a test before this one asked.
+    moved.__dict__.pop("instances", None)
     record, gates = check(tmp_path, moved)
     assert "float32" in record["fault"] and failing(gates) and "aovs" not in record
 
