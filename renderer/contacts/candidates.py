@@ -12,7 +12,7 @@ from renderer.kernels.simd import at, get, movemask, put, smaller
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS, LEAF_BITS
 from renderer.trace.ray_lanes import WIDTH, shear_of
-from renderer.trace.stream import END, leave_leaf, leave_node, list_lane, meet_nodes
+from renderer.trace.stream import leave_leaf, leave_node, list_lane, meet_nodes
 from renderer.trace.traverse import load_lane
 
 # Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
@@ -45,46 +45,43 @@ def find_blocks(tree, rays, begin, end, scratch, found):
     prepared, lanes, rounds = scratch.prepared, scratch.lanes, np.int64(0)
     for k in range(end - begin):
         put(found.counts, k, 0)
-    nodes, leaves = smaller(end - begin, WIDTH), 0
+    nodes, leaves, ends = smaller(end - begin, WIDTH), 0, 0
     following = begin + nodes
     for r in range(nodes):
         load_lane(rays, scratch, r, begin + r)
         put(lanes.at_node, r, r)
-    while nodes + leaves > 0:
+    while nodes + leaves + ends > 0:
         rounds += 1
         meet_nodes(tree, prepared, lanes, nodes)
         entered, nodes = nodes, 0
         for k in range(entered):
             r = get(lanes.at_node, k)
-            nodes, leaves = list_lane(lanes, r, leave_node(tree, prepared, lanes, r, True), nodes, leaves)
+            child = leave_node(tree, prepared, lanes, r, True)
+            nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
         _see_leaves(tree, prepared, lanes, leaves)
         entered, leaves = leaves, 0
         for k in range(entered):
             r = get(lanes.at_leaf, k)
-            child = get(lanes.child, r)
-            if child != END:
-                if get(lanes.bits, r) != 0:
-                    _list_block(found, get(scratch.number, r) - begin, ~child >> LEAF_BITS)
-                child = leave_leaf(tree, prepared, lanes, r)
-            if child == END:
-                if following == end or rounds > _ROUNDS:
-                    continue
+            if get(lanes.bits, r) != 0:
+                _list_block(found, get(scratch.number, r) - begin, ~get(lanes.child, r) >> LEAF_BITS)
+            child = leave_leaf(tree, prepared, lanes, r)
+            nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
+        for k in range(ends):
+            if following < end and rounds <= _ROUNDS:
+                r = get(lanes.at_end, k)
                 load_lane(rays, scratch, r, following)
-                following, child = following + 1, 0
-            nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
+                put(lanes.at_node, nodes, r)
+                following, nodes = following + 1, nodes + 1
+        ends = 0
     return following, rounds
 
 
 @inlined
 def _see_leaves(tree, rays, lanes, count):
-    """Compute of each of ``count`` rays which faces it passes within, in the first block of its leaf.
-
-    A ray at END is tested against block 0, and the result is ignored.
-    """
+    """Compute of each of ``count`` rays which faces it passes within, in the first block of its leaf."""
     for k in range(count):
         r = get(lanes.at_leaf, k)
-        child = get(lanes.child, r)
-        block = (~child >> LEAF_BITS) if child != END else 0
+        block = ~get(lanes.child, r) >> LEAF_BITS
         _, seen = see_triangles(tree, block * BLOCK_WORDS, shear_of(rays, r))
         put(lanes.bits, r, movemask(seen))
 

@@ -75,8 +75,8 @@ def _prefetch_child(tree, child):
 
 class Lanes(NamedTuple):
     """Sixteen rays under way, as pointers: for each ray its next child, the top of its stack and the stack; the lists
-    of the rays at a node and at a leaf; and the results of a round: the bits of the octants or triangles met, those of
-    the triangles in doubt, the octants' distances, and the triangles' t, u, v, w.
+    of the rays at a node, at a leaf and at END; and the results of a round: the bits of the octants or triangles met,
+    those of the triangles in doubt, the octants' distances, and the triangles' t, u, v, w.
     """
 
     child: Any
@@ -85,6 +85,7 @@ class Lanes(NamedTuple):
     stack_size: int
     at_node: Any
     at_leaf: Any
+    at_end: Any
     bits: Any
     doubts: Any
     distances: Any
@@ -92,7 +93,7 @@ class Lanes(NamedTuple):
 
 
 # The numbers of int64 (without the stacks), float32 and float64 in ``Lanes``.
-LANE_INTEGERS, LANE_FLOATS, LANE_DOUBLES = 6 * WIDTH, 8 * WIDTH, 4 * BLOCK_FACES * WIDTH
+LANE_INTEGERS, LANE_FLOATS, LANE_DOUBLES = 7 * WIDTH, 8 * WIDTH, 4 * BLOCK_FACES * WIDTH
 
 
 @inlined
@@ -100,7 +101,8 @@ def make_lanes(integers, floats, doubles, stack_size):
     """Lanes in the given memory; the stacks, ``stack_size`` entries each, follow the LANE_INTEGERS other words."""
     return Lanes(
         integers, at(integers, WIDTH), at(integers, LANE_INTEGERS), stack_size, at(integers, 2 * WIDTH),
-        at(integers, 3 * WIDTH), at(integers, 4 * WIDTH), at(integers, 5 * WIDTH), floats, doubles,
+        at(integers, 3 * WIDTH), at(integers, 4 * WIDTH), at(integers, 5 * WIDTH), at(integers, 6 * WIDTH), floats,
+        doubles,
     )  # fmt: skip
 
 
@@ -177,15 +179,10 @@ def _go_on(tree, rays, lanes, r, stack, entry, top):
 
 @inlined
 def meet_leaves(tree, rays, lanes, count):
-    """Compute what each of ``count`` rays hits in the first block of its leaf.
-
-    A ray at END is tested against block 0, and the result is ignored.
-    """
+    """Compute what each of ``count`` rays hits in the first block of its leaf."""
     for k in range(count):
         r = get(lanes.at_leaf, k)
-        child = get(lanes.child, r)
-        block = (~child >> LEAF_BITS) if child != END else 0
-        shear = shear_of(rays, r)
+        block, shear = ~get(lanes.child, r) >> LEAF_BITS, shear_of(rays, r)
         edges, seen = see_triangles(tree, block * BLOCK_WORDS, shear)
         t_min, t_max = get(rays.doubles, T_MIN + r), get(rays.doubles, T + r)
         t, doubt, _, due = meet_planes(edges, shear, t_min, t_max)
@@ -231,8 +228,14 @@ def leave_leaf(tree, rays, lanes, r):
 
 
 @inlined
-def list_lane(lanes, r, child, nodes, leaves):
-    """Put lane ``r`` into the list of nodes or of leaves, as its next child is. Returns the lengths of both lists."""
+def list_lane(lanes, r, child, lists):
+    """Put lane ``r`` into the list of nodes, of leaves or of ends, as its next child is.
+
+    ``lists`` are the lengths of the three; returns them anew. It takes no branch: the lane is written to all three.
+    """
+    nodes, leaves, ends = lists
     put(lanes.at_node, nodes, r)
     put(lanes.at_leaf, leaves, r)
-    return nodes + np.int64(child >= 0), leaves + np.int64(child < 0)
+    put(lanes.at_end, ends, r)
+    at_node, at_end = np.int64(child >= 0), np.int64(child == END)
+    return nodes + at_node, leaves + (1 - at_node - at_end), ends + at_end

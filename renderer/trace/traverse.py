@@ -132,14 +132,16 @@ def load_lane(rays, scratch, r, i):
 
 
 @kernel
-def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_hit):
-    """Run the listed lanes to their ends; the rays in ``scratch.waiting`` from ``following`` to ``count`` take the
-    places of those that end, but none does after _WORK.
+def _run_lanes(tree, rays, found, scratch, lists, waiting, any_hit):
+    """Run the lanes in ``lists``, see ``list_lane``, to their ends; the rays in ``scratch.waiting`` from waiting[0] to
+    waiting[1] take the places of those that end, but none does after _WORK.
 
     Returns the first ray that still waits, and the number of rounds.
     """
-    prepared, lanes, waiting, rounds = scratch.prepared, scratch.lanes, scratch.waiting, np.int64(0)
-    while nodes + leaves > 0:
+    prepared, lanes, rounds = scratch.prepared, scratch.lanes, np.int64(0)
+    nodes, leaves, ends = lists
+    following, count = waiting
+    while nodes + leaves + ends > 0:
         rounds += 1
         # Take the lanes at nodes one step on.
         meet_nodes(tree, prepared, lanes, nodes)
@@ -147,26 +149,26 @@ def _run_lanes(tree, rays, found, scratch, nodes, leaves, following, count, any_
         for k in range(entered):
             r = get(lanes.at_node, k)
             child = leave_node(tree, prepared, lanes, r, any_hit)
-            nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
-        # Take the lanes at leaves one block on; a lane whose ray ends loads the next ray.
+            nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
+        # Take the lanes at leaves one block on.
         meet_leaves(tree, prepared, lanes, leaves)
         entered, leaves = leaves, 0
         for k in range(entered):
             r = get(lanes.at_leaf, k)
-            child, hit = get(lanes.child, r), False
-            if child != END:
-                hit, doubtful = take_hits(tree, prepared, lanes, r)
-                put(scratch.doubtful, r, get(scratch.doubtful, r) | np.int64(doubtful))
-                child = leave_leaf(tree, prepared, lanes, r)
-            if child == END or (any_hit and hit):
-                i, doubtful = get(scratch.number, r), get(scratch.doubtful, r) != 0
-                rounds += _finish(tree, rays, found, i, scratch, r, doubtful, any_hit)
-                if following == count or rounds > _WORK:
-                    continue
-                load_lane(rays, scratch, r, get(waiting, following))
-                following += 1
-                child = 0
-            nodes, leaves = list_lane(lanes, r, child, nodes, leaves)
+            hit, doubtful = take_hits(tree, prepared, lanes, r)
+            put(scratch.doubtful, r, get(scratch.doubtful, r) | np.int64(doubtful))
+            child = END if any_hit and hit else leave_leaf(tree, prepared, lanes, r)
+            nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
+        # Load the next rays into the lanes of those that ended.
+        for k in range(ends):
+            r = get(lanes.at_end, k)
+            i, doubtful = get(scratch.number, r), get(scratch.doubtful, r) != 0
+            rounds += _finish(tree, rays, found, i, scratch, r, doubtful, any_hit)
+            if following < count and rounds <= _WORK:
+                load_lane(rays, scratch, r, get(scratch.waiting, following))
+                put(lanes.at_node, nodes, r)
+                following, nodes = following + 1, nodes + 1
+        ends = 0
     return following, rounds
 
 
@@ -179,7 +181,7 @@ def _trace_stream(tree, rays, found, scratch, following, count, any_hit):
     for r in range(nodes):
         load_lane(rays, scratch, r, get(scratch.waiting, following + r))
         put(lanes.at_node, r, r)
-    return _run_lanes(tree, rays, found, scratch, nodes, 0, following + nodes, count, any_hit)[0]
+    return _run_lanes(tree, rays, found, scratch, (nodes, 0, 0), (following + nodes, count), any_hit)[0]
 
 
 @kernel
@@ -200,13 +202,13 @@ def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
         while meeting != 0:
             wait_octant(lanes, lowest_bit(meeting), entry, child)
             meeting &= meeting - 1
-    nodes, leaves = 0, 0
+    lists = 0, 0, 0
     for r in range(WIDTH):
         if any_hit and best_of(prepared, r)[1] != NO_FACE:
             _finish(tree, rays, found, first + r, scratch, r, False, any_hit)
         else:
-            nodes, leaves = list_lane(lanes, r, resume(tree, prepared, lanes, r), nodes, leaves)
-    return _run_lanes(tree, rays, found, scratch, nodes, leaves, 0, 0, any_hit)[1]
+            lists = list_lane(lanes, r, resume(tree, prepared, lanes, r), lists)
+    return _run_lanes(tree, rays, found, scratch, lists, (0, 0), any_hit)[1]
 
 
 @inlined
