@@ -12,7 +12,7 @@ from renderer.kernels.simd import at, get, movemask, put, smaller
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS, LEAF_BITS
 from renderer.trace.ray_lanes import WIDTH, shear_of
-from renderer.trace.stream import leave_leaf, leave_node, list_lane, meet_nodes
+from renderer.trace.stream import leave_leaf, list_lane, meet_nodes, resume
 from renderer.trace.traverse import load_lane
 
 # Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
@@ -56,7 +56,7 @@ def find_blocks(tree, rays, begin, end, scratch, found):
         entered, nodes = nodes, 0
         for k in range(entered):
             r = get(lanes.at_node, k)
-            child = leave_node(tree, prepared, lanes, r, True)
+            child = resume(tree, prepared, lanes, r)
             nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
         _see_leaves(tree, prepared, lanes, leaves)
         entered, leaves = leaves, 0

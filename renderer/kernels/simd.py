@@ -28,10 +28,11 @@ class Vector(types.Type):
 
 F32X8 = Vector("f32", 8)
 F64X4 = Vector("f64", 4)
+I64X8 = Vector("i64", 8)
 MASK8 = Vector("mask", 8)
 MASK4 = Vector("mask", 4)
 
-_ELEMENT = {"f32": ir.FloatType(), "f64": ir.DoubleType(), "mask": ir.IntType(1)}
+_ELEMENT = {"f32": ir.FloatType(), "f64": ir.DoubleType(), "i64": ir.IntType(64), "mask": ir.IntType(1)}
 _MASK_OF = {8: MASK8, 4: MASK4}
 
 
@@ -443,3 +444,45 @@ def bits_float(typingctx, bits):
         return builder.bitcast(builder.trunc(args[0], ir.IntType(32)), ir.FloatType())
 
     return types.float32(types.int64), codegen
+
+
+@intrinsic
+def above(typingctx, high, low, index):
+    """Eight int64: the bits of eight float32 above as many int32, which a ``pointer`` has from ``index`` on."""
+
+    def codegen(context, builder, sig, args):
+        word, wide = ir.VectorType(ir.IntType(32), 8), _llvm(I64X8)
+        lower = _load(builder, _pointer(context, builder, sig.args[1], args[1], args[2], word), sig.args[1])
+        upper = builder.shl(builder.zext(builder.bitcast(args[0], word), wide), ir.Constant(wide, [32] * 8))
+        return builder.or_(upper, builder.zext(lower, wide))
+
+    return I64X8(high, low, types.intp), codegen
+
+
+# The comparisons of a network that sorts eight values: those of a row are made at once (Knuth 3, 5.3.4: 19 in all, and
+# no network has fewer rows).
+_NETWORK = (
+    ((0, 2), (1, 3), (4, 6), (5, 7)), ((0, 4), (1, 5), (2, 6), (3, 7)), ((0, 1), (2, 3), (4, 5), (6, 7)),
+    ((2, 4), (3, 5)), ((1, 4), (3, 6)), ((1, 2), (3, 4), (5, 6)),
+)  # fmt: skip
+
+
+@intrinsic
+def greatest_first(typingctx, mask, vector):
+    """The lanes of eight int64 that the mask sets, in falling order; then the least int64 in place of the others."""
+
+    def codegen(context, builder, sig, args):
+        lanes = ir.VectorType(ir.IntType(32), 8)
+        found = builder.select(args[0], args[1], ir.Constant(_llvm(I64X8), [-(1 << 63)] * 8))
+        for row in _NETWORK:
+            partner = list(range(8))
+            for a, b in row:
+                partner[a], partner[b] = b, a
+            other = builder.shuffle_vector(found, found, ir.Constant(lanes, partner))
+            larger_first = builder.icmp_signed(">", found, other)
+            high, low = builder.select(larger_first, found, other), builder.select(larger_first, other, found)
+            chosen = [i if partner[i] >= i else 8 + i for i in range(8)]
+            found = builder.shuffle_vector(high, low, ir.Constant(lanes, chosen))
+        return found
+
+    return vector(mask, vector), codegen

@@ -156,7 +156,7 @@ def make_slabs(ray, largest):
 
 @inlined
 def enter_boxes(nodes, node, slabs, lower, upper):
-    """Entry distances (8 x float32), and the bits of the octants that the ray meets within [lower, upper].
+    """Entry distances (8 x float32), and the mask of the octants that the ray meets within [lower, upper].
 
     A distance is NaN where the direction is 0 and the origin lies in a slab's plane. Each comparison is false for NaN,
     so the interval stays as it was.
@@ -174,7 +174,7 @@ def enter_boxes(nodes, node, slabs, lower, upper):
     t1 = select(f < t1, f, t1)
     f = _distances(nodes, base + slabs.far_z, slabs.far_origin_z, slabs.far_inverse_z)
     t1 = select(f < t1, f, t1)
-    return t0, movemask(t0 <= t1 * splat8(FAR_PADDING))
+    return t0, t0 <= t1 * splat8(FAR_PADDING)
 
 
 @inlined

@@ -9,19 +9,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.jit import inlined
 from renderer.kernels.simd import (
+    above,
     at,
     bits_float,
     count_bits,
-    float_bits,
     get,
-    larger,
+    greatest_first,
     lowest_bit,
     movemask,
     prefetch,
     put,
-    smaller,
     splat4,
     splat8,
     store,
@@ -36,28 +35,6 @@ _LOW_WORD = 0xFFFFFFFF
 END = -(1 << 31)
 _BOTTOM = (-0x800000 << 32) | (END & _LOW_WORD)
 _LINE = CACHE_LINE // 4
-
-
-@inlined
-def _entry(tree, base, place, t0):
-    """The entry of an octant on the stack: the bits of its float32 distance above its child."""
-    return (float_bits(get(t0, place)) << 32) | (np.int64(get(tree.links, base + place)) & _LOW_WORD)
-
-
-@kernel
-def _push_octants(tree, base, t0, bits, stack, top, any_hit):
-    """Push the octants in ``bits`` of the node whose children begin at ``base``: nearest last, unless ``any_hit``."""
-    bottom = top
-    while bits != 0:
-        entry = _entry(tree, base, lowest_bit(bits), t0)
-        bits &= bits - 1
-        at = top
-        while not any_hit and at > bottom and get(stack, at - 1) < entry:
-            put(stack, at, get(stack, at - 1))
-            at -= 1
-        put(stack, at, entry)
-        top += 1
-    return top
 
 
 @inlined
@@ -131,36 +108,18 @@ def resume(tree, rays, lanes, r):
 
 @inlined
 def meet_nodes(tree, rays, lanes, count):
-    """Compute which octants of its node each of ``count`` rays meets."""
+    """Push the octants of its node that each of ``count`` rays meets onto its stack, the nearest last.
+
+    It takes no branch: all eight are sorted and written, and the top moves by those that are met.
+    """
     for k in range(count):
         r = get(lanes.at_node, k)
+        node, top = get(lanes.child, r), get(lanes.top, r)
         lower, upper = splat8(get(rays.floats, LOWER + r)), splat8(get(rays.floats, LIMIT + r))
-        t0, bits = enter_boxes(tree.nodes, get(lanes.child, r), slabs_of(rays, r), lower, upper)
-        store(lanes.distances, 8 * r, t0)
-        put(lanes.bits, r, bits)
-
-
-@inlined
-def leave_node(tree, rays, lanes, r, any_hit):
-    """Choose the next child of ray ``r`` at a node: the nearest octant that it meets, else one off its stack.
-
-    Returns that child. The other octants are pushed. Up to two octants, the usual case, take no branch; octant 7 stands
-    in for those that are not met.
-    """
-    base, bits, top = get(lanes.child, r) * NODE_WORDS + CHILDREN, get(lanes.bits, r), get(lanes.top, r)
-    t0, stack = at(lanes.distances, 8 * r), at(lanes.stacks, r * lanes.stack_size)
-    others = bits & (bits - 1)
-    if others & (others - 1) != 0:
-        top = _push_octants(tree, base, t0, bits, stack, top, any_hit) - 1
-        entry = get(stack, top)
-    else:
-        a, b = _entry(tree, base, lowest_bit(bits | 128), t0), _entry(tree, base, lowest_bit(others | 128), t0)
-        waiting = get(stack, top - 1)
-        put(stack, top, larger(a, b))
-        nearest = smaller(a, b) if others != 0 else a
-        entry = nearest if bits != 0 else waiting
-        top += count_bits(bits) - 1
-    return _go_on(tree, rays, lanes, r, stack, entry, top)
+        t0, meets = enter_boxes(tree.nodes, node, slabs_of(rays, r), lower, upper)
+        octants = above(t0, tree.links, node * NODE_WORDS + CHILDREN)
+        store(lanes.stacks, r * lanes.stack_size + top, greatest_first(meets, octants))
+        put(lanes.top, r, top + count_bits(movemask(meets)))
 
 
 @inlined

@@ -21,7 +21,6 @@ from renderer.trace.stream import (
     Lanes,
     begin_ray,
     leave_leaf,
-    leave_node,
     list_lane,
     make_lanes,
     meet_leaves,
@@ -148,7 +147,7 @@ def _run_lanes(tree, rays, found, scratch, lists, waiting, any_hit):
         entered, nodes = nodes, 0
         for k in range(entered):
             r = get(lanes.at_node, k)
-            child = leave_node(tree, prepared, lanes, r, any_hit)
+            child = resume(tree, prepared, lanes, r)
             nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
         # Take the lanes at leaves one block on.
         meet_leaves(tree, prepared, lanes, leaves)
