@@ -66,6 +66,17 @@ def round_down(x):
 
 
 @inlined
+def round_both(x):
+    """A float32 <= x and one >= x, each within three ulp of it or infinite, but never on the wrong side.
+
+    The least float32 is never above +inf nor the greatest below -inf, so no difference with either is NaN.
+    """
+    y = larger(-LARGEST_FLOAT, smaller(LARGEST_FLOAT, np.float32(x)))
+    step = np.float32(abs(y) * _STEP + _TINY)
+    return np.float32(y - step), np.float32(y + step)
+
+
+@inlined
 def face_range(a, b, c):
     """The interval of a face's box on one axis, from its corners' coordinates: float32, rounded outwards.
 
@@ -137,7 +148,7 @@ def make_slab(axis, o, d, largest):
     inverse = np.float32(largest / d)
     back = np.signbit(d)
     flip = 8 if back else 0
-    down, up = round_down(o), round_up(o)
+    down, up = round_both(o)
     near_inverse = smaller(larger(inverse, -LARGEST_FLOAT), LARGEST_FLOAT)
     near_origin, far_origin = (down if back else up), (up if back else down)
     return 16 * axis + flip, 16 * axis + 8 - flip, near_origin, far_origin, near_inverse, inverse
