@@ -328,13 +328,18 @@ def select(typingctx, mask, chosen, other):
     return chosen(mask, chosen, other), codegen
 
 
+def _call(builder: Any, name: str, vector: Vector, value: Any) -> Any:
+    """Call one of LLVM's own functions of a vector."""
+    kind, name = value.type, f"llvm.{name}.v{vector.lanes}{vector.scalar}"
+    return builder.call(cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name), [value])
+
+
 @intrinsic
 def magnitude(typingctx, vector):
     """Absolute values, lane by lane."""
 
     def codegen(context, builder, sig, args):
-        negative = builder.fcmp_ordered("<", args[0], ir.Constant(_llvm(sig.args[0]), None))
-        return builder.select(negative, builder.fneg(args[0]), args[0])
+        return _call(builder, "fabs", sig.args[0], args[0])
 
     return vector(vector), codegen
 
@@ -344,10 +349,7 @@ def square_root(typingctx, vector):
     """Square roots, lane by lane, rounded as IEEE 754 has it; NaN of what is below 0."""
 
     def codegen(context, builder, sig, args):
-        kind, lanes = args[0].type, sig.args[0]
-        name = f"llvm.sqrt.v{lanes.lanes}{lanes.scalar}"
-        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
-        return builder.call(function, [args[0]])
+        return _call(builder, "sqrt", sig.args[0], args[0])
 
     return vector(vector), codegen
 
