@@ -8,32 +8,35 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, movemask, put, smaller
+from renderer.kernels.simd import at, get, movemask, put
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS, LEAF_BITS
-from renderer.trace.ray_lanes import WIDTH, shear_of
+from renderer.trace.ray_lanes import shear_of
 from renderer.trace.stream import leave_leaf, list_lane, meet_nodes, resume
-from renderer.trace.traverse import load_lane
+from renderer.trace.traverse import begin_lanes, load_lane
 
 # Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
 # meshes meet. A ray that meets more is searched for alone.
 TOGETHER, LISTED = 256, 32
-CANDIDATE_WORDS = TOGETHER * (LISTED + 1)
+CANDIDATE_WORDS = TOGETHER * (LISTED + 2)
 # The rounds of sixteen rays after which no further ray begins: some milliseconds, several times what most meshes take.
 _ROUNDS = 1 << 13
 
 
 class Candidates(NamedTuple):
-    """Pointers to int64: LISTED blocks for each ray, and how many were met, which may be more."""
+    """Pointers to int64: LISTED blocks for each ray; how many were met, which may be more; and the rays' numbers, with
+    room for WIDTH more.
+    """
 
     blocks: Any
     counts: Any
+    numbers: Any
 
 
 @inlined
 def make_candidates(words):
-    """``Candidates`` in memory for CANDIDATE_WORDS int64."""
-    return Candidates(words, at(words, TOGETHER * LISTED))
+    """``Candidates`` in memory for CANDIDATE_WORDS + WIDTH int64."""
+    return Candidates(words, at(words, TOGETHER * LISTED), at(words, TOGETHER * (LISTED + 1)))
 
 
 @kernel
@@ -43,13 +46,12 @@ def find_blocks(tree, rays, begin, end, scratch, found):
     Returns the ray before which it ended, ``end`` unless there was much to do, and the number of rounds.
     """
     prepared, lanes, rounds = scratch.prepared, scratch.lanes, np.int64(0)
-    for k in range(end - begin):
+    count = end - begin
+    for k in range(count):
         put(found.counts, k, 0)
-    nodes, leaves, ends = smaller(end - begin, WIDTH), 0, 0
-    following = begin + nodes
-    for r in range(nodes):
-        load_lane(rays, scratch, r, begin + r)
-        put(lanes.at_node, r, r)
+        put(found.numbers, k, begin + k)
+    nodes, leaves, ends = begin_lanes(rays, scratch, found.numbers, 0, count), 0, 0
+    following = nodes
     while nodes + leaves + ends > 0:
         rounds += 1
         meet_nodes(tree, prepared, lanes, nodes)
@@ -67,13 +69,13 @@ def find_blocks(tree, rays, begin, end, scratch, found):
             child = leave_leaf(tree, prepared, lanes, r)
             nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
         for k in range(ends):
-            if following < end and rounds <= _ROUNDS:
+            if following < count and rounds <= _ROUNDS:
                 r = get(lanes.at_end, k)
-                load_lane(rays, scratch, r, following)
+                load_lane(rays, scratch, r, found.numbers, following)
                 put(lanes.at_node, nodes, r)
                 following, nodes = following + 1, nodes + 1
         ends = 0
-    return following, rounds
+    return begin + following, rounds
 
 
 @inlined

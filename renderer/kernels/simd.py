@@ -28,11 +28,13 @@ class Vector(types.Type):
 
 F32X8 = Vector("f32", 8)
 F64X4 = Vector("f64", 4)
+F64X8 = Vector("f64", 8)
 I64X8 = Vector("i64", 8)
 MASK8 = Vector("mask", 8)
 MASK4 = Vector("mask", 4)
 
 _ELEMENT = {"f32": ir.FloatType(), "f64": ir.DoubleType(), "i64": ir.IntType(64), "mask": ir.IntType(1)}
+_NUMBER = {"f32": types.float32, "f64": types.float64}
 _MASK_OF = {8: MASK8, 4: MASK4}
 
 
@@ -46,32 +48,46 @@ class _VectorModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, _llvm(fe_type))
 
 
-def _binary(op: Any, emit: Any) -> None:
-    """Give ``op`` a meaning for two equal float vectors."""
+def _numbers(args: Any) -> Any:
+    """The vector that two operands have in common: equal float vectors, or one and a number for all lanes."""
+    for vector in args:
+        if isinstance(vector, Vector) and vector.scalar in _NUMBER:
+            fits = all(other in (vector, _NUMBER[vector.scalar]) for other in map(types.unliteral, args))
+            return vector if fits and len(args) == 2 else None
+    return None
+
+
+def _spread(builder: Any, vector: Vector, value: Any) -> Any:
+    """A vector as it is; a number in all lanes."""
+    if isinstance(value.type, ir.VectorType):
+        return value
+    one = builder.insert_element(ir.Constant(_llvm(vector), ir.Undefined), value, ir.IntType(32)(0))
+    order = ir.Constant(ir.VectorType(ir.IntType(32), vector.lanes), [0] * vector.lanes)
+    return builder.shuffle_vector(one, one, order)
+
+
+def _operator(op: Any, answer: Any, emit: Any) -> None:
+    """Give ``op`` a meaning for float vectors, and for one and a number; ``answer`` is the type of its result."""
 
     @infer_global(op)
     class _Typing(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            if len(args) == 2 and isinstance(args[0], Vector) and args[0] == args[1] and args[0].scalar != "mask":
-                return signature(args[0], *args)
-            return None
+            vector = _numbers(args)
+            return signature(answer(vector), *map(types.unliteral, args)) if vector is not None else None
 
-    @lower_builtin(op, Vector, Vector)
-    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return emit(builder, args[0], args[1])
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return emit(builder, *(_spread(builder, _numbers(sig.args), value) for value in args))
+
+    for kinds in ((Vector, Vector), (Vector, types.Float), (types.Float, Vector)):
+        lower_builtin(op, *kinds)(lower)
+
+
+def _binary(op: Any, emit: Any) -> None:
+    _operator(op, lambda vector: vector, emit)
 
 
 def _comparison(op: Any, predicate: str) -> None:
-    @infer_global(op)
-    class _Typing(AbstractTemplate):
-        def generic(self, args: Any, kws: Any) -> Any:
-            if len(args) == 2 and isinstance(args[0], Vector) and args[0] == args[1] and args[0].scalar != "mask":
-                return signature(_MASK_OF[args[0].lanes], *args)
-            return None
-
-    @lower_builtin(op, Vector, Vector)
-    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.fcmp_ordered(predicate, args[0], args[1])
+    _operator(op, lambda vector: _MASK_OF[vector.lanes], lambda b, x, y: b.fcmp_ordered(predicate, x, y))
 
 
 def _logic(op: Any, emit: Any) -> None:
@@ -149,28 +165,30 @@ int64_pointer = _pointer_to(types.int64)
 bool_pointer = _pointer_to(types.boolean)
 
 
-def _extreme(predicate: str) -> Any:
-    """The second of two numbers of one type where ``predicate`` puts it before the first, else the first."""
+def _extreme(a: Any, b: Any, predicate: str) -> Any:
+    """The second of two values where ``predicate`` puts it before the first, else the first."""
+    vector = _numbers((a, b))
+    number = types.unliteral(a)
 
     def codegen(context, builder, sig, args):
-        compare = builder.fcmp_ordered if isinstance(sig.return_type, types.Float) else builder.icmp_signed
+        if vector is not None:
+            args = [_spread(builder, vector, value) for value in args]
+        compare = builder.icmp_signed if isinstance(number, types.Integer) else builder.fcmp_ordered
         return builder.select(compare(predicate, args[1], args[0]), args[1], args[0])
 
-    return codegen
+    return (number(number, number) if vector is None else vector(number, types.unliteral(b))), codegen
 
 
 @intrinsic
 def larger(typingctx, a, b):
-    """``max(a, b)`` of two numbers of one type; a where either is NaN. Numba's own takes longer to compile."""
-    number = types.unliteral(a)
-    return number(number, number), _extreme(">")
+    """``max(a, b)`` of two numbers of one type, or of float vectors; a where either is NaN."""
+    return _extreme(a, b, ">")
 
 
 @intrinsic
 def smaller(typingctx, a, b):
-    """``min(a, b)`` of two numbers of one type; a where either is NaN."""
-    number = types.unliteral(a)
-    return number(number, number), _extreme("<")
+    """``min(a, b)`` of two numbers of one type, or of float vectors; a where either is NaN."""
+    return _extreme(a, b, "<")
 
 
 # Words of ``local_words``: what a frame may take without asking the system, which on Windows is less than 4,096 bytes.
@@ -245,15 +263,15 @@ def prefetch(typingctx, base, index):
     return types.void(base, types.intp), codegen
 
 
+def _put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    context.pack_value(builder, sig.args[0].dtype, args[2], builder.gep(args[0], [args[1]]))
+    return context.get_dummy_value()
+
+
 @intrinsic
 def put(typingctx, base, index, value):
     """Write the element at ``index`` of a ``pointer``."""
-
-    def codegen(context, builder, sig, args):
-        context.pack_value(builder, sig.args[0].dtype, args[2], builder.gep(args[0], [args[1]]))
-        return context.get_dummy_value()
-
-    return types.void(base, types.intp, base.dtype), codegen
+    return types.void(base, types.intp, base.dtype), _put
 
 
 def _load(builder: Any, pointer: Any, array_type: Any) -> Any:
@@ -286,8 +304,67 @@ def load4(typingctx, array, index):
 
 
 @intrinsic
+def gather8(typingctx, base, rows, step, column):
+    """Eight float64, ``base[row * step + column]`` of the eight numbers of rows at ``rows``."""
+
+    def codegen(context, builder, sig, args):
+        base, rows, step, column = args
+        found, word = ir.Constant(_llvm(F64X8), ir.Undefined), ir.IntType(64)
+        for lane in range(8):
+            row = builder.load(builder.gep(rows, [word(lane)]))
+            value = builder.load(builder.gep(base, [builder.add(builder.mul(row, step), column)]))
+            found = builder.insert_element(found, value, ir.IntType(32)(lane))
+        return found
+
+    return F64X8(base, rows, types.int64, types.int64), codegen
+
+
+@intrinsic
+def narrow(typingctx, number):
+    """A float64, or eight, rounded to float32."""
+    single, many = types.float32(types.float64), F32X8(F64X8)
+    return (many if isinstance(number, Vector) else single), lambda context, builder, sig, args: builder.fptrunc(
+        args[0], context.get_value_type(sig.return_type)
+    )
+
+
+@intrinsic
+def widen(typingctx, number):
+    """A float32, or eight, as float64."""
+    single, many = types.float64(types.float32), F64X8(F32X8)
+    return (many if isinstance(number, Vector) else single), lambda context, builder, sig, args: builder.fpext(
+        args[0], context.get_value_type(sig.return_type)
+    )
+
+
+@intrinsic
+def is_negative(typingctx, number):
+    """Whether the sign bit of a float64 is set, or that of each of eight."""
+
+    def codegen(context, builder, sig, args):
+        word = ir.VectorType(ir.IntType(64), 8) if isinstance(number, Vector) else ir.IntType(64)
+        return builder.icmp_signed("<", builder.bitcast(args[0], word), ir.Constant(word, None))
+
+    return (MASK8 if isinstance(number, Vector) else types.boolean)(types.unliteral(number)), codegen
+
+
+@intrinsic
+def alike(typingctx, number, other):
+    """A number, or where ``other`` is a vector of eight, eight of it."""
+    number = types.unliteral(number)
+    kind = _lanes_of(MASK8, number) if isinstance(other, Vector) else number
+
+    def codegen(context, builder, sig, args):
+        return _spread(builder, kind, args[0]) if kind != number else args[0]
+
+    return kind(number, other), codegen
+
+
+@intrinsic
 def store(typingctx, array, index, vector):
-    """Write a vector's lanes to ``array[index:index + lanes]``; the element types must agree."""
+    """Write a vector's lanes to ``array[index:index + lanes]``, or a number to one place; the types must agree."""
+    if not isinstance(vector, Vector):
+        return types.void(array, types.intp, array.dtype), _put
 
     def codegen(context, builder, sig, args):
         pointer = _pointer(context, builder, sig.args[0], args[0], args[1], _llvm(sig.args[2]))
@@ -298,12 +375,7 @@ def store(typingctx, array, index, vector):
 
 
 def _splat(vector: Vector) -> Any:
-    def codegen(context, builder, sig, args):
-        one = builder.insert_element(ir.Constant(_llvm(vector), ir.Undefined), args[0], ir.IntType(32)(0))
-        order = ir.Constant(ir.VectorType(ir.IntType(32), vector.lanes), [0] * vector.lanes)
-        return builder.shuffle_vector(one, one, order)
-
-    return codegen
+    return lambda context, builder, sig, args: _spread(builder, vector, args[0])
 
 
 @intrinsic
@@ -318,25 +390,36 @@ def splat4(typingctx, value):
     return F64X4(types.float64), _splat(F64X4)
 
 
+def _lanes_of(mask: Any, number: Any) -> Any:
+    """The type that a number or vector has beside a mask, which may be a bool."""
+    number = types.unliteral(number)
+    if not isinstance(mask, Vector) or isinstance(number, Vector):
+        return number
+    return {types.float32: F32X8, types.float64: F64X8, types.int64: I64X8}[number]
+
+
 @intrinsic
 def select(typingctx, mask, chosen, other):
-    """Lane by lane: ``chosen`` where the mask is set, else ``other``."""
+    """Lane by lane: ``chosen`` where the mask is set, else ``other``; numbers stand for all lanes. No branch."""
+    kind = _lanes_of(mask, chosen)
 
     def codegen(context, builder, sig, args):
-        return builder.select(args[0], args[1], args[2])
+        both = [_spread(builder, kind, value) if isinstance(mask, Vector) else value for value in args[1:]]
+        return builder.select(args[0], *both)
 
-    return chosen(mask, chosen, other), codegen
+    return kind(mask, types.unliteral(chosen), types.unliteral(other)), codegen
 
 
 def _call(builder: Any, name: str, vector: Vector, value: Any) -> Any:
-    """Call one of LLVM's own functions of a vector."""
-    kind, name = value.type, f"llvm.{name}.v{vector.lanes}{vector.scalar}"
+    """Call one of LLVM's own functions of a vector or number."""
+    suffix = f"v{vector.lanes}{vector.scalar}" if isinstance(vector, Vector) else f"f{vector.bitwidth}"
+    kind, name = value.type, f"llvm.{name}.{suffix}"
     return builder.call(cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name), [value])
 
 
 @intrinsic
 def magnitude(typingctx, vector):
-    """Absolute values, lane by lane."""
+    """The absolute value of a number, or of each lane."""
 
     def codegen(context, builder, sig, args):
         return _call(builder, "fabs", sig.args[0], args[0])

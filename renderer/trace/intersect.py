@@ -8,7 +8,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined
-from renderer.kernels.simd import larger, load4, load8, magnitude, movemask, select, smaller, splat4, splat8
+from renderer.kernels.simd import (
+    is_negative,
+    larger,
+    load4,
+    load8,
+    magnitude,
+    movemask,
+    narrow,
+    select,
+    smaller,
+    splat4,
+    splat8,
+    widen,
+)
 from renderer.trace.layout import NODE_WORDS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
@@ -49,9 +62,8 @@ def round_up(x):
     Of NaN it is the least float32.
     """
     # No branch, here and below: whether a random ray takes it cannot be predicted.
-    y = larger(-LARGEST_FLOAT, np.float32(x))
-    step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) < x else np.float32(0.0)
-    return np.float32(y + step)
+    y = larger(-LARGEST_FLOAT, narrow(x))
+    return y + select(widen(y) < x, magnitude(y) * _STEP + _TINY, np.float32(0.0))
 
 
 @inlined
@@ -60,9 +72,8 @@ def round_down(x):
 
     Of NaN it is the largest float32.
     """
-    y = smaller(LARGEST_FLOAT, np.float32(x))
-    step = np.float32(abs(y) * _STEP + _TINY) if np.float64(y) > x else np.float32(0.0)
-    return np.float32(y - step)
+    y = smaller(LARGEST_FLOAT, narrow(x))
+    return y - select(widen(y) > x, magnitude(y) * _STEP + _TINY, np.float32(0.0))
 
 
 @inlined
@@ -71,9 +82,9 @@ def round_both(x):
 
     The least float32 is never above +inf nor the greatest below -inf, so no difference with either is NaN.
     """
-    y = larger(-LARGEST_FLOAT, smaller(LARGEST_FLOAT, np.float32(x)))
-    step = np.float32(abs(y) * _STEP + _TINY)
-    return np.float32(y - step), np.float32(y + step)
+    y = larger(-LARGEST_FLOAT, smaller(LARGEST_FLOAT, narrow(x)))
+    step = magnitude(y) * _STEP + _TINY
+    return y - step, y + step
 
 
 @inlined
@@ -95,21 +106,21 @@ def box_limit(t, largest):
 
 
 class Ray(NamedTuple):
-    """One ray as it came: origin, direction, and the least t that counts."""
+    """One ray as it came, or eight as vectors: origin, direction, and the least t that counts."""
 
-    ox: float
-    oy: float
-    oz: float
-    dx: float
-    dy: float
-    dz: float
-    t_min: float
+    ox: Any
+    oy: Any
+    oz: Any
+    dx: Any
+    dy: Any
+    dz: Any
+    t_min: Any
 
 
 @inlined
 def largest_of(ray):
     """The largest component of a ray's direction, without its sign."""
-    return larger(larger(abs(ray.dx), abs(ray.dy)), abs(ray.dz))
+    return larger(larger(magnitude(ray.dx), magnitude(ray.dy)), magnitude(ray.dz))
 
 
 class Slabs(NamedTuple):
@@ -145,13 +156,14 @@ def make_slab(axis, o, d, largest):
     The sign bit chooses the rows, so -0.0 is a direction like any other. The near reciprocal is finite and never above
     the true one. The far one may be infinite; times a difference of 0 it makes NaN, which ``enter_boxes`` ignores.
     """
-    inverse = np.float32(largest / d)
-    back = np.signbit(d)
-    flip = 8 if back else 0
+    inverse, back = narrow(largest / d), is_negative(d)
     down, up = round_both(o)
     near_inverse = smaller(larger(inverse, -LARGEST_FLOAT), LARGEST_FLOAT)
-    near_origin, far_origin = (down if back else up), (up if back else down)
-    return 16 * axis + flip, 16 * axis + 8 - flip, near_origin, far_origin, near_inverse, inverse
+    low, high = np.int64(16 * axis), np.int64(16 * axis + 8)
+    return (
+        select(back, high, low), select(back, low, high), select(back, down, up), select(back, up, down),
+        near_inverse, inverse,
+    )  # fmt: skip
 
 
 @inlined
@@ -217,7 +229,7 @@ class Shear(NamedTuple):
 def make_shear(ray):
     """Turn the axes so that z is the largest component of the direction, then shear the direction onto it."""
     axis = longest_axis(ray)
-    row_x, row_y, row_z = turned(axis, 0, 4, 8)
+    row_x, row_y, row_z = turned(axis, np.int64(0), np.int64(4), np.int64(8))
     ox, oy, oz = turned(axis, ray.ox, ray.oy, ray.oz)
     dx, dy, dz = turned(axis, ray.dx, ray.dy, ray.dz)
     return Shear(row_x, row_y, row_z, ox, oy, oz, dx / dz, dy / dz, dz)
@@ -225,10 +237,9 @@ def make_shear(ray):
 
 @inlined
 def longest_axis(ray):
-    """Two bools: the largest component of the direction is z; it is y. Neither means x."""
-    ax, ay, az = abs(ray.dx), abs(ray.dy), abs(ray.dz)
-    on_z = az >= ax and az >= ay
-    return on_z, not on_z and ay >= ax
+    """Two bools: the largest component of the direction is z; else it is y. Neither means x."""
+    ax, ay, az = magnitude(ray.dx), magnitude(ray.dy), magnitude(ray.dz)
+    return (az >= ax) & (az >= ay), ay >= ax
 
 
 @inlined
@@ -240,7 +251,7 @@ def turned(axis, x, y, z):
 
 @inlined
 def _chosen(on_z, on_y, if_x, if_y, if_z):
-    return if_z if on_z else (if_y if on_y else if_x)
+    return select(on_z, if_z, select(on_y, if_y, if_x))
 
 
 class Edges(NamedTuple):

@@ -5,10 +5,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined
-from renderer.kernels.simd import get, put
+from renderer.kernels.simd import alike, at, get, narrow, put, select, store
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import LEAF_BITS, MAX_LEAF_BLOCKS
 from renderer.trace.leaf import NO_FACE, nearest_in_blocks
+from renderer.trace.rays import eight_rays_at
 
 WIDTH = 16
 
@@ -18,10 +19,10 @@ WIDTH = 16
 NEAR_ORIGIN, FAR_ORIGIN, NEAR_INVERSE, FAR_INVERSE = 0, 3 * WIDTH, 6 * WIDTH, 9 * WIDTH
 LOWER, LIMIT, SLOPE_U, SLOPE_V = 12 * WIDTH, 13 * WIDTH, 14 * WIDTH, 15 * WIDTH
 FLOATS = 16 * WIDTH
-# Rows of float64: origin, shear and direction of ``Shear``; t_min, and the t of the best hit, at first t_max; that
-# hit's barycentric numerators and their denominator; and the largest component of the direction.
+# Rows of float64: origin, shear and direction of ``Shear``; t_min, and the t of the best hit, at first t_max; the
+# largest component of the direction; and that hit's barycentric numerators and their denominator.
 ORIGIN, SHEAR, DIRECTION_Z, T_MIN, T = 0, 3 * WIDTH, 5 * WIDTH, 6 * WIDTH, 7 * WIDTH
-U, V, W, LARGEST = 8 * WIDTH, 9 * WIDTH, 10 * WIDTH, 11 * WIDTH
+LARGEST, U, V, W = 8 * WIDTH, 9 * WIDTH, 10 * WIDTH, 11 * WIDTH
 DOUBLES = 12 * WIDTH
 # Rows of int64: the near rows of a node and the rows of a block, three axes each, and the best hit's face.
 NEAR_ROW, BLOCK_ROW, FACE = 0, 3 * WIDTH, 6 * WIDTH
@@ -38,7 +39,7 @@ class Prepared(NamedTuple):
 
 @inlined
 def prepare_ray(rays, r, ray, t_max):
-    """Write ``ray``, which has met nothing yet, to place ``r``."""
+    """Write ``ray``, which has met nothing yet, to place ``r``; or eight rays, vectors, to the places from ``r`` on."""
     floats, doubles, integers = rays
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
@@ -46,28 +47,48 @@ def prepare_ray(rays, r, ray, t_max):
     _put_axes(floats, FAR_ORIGIN + r, slabs.far_origin_x, slabs.far_origin_y, slabs.far_origin_z)
     _put_axes(floats, NEAR_INVERSE + r, slabs.near_inverse_x, slabs.near_inverse_y, slabs.near_inverse_z)
     _put_axes(floats, FAR_INVERSE + r, slabs.far_inverse_x, slabs.far_inverse_y, slabs.far_inverse_z)
-    put(floats, LOWER + r, round_down(ray.t_min * largest))
-    put(floats, LIMIT + r, box_limit(t_max, largest))
+    store(floats, LOWER + r, round_down(ray.t_min * largest))
+    store(floats, LIMIT + r, box_limit(t_max, largest))
     # The shear divides by a component that may be negative, the slopes divide by its absolute value.
-    sign = 1.0 if shear.direction_z > 0.0 else -1.0
-    put(floats, SLOPE_U + r, np.float32(shear.shear_x * sign))
-    put(floats, SLOPE_V + r, np.float32(shear.shear_y * sign))
+    sign = select(shear.direction_z > 0.0, 1.0, -1.0)
+    store(floats, SLOPE_U + r, narrow(shear.shear_x * sign))
+    store(floats, SLOPE_V + r, narrow(shear.shear_y * sign))
     _put_axes(doubles, ORIGIN + r, shear.origin_x, shear.origin_y, shear.origin_z)
-    put(doubles, SHEAR + r, shear.shear_x)
-    put(doubles, SHEAR + WIDTH + r, shear.shear_y)
-    put(doubles, DIRECTION_Z + r, shear.direction_z)
-    put(doubles, T_MIN + r, ray.t_min)
-    put(doubles, LARGEST + r, largest)
+    store(doubles, SHEAR + r, shear.shear_x)
+    store(doubles, SHEAR + WIDTH + r, shear.shear_y)
+    store(doubles, DIRECTION_Z + r, shear.direction_z)
+    store(doubles, T_MIN + r, ray.t_min)
+    store(doubles, LARGEST + r, largest)
     _put_axes(integers, NEAR_ROW + r, slabs.near_x, slabs.near_y, slabs.near_z)
     _put_axes(integers, BLOCK_ROW + r, shear.row_x, shear.row_y, shear.row_z)
-    put_best(rays, r, (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0))
+    store(doubles, T + r, t_max)
+    store(integers, FACE + r, alike(np.int64(NO_FACE), t_max))
+
+
+@inlined
+def prepare_sixteen(rays, lanes, numbers):
+    """Write the sixteen rays whose numbers stand at ``numbers``."""
+    for half in range(0, WIDTH, 8):
+        ray, t_max = eight_rays_at(rays, at(numbers, half))
+        prepare_ray(lanes, half, ray, t_max)
+
+
+@inlined
+def copy_ray(source, column, lanes, r):
+    """Copy a prepared ray that has met nothing yet to place ``r``, but for its slopes, which only packets read."""
+    for row in range(0, SLOPE_U, WIDTH):
+        put(lanes.floats, row + r, get(source.floats, row + column))
+    for row in range(0, U, WIDTH):
+        put(lanes.doubles, row + r, get(source.doubles, row + column))
+    for row in range(0, INTEGERS, WIDTH):
+        put(lanes.integers, row + r, get(source.integers, row + column))
 
 
 @inlined
 def _put_axes(base, first, x, y, z):
-    put(base, first, x)
-    put(base, first + WIDTH, y)
-    put(base, first + 2 * WIDTH, z)
+    store(base, first, x)
+    store(base, first + WIDTH, y)
+    store(base, first + 2 * WIDTH, z)
 
 
 @inlined

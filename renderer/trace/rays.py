@@ -10,11 +10,13 @@ from renderer.kernels.simd import (
     at,
     bool_pointer,
     float64_pointer,
+    gather8,
     get,
     int64_pointer,
     larger,
     pointer,
     put,
+    select,
     smaller,
 )
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
@@ -98,13 +100,31 @@ def first_bad_ray(rays, begin, end):
 @inlined
 def ray_at(rays, i):
     """Ray ``i`` in the tree's units, and its t_max."""
-    o, d, s = at(rays.origins, i * rays.origin_step), at(rays.directions, i * rays.direction_step), rays.scale
-    least = get(rays.t_min, i * rays.min_step)
+    o, d = at(rays.origins, i * rays.origin_step), at(rays.directions, i * rays.direction_step)
+    origin, direction = (get(o, 0), get(o, 1), get(o, 2)), (get(d, 0), get(d, 1), get(d, 2))
+    return _scaled(
+        origin, direction, get(rays.t_min, i * rays.min_step), get(rays.t_max, i * rays.max_step), rays.scale
+    )
+
+
+@inlined
+def eight_rays_at(rays, numbers):
+    """``ray_at`` of the eight rays whose numbers stand at ``numbers``, as vectors."""
+    o, d, s, z = rays.origins, rays.directions, rays.origin_step, rays.direction_step
+    origin = gather8(o, numbers, s, 0), gather8(o, numbers, s, 1), gather8(o, numbers, s, 2)
+    direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
+    t_min, t_max = gather8(rays.t_min, numbers, rays.min_step, 0), gather8(rays.t_max, numbers, rays.max_step, 0)
+    return _scaled(origin, direction, t_min, t_max, rays.scale)
+
+
+@inlined
+def _scaled(origin, direction, t_min, t_max, scale):
+    """Rays in the tree's units, whose ``scale`` is given, and their t_max."""
     # A t_min above 0 stays above 0 in the tree's units too, so that a hit at the origin is still too near.
-    t_min = larger(s * least, _TINIEST) if least > 0.0 else least
-    ray = Ray(s * get(o, 0), s * get(o, 1), s * get(o, 2), get(d, 0), get(d, 1), get(d, 2), t_min)
+    t_min = select(t_min > 0.0, larger(t_min * scale, _TINIEST), t_min)
+    ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, *direction, t_min)
     # A hit whose t is beyond the largest float64, in either unit, is none.
-    return ray, smaller(s * smaller(get(rays.t_max, i * rays.max_step), _MOST), _MOST)
+    return ray, smaller(smaller(t_max, _MOST) * scale, _MOST)
 
 
 @inlined

@@ -52,8 +52,8 @@ def _prefetch_child(tree, child):
 
 class Lanes(NamedTuple):
     """Sixteen rays under way, as pointers: for each ray its next child, the top of its stack and the stack; the lists
-    of the rays at a node, at a leaf and at END; and the results of a round: the bits of the octants or triangles met,
-    those of the triangles in doubt, the octants' distances, and the triangles' t, u, v, w.
+    of the rays at a node, at a leaf and at END; and the results of a round: the bits of the triangles met, those of the
+    triangles in doubt, and their t, u, v, w.
     """
 
     child: Any
@@ -65,21 +65,19 @@ class Lanes(NamedTuple):
     at_end: Any
     bits: Any
     doubts: Any
-    distances: Any
     hits: Any
 
 
-# The numbers of int64 (without the stacks), float32 and float64 in ``Lanes``.
-LANE_INTEGERS, LANE_FLOATS, LANE_DOUBLES = 7 * WIDTH, 8 * WIDTH, 4 * BLOCK_FACES * WIDTH
+# The numbers of int64 (without the stacks) and float64 in ``Lanes``.
+LANE_INTEGERS, LANE_DOUBLES = 7 * WIDTH, 4 * BLOCK_FACES * WIDTH
 
 
 @inlined
-def make_lanes(integers, floats, doubles, stack_size):
+def make_lanes(integers, doubles, stack_size):
     """Lanes in the given memory; the stacks, ``stack_size`` entries each, follow the LANE_INTEGERS other words."""
     return Lanes(
         integers, at(integers, WIDTH), at(integers, LANE_INTEGERS), stack_size, at(integers, 2 * WIDTH),
-        at(integers, 3 * WIDTH), at(integers, 4 * WIDTH), at(integers, 5 * WIDTH), at(integers, 6 * WIDTH), floats,
-        doubles,
+        at(integers, 3 * WIDTH), at(integers, 4 * WIDTH), at(integers, 5 * WIDTH), at(integers, 6 * WIDTH), doubles,
     )  # fmt: skip
 
 

@@ -10,13 +10,12 @@ from renderer.kernels.simd import at, get, lowest_bit, pointer, put, smaller
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import NO_FACE, search_all_blocks, tree_pointers
 from renderer.trace.packet import child_of, meet_octant, trace_packet
-from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, prepare_ray
+from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, copy_ray, prepare_sixteen
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.singly import search_singly, stack_size
 from renderer.trace.stream import (
     END,
     LANE_DOUBLES,
-    LANE_FLOATS,
     LANE_INTEGERS,
     Lanes,
     begin_ray,
@@ -39,11 +38,13 @@ _WORK = 1 << 15
 
 
 class Scratch(NamedTuple):
-    """Memory of one thread, as pointers: sixteen prepared rays and their lanes; a packet's stack; for each of the rays
-    whether a hit was in doubt, and its number; and the numbers of the rays that wait for a stream.
+    """Memory of one thread, as pointers: sixteen prepared rays and their lanes; sixteen more, ready for lanes that end;
+    a packet's stack; for each of the rays whether a hit was in doubt, and its number; and the numbers of the rays that
+    wait for a stream.
     """
 
     prepared: Prepared
+    ready: Prepared
     lanes: Lanes
     packet_stack: Any
     doubtful: Any
@@ -63,10 +64,10 @@ class Memory(NamedTuple):
 def make_memory(depth: int, rays: int) -> Memory:
     """Memory for ranges of up to ``rays`` rays against a tree of ``depth`` levels."""
     size = stack_size(depth)
-    integers = INTEGERS + 2 * WIDTH + LANE_INTEGERS + (WIDTH + 1) * size + rays
+    integers = 2 * INTEGERS + 2 * WIDTH + LANE_INTEGERS + (WIDTH + 1) * size + rays + WIDTH
     return Memory(
-        cache_aligned(FLOATS + LANE_FLOATS, np.float32),
-        cache_aligned(DOUBLES + LANE_DOUBLES, np.float64),
+        cache_aligned(2 * FLOATS, np.float32),
+        cache_aligned(2 * DOUBLES + LANE_DOUBLES, np.float64),
         cache_aligned(integers, np.int64),
         size,
     )
@@ -76,14 +77,16 @@ def make_memory(depth: int, rays: int) -> Memory:
 def make_scratch(memory):
     """Pointers into a ``Memory``."""
     floats, doubles, integers = pointer(memory.floats), pointer(memory.doubles), pointer(memory.integers)
-    doubtful = at(integers, INTEGERS)
+    prepared = Prepared(floats, doubles, integers)
+    ready = Prepared(at(floats, FLOATS), at(doubles, DOUBLES), at(integers, INTEGERS))
+    doubtful = at(integers, 2 * INTEGERS)
     number = at(doubtful, WIDTH)
     lane_integers = at(number, WIDTH)
     size = memory.stack_size
-    lanes = make_lanes(lane_integers, at(floats, FLOATS), at(doubles, DOUBLES), size)
+    lanes = make_lanes(lane_integers, at(doubles, 2 * DOUBLES), size)
     packet_stack = at(lane_integers, LANE_INTEGERS + WIDTH * size)
     waiting = at(packet_stack, size)
-    return Scratch(Prepared(floats, doubles, integers), lanes, packet_stack, doubtful, number, waiting)
+    return Scratch(prepared, ready, lanes, packet_stack, doubtful, number, waiting)
 
 
 @kernel
@@ -120,13 +123,30 @@ def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
     return steps // WIDTH
 
 
+@kernel
+def begin_lanes(rays, scratch, numbers, following, count):
+    """Let the rays whose numbers stand at ``numbers`` from ``following`` to ``count`` begin, as many as there are
+    lanes. Returns how many. There is room for sixteen numbers more.
+    """
+    for k in range(count, count + WIDTH):
+        put(numbers, k, get(numbers, count - 1))
+    if following % WIDTH != 0:
+        prepare_sixteen(rays, scratch.ready, at(numbers, following - following % WIDTH))
+    lanes = smaller(count - following, WIDTH)
+    for r in range(lanes):
+        load_lane(rays, scratch, r, numbers, following + r)
+        put(scratch.lanes.at_node, r, r)
+    return lanes
+
+
 @inlined
-def load_lane(rays, scratch, r, i):
-    """Let ray ``i`` begin in lane ``r``."""
-    ray, t_max = ray_at(rays, i)
-    prepare_ray(scratch.prepared, r, ray, t_max)
+def load_lane(rays, scratch, r, numbers, k):
+    """Let the ray whose number is the k-th of ``numbers`` begin in lane ``r``. Every sixteenth makes sixteen ready."""
+    if k % WIDTH == 0:
+        prepare_sixteen(rays, scratch.ready, at(numbers, k))
+    copy_ray(scratch.ready, k % WIDTH, scratch.prepared, r)
     begin_ray(scratch.lanes, r)
-    put(scratch.number, r, i)
+    put(scratch.number, r, get(numbers, k))
     put(scratch.doubtful, r, 0)
 
 
@@ -164,7 +184,7 @@ def _run_lanes(tree, rays, found, scratch, lists, waiting, any_hit):
             i, doubtful = get(scratch.number, r), get(scratch.doubtful, r) != 0
             rounds += _finish(tree, rays, found, i, scratch, r, doubtful, any_hit)
             if following < count and rounds <= _WORK:
-                load_lane(rays, scratch, r, get(scratch.waiting, following))
+                load_lane(rays, scratch, r, scratch.waiting, following)
                 put(lanes.at_node, nodes, r)
                 following, nodes = following + 1, nodes + 1
         ends = 0
@@ -176,10 +196,7 @@ def _trace_stream(tree, rays, found, scratch, following, count, any_hit):
     """Trace the rays in ``scratch.waiting`` from ``following`` to ``count``, sixteen at a time; returns the first that
     still waits.
     """
-    lanes, nodes = scratch.lanes, smaller(count - following, WIDTH)
-    for r in range(nodes):
-        load_lane(rays, scratch, r, get(scratch.waiting, following + r))
-        put(lanes.at_node, r, r)
+    nodes = begin_lanes(rays, scratch, scratch.waiting, following, count)
     return _run_lanes(tree, rays, found, scratch, (nodes, 0, 0), (following + nodes, count), any_hit)[0]
 
 
@@ -192,7 +209,6 @@ def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
     prepared, lanes = scratch.prepared, scratch.lanes
     for r in range(WIDTH):
         begin_ray(lanes, r)
-        put(scratch.number, r, first + r)
         put(scratch.doubtful, r, (doubtful >> r) & 1)
     for k in range(top):
         entry = get(scratch.packet_stack, k)
@@ -215,8 +231,8 @@ def _trace_sixteen(tree, rays, found, first, scratch, any_hit):
     """Trace the rays from ``first`` on as a packet, and as lanes from where it gave up; returns the rounds of lanes."""
     prepared, rounds = scratch.prepared, np.int64(0)
     for r in range(WIDTH):
-        ray, t_max = ray_at(rays, first + r)
-        prepare_ray(prepared, r, ray, t_max)
+        put(scratch.number, r, first + r)
+    prepare_sixteen(rays, prepared, scratch.number)
     top, doubtful = trace_packet(tree, prepared, scratch.packet_stack, any_hit)
     if top > 0:
         return _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit)
