@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, movemask, put
+from renderer.kernels.simd import at, get, movemask, put, smaller
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS, LEAF_BITS
-from renderer.trace.ray_lanes import shear_of
-from renderer.trace.stream import leave_leaf, list_lane, meet_nodes, resume
-from renderer.trace.traverse import begin_lanes, load_lane
+from renderer.trace.ray_lanes import CHILD, NUMBER, WIDTH, shear_of
+from renderer.trace.stream import begin_rays, clear_lanes, end_ray, leave_leaf, list_lane, meet_nodes, resume
 
 # Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
 # meshes meet. A ray that meets more is searched for alone.
@@ -46,36 +45,35 @@ def find_blocks(tree, rays, begin, end, scratch, found):
     Returns the ray before which it ended, ``end`` unless there was much to do, and the number of rounds.
     """
     prepared, lanes, rounds = scratch.prepared, scratch.lanes, np.int64(0)
-    count = end - begin
+    count, following = end - begin, np.int64(0)
+    nodes, leaves, ends = 0, 0, 0
+    clear_lanes(lanes)
+    for k in range(count + WIDTH):
+        put(found.numbers, k, begin + smaller(k, count - 1))
     for k in range(count):
         put(found.counts, k, 0)
-        put(found.numbers, k, begin + k)
-    nodes, leaves, ends = begin_lanes(rays, scratch, found.numbers, 0, count), 0, 0
-    following = nodes
-    while nodes + leaves + ends > 0:
+    while True:
+        if following < count and rounds <= _ROUNDS:
+            following, nodes = begin_rays(rays, prepared, lanes, (found.numbers, following, count), (nodes, leaves))
+        if nodes + leaves + ends == 0:
+            return begin + following, rounds
         rounds += 1
         meet_nodes(tree, prepared, lanes, nodes)
         entered, nodes = nodes, 0
         for k in range(entered):
             r = get(lanes.at_node, k)
-            child = resume(tree, prepared, lanes, r)
-            nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
+            nodes, leaves, ends = list_lane(lanes, r, resume(tree, prepared, lanes, r), (nodes, leaves, ends))
         _see_leaves(tree, prepared, lanes, leaves)
         entered, leaves = leaves, 0
         for k in range(entered):
             r = get(lanes.at_leaf, k)
-            if get(lanes.bits, r) != 0:
-                _list_block(found, get(scratch.number, r) - begin, ~get(lanes.child, r) >> LEAF_BITS)
-            child = leave_leaf(tree, prepared, lanes, r)
-            nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
+            if get(lanes.bits, k) != 0:
+                block = ~get(prepared.integers, CHILD + r) >> LEAF_BITS
+                _list_block(found, get(prepared.integers, NUMBER + r) - begin, block)
+            nodes, leaves, ends = list_lane(lanes, r, leave_leaf(tree, prepared, lanes, r), (nodes, leaves, ends))
         for k in range(ends):
-            if following < count and rounds <= _ROUNDS:
-                r = get(lanes.at_end, k)
-                load_lane(rays, scratch, r, found.numbers, following)
-                put(lanes.at_node, nodes, r)
-                following, nodes = following + 1, nodes + 1
+            end_ray(lanes, get(lanes.at_end, k))
         ends = 0
-    return begin + following, rounds
 
 
 @inlined
@@ -83,9 +81,9 @@ def _see_leaves(tree, rays, lanes, count):
     """Compute of each of ``count`` rays which faces it passes within, in the first block of its leaf."""
     for k in range(count):
         r = get(lanes.at_leaf, k)
-        block = ~get(lanes.child, r) >> LEAF_BITS
+        block = ~get(rays.integers, CHILD + r) >> LEAF_BITS
         _, seen = see_triangles(tree, block * BLOCK_WORDS, shear_of(rays, r))
-        put(lanes.bits, r, movemask(seen))
+        put(lanes.bits, k, movemask(seen))
 
 
 @inlined

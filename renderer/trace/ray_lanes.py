@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import alike, at, get, narrow, put, select, store
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import alike, get, narrow, put, select, store
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import LEAF_BITS, MAX_LEAF_BLOCKS
 from renderer.trace.leaf import NO_FACE, nearest_in_blocks
@@ -18,19 +18,20 @@ WIDTH = 16
 # units.
 NEAR_ORIGIN, FAR_ORIGIN, NEAR_INVERSE, FAR_INVERSE = 0, 3 * WIDTH, 6 * WIDTH, 9 * WIDTH
 LOWER, LIMIT, SLOPE_U, SLOPE_V = 12 * WIDTH, 13 * WIDTH, 14 * WIDTH, 15 * WIDTH
-FLOATS = 16 * WIDTH
 # Rows of float64: origin, shear and direction of ``Shear``; t_min, and the t of the best hit, at first t_max; the
 # largest component of the direction; and that hit's barycentric numerators and their denominator.
 ORIGIN, SHEAR, DIRECTION_Z, T_MIN, T = 0, 3 * WIDTH, 5 * WIDTH, 6 * WIDTH, 7 * WIDTH
 LARGEST, U, V, W = 8 * WIDTH, 9 * WIDTH, 10 * WIDTH, 11 * WIDTH
-DOUBLES = 12 * WIDTH
-# Rows of int64: the near rows of a node and the rows of a block, three axes each, and the best hit's face.
+# Rows of int64: the near rows of a node and the rows of a block, three axes each; the best hit's face; for a stream the
+# ray's next child, the top of its stack, its number, and whether a hit was in doubt.
 NEAR_ROW, BLOCK_ROW, FACE = 0, 3 * WIDTH, 6 * WIDTH
-INTEGERS = 7 * WIDTH
+CHILD, TOP, NUMBER, DOUBTFUL = 7 * WIDTH, 8 * WIDTH, 9 * WIDTH, 10 * WIDTH
+# The words of sixteen rays in each of the three: a place ``r`` of the next sixteen is so much larger.
+SIXTEEN = 16 * WIDTH
 
 
 class Prepared(NamedTuple):
-    """Pointers to the rows: FLOATS float32, DOUBLES float64 and INTEGERS int64."""
+    """Pointers to the rows, SIXTEEN words each for sixteen rays: float32, float64 and int64."""
 
     floats: Any
     doubles: Any
@@ -65,23 +66,11 @@ def prepare_ray(rays, r, ray, t_max):
     store(integers, FACE + r, alike(np.int64(NO_FACE), t_max))
 
 
-@inlined
-def prepare_sixteen(rays, lanes, numbers):
-    """Write the sixteen rays whose numbers stand at ``numbers``."""
-    for half in range(0, WIDTH, 8):
-        ray, t_max = eight_rays_at(rays, at(numbers, half))
-        prepare_ray(lanes, half, ray, t_max)
-
-
-@inlined
-def copy_ray(source, column, lanes, r):
-    """Copy a prepared ray that has met nothing yet to place ``r``, but for its slopes, which only packets read."""
-    for row in range(0, SLOPE_U, WIDTH):
-        put(lanes.floats, row + r, get(source.floats, row + column))
-    for row in range(0, U, WIDTH):
-        put(lanes.doubles, row + r, get(source.doubles, row + column))
-    for row in range(0, INTEGERS, WIDTH):
-        put(lanes.integers, row + r, get(source.integers, row + column))
+@kernel
+def prepare_eight(rays, prepared, r, numbers):
+    """Write the eight rays whose numbers stand at ``numbers`` to the places from ``r`` on."""
+    ray, t_max = eight_rays_at(rays, numbers)
+    prepare_ray(prepared, r, ray, t_max)
 
 
 @inlined

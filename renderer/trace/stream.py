@@ -1,4 +1,4 @@
-"""Incoherent rays through the tree, sixteen at a time; the next ray takes the place of one that ends.
+"""Incoherent rays through the tree, some sixteen to twenty-four at a time: eight more begin where there is room.
 
 The processor cannot predict whether a ray goes to a node, goes to a leaf, or ends, and a mispredicted branch discards
 all work begun after it. So each round first computes what every ray meets, without a branch, and then decides: the
@@ -21,13 +21,31 @@ from renderer.kernels.simd import (
     movemask,
     prefetch,
     put,
+    smaller,
     splat4,
     splat8,
     store,
 )
 from renderer.trace.intersect import box_limit, enter_boxes, meet_planes, see_triangles
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
-from renderer.trace.ray_lanes import LARGEST, LIMIT, LOWER, T_MIN, WIDTH, T, best_of, put_best, shear_of, slabs_of
+from renderer.trace.ray_lanes import (
+    CHILD,
+    DOUBTFUL,
+    LARGEST,
+    LIMIT,
+    LOWER,
+    NUMBER,
+    SIXTEEN,
+    T_MIN,
+    TOP,
+    WIDTH,
+    T,
+    best_of,
+    prepare_eight,
+    put_best,
+    shear_of,
+    slabs_of,
+)
 
 _LOW_WORD = 0xFFFFFFFF
 # The entry at the bottom of each ray's stack. END is the code of no leaf. The distance -inf is beyond no limit, not
@@ -51,13 +69,14 @@ def _prefetch_child(tree, child):
 
 
 class Lanes(NamedTuple):
-    """Sixteen rays under way, as pointers: for each ray its next child, the top of its stack and the stack; the lists
-    of the rays at a node, at a leaf and at END; and the results of a round: the bits of the triangles met, those of the
-    triangles in doubt, and their t, u, v, w.
+    """Rays under way, as pointers: their stacks; the lists of the rays at a node, at a leaf and at END; of a round, for
+    each place in the list of leaves, the bits of the triangles met, those in doubt, and t, u, v, w; and which places
+    are free.
+
+    The places of eight rays are taken together. ``left`` is the number of each eight's rays that are under way, and in
+    its last word the bits of the eights that are free.
     """
 
-    child: Any
-    top: Any
     stacks: Any
     stack_size: int
     at_node: Any
@@ -66,42 +85,90 @@ class Lanes(NamedTuple):
     bits: Any
     doubts: Any
     hits: Any
+    left: Any
 
 
+# The places for rays. Eight are free again when all their rays have ended, so there are more places than rays under
+# way; those are fewer than ENOUGH when eight more begin.
+SIXTEENS = 4
+_EIGHTS, _PLACES = 2 * SIXTEENS, SIXTEENS * WIDTH
+ENOUGH = WIDTH
 # The numbers of int64 (without the stacks) and float64 in ``Lanes``.
-LANE_INTEGERS, LANE_DOUBLES = 7 * WIDTH, 4 * BLOCK_FACES * WIDTH
+LANE_INTEGERS, LANE_DOUBLES = 5 * _PLACES + _EIGHTS + 1, 4 * BLOCK_FACES * _PLACES
 
 
 @inlined
 def make_lanes(integers, doubles, stack_size):
     """Lanes in the given memory; the stacks, ``stack_size`` entries each, follow the LANE_INTEGERS other words."""
     return Lanes(
-        integers, at(integers, WIDTH), at(integers, LANE_INTEGERS), stack_size, at(integers, 2 * WIDTH),
-        at(integers, 3 * WIDTH), at(integers, 4 * WIDTH), at(integers, 5 * WIDTH), at(integers, 6 * WIDTH), doubles,
+        at(integers, LANE_INTEGERS), stack_size, integers, at(integers, _PLACES), at(integers, 2 * _PLACES),
+        at(integers, 3 * _PLACES), at(integers, 4 * _PLACES), doubles, at(integers, 5 * _PLACES),
     )  # fmt: skip
 
 
 @inlined
-def begin_ray(lanes, r):
-    """Let the prepared ray ``r`` start at the root."""
-    put(lanes.child, r, 0)
-    put(lanes.top, r, 1)
-    put(lanes.stacks, r * lanes.stack_size, _BOTTOM)
+def clear_lanes(lanes):
+    """Let all places be free."""
+    put(lanes.left, _EIGHTS, (1 << _EIGHTS) - 1)
 
 
 @inlined
-def wait_octant(lanes, r, entry, child):
+def begin_rays(rays, prepared, lanes, waiting, lists):
+    """Let rays begin, eight at a time, while few are under way and there are places.
+
+    waiting  the numbers of rays that wait, with seven more to be read; the first that has not begun; and their number
+    lists    the lengths of the lists of nodes and leaves
+
+    Returns the first ray that still waits, and the length of the list of nodes.
+    """
+    numbers, following, count = waiting
+    nodes, leaves = lists
+    while following < count and nodes + leaves <= ENOUGH and get(lanes.left, _EIGHTS) != 0:
+        free = get(lanes.left, _EIGHTS)
+        eight = lowest_bit(free)
+        put(lanes.left, _EIGHTS, free & (free - 1))
+        some, r = smaller(count - following, 8), (eight >> 1) * SIXTEEN + 8 * (eight & 1)
+        prepare_eight(rays, prepared, r, at(numbers, following))
+        put(lanes.left, eight, some)
+        for k in range(some):
+            begin_ray(prepared, lanes, r + k, get(numbers, following + k))
+            put(lanes.at_node, nodes + k, r + k)
+        following, nodes = following + some, nodes + some
+    return following, nodes
+
+
+@inlined
+def begin_ray(prepared, lanes, r, number):
+    """Let the prepared ray at place ``r`` start at the root."""
+    integers, bottom = prepared.integers, stack_of(lanes, r)
+    put(integers, CHILD + r, 0)
+    put(integers, TOP + r, bottom + 1)
+    put(integers, NUMBER + r, number)
+    put(integers, DOUBTFUL + r, 0)
+    put(lanes.stacks, bottom, _BOTTOM)
+
+
+@inlined
+def stack_of(lanes, r):
+    """Where the stack of place ``r`` begins in ``stacks``."""
+    return ((r // SIXTEEN) * WIDTH + r % WIDTH) * lanes.stack_size
+
+
+@inlined
+def end_ray(lanes, r):
+    """Count a ray as ended; its eight places are free when it is the last of them."""
+    eight = 2 * (r // SIXTEEN) + r % WIDTH // 8
+    left = get(lanes.left, eight) - 1
+    put(lanes.left, eight, left)
+    put(lanes.left, _EIGHTS, get(lanes.left, _EIGHTS) | (np.int64(left == 0) << eight))
+
+
+@inlined
+def wait_octant(prepared, lanes, r, entry, child):
     """Push an octant onto the stack of ray ``r``: the distance of ``entry``, and its child."""
-    top = get(lanes.top, r)
-    put(lanes.stacks, r * lanes.stack_size + top, ((entry >> 32) << 32) | (child & _LOW_WORD))
-    put(lanes.top, r, top + 1)
-
-
-@inlined
-def resume(tree, rays, lanes, r):
-    """Take the next child of ray ``r`` off its stack, and return it."""
-    stack, top = at(lanes.stacks, r * lanes.stack_size), get(lanes.top, r) - 1
-    return _go_on(tree, rays, lanes, r, stack, get(stack, top), top)
+    top = get(prepared.integers, TOP + r)
+    put(lanes.stacks, top, ((entry >> 32) << 32) | (child & _LOW_WORD))
+    put(prepared.integers, TOP + r, top + 1)
 
 
 @inlined
@@ -112,24 +179,24 @@ def meet_nodes(tree, rays, lanes, count):
     """
     for k in range(count):
         r = get(lanes.at_node, k)
-        node, top = get(lanes.child, r), get(lanes.top, r)
+        node, top = get(rays.integers, CHILD + r), get(rays.integers, TOP + r)
         lower, upper = splat8(get(rays.floats, LOWER + r)), splat8(get(rays.floats, LIMIT + r))
         t0, meets = enter_boxes(tree.nodes, node, slabs_of(rays, r), lower, upper)
-        octants = above(t0, tree.links, node * NODE_WORDS + CHILDREN)
-        store(lanes.stacks, r * lanes.stack_size + top, greatest_first(meets, octants))
-        put(lanes.top, r, top + count_bits(movemask(meets)))
+        store(lanes.stacks, top, greatest_first(meets, above(t0, tree.links, node * NODE_WORDS + CHILDREN)))
+        put(rays.integers, TOP + r, top + count_bits(movemask(meets)))
 
 
 @inlined
-def _go_on(tree, rays, lanes, r, stack, entry, top):
-    """Go on with ``entry``, or where that is beyond the best hit, with the next one below ``top`` that is not."""
-    limit = get(rays.floats, LIMIT + r)
+def resume(tree, rays, lanes, r):
+    """Take the next child of ray ``r`` that is not beyond its best hit off its stack, and return it."""
+    limit, top = get(rays.floats, LIMIT + r), get(rays.integers, TOP + r) - 1
+    entry = get(lanes.stacks, top)
     while bits_float(entry >> 32) > limit:
         top -= 1
-        entry = get(stack, top)
+        entry = get(lanes.stacks, top)
     child = np.int64(np.int32(entry & _LOW_WORD))
-    put(lanes.child, r, child)
-    put(lanes.top, r, top)
+    put(rays.integers, CHILD + r, child)
+    put(rays.integers, TOP + r, top)
     _prefetch_child(tree, child)
     return child
 
@@ -139,13 +206,13 @@ def meet_leaves(tree, rays, lanes, count):
     """Compute what each of ``count`` rays hits in the first block of its leaf."""
     for k in range(count):
         r = get(lanes.at_leaf, k)
-        block, shear = ~get(lanes.child, r) >> LEAF_BITS, shear_of(rays, r)
+        block, shear = ~get(rays.integers, CHILD + r) >> LEAF_BITS, shear_of(rays, r)
         edges, seen = see_triangles(tree, block * BLOCK_WORDS, shear)
         t_min, t_max = get(rays.doubles, T_MIN + r), get(rays.doubles, T + r)
         t, doubt, _, due = meet_planes(edges, shear, t_min, t_max)
-        put(lanes.bits, r, movemask(seen & (t >= splat4(t_min)) & (t <= splat4(t_max))) & ~movemask(doubt))
-        put(lanes.doubts, r, movemask(seen & due))
-        hits = 4 * BLOCK_FACES * r
+        put(lanes.bits, k, movemask(seen & (t >= splat4(t_min)) & (t <= splat4(t_max))) & ~movemask(doubt))
+        put(lanes.doubts, k, movemask(seen & due))
+        hits = 4 * BLOCK_FACES * k
         store(lanes.hits, hits, t)
         store(lanes.hits, hits + BLOCK_FACES, edges.e1)
         store(lanes.hits, hits + 2 * BLOCK_FACES, edges.e2)
@@ -153,33 +220,37 @@ def meet_leaves(tree, rays, lanes, count):
 
 
 @inlined
-def take_hits(tree, rays, lanes, r):
-    """Keep the best hit of a leaf's first block. Returns whether there is one, and whether any hit was in doubt."""
-    block, bits, hits = ~get(lanes.child, r) >> LEAF_BITS, get(lanes.bits, r), at(lanes.hits, 4 * BLOCK_FACES * r)
-    doubtful = get(lanes.doubts, r)
-    if bits != 0:
-        t, face, u, v, w = best_of(rays, r)
-        while bits != 0:
-            i = lowest_bit(bits)
-            bits &= bits - 1
-            ti, fi = get(hits, i), get(tree.faces, block * BLOCK_FACES + i)
-            if ti < t or (ti == t and fi < face):
-                t, face = ti, fi
-                u, v, w = get(hits, BLOCK_FACES + i), get(hits, 2 * BLOCK_FACES + i), get(hits, 3 * BLOCK_FACES + i)
-        put_best(rays, r, (t, face, u, v, w))
-        put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
-        return True, doubtful != 0
-    return False, doubtful != 0
+def take_hits(tree, rays, lanes, k):
+    """Keep the best hit of the first block that the ``k``-th ray at a leaf met, and whether one was in doubt.
+
+    Returns whether there is a hit.
+    """
+    r, bits, hits = get(lanes.at_leaf, k), get(lanes.bits, k), at(lanes.hits, 4 * BLOCK_FACES * k)
+    put(rays.integers, DOUBTFUL + r, get(rays.integers, DOUBTFUL + r) | get(lanes.doubts, k))
+    if bits == 0:
+        return False
+    block = ~get(rays.integers, CHILD + r) >> LEAF_BITS
+    t, face, u, v, w = best_of(rays, r)
+    while bits != 0:
+        i = lowest_bit(bits)
+        bits &= bits - 1
+        ti, fi = get(hits, i), get(tree.faces, block * BLOCK_FACES + i)
+        if ti < t or (ti == t and fi < face):
+            t, face = ti, fi
+            u, v, w = get(hits, BLOCK_FACES + i), get(hits, 2 * BLOCK_FACES + i), get(hits, 3 * BLOCK_FACES + i)
+    put_best(rays, r, (t, face, u, v, w))
+    put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
+    return True
 
 
 @inlined
 def leave_leaf(tree, rays, lanes, r):
     """Choose the next child of ray ``r`` at a leaf: the rest of its blocks, else one off its stack. Returns it."""
-    child = get(lanes.child, r)
+    child = get(rays.integers, CHILD + r)
     if ~child & (MAX_LEAF_BLOCKS - 1) != 0:
         # The first block is one further on, and the number of blocks one less.
         child -= MAX_LEAF_BLOCKS - 1
-        put(lanes.child, r, child)
+        put(rays.integers, CHILD + r, child)
         return child
     return resume(tree, rays, lanes, r)
 

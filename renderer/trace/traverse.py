@@ -10,21 +10,26 @@ from renderer.kernels.simd import at, get, lowest_bit, pointer, put, smaller
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import NO_FACE, search_all_blocks, tree_pointers
 from renderer.trace.packet import child_of, meet_octant, trace_packet
-from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, best_of, copy_ray, prepare_sixteen
+from renderer.trace.ray_lanes import DOUBTFUL, NUMBER, SIXTEEN, WIDTH, Prepared, best_of, prepare_eight
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.singly import search_singly, stack_size
 from renderer.trace.stream import (
     END,
     LANE_DOUBLES,
     LANE_INTEGERS,
+    SIXTEENS,
     Lanes,
     begin_ray,
+    begin_rays,
+    clear_lanes,
+    end_ray,
     leave_leaf,
     list_lane,
     make_lanes,
     meet_leaves,
     meet_nodes,
     resume,
+    stack_of,
     take_hits,
     wait_octant,
 )
@@ -38,17 +43,13 @@ _WORK = 1 << 15
 
 
 class Scratch(NamedTuple):
-    """Memory of one thread, as pointers: sixteen prepared rays and their lanes; sixteen more, ready for lanes that end;
-    a packet's stack; for each of the rays whether a hit was in doubt, and its number; and the numbers of the rays that
-    wait for a stream.
+    """Memory of one thread, as pointers: prepared rays, of which a packet takes the first sixteen; a stream's lanes; a
+    packet's stack; and the numbers of the rays that wait for a stream.
     """
 
     prepared: Prepared
-    ready: Prepared
     lanes: Lanes
     packet_stack: Any
-    doubtful: Any
-    number: Any
     waiting: Any
 
 
@@ -63,11 +64,11 @@ class Memory(NamedTuple):
 
 def make_memory(depth: int, rays: int) -> Memory:
     """Memory for ranges of up to ``rays`` rays against a tree of ``depth`` levels."""
-    size = stack_size(depth)
-    integers = 2 * INTEGERS + 2 * WIDTH + LANE_INTEGERS + (WIDTH + 1) * size + rays + WIDTH
+    size, prepared = stack_size(depth), SIXTEENS * SIXTEEN
+    integers = prepared + LANE_INTEGERS + (SIXTEENS * WIDTH + 1) * size + rays + WIDTH
     return Memory(
-        cache_aligned(2 * FLOATS, np.float32),
-        cache_aligned(2 * DOUBLES + LANE_DOUBLES, np.float64),
+        cache_aligned(prepared, np.float32),
+        cache_aligned(prepared + LANE_DOUBLES, np.float64),
         cache_aligned(integers, np.int64),
         size,
     )
@@ -77,16 +78,10 @@ def make_memory(depth: int, rays: int) -> Memory:
 def make_scratch(memory):
     """Pointers into a ``Memory``."""
     floats, doubles, integers = pointer(memory.floats), pointer(memory.doubles), pointer(memory.integers)
-    prepared = Prepared(floats, doubles, integers)
-    ready = Prepared(at(floats, FLOATS), at(doubles, DOUBLES), at(integers, INTEGERS))
-    doubtful = at(integers, 2 * INTEGERS)
-    number = at(doubtful, WIDTH)
-    lane_integers = at(number, WIDTH)
-    size = memory.stack_size
-    lanes = make_lanes(lane_integers, at(doubles, 2 * DOUBLES), size)
-    packet_stack = at(lane_integers, LANE_INTEGERS + WIDTH * size)
-    waiting = at(packet_stack, size)
-    return Scratch(prepared, ready, lanes, packet_stack, doubtful, number, waiting)
+    size, lane_integers = memory.stack_size, at(integers, SIXTEENS * SIXTEEN)
+    lanes = make_lanes(lane_integers, at(doubles, SIXTEENS * SIXTEEN), size)
+    packet_stack = at(lane_integers, LANE_INTEGERS + SIXTEENS * WIDTH * size)
+    return Scratch(Prepared(floats, doubles, integers), lanes, packet_stack, at(packet_stack, size))
 
 
 @kernel
@@ -110,134 +105,106 @@ def are_coherent(rays, begin):
 
 
 @inlined
-def _finish(tree, rays, found, i, scratch, r, doubtful, any_hit):
-    """Write the hit of ray ``i``, in lane ``r``; if one was in doubt, after a careful search on the lane's stack.
+def _finish(tree, rays, found, scratch, r, any_hit):
+    """Write the hit of the ray at place ``r``; if one was in doubt, after a careful search on the ray's stack.
 
-    Returns the rounds of sixteen lanes that take as long as that search.
+    Returns the rounds of sixteen rays that take as long as that search.
     """
-    best, steps = best_of(scratch.prepared, r), np.int64(0)
-    if doubtful:
+    best, integers, steps = best_of(scratch.prepared, r), scratch.prepared.integers, np.int64(0)
+    i = get(integers, NUMBER + r)
+    if get(integers, DOUBTFUL + r) != 0:
         ray, t_max = ray_at(rays, i)
-        best, steps = search_singly(tree, ray, t_max, at(scratch.lanes.stacks, r * scratch.lanes.stack_size))
+        best, steps = search_singly(tree, ray, t_max, at(scratch.lanes.stacks, stack_of(scratch.lanes, r)))
     write_hit(found, i, rays.scale, best, any_hit)
     return steps // WIDTH
 
 
 @kernel
-def begin_lanes(rays, scratch, numbers, following, count):
-    """Let the rays whose numbers stand at ``numbers`` from ``following`` to ``count`` begin, as many as there are
-    lanes. Returns how many. There is room for sixteen numbers more.
-    """
-    for k in range(count, count + WIDTH):
-        put(numbers, k, get(numbers, count - 1))
-    if following % WIDTH != 0:
-        prepare_sixteen(rays, scratch.ready, at(numbers, following - following % WIDTH))
-    lanes = smaller(count - following, WIDTH)
-    for r in range(lanes):
-        load_lane(rays, scratch, r, numbers, following + r)
-        put(scratch.lanes.at_node, r, r)
-    return lanes
-
-
-@inlined
-def load_lane(rays, scratch, r, numbers, k):
-    """Let the ray whose number is the k-th of ``numbers`` begin in lane ``r``. Every sixteenth makes sixteen ready."""
-    if k % WIDTH == 0:
-        prepare_sixteen(rays, scratch.ready, at(numbers, k))
-    copy_ray(scratch.ready, k % WIDTH, scratch.prepared, r)
-    begin_ray(scratch.lanes, r)
-    put(scratch.number, r, get(numbers, k))
-    put(scratch.doubtful, r, 0)
-
-
-@kernel
 def _run_lanes(tree, rays, found, scratch, lists, waiting, any_hit):
-    """Run the lanes in ``lists``, see ``list_lane``, to their ends; the rays in ``scratch.waiting`` from waiting[0] to
-    waiting[1] take the places of those that end, but none does after _WORK.
+    """Run the rays in ``lists``, see ``list_lane``, to their ends, and those of ``waiting``, see ``begin_rays``; but
+    none of these begins after _WORK.
 
     Returns the first ray that still waits, and the number of rounds.
     """
     prepared, lanes, rounds = scratch.prepared, scratch.lanes, np.int64(0)
     nodes, leaves, ends = lists
-    following, count = waiting
-    while nodes + leaves + ends > 0:
+    numbers, following, count = waiting
+    while True:
+        if following < count and rounds <= _WORK:
+            following, nodes = begin_rays(rays, prepared, lanes, (numbers, following, count), (nodes, leaves))
+        if nodes + leaves + ends == 0:
+            return following, rounds
         rounds += 1
-        # Take the lanes at nodes one step on.
+        # Take the rays at nodes one step on.
         meet_nodes(tree, prepared, lanes, nodes)
         entered, nodes = nodes, 0
         for k in range(entered):
             r = get(lanes.at_node, k)
-            child = resume(tree, prepared, lanes, r)
-            nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
-        # Take the lanes at leaves one block on.
+            nodes, leaves, ends = list_lane(lanes, r, resume(tree, prepared, lanes, r), (nodes, leaves, ends))
+        # Take the rays at leaves one block on.
         meet_leaves(tree, prepared, lanes, leaves)
         entered, leaves = leaves, 0
         for k in range(entered):
-            r = get(lanes.at_leaf, k)
-            hit, doubtful = take_hits(tree, prepared, lanes, r)
-            put(scratch.doubtful, r, get(scratch.doubtful, r) | np.int64(doubtful))
+            r, hit = get(lanes.at_leaf, k), take_hits(tree, prepared, lanes, k)
             child = END if any_hit and hit else leave_leaf(tree, prepared, lanes, r)
             nodes, leaves, ends = list_lane(lanes, r, child, (nodes, leaves, ends))
-        # Load the next rays into the lanes of those that ended.
         for k in range(ends):
             r = get(lanes.at_end, k)
-            i, doubtful = get(scratch.number, r), get(scratch.doubtful, r) != 0
-            rounds += _finish(tree, rays, found, i, scratch, r, doubtful, any_hit)
-            if following < count and rounds <= _WORK:
-                load_lane(rays, scratch, r, scratch.waiting, following)
-                put(lanes.at_node, nodes, r)
-                following, nodes = following + 1, nodes + 1
+            rounds += _finish(tree, rays, found, scratch, r, any_hit)
+            end_ray(lanes, r)
         ends = 0
-    return following, rounds
 
 
 @inlined
 def _trace_stream(tree, rays, found, scratch, following, count, any_hit):
-    """Trace the rays in ``scratch.waiting`` from ``following`` to ``count``, sixteen at a time; returns the first that
-    still waits.
-    """
-    nodes = begin_lanes(rays, scratch, scratch.waiting, following, count)
-    return _run_lanes(tree, rays, found, scratch, (nodes, 0, 0), (following + nodes, count), any_hit)[0]
+    """Trace the rays in ``scratch.waiting`` from ``following`` to ``count``; returns the first that still waits."""
+    clear_lanes(scratch.lanes)
+    for k in range(count, count + WIDTH):
+        put(scratch.waiting, k, get(scratch.waiting, count - 1))
+    return _run_lanes(tree, rays, found, scratch, (0, 0, 0), (scratch.waiting, following, count), any_hit)[0]
 
 
 @kernel
-def _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit):
+def _hand_over(tree, rays, found, scratch, top, doubtful, any_hit):
     """Let the rays of a packet that gave up go on as lanes, each with those of the waiting octants that it meets.
 
     Returns the number of rounds.
     """
     prepared, lanes = scratch.prepared, scratch.lanes
     for r in range(WIDTH):
-        begin_ray(lanes, r)
-        put(scratch.doubtful, r, (doubtful >> r) & 1)
+        begin_ray(prepared, lanes, r, get(prepared.integers, NUMBER + r))
+        put(prepared.integers, DOUBTFUL + r, (doubtful >> r) & 1)
     for k in range(top):
         entry = get(scratch.packet_stack, k)
         child, at_ = child_of(tree, entry & 0xFFFFFFFF)
         meeting = meet_octant(tree, prepared, at_)
         while meeting != 0:
-            wait_octant(lanes, lowest_bit(meeting), entry, child)
+            wait_octant(prepared, lanes, lowest_bit(meeting), entry, child)
             meeting &= meeting - 1
     lists = 0, 0, 0
     for r in range(WIDTH):
         if any_hit and best_of(prepared, r)[1] != NO_FACE:
-            _finish(tree, rays, found, first + r, scratch, r, False, any_hit)
+            put(prepared.integers, DOUBTFUL + r, 0)
+            _finish(tree, rays, found, scratch, r, any_hit)
         else:
             lists = list_lane(lanes, r, resume(tree, prepared, lanes, r), lists)
-    return _run_lanes(tree, rays, found, scratch, lists, (0, 0), any_hit)[1]
+    return _run_lanes(tree, rays, found, scratch, lists, (scratch.waiting, 0, 0), any_hit)[1]
 
 
 @inlined
 def _trace_sixteen(tree, rays, found, first, scratch, any_hit):
     """Trace the rays from ``first`` on as a packet, and as lanes from where it gave up; returns the rounds of lanes."""
-    prepared, rounds = scratch.prepared, np.int64(0)
+    prepared, rounds, numbers = scratch.prepared, np.int64(0), at(scratch.prepared.integers, NUMBER)
     for r in range(WIDTH):
-        put(scratch.number, r, first + r)
-    prepare_sixteen(rays, prepared, scratch.number)
+        put(numbers, r, first + r)
+    for half in range(0, WIDTH, 8):
+        prepare_eight(rays, prepared, half, at(numbers, half))
     top, doubtful = trace_packet(tree, prepared, scratch.packet_stack, any_hit)
     if top > 0:
-        return _hand_over(tree, rays, found, first, scratch, top, doubtful, any_hit)
+        return _hand_over(tree, rays, found, scratch, top, doubtful, any_hit)
     for r in range(WIDTH):
-        rounds += _finish(tree, rays, found, first + r, scratch, r, (doubtful >> r) & 1 != 0, any_hit)
+        put(prepared.integers, DOUBTFUL + r, (doubtful >> r) & 1)
+        rounds += _finish(tree, rays, found, scratch, r, any_hit)
     return rounds
 
 
