@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.jit import inlined
 from renderer.kernels.simd import alike, get, narrow, put, select, store
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import LEAF_BITS, MAX_LEAF_BLOCKS
@@ -66,7 +66,7 @@ def prepare_ray(rays, r, ray, t_max):
     store(integers, FACE + r, alike(np.int64(NO_FACE), t_max))
 
 
-@kernel
+@inlined
 def prepare_eight(rays, prepared, r, numbers):
     """Write the eight rays whose numbers stand at ``numbers`` to the places from ``r`` on."""
     ray, t_max = eight_rays_at(rays, numbers)
