@@ -90,9 +90,9 @@ class Lanes(NamedTuple):
 
 # The places for rays. Eight are free again when all their rays have ended, so there are more places than rays under
 # way; those are fewer than ENOUGH when eight more begin.
-SIXTEENS = 4
+SIXTEENS = 8
 _EIGHTS, _PLACES = 2 * SIXTEENS, SIXTEENS * WIDTH
-ENOUGH = WIDTH
+ENOUGH = 2 * WIDTH
 # The numbers of int64 (without the stacks) and float64 in ``Lanes``.
 LANE_INTEGERS, LANE_DOUBLES = 5 * _PLACES + _EIGHTS + 1, 4 * BLOCK_FACES * _PLACES
 
