@@ -320,6 +320,21 @@ def gather8(typingctx, base, rows, step, column):
 
 
 @intrinsic
+def every8(typingctx, base, first, step):
+    """Eight float64 of a ``pointer``, each ``step`` after the one before."""
+
+    def codegen(context, builder, sig, args):
+        base, index, step = args
+        found = ir.Constant(_llvm(F64X8), ir.Undefined)
+        for lane in range(8):
+            found = builder.insert_element(found, builder.load(builder.gep(base, [index])), ir.IntType(32)(lane))
+            index = builder.add(index, step)
+        return found
+
+    return F64X8(base, types.int64, types.int64), codegen
+
+
+@intrinsic
 def narrow(typingctx, number):
     """A float64, or eight, rounded to float32."""
     single, many = types.float32(types.float64), F32X8(F64X8)

@@ -9,11 +9,14 @@ from renderer.kernels.simd import (
     address,
     at,
     bool_pointer,
+    every8,
     float64_pointer,
     gather8,
     get,
     int64_pointer,
     larger,
+    magnitude,
+    movemask,
     pointer,
     put,
     select,
@@ -85,16 +88,41 @@ def first_bad_ray(rays, begin, end):
     In bounds, the components of ``scale`` times the origin are at most FARTHEST, and the largest component of the
     direction is from SHORTEST to LONGEST. NaN is out of bounds.
     """
-    for i in range(begin, end):
-        far, largest, odd = 0.0, 0.0, 0.0
-        for k in range(3):
-            o, d = get(rays.origins, i * rays.origin_step + k), get(rays.directions, i * rays.direction_step + k)
-            far, largest = larger(far, abs(o)), larger(largest, abs(d))
-            # A NaN is never larger, but x - x is NaN for NaN and inf, and 0 otherwise.
-            odd += (o - o) + (d - d)
-        if not (odd == 0.0 and far * rays.scale <= FARTHEST and SHORTEST <= largest <= LONGEST):
-            return i
+    i = begin
+    # Eight at a time; those among which one is out of bounds, and the last ones, one by one.
+    while i < end:
+        if i + 8 <= end and _are_good(rays, i):
+            i += 8
+            continue
+        for j in range(i, smaller(i + 8, end)):
+            if not _is_good(rays, j):
+                return j
+        i += 8
     return -1
+
+
+@inlined
+def _are_good(rays, i):
+    """Whether the eight rays from ``i`` on are in bounds. A comparison with NaN is false."""
+    o, s, d, z = rays.origins, rays.origin_step, rays.directions, rays.direction_step
+    x, y, w = every8(o, i * s, s), every8(o, i * s + 1, s), every8(o, i * s + 2, s)
+    near = (magnitude(x) * rays.scale <= FARTHEST) & (magnitude(y) * rays.scale <= FARTHEST)
+    near = near & (magnitude(w) * rays.scale <= FARTHEST)
+    x, y, w = every8(d, i * z, z), every8(d, i * z + 1, z), every8(d, i * z + 2, z)
+    x, y, w = magnitude(x), magnitude(y), magnitude(w)
+    good = near & (x <= LONGEST) & (y <= LONGEST) & (w <= LONGEST)
+    return movemask(good & (larger(larger(x, y), w) >= SHORTEST)) == 0xFF
+
+
+@inlined
+def _is_good(rays, i):
+    far, largest, odd = 0.0, 0.0, 0.0
+    for k in range(3):
+        o, d = get(rays.origins, i * rays.origin_step + k), get(rays.directions, i * rays.direction_step + k)
+        far, largest = larger(far, abs(o)), larger(largest, abs(d))
+        # A NaN is never larger, but x - x is NaN for NaN and inf, and 0 otherwise.
+        odd += (o - o) + (d - d)
+    return odd == 0.0 and far * rays.scale <= FARTHEST and SHORTEST <= largest <= LONGEST
 
 
 @inlined
