@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.contacts.candidates import LISTED, TOGETHER, find_blocks, make_candidates
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, extract, get, lowest_bit, movemask, pointer, put, smaller, splat8
+from renderer.kernels.simd import at, extract, get, lowest_bit, pointer, put, smaller, splat8
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import (
     box_limit,
@@ -119,8 +119,7 @@ def _search(tree, ray, shear, t_max, found, stack):
         if child < 0:
             count = _list_hits(tree, blocks_of(child), ray, shear, t_max, found, count)
             continue
-        _, meets = enter_boxes(tree.nodes, child, slabs, lower, upper)
-        bits = movemask(meets)
+        _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
         top = push_children(tree, child, bits, stack, top)
     return count
 

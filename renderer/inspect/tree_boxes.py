@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect, is_count
 from renderer.kernels.jit import kernel
-from renderer.kernels.simd import movemask, splat8, store
+from renderer.kernels.simd import splat8, store
 from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import check_rays
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
@@ -130,8 +130,7 @@ def _meet(words: NDArray[np.float32], ray: Ray, t_max: float, distances: NDArray
     """``enter_boxes`` of a node for Python: fills ``distances`` (8,) float32 and returns bits of the octants met."""
     largest = largest_of(ray)
     lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
-    t0, meets = enter_boxes(words, 0, make_slabs(ray, largest), lower, upper)
-    bits = movemask(meets)
+    t0, bits = enter_boxes(words, 0, make_slabs(ray, largest), lower, upper)
     store(distances, 0, t0)
     return bits
 

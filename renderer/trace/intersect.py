@@ -179,6 +179,13 @@ def make_slabs(ray, largest):
 
 @inlined
 def enter_boxes(nodes, node, slabs, lower, upper):
+    """``meet_boxes`` with the bits of the octants in place of the mask."""
+    t0, meets = meet_boxes(nodes, node, slabs, lower, upper)
+    return t0, movemask(meets)
+
+
+@inlined
+def meet_boxes(nodes, node, slabs, lower, upper):
     """Entry distances (8 x float32), and the mask of the octants that the ray meets within [lower, upper].
 
     A distance is NaN where the direction is 0 and the origin lies in a slab's plane. Each comparison is false for NaN,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from renderer.kernels.jit import kernel
-from renderer.kernels.simd import LOCAL_WORDS, get, local_words, movemask, put, splat8
+from renderer.kernels.simd import LOCAL_WORDS, get, local_words, put, splat8
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_children, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
@@ -40,8 +40,8 @@ def search_singly(tree, ray, t_max, stack):
             best = nearest_carefully(tree, first, count, ray, shear, best)
             steps += count
             continue
-        _, meets = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
-        top = push_children(tree, child, movemask(meets), stack, top)
+        _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
+        top = push_children(tree, child, bits, stack, top)
         steps += 1
     return best, steps
 

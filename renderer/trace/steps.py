@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, lowest_bit, movemask, pointer, put, splat8, store
+from renderer.kernels.simd import at, get, lowest_bit, pointer, put, splat8, store
 from renderer.process.parallel import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
@@ -100,8 +100,7 @@ def _count(tree, ray, t_max, stack, near, distances):
             triangles += _faces_in(tree, first, count)
             continue
         nodes += 1
-        t0, meets = enter_boxes(tree.nodes, child, slabs, lower, splat8(limit))
-        bits = movemask(meets)
+        t0, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(limit))
         store(distances, 0, t0)
         top = _push_sorted(tree.links, child * NODE_WORDS + CHILDREN, bits, stack, near, distances, top)
     return nodes, triangles

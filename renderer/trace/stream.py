@@ -26,7 +26,7 @@ from renderer.kernels.simd import (
     splat8,
     store,
 )
-from renderer.trace.intersect import box_limit, enter_boxes, meet_planes, see_triangles
+from renderer.trace.intersect import box_limit, meet_boxes, meet_planes, see_triangles
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.trace.ray_lanes import (
     CHILD,
@@ -181,7 +181,7 @@ def meet_nodes(tree, rays, lanes, count):
         r = get(lanes.at_node, k)
         node, top = get(rays.integers, CHILD + r), get(rays.integers, TOP + r)
         lower, upper = splat8(get(rays.floats, LOWER + r)), splat8(get(rays.floats, LIMIT + r))
-        t0, meets = enter_boxes(tree.nodes, node, slabs_of(rays, r), lower, upper)
+        t0, meets = meet_boxes(tree.nodes, node, slabs_of(rays, r), lower, upper)
         store(lanes.stacks, top, greatest_first(meets, above(t0, tree.links, node * NODE_WORDS + CHILDREN)))
         put(rays.integers, TOP + r, top + count_bits(movemask(meets)))
 

@@ -5,19 +5,28 @@ import pytest
 from numba import njit
 
 from renderer.kernels.simd import (
+    above,
+    alike,
     bits_float,
     double_of,
+    every8,
     extract,
     float32_pointer,
     float64_pointer,
     float_bits,
+    gather8,
     get,
+    greatest_first,
     int32_pointer,
+    is_negative,
     larger,
     load4,
     load8,
     lowest_bit,
+    magnitude,
     movemask,
+    narrow,
+    pointer,
     put,
     select,
     smaller,
@@ -25,6 +34,7 @@ from renderer.kernels.simd import (
     splat8,
     square_root,
     store,
+    widen,
 )
 
 F32 = [0.0, -0.0, 1.0, -1.5, np.inf, -np.inf, np.nan, 1e-45, 3.4e38, 0.1, 0.3, 7.0]
@@ -182,3 +192,95 @@ def test_pointers_from_addresses():
     arrays = np.array([2, 0], np.float32), np.array([1 / 3, 0]), np.array([-9, 0], np.int32)
     assert through_addresses(*(a.ctypes.data for a in arrays), np.float64(-0.1).view(np.int64)) == -0.1
     assert [a[1] for a in arrays] == [np.float32(3), 1 / 3 + 1, -8]
+
+
+@njit
+def sort_octants(distances, links, limit, out):
+    octants = load8(distances, 0)
+    store(out, 1, greatest_first(octants <= splat8(limit), above(octants, pointer(links), 2)))
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_octants_are_sorted_as_numpy_sorts_them(seed):
+    """Any number of them, among them equal distances, -0.0 and infinity; what is not met comes last."""
+    rng = np.random.default_rng(seed)
+    distances = rng.choice([0.0, -0.0, np.inf, 1e-45, 2.5, *rng.uniform(0, 9, 8)], 8).astype(np.float32)
+    links, out = rng.integers(-(2**31), 2**31, 10, dtype=np.int32), np.full(10, 77)
+    limit = np.float32(rng.choice([-1.0, 0.0, 3.0, np.inf]))
+    sort_octants(distances, links, limit, out)
+    octants = (distances.view(np.int32).astype(np.int64) << 32) | links[2:].view(np.uint32).astype(np.int64)
+    met = octants[distances <= limit]
+    least = np.full(8 - len(met), np.iinfo(np.int64).min)
+    assert out.tolist() == [77, *np.sort(met)[::-1].tolist(), *least.tolist(), 77]
+
+
+@njit
+def eight_of(base, rows, step, out, ints):
+    pointed = pointer(base)
+    x, y = gather8(pointed, pointer(rows), step, 1), every8(pointed, 2, step)
+    store(out, 0, x)
+    store(out, 8, y)
+    store(out, 16, widen(narrow(x)))
+    store(out, 24, select(is_negative(x), y, 0.5))
+    store(out, 32, larger(smaller(x, 1.0), -1.0) * 2.0 + magnitude(y))
+    store(out, 40, alike(7.0, x))
+    store(pointer(out), 48, alike(7.0, 1.0))
+    store(ints, 0, select(x > 0.0, 3, 4))
+    store(ints, 8, alike(9, y))
+
+
+@pytest.mark.parametrize("step", [0, 3])
+def test_eight_doubles_from_anywhere_are_treated_as_one_is(step):
+    rng = np.random.default_rng(step)
+    base = rng.choice([0.0, -0.0, np.inf, -np.inf, 0.1, 1e300, -5e-324, *rng.normal(size=9)], 40)
+    rows, out, ints = rng.integers(0, 12, 8), np.zeros(49), np.zeros(16, np.int64)
+    eight_of(base, rows, step, out, ints)
+    x, y = base[rows * step + 1], base[2 + step * np.arange(8)]
+    with np.errstate(over="ignore"):
+        rounded = x.astype(np.float32).astype(float)
+    expected = [x, y, rounded, np.where(np.signbit(x), y, 0.5), np.clip(x, -1.0, 1.0) * 2.0 + np.abs(y), np.full(8, 7)]
+    np.testing.assert_array_equal(out[:48].reshape(6, 8), expected)
+    np.testing.assert_array_equal(np.signbit(out[:16].reshape(2, 8)), np.signbit([x, y]))
+    assert out[48] == 7.0 and ints.tolist() == [*np.where(x > 0, 3, 4), *[9] * 8]
+
+
+@njit
+def with_numbers(a, c, out, masks):
+    x = load8(a, 0)
+    store(out, 0, x + c)
+    store(out, 8, c - x)
+    store(out, 16, larger(x, c))
+    store(out, 24, larger(c, x))
+    store(out, 32, smaller(x, c))
+    store(out, 40, smaller(c, x))
+    store(out, 48, select(x < c, c, x))
+    masks[0], masks[1] = movemask(x < c), movemask(c <= x)
+
+
+def test_a_number_beside_a_vector_stands_for_all_lanes():
+    a, c = np.array([0.0, -0.0, np.nan, np.inf, -3.0, 0.5, 0.25, 7.0], np.float32), np.float32(0.5)
+    out, masks = np.zeros(56, np.float32), np.zeros(2, np.int64)
+    with_numbers(a, c, out, masks)
+    lanes = np.full(8, c)
+    with np.errstate(all="ignore"):
+        less, more = np.where(a > c, a, c), np.where(a < c, a, c)
+        expected = [
+            a + c, c - a, np.where(c > a, c, a), less, np.where(c < a, c, a), more, np.where(a < c, lanes, a),
+        ]  # fmt: skip
+        assert masks.tolist() == [bits_of(a < c), bits_of(c <= a)]
+    np.testing.assert_array_equal(out.reshape(7, 8), expected)
+
+
+@njit
+def magnitudes(a8, a4, out8, out4, number):
+    store(out8, 0, magnitude(load8(a8, 0)))
+    store(out4, 0, magnitude(load4(a4, 0)))
+    return magnitude(number)
+
+
+def test_magnitudes_have_no_sign():
+    a8 = np.array([0.0, -0.0, -1e-45, -np.inf, np.inf, -2.5, 2.5, -np.nan], np.float32)
+    out8, out4 = np.zeros(8, np.float32), np.zeros(4)
+    assert magnitudes(a8, np.array([-0.0, -1e300, 5.0, -np.inf]), out8, out4, -0.0).hex() == (0.0).hex()
+    assert out8.tobytes() == np.abs(a8).tobytes() and out4.tolist() == [0.0, 1e300, 5.0, np.inf]
+    assert not np.signbit(out4[0])

@@ -10,11 +10,12 @@ from renderer.kernels.jit import kernel
 from renderer.kernels.simd import pointer, splat8
 from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
+from renderer.trace.batch import RayBatch
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
 from renderer.trace.layout import NODE_WORDS
 from renderer.trace.packet import enter_beam, make_beam
-from renderer.trace.ray_lanes import DOUBLES, FLOATS, INTEGERS, WIDTH, Prepared, prepare_ray
-from renderer.trace.rays import RayPointers
+from renderer.trace.ray_lanes import SIXTEEN, WIDTH, Prepared, prepare_eight, prepare_ray
+from renderer.trace.rays import RayPointers, ray_at, ray_pointers
 from renderer.trace.traverse import are_coherent
 
 SEEDS = st.integers(0, 2**20)
@@ -86,6 +87,32 @@ def test_a_packet_that_gives_up_is_traced_all_the_same():
 
 
 @kernel
+def _prepare_both(rays, numbers, together, alone):
+    floats, doubles, integers = together
+    source = ray_pointers(rays, 0.25)
+    prepare_eight(source, Prepared(pointer(floats), pointer(doubles), pointer(integers)), 8, pointer(numbers))
+    floats, doubles, integers = alone
+    for k in range(8):
+        ray, t_max = ray_at(source, numbers[k])
+        prepare_ray(Prepared(pointer(floats), pointer(doubles), pointer(integers)), 8 + k, ray, t_max)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_eight_rays_are_prepared_as_each_is_alone(seed):
+    """Bit for bit: directions along axes, of equal components and of -0.0, origins and bounds of any size."""
+    rng = np.random.default_rng(seed)
+    origins = rng.choice([0.0, -0.0, 1.0, -(2.0**126), 1e-310, *rng.normal(size=9)], (20, 3))
+    directions = rng.choice([0.0, -0.0, 1.0, -1.0, 1e-200, -1e200, *rng.normal(size=9)], (20, 3))
+    t_max = rng.choice([0.0, 1e-320, 3.0, 1e308, np.inf], 20)
+    rays = RayBatch(origins, directions, rng.choice([0.0, 1e-320, 0.5], 20), t_max)
+    together, alone = ([np.zeros(SIXTEEN, kind) for kind in (np.float32, float, np.int64)] for _ in range(2))
+    _prepare_both(rays, rng.integers(0, 20, 8), tuple(together), tuple(alone))
+    for one, other in zip(together, alone, strict=True):
+        assert one.tobytes() == other.tobytes() and one.reshape(16, 16)[:, 8:].any()
+        assert not one.reshape(16, 16)[:, :8].any()
+
+
+@kernel
 def _are_coherent(origins, directions, bound):
     return are_coherent(
         RayPointers(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 3, 0, 0, 1.0), 0
@@ -124,7 +151,7 @@ def _meet_beam_and_rays(nodes, origins, directions, t_max, room):
 
 def _beam_and_rays(nodes, origins, directions, t_max):
     """The bits of the octants that the beam of sixteen rays meets, and those that any of them meets alone."""
-    room = np.empty(FLOATS, np.float32), np.empty(DOUBLES), np.empty(INTEGERS, np.int64)
+    room = np.empty(SIXTEEN, np.float32), np.empty(SIXTEEN), np.empty(SIXTEEN, np.int64)
     return _meet_beam_and_rays(nodes, origins, directions, t_max, room)
 
 
