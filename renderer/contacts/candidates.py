@@ -1,4 +1,4 @@
-"""The blocks that rays may hit, found sixteen rays at a time.
+"""The blocks that rays may hit, found as a stream.
 
 A block is listed where the ray passes some face's edges on the same side; where the hit lies is left to ``gather``.
 """
@@ -44,7 +44,7 @@ def find_blocks(tree, rays, begin, end, scratch, found):
 
     Returns the ray before which it ended, ``end`` unless there was much to do, and the number of rounds.
     """
-    prepared, lanes, rounds = scratch.prepared, scratch.lanes, np.int64(0)
+    prepared, lanes, steps = scratch.prepared, scratch.lanes, np.int64(0)
     count, following = end - begin, np.int64(0)
     nodes, leaves, ends = 0, 0, 0
     clear_lanes(lanes)
@@ -53,11 +53,11 @@ def find_blocks(tree, rays, begin, end, scratch, found):
     for k in range(count):
         put(found.counts, k, 0)
     while True:
-        if following < count and rounds <= _ROUNDS:
+        if following < count and steps <= _ROUNDS * WIDTH:
             following, nodes = begin_rays(rays, prepared, lanes, (found.numbers, following, count), (nodes, leaves))
         if nodes + leaves + ends == 0:
-            return begin + following, rounds
-        rounds += 1
+            return begin + following, steps // WIDTH
+        steps += nodes + leaves
         meet_nodes(tree, prepared, lanes, nodes)
         entered, nodes = nodes, 0
         for k in range(entered):

@@ -26,7 +26,7 @@ LARGEST, U, V, W = 8 * WIDTH, 9 * WIDTH, 10 * WIDTH, 11 * WIDTH
 # ray's next child, the top of its stack, its number, and whether a hit was in doubt.
 NEAR_ROW, BLOCK_ROW, FACE = 0, 3 * WIDTH, 6 * WIDTH
 CHILD, TOP, NUMBER, DOUBTFUL = 7 * WIDTH, 8 * WIDTH, 9 * WIDTH, 10 * WIDTH
-# The words of sixteen rays in each of the three: a place ``r`` of the next sixteen is so much larger.
+# The words of sixteen rays in each of the three: a lane ``r`` of the next sixteen is so much larger.
 SIXTEEN = 16 * WIDTH
 
 
@@ -40,7 +40,7 @@ class Prepared(NamedTuple):
 
 @inlined
 def prepare_ray(rays, r, ray, t_max):
-    """Write ``ray``, which has met nothing yet, to place ``r``; or eight rays, vectors, to the places from ``r`` on."""
+    """Write ``ray``, which has met nothing yet, to lane ``r``; or eight rays, vectors, to the lanes from ``r`` on."""
     floats, doubles, integers = rays
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
@@ -68,7 +68,7 @@ def prepare_ray(rays, r, ray, t_max):
 
 @inlined
 def prepare_eight(rays, prepared, r, numbers):
-    """Write the eight rays whose numbers stand at ``numbers`` to the places from ``r`` on."""
+    """Write the eight rays whose numbers stand at ``numbers`` to the lanes from ``r`` on."""
     ray, t_max = eight_rays_at(rays, numbers)
     prepare_ray(prepared, r, ray, t_max)
 

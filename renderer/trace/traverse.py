@@ -15,6 +15,7 @@ from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointer
 from renderer.trace.singly import search_singly, stack_size
 from renderer.trace.stream import (
     END,
+    ENOUGH,
     LANE_DOUBLES,
     LANE_INTEGERS,
     SIXTEENS,
@@ -39,7 +40,7 @@ from renderer.trace.stream import (
 _SPREAD = 0.125
 # The rounds of lanes in a call, beside those of the rays under way then: some 10 ms, so that Ctrl-C need not wait for
 # long. A chunk of rays takes fewer on most meshes, and is not cut.
-_WORK = 1 << 15
+_WORK = 1 << 14
 
 
 class Scratch(NamedTuple):
@@ -106,9 +107,9 @@ def are_coherent(rays, begin):
 
 @inlined
 def _finish(tree, rays, found, scratch, r, any_hit):
-    """Write the hit of the ray at place ``r``; if one was in doubt, after a careful search on the ray's stack.
+    """Write the hit of the ray in lane ``r``; if one was in doubt, after a careful search on the ray's stack.
 
-    Returns the rounds of sixteen rays that take as long as that search.
+    Returns the rounds of lanes that take as long as that search.
     """
     best, integers, steps = best_of(scratch.prepared, r), scratch.prepared.integers, np.int64(0)
     i = get(integers, NUMBER + r)
@@ -116,7 +117,7 @@ def _finish(tree, rays, found, scratch, r, any_hit):
         ray, t_max = ray_at(rays, i)
         best, steps = search_singly(tree, ray, t_max, at(scratch.lanes.stacks, stack_of(scratch.lanes, r)))
     write_hit(found, i, rays.scale, best, any_hit)
-    return steps // WIDTH
+    return steps // ENOUGH
 
 
 @kernel

@@ -63,7 +63,7 @@ EQUIVALENT: dict[str, str] = {
         "a call that ends earlier is called again: the same answers",
     "renderer.trace.traverse.make_memory #0: 1 -> 2": "memory behind the last stack is never written nor read",
     "renderer.kernels.compiler.probe #0: True -> False": "a kernel answers alike whether what it calls is inlined",
-    "renderer.trace.stream._go_on #0: _prefetch_child(tree, child) -> pass": "a prefetch changes no answer",
+    "renderer.trace.stream.resume #0: _prefetch_child(tree, child) -> pass": "a prefetch changes no answer",
     "renderer.shade.whitted._meet_surfaces #0: times(row3(bundle.weights, i), row3(scene.colors, 1)) -> "
     "times(row3(scene.colors, 1), row3(bundle.weights, i))": "a product is the same in either order",
     "renderer.distance.block_distance #0: -48 -> (48)":
