@@ -1,4 +1,4 @@
-"""The midpoint rule: the eight octants about the middle of a box, as binary cuts."""
+"""The midpoint rule: the octants about the middle of a box, eight where it is nearly a cube, as binary cuts."""
 
 from typing import NamedTuple
 
@@ -72,7 +72,11 @@ def cut_octants(faces, tree, part, whole, count, room):
 
 @inlined
 def _box_middle(boxes, base):
-    """The axes of the box at word ``base``, longest first, and the doubled middle along each."""
+    """The axes of the box at word ``base``, longest first, and the doubled middle along each.
+
+    It is infinite, so that nothing is cut, along an axis that is not half as long as the longest: in an octree of cubes
+    the box is one layer of cells. To cut such boxes costs rays at terrains a fifth more nodes.
+    """
     x = -boxes[base + 4] - boxes[base]
     y = -boxes[base + 5] - boxes[base + 1]
     z = -boxes[base + 6] - boxes[base + 2]
@@ -80,10 +84,13 @@ def _box_middle(boxes, base):
     if y > x:
         a, b, x, y = 1, 0, y, x
     if z > y:
-        b, c, y = 2, b, z
+        b, c, y, z = 2, b, z, y
         if y > x:
-            a, b = b, a
-    return (a, b, c), (double_centre(boxes, base, a), double_centre(boxes, base, b), double_centre(boxes, base, c))
+            a, b, x, y = b, a, y, x
+    half, none = x * np.float32(0.5), np.float32(np.inf)
+    second = double_centre(boxes, base, b) if y >= half else none
+    third = double_centre(boxes, base, c) if z >= half else none
+    return (a, b, c), (double_centre(boxes, base, a), second, third)
 
 
 @kernel
