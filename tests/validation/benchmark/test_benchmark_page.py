@@ -53,7 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(timing, "REST", 0.0)
         patch.setattr(meshes, "QUICK", (100, 400, 1_000))
-        patch.setattr(meshes, "QUICK_FORMS", (("thin", 600), ("city", 300)))
+        patch.setattr(meshes, "QUICK_FORMS", (("scan", 600), ("city", 300)))
         patch.setattr(calls, "_CALLS", 2)
         patch.setattr(command, "QUICK_RAYS", 300)
         patch.setattr(drop_in, "QUICK_RAYS", (1, 40))
@@ -77,7 +77,7 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
     assert found["environment"]["packages"]["numba"] and found["environment"]["threads"] >= 1
     assert len(found["series"]) == 3 and "own" not in found["series"]
     spheres = dict.fromkeys(found["series"], "spheres")
-    assert found["kinds"] == spheres | {"thin_600": "thin", "city_300": "city", "own": "file"}
+    assert found["kinds"] == spheres | {"scan_600": "scan", "city_300": "city", "own": "file"}
     asked = [(row["mesh"], row["query"]) for row in found["queries"]]
     # Six families of rays for two queries, one for two more; one of points for one query, two for two more. Other kinds
     # are asked by each family once, and by two of them twice.
@@ -88,7 +88,7 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
         assert row["agree"] and len(ours["seconds"]) == 5 and min(ours["seconds"]) <= ours["median"]
         assert ours["ns"] == pytest.approx(1e3 / ours["mrays"])
         assert (row["hit_share"] == 0.0) == (row["family"] == "misses")
-        brief = found["kinds"][row["mesh"]] in ("thin", "city")
+        brief = found["kinds"][row["mesh"]] in ("scan", "city")
         assert not brief or not {"trimesh", "mitsuba_scalar"} & set(row["contenders"])
     assert [row["rays"] for row in found["calls"]] == [1, 10, 100]
     # The mesh by path is none of the series, so no fit knows of it: a fit needs all three others.

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from validation.benchmark.measures.kinds import DIGITS, FIRST, KINDS, title
 from validation.benchmark.page import figures, heat, pareto
@@ -20,10 +20,6 @@ _TEMPLATES = Path(__file__).resolve().parents[2] / "report" / "templates"
 
 def html(record: Mapping[str, Any], ideas: Sequence[Idea] = ()) -> str:
     """The page: tables and figures in light and dark; ``ideas`` are those of ``history``."""
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    environment.filters["number"] = number
     plots = {
         "query_figures": figures.query_figures(record),
         "build_figures": figures.build_figures(record),
@@ -33,14 +29,30 @@ def html(record: Mapping[str, Any], ideas: Sequence[Idea] = ()) -> str:
     shown |= {"heat": {"shades": heat.SHADES, "legend": heat.legend(), "least": heat.MEAN_FACES,
                        "first": heat.first_hits(record), "summary": heat.summary(record),
                        "others": heat.others(record), "few": heat.few(record)}}  # fmt: skip
-    shown |= {"kept": [i for i in ideas if i.kept], "dropped": [i for i in ideas if not i.kept]}
-    shown |= {"said": {name: kind.said for name, kind in KINDS.items()}, "digits": DIGITS}
-    return environment.get_template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **shown, **plots)
+    shown |= {"said": {name: kind.said for name, kind in KINDS.items()}, "digits": DIGITS} | _by_fate(ideas)
+    return _template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **shown, **plots)
+
+
+def ideas_tables(ideas: Sequence[Idea]) -> str:
+    """The page's tables of ideas, kept and dropped, alone."""
+    return _template("benchmark_ideas.html").render(_by_fate(ideas))
 
 
 def ratios(record: Mapping[str, Any]) -> str:
     """The terminal's text: every ratio of ours to a peer, larger is faster, then the targets."""
     return "\n".join(_lines(record))
+
+
+def _template(name: str) -> Template:
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.filters["number"] = number
+    return environment.get_template(name)
+
+
+def _by_fate(ideas: Sequence[Idea]) -> dict[str, list[Idea]]:
+    return {"kept": [i for i in ideas if i.kept], "dropped": [i for i in ideas if not i.kept]}
 
 
 def _tables(record: Mapping[str, Any]) -> list[dict[str, Any]]:
