@@ -1,6 +1,7 @@
 """One small run from the command line: the record, its way through JSON, and the page drawn from it alone."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from renderer.mesh.mesh import Mesh
 from validation import timing
 from validation.benchmark import __main__ as command
 from validation.benchmark.measures import ablation, calls, drop_in, first_answers, frames, memory, meshes, processes
-from validation.benchmark.page import page, record
+from validation.benchmark.page import heat, history, page, record
 from validation.benchmark.parameters import study
 from validation.benchmark.peers import systems
 from validation.benchmark.peers.ours import OURS, OURS_ONE
@@ -97,6 +98,9 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
     for row in found["builds"]:
         assert {"ours_midpoint", "ours_sah", "embree"} <= set(row["contenders"])
         assert {"embree"} <= set(row["ratios_refit"]) and not [n for n in row["ratios_refit"] if n.startswith(OURS)]
+        seconds = {name: c["seconds"] for name, c in row["contenders"].items()}
+        for name, against in row["ratios_refit"].items():
+            assert against == timing.ratio(seconds[name], seconds["ours_refit"])
 
 
 def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -121,6 +125,40 @@ def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: py
     assert "12.34" in capsys.readouterr().out
     for outside in ("http://", "https://", "<script", "<link"):
         assert outside not in text.replace("http://www.w3.org", "")
+
+
+def test_the_heat_map_is_right_after_the_targets_with_a_cell_for_each_ratio(folder: Path) -> None:
+    stored = record.read(folder / "benchmark.json")
+    stored["queries"][1]["agree"] = False
+    text = page.html(stored)
+    titles = re.findall(r"<h2>(.*?)</h2>", text)
+    assert titles[:3] == ["Targets", "Heat map", "Rays"] and titles[-1] == "What was tried and kept"
+    shown = text.split("<h2>Heat map</h2>")[1].split("<h2>Rays</h2>")[0]
+    rows = [r for r in stored["queries"] if r["query"] in ("closest", "any")]
+    for peer in heat.peers(stored):
+        of = [r for r in rows if heat.first_ratio(r, peer) is not None]
+        assert len(re.findall(f'title="[^"]* rays, (?:closest|any) hit, against {peer}: ', shown)) == len(of) > 0
+    disagreeing = re.findall(r'<td class="[a-z]+\d odd[^>]*>[\d.]+≠</td>', shown)
+    assert len(disagreeing) == len(heat.peers(stored))
+    assert all(name in shown for name, _ in heat.legend()) and "prefers-color-scheme: dark" in text
+    for what in ("Build, refit and memory", "build", "refit", "memory at rest", "Calls of few rays", "below 1"):
+        assert what in shown
+    assert "efficiency of 2 threads" in text.split("<h2>Rays</h2>")[1]
+
+
+def test_the_page_has_the_history_of_ideas_and_a_faulty_one_stops_the_run(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    form = [line[2:] for line in history.FILE.read_text(encoding="utf-8").splitlines() if "=" in line or "[[" in line]
+    own = tmp_path / "history.toml"
+    own.write_text("\n".join(form).replace("One sentence", "EXAMPLE sentence"), encoding="utf-8")
+    monkeypatch.setattr(history, "FILE", own)
+    assert command.main(["--page-only", "--output", str(folder)]) == 0
+    assert "EXAMPLE sentence" in (folder / "benchmark.html").read_text(encoding="utf-8")
+    own.write_text("surprise = 1\n", encoding="utf-8")
+    monkeypatch.setattr(command, "measure", lambda *_: pytest.fail("measured"))
+    assert command.main(["--quick", "--output", str(tmp_path)]) == 2
+    assert "history.toml: surprise: Extra inputs" in capsys.readouterr().err
 
 
 def test_the_terminal_shows_ratios_and_what_is_missing(folder: Path) -> None:

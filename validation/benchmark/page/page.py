@@ -47,7 +47,7 @@ def _template(name: str) -> Template:
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    environment.filters["number"] = number
+    environment.filters |= {"number": number, "ratio": heat.text}
     return environment.get_template(name)
 
 
@@ -102,7 +102,7 @@ def _lines(record: Mapping[str, Any]) -> Iterator[str]:
 def _heat_lines(record: Mapping[str, Any]) -> Iterator[str]:
     for of in heat.summary(record):
         yield (f"heat map, {of['peer']}, {of['threads']}: geometric mean {_times(of['mean'])}, "
-               f"least {of['least']:.2f} ({of['where']}), {of['below']} of {of['cells']} cells below 1")  # fmt: skip
+               f"least {heat.text(of['least'])} ({of['where']}), {of['below']} of {of['cells']} cells below 1")  # fmt: skip
     for row in record["calls"]:
         found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in row["ratios"].items())
         yield f"calls of {row['rays']}, peer's time over ours: {found}"
