@@ -101,8 +101,9 @@ def _lines(record: Mapping[str, Any]) -> Iterator[str]:
 
 def _heat_lines(record: Mapping[str, Any]) -> Iterator[str]:
     for of in heat.summary(record):
-        yield (f"heat map, {of['peer']}, {of['threads']}: geometric mean {_times(of['mean'])}, "
-               f"least {heat.text(of['least'])} ({of['where']}), {of['below']} of {of['cells']} cells below 1")  # fmt: skip
+        least = f"least {heat.text(of['least'])} ({of['where']})"
+        yield (f"heat map, {of['peer']}, {of['threads']}: geometric mean {_times(of['mean'])}, {least}, "
+               f"{of['below']} of {of['cells']} cells below 1")  # fmt: skip
     for row in record["calls"]:
         found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in row["ratios"].items())
         yield f"calls of {row['rays']}, peer's time over ours: {found}"
