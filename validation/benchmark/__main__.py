@@ -50,10 +50,12 @@ def make_parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here, so that --help does not wait for it.
     from renderer.process.files import write_atomically
-    from validation.benchmark.page import page, record
+    from validation.benchmark.page import history, page, record
     from validation.progress import steps
 
     options.output.mkdir(parents=True, exist_ok=True)
+    # Read first, so that a fault in it is not told after an hour of measuring.
+    ideas = history.read()
     stored, drawn = options.output / "benchmark.json", options.output / "benchmark.html"
     if not options.page_only:
         missing = [path for path in options.mesh if not path.is_file()]
@@ -63,7 +65,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
             measured = measure(options.quick, options.huge, tuple(options.mesh), command, step)
         record.write(measured, stored)
     text = record.read(stored)
-    page_text = page.html(text)
+    page_text = page.html(text, ideas)
     write_atomically(drawn, lambda file: file.write(page_text.encode()))
     print(page.ratios(text))
     print(f"benchmark: {text['seconds']:.0f} s; see {drawn}")
@@ -74,7 +76,7 @@ def measure(
     quick: bool, huge: bool, paths: tuple[Path, ...], command: str, step: Callable[[str], None]
 ) -> dict[str, Any]:
     """The whole record; see ``validation.benchmark.page.record``."""
-    from validation.benchmark.measures import ablation, drop_in, first_answers, frames, meshes, processes
+    from validation.benchmark.measures import ablation, calls, drop_in, first_answers, frames, meshes, processes
     from validation.benchmark.measures.queries import fits
     from validation.benchmark.page import record, targets
     from validation.benchmark.parameters import study
@@ -84,38 +86,41 @@ def measure(
     step("contenders")
     systems, missing = available()
     names = {system.name for system in systems}
-    series: list[str] = []
+    kinds: dict[str, str] = {}
     rows: dict[str, list[Any]] = {"queries": [], "builds": [], "memory": []}
     open_edges: dict[str, int] = {}
-    for mesh, generated in meshes.chosen(quick, huge, paths):
-        series += [mesh.name] if generated else []
-        _measure_mesh(mesh, systems, QUICK_RAYS if quick else RAYS, rows, step)
-        open_edges |= {mesh.name: len(mesh.open_edges)} if len(mesh.open_edges) else {}
+    for chosen in meshes.chosen(quick, huge, paths):
+        mesh, kinds[chosen.mesh.name] = chosen.mesh, chosen.kind
+        _measure_mesh(chosen, systems, QUICK_RAYS if quick else RAYS, rows, step)
+        open_edges |= {mesh.name: len(mesh.open_edges)} if not chosen.brief and len(mesh.open_edges) else {}
+    series = [name for name, kind in kinds.items() if kind == meshes.SERIES]
     llvm = "mitsuba_llvm" in names
     found: dict[str, Any] = {
         "schema": record.SCHEMA, "command": command, "date": date.isoformat(timespec="seconds"),
         "commit": record.commit(), "quick": quick, "environment": record.describe(_libllvm(llvm), load),
-        "systems": record.described(systems), "missing": missing, "series": series,
+        "systems": record.described(systems), "missing": missing, "series": series, "kinds": kinds,
         "open_edges": open_edges, **rows,
         "fits": fits(rows["queries"], series), "drop_in": drop_in.run(quick, step),
+        "calls": calls.measure(systems, step),
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
-        "first_answers": first_answers.measure(names, step),
+        "first_answers": first_answers.measure(step),
         "ablation": ablation.run(quick, step), "knobs": study.run(quick, step),
     }  # fmt: skip
     return found | {"targets": targets.judged(found), "seconds": time.perf_counter() - began}
 
 
 def _measure_mesh(
-    mesh: Any, systems: Sequence[Any], count: int, rows: dict[str, list[Any]], step: Callable[[str], None]
+    chosen: Any, systems: Sequence[Any], count: int, rows: dict[str, list[Any]], step: Callable[[str], None]
 ) -> None:
     """Add one mesh's rows, memory first, while this process is small."""
     from validation.benchmark.measures import builds, memory, queries
 
+    mesh = chosen.mesh
     grown = memory.measure(mesh, systems, step)
     rows["memory"] += [grown] if grown is not None else []
     rows["builds"].append(builds.measure(mesh, systems, step))
-    rows["queries"] += queries.measure(mesh, systems, count, step)
+    rows["queries"] += queries.measure(mesh, systems, count, step, brief=chosen.brief)
 
 
 def _libllvm(used: bool) -> str | None:

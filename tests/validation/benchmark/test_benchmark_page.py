@@ -1,6 +1,7 @@
 """One small run from the command line: the record, its way through JSON, and the page drawn from it alone."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,8 @@ from renderer.mesh.load import save_ply
 from renderer.mesh.mesh import Mesh
 from validation import timing
 from validation.benchmark import __main__ as command
-from validation.benchmark.measures import ablation, drop_in, first_answers, frames, memory, meshes, processes
-from validation.benchmark.page import page, record
+from validation.benchmark.measures import ablation, calls, drop_in, first_answers, frames, memory, meshes, processes
+from validation.benchmark.page import heat, history, page, record
 from validation.benchmark.parameters import study
 from validation.benchmark.peers import systems
 from validation.benchmark.peers.ours import OURS, OURS_ONE
@@ -46,13 +47,15 @@ def _ablation(*_: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run on three tiny meshes and an open one by path; what takes long is replaced by records of the same form."""
+    """A run on five tiny meshes and an open one by path; what takes long is replaced by records of the same form."""
     folder = tmp_path_factory.mktemp("benchmark")
     spheres = meshes.displaced_spheres(500)
     save_ply(Mesh(spheres.vertices, spheres.faces[1:]), folder / "own.ply")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(timing, "REST", 0.0)
         patch.setattr(meshes, "QUICK", (100, 400, 1_000))
+        patch.setattr(meshes, "QUICK_FORMS", (("scan", 600), ("city", 300)))
+        patch.setattr(calls, "_CALLS", 2)
         patch.setattr(command, "QUICK_RAYS", 300)
         patch.setattr(drop_in, "QUICK_RAYS", (1, 40))
         patch.setattr(frames, "measure", _frames)
@@ -74,31 +77,45 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
     assert found["missing"]["nobody"] == "pip install nobody"
     assert found["environment"]["packages"]["numba"] and found["environment"]["threads"] >= 1
     assert len(found["series"]) == 3 and "own" not in found["series"]
+    spheres = dict.fromkeys(found["series"], "spheres")
+    assert found["kinds"] == spheres | {"scan_600": "scan", "city_300": "city", "own": "file"}
     asked = [(row["mesh"], row["query"]) for row in found["queries"]]
-    # Four families of rays for two queries, one for two more; one of points for one query, two for two more.
-    assert len(asked) == 4 * (4 * 2 + 2 + 1 + 2 * 2) - 3 and found["open_edges"] == {"own": 3}
+    # Six families of rays for two queries, one for two more; one of points for one query, two for two more. Other kinds
+    # are asked by each family once, and by two of them twice.
+    assert len(asked) == 4 * (6 * 2 + 2 + 1 + 2 * 2) - 3 + 2 * (6 + 2) and found["open_edges"] == {"own": 3}
     assert ("own", "nearest") in asked and not {("own", "contains"), ("own", "signed")} & set(asked)
     for row in found["queries"]:
         ours = row["contenders"][OURS]
         assert row["agree"] and len(ours["seconds"]) == 5 and min(ours["seconds"]) <= ours["median"]
         assert ours["ns"] == pytest.approx(1e3 / ours["mrays"])
+        assert (row["hit_share"] == 0.0) == (row["family"] == "misses")
+        brief = found["kinds"][row["mesh"]] in ("scan", "city")
+        assert not brief or not {"trimesh", "mitsuba_scalar"} & set(row["contenders"])
+    assert [row["rays"] for row in found["calls"]] == [1, 10, 100]
     # The mesh by path is none of the series, so no fit knows of it: a fit needs all three others.
     assert {f["contender"] for f in found["fits"]} >= {OURS, OURS_ONE, "embree", "trimesh", "mitsuba_scalar"}
     assert len(found["drop_in"]) == 5 * 2 and all(min(row["ratios"].values()) > 0 for row in found["drop_in"])
     for row in found["builds"]:
         assert {"ours_midpoint", "ours_sah", "embree"} <= set(row["contenders"])
+        assert {"embree"} <= set(row["ratios_refit"]) and not [n for n in row["ratios_refit"] if n.startswith(OURS)]
+        seconds = {name: c["seconds"] for name, c in row["contenders"].items()}
+        for name, against in row["ratios_refit"].items():
+            assert against == timing.ratio(seconds[name], seconds["ours_refit"])
 
 
 def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stored = json.loads((folder / "benchmark.json").read_text(encoding="utf-8"))
     stored["queries"][0]["ratios"]["embree"] = 12.34
+    stored["queries"][0]["ratios_one_thread"]["embree"] = 0.9876
     stored["environment"]["processor"] = "A <made-up> processor"
     record.write(stored, folder / "benchmark.json")
     assert command.main(["--page-only", "--output", str(folder)]) == 0
     text = (folder / "benchmark.html").read_text(encoding="utf-8")
-    assert "12.34" in text and "A &lt;made-up&gt; processor" in text and "pip install nobody" in text
+    assert (
+        "12.34" in text and ">0.98<" in text and "A &lt;made-up&gt; processor" in text and "pip install nobody" in text
+    )
     # Memory is not drawn for meshes as small as these.
-    assert text.count("<svg") == 8 + 7 + 1
+    assert text.count("<svg") == 12 + 7 + 1
     assert "own has 3 open edges" in text and "2<sup>−20</sup>" in text
     first, second = text.split("<h2>All hits and points</h2>")
     assert "libigl<br>" in second and "libigl<br>" not in first
@@ -110,14 +127,52 @@ def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: py
         assert outside not in text.replace("http://www.w3.org", "")
 
 
+def test_the_heat_map_is_right_after_the_targets_with_a_cell_for_each_ratio(folder: Path) -> None:
+    stored = record.read(folder / "benchmark.json")
+    stored["queries"][1]["agree"] = False
+    text = page.html(stored)
+    titles = re.findall(r"<h2>(.*?)</h2>", text)
+    assert titles[:3] == ["Targets", "Heat map", "Rays"] and titles[-1] == "What was tried and kept"
+    shown = text.split("<h2>Heat map</h2>")[1].split("<h2>Rays</h2>")[0]
+    rows = [r for r in stored["queries"] if r["query"] in ("closest", "any")]
+    for peer in heat.peers(stored):
+        of = [r for r in rows if heat.first_ratio(r, peer) is not None]
+        assert len(re.findall(f'title="[^"]* rays, (?:closest|any) hit, against {peer}: ', shown)) == len(of) > 0
+    disagreeing = re.findall(r'<td class="[a-z]+\d odd[^>]*>[\d.]+≠</td>', shown)
+    assert len(disagreeing) == len(heat.peers(stored))
+    assert all(name in shown for name, _ in heat.legend()) and "prefers-color-scheme: dark" in text
+    for what in ("Build, refit and memory", "build", "refit", "memory at rest", "Calls of few rays", "below 1"):
+        assert what in shown
+    assert "efficiency of 2 threads" in text.split("<h2>Rays</h2>")[1]
+
+
+def test_the_page_has_the_history_of_ideas_and_a_faulty_one_stops_the_run(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    form = [line[2:] for line in history.FILE.read_text(encoding="utf-8").splitlines() if "=" in line or "[[" in line]
+    own = tmp_path / "history.toml"
+    own.write_text("\n".join(form).replace("One sentence", "EXAMPLE sentence"), encoding="utf-8")
+    monkeypatch.setattr(history, "FILE", own)
+    assert command.main(["--page-only", "--output", str(folder)]) == 0
+    assert "EXAMPLE sentence" in (folder / "benchmark.html").read_text(encoding="utf-8")
+    own.write_text("surprise = 1\n", encoding="utf-8")
+    monkeypatch.setattr(command, "measure", lambda *_: pytest.fail("measured"))
+    assert command.main(["--quick", "--output", str(tmp_path)]) == 2
+    assert "history.toml: surprise: Extra inputs" in capsys.readouterr().err
+
+
 def test_the_terminal_shows_ratios_and_what_is_missing(folder: Path) -> None:
     lines = page.ratios(record.read(folder / "benchmark.json")).splitlines()
     assert any(line.startswith("spheres_") and "bounce" in line for line in lines)
     assert any("target import renderer: 0.25 s (below 0.5) met" in line for line in lines)
     assert any("target first hit: 4.00 CPU s (below 8) met" in line for line in lines)
     assert any("target first picture: - not measured" in line for line in lines)
+    assert any("target a call of 10 rays, against embree: " in line for line in lines)
+    assert [line for line in lines if line.startswith("heat map, embree, one thread each: geometric mean ")]
+    assert any(line.startswith("calls of 1, peer's time over ours: embree ") for line in lines)
     assert "own: 3 open edges, so nothing is inside: not asked for contains and signed" in lines
     heads = [line.split() for line in lines if line.startswith("mesh ")]
+    assert heads[0][-2:] == ["embree", "1:1"] and "1:1" not in heads[1]
     assert "mitsuba_scalar" in heads[0] and "libigl" not in heads[0]
     assert "mitsuba_scalar" not in heads[1] and "libigl" in heads[1]
     assert any(line.split()[1:3] == ["near", "signed"] for line in lines)
@@ -143,7 +198,7 @@ def test_other_records_are_refused(folder: Path, tmp_path: Path) -> None:
     stored = record.read(folder / "benchmark.json")
     path = tmp_path / "benchmark.json"
     path.write_text(json.dumps(stored | {"schema": 99}))
-    with pytest.raises(ValueError, match="schema 4, got 99"):
+    with pytest.raises(ValueError, match="schema 5, got 99"):
         record.read(path)
     path.write_text(json.dumps({k: v for k, v in stored.items() if k != "fits"}))
     with pytest.raises(ValueError, match="expected the keys"):

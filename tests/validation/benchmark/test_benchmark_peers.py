@@ -14,13 +14,13 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box
 from renderer.octree import Octree
 from validation import timing
-from validation.benchmark.measures import queries
+from validation.benchmark.measures import calls, queries
 from validation.benchmark.measures.families import cosine_distributed, families, points
-from validation.benchmark.measures.kinds import KINDS
-from validation.benchmark.measures.meshes import displaced_spheres
-from validation.benchmark.peers import systems
+from validation.benchmark.measures.kinds import FIRST, KINDS
+from validation.benchmark.measures.meshes import displaced_spheres, named
+from validation.benchmark.peers import ours, systems
 from validation.benchmark.peers.contender import Family, HitLists, Points, System
-from validation.benchmark.peers.ours import OURS, OURS_ONE
+from validation.benchmark.peers.ours import OURS, OURS_ONE, OURS_TWO, Ours
 
 
 @pytest.fixture(scope="module")
@@ -52,14 +52,16 @@ def _system(name: str) -> System:
 def test_a_contender_agrees_with_ours(name: str, mesh: Mesh, octree: Octree, rays: tuple[Family, ...]) -> None:
     peer = _system(name).loaded(mesh.vertices, mesh.faces)
     for family in rays:
-        ours = octree.closest_hit(family.origins, family.directions, t_max=family.t_max)
+        hits = octree.closest_hit(family.origins, family.directions, t_max=family.t_max)
         query = peer.closest(family)
-        assert query is not None
+        if query is None:
+            assert name in ("open3d", "trimesh") and family.name == "short"
+            continue
         t = query.read(query.trace())
-        assert np.array_equal(np.isfinite(t), ours.hit), family.name
+        assert np.array_equal(np.isfinite(t), hits.hit), family.name
         # Embree's float32 error of a point is some 2^-24 of the coordinates, 2 here, and t is a share of the ray; the
         # shortest t are those of bounces into the next face, about 1e-3 of it. Seen: 3e-5.
-        assert np.allclose(t[ours.hit], ours.t[ours.hit], rtol=1e-3, atol=1e-6), family.name
+        assert np.allclose(t[hits.hit], hits.t[hits.hit], rtol=1e-3, atol=1e-6), family.name
         asked = peer.any(family)
         if asked is None:
             assert name == "trimesh" and family.name == "shadow"
@@ -82,13 +84,13 @@ _MORE = {
 def test_a_contender_agrees_with_ours_on_all_hits_and_points(
     name: str, mesh: Mesh, octree: Octree, rays: tuple[Family, ...]
 ) -> None:
-    ours, peer = (_system(n).loaded(mesh.vertices, mesh.faces) for n in (OURS, name))
+    own, peer = (_system(n).loaded(mesh.vertices, mesh.faces) for n in (OURS, name))
     found = set()
     for kind in KINDS.values():
         for asked in (*rays, *points(mesh, 600)):
             query = kind.ask(peer, asked) if asked.name in kind.families else None
-            if query is not None and kind.name not in ("closest", "any"):
-                expected = kind.ask(ours, asked)
+            if query is not None and kind.name not in FIRST:
+                expected = kind.ask(own, asked)
                 assert expected is not None
                 known, answer = expected.read(expected.trace()), query.read(query.trace())
                 assert len(kind.hit(answer)) == 600 and kind.hit(known).sum() > 100
@@ -148,15 +150,36 @@ def test_a_ray_ends_where_it_should(name: str) -> None:
         assert query.read(query.trace()).tolist() == [expected]
 
 
+@pytest.mark.parametrize("name", ["embree", "open3d", "mitsuba_llvm"])
+def test_short_rays_end_for_a_contender_too(name: str, mesh: Mesh, octree: Octree, rays: tuple[Family, ...]) -> None:
+    short = next(family for family in rays if family.name == "short")
+    asked = _system(name).loaded(mesh.vertices, mesh.faces).any(short)
+    assert asked is not None
+    expected = octree.any_hit(short.origins, short.directions, t_max=short.t_max)
+    # Else nothing is told by what follows: without their end, more of them hit.
+    assert expected.sum() < 0.8 * octree.any_hit(short.origins, short.directions).sum()
+    assert np.array_equal(asked.read(asked.trace()), expected)
+
+
 def test_every_family_hits_and_shadow_rays_end_at_one_light(octree: Octree, rays: tuple[Family, ...]) -> None:
-    assert [family.name for family in rays] == ["camera", "shadow", "random", "bounce"]
+    assert [family.name for family in rays] == ["camera", "shadow", "random", "bounce", "misses", "short"]
     for family in rays:
         assert len(family) == 600
         share = octree.any_hit(family.origins, family.directions, t_max=family.t_max).mean()
-        assert 0.05 < share < 0.95, family.name  # else a contender would be timed on an empty scene
+        assert share == 0.0 if family.name == "misses" else 0.05 < share < 0.95, (
+            family.name
+        )  # else a contender would be timed on an empty scene
         for array in (family.origins, family.directions):
             assert np.array_equal(array, array.astype(np.float32))
-    shadow = rays[1]
+    shadow, misses, short = rays[1], rays[4], rays[5]
+    assert [family.name for family in rays if family.beyond] == ["short"] and short.at_most(5).beyond
+    lower, upper = octree.mesh.bounds
+    assert np.isinf(misses.t_max) and short.t_max == pytest.approx(0.02 * np.linalg.norm(upper - lower))
+    assert np.linalg.norm(short.directions, axis=1) == pytest.approx(1.0)
+    assert octree.closest_point(short.origins).distance.max() <= 0.50001 * short.t_max
+    # The box of the misses is half as large again as the mesh's, and they fill it.
+    reach = np.abs(misses.origins - (lower + upper) / 2) / (upper - lower) * 2
+    assert 1.45 < reach.max() < 1.5000001
     # The ends differ by the rounding of the directions to float32 alone: below 16, that is 2^-21 up or down.
     assert np.ptp(shadow.origins + shadow.directions, axis=0).max() <= 2.0**-20
     assert shadow.t_max == 1.0
@@ -188,6 +211,21 @@ def test_bounce_rays_follow_the_cosine() -> None:
     assert abs((cosine**2).mean() - 1 / 2) < 0.011
 
 
+def test_misses_are_repeated_where_there_are_few_and_a_flat_mesh_has_some(monkeypatch: pytest.MonkeyPatch) -> None:
+    octree = Octree.from_mesh(displaced_spheres(1_000))
+    whole = families(octree, 500)[4]
+    assert len(np.unique(whole.origins, axis=0)) == 500
+    monkeypatch.setattr("validation.benchmark.measures.families._BATCHES", 1)
+    few = families(octree, 500)[4]
+    distinct = len(np.unique(few.origins, axis=0))
+    assert len(few) == 500 and 50 < distinct < 500
+    assert np.array_equal(few.origins[distinct:], few.origins[: 500 - distinct])
+    # Seen from above, a tilted square is flat in no axis and hides nothing; a level one is flat in y.
+    corners = np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
+    level = families(Octree(corners, np.array([[0, 2, 1], [0, 3, 2]])), 300)
+    assert np.ptp(level[4].origins[:, 1]) > 0.05 and len(level[4]) == 300
+
+
 def test_fewer_rays_are_spread_over_the_family() -> None:
     family = Family("f", np.arange(30.0).reshape(10, 3), np.ones((10, 3)), 1.0)
     few = family.at_most(4)
@@ -214,9 +252,14 @@ def test_measured_rows_say_who_hit_what(mesh: Mesh) -> None:
     kinds = [KINDS["closest"], KINDS["any"]]
     rows = queries.measure(mesh, chosen, 30_000, lambda _: None, kinds)
     assert [(r["family"], r["query"]) for r in rows] == [
-        (f, q) for f in ("camera", "shadow", "random", "bounce") for q in ("closest", "any")
+        (f, q) for f in ("camera", "shadow", "random", "bounce", "misses", "short") for q in ("closest", "any")
     ]
     for row in rows:
+        seconds = {name: np.array(c["seconds"]) / c["rays"] for name, c in row["contenders"].items()}
+        assert set(row["ratios_one_thread"]) == {"embree", "mitsuba_scalar"}
+        for name, found in row["ratios_one_thread"].items():
+            assert found == pytest.approx(np.median(seconds[name] / seconds[OURS_ONE]))
+        assert row["ratios"]["embree"] == pytest.approx(np.median(seconds["embree"] / seconds[OURS]))
         assert row["agree"] and set(row["ratios"]) == {OURS_ONE, "embree", "mitsuba_scalar"}
         scalar = row["contenders"]["mitsuba_scalar"]
         assert scalar["rays"] == 20_000 and len(scalar["seconds"]) == 5
@@ -279,12 +322,72 @@ def test_the_queries_of_one_mesh_alone(capsys: pytest.CaptureFixture[str], monke
         queries.main(["1000", "--rays", "0"])
 
 
+def test_other_kinds_of_meshes_are_asked_in_brief_and_fast_contenders_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "REST", 0.0)
+    chosen = [_system(name) for name in (OURS, "embree", "libigl", "mitsuba_scalar")]
+    rows = queries.measure(named("city_300"), chosen, 300, lambda _: None, brief=True)
+    closest = [(family, "closest") for family in ("camera", "shadow", "random", "bounce", "misses", "short")]
+    assert sorted((r["family"], r["query"]) for r in rows) == sorted([*closest, ("shadow", "any"), ("short", "any")])
+    assert all(set(r["contenders"]) == {OURS, "embree"} and r["agree"] for r in rows)
+    # Without our one thread, nothing is compared to it.
+    assert all(r["ratios_one_thread"] == {} and r["efficiency"] is None for r in rows)
+
+
+def test_a_miss_that_hits_and_a_scene_without_hits_are_found(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "REST", 0.0)
+    asked = families(Octree.from_mesh(mesh), 300)
+    for name, family in (("misses", asked[0]), ("camera", asked[4])):
+        wrong = (replace(family, name=name),)
+        monkeypatch.setattr(queries, "families", lambda *_, wrong=wrong: wrong)
+        rows = queries.measure(mesh, [_system(OURS)], 300, lambda _: None, [KINDS["closest"]])
+        assert [row["agree"] for row in rows] == [False]
+
+
+def test_the_efficiency_is_that_of_two_threads() -> None:
+    each = {OURS: [1.0, 2.0, 4.0], OURS_ONE: [8.0, 8.0, 8.0], OURS_TWO: [5.0, 5.0, 5.0]}
+    assert queries._efficiency(each, 16) == pytest.approx(0.8)
+    assert queries._efficiency(each, 2) == pytest.approx(2.0)
+    del each[OURS_TWO]
+    assert queries._efficiency(each, 16) is None and queries._efficiency(each, 1) is None
+
+
+@pytest.mark.parametrize(("threads", "names"), [(1, []), (2, []), (16, [OURS_TWO])])
+def test_two_threads_are_a_contender_where_all_are_more(
+    threads: int, names: list[str], mesh: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ours, "available_threads", lambda: threads)
+    found = ours.systems()
+    assert [s.name for s in found] == [OURS, OURS_ONE, *names] and not any(s.times_build for s in found[1:])
+    peers = queries._peers(mesh, [replace(s, threads=s.threads) for s in found])
+    first = peers[OURS]
+    assert isinstance(first, Ours)
+    for name, expected in ((OURS_ONE, 1), (OURS_TWO, 2)):
+        other = peers.get(name)
+        if isinstance(other, Ours):
+            assert other.octree.threads == expected and other.octree.mesh is first.octree.mesh
+
+
+def test_calls_of_few_rays_are_compared_thread_by_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "REST", 0.0)
+    monkeypatch.setattr(calls, "_CALLS", 3)
+    single = _system("embree")
+    chosen = [_system(OURS), _system(OURS_ONE), single, replace(single, name="open3d", threads=2)]
+    rows = calls.measure(chosen, lambda _: None)
+    assert [row["rays"] for row in rows] == [1, 10, 100]
+    for row in rows:
+        micros = {name: np.array(runs) for name, runs in row["micros"].items()}
+        assert set(micros) == {OURS, OURS_ONE, "embree", "open3d"} and set(row["ratios"]) == {"embree", "open3d"}
+        assert row["ratios"]["embree"] == pytest.approx(np.median(micros["embree"] / micros[OURS_ONE]))
+        assert row["ratios"]["open3d"] == pytest.approx(np.median(micros["open3d"] / micros[OURS]))
+        assert row["median"][OURS] == pytest.approx(np.median(micros[OURS])) and row["median"][OURS] > 0.1
+
+
 def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def absent(name: str) -> Any:
         raise ModuleNotFoundError(f"No module named {name!r}")
 
     monkeypatch.setattr(systems, "import_module", absent)
     found, missing = systems.available()
-    assert [system.name for system in found] == [OURS, OURS_ONE]
+    assert {system.name for system in found} - {OURS_TWO} == {OURS, OURS_ONE}
     assert set(missing) == set(systems._PEERS) | {"mitsuba_llvm"}
     assert "pip install open3d" in missing["open3d"] and "libllvm19" in missing["mitsuba_llvm"]

@@ -32,6 +32,7 @@ def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) 
         "faces": len(mesh.faces),
         "contenders": {n: {"seconds": s, "median": statistics.median(s)} for n, s in seconds.items()},
         "ratios": {name: ratio(s, seconds[own]) for name, s in seconds.items() if name != own},
+        "ratios_refit": {peer.name: ratio(seconds[peer.name], seconds[REFIT]) for peer in peers if REFIT in seconds},
     }
 
 

@@ -1,4 +1,4 @@
-"""Seconds to the first results: with nothing compiled, with kernels compiled ahead, and call by call afterwards.
+"""Seconds to the first results: with nothing compiled, and with kernels compiled ahead.
 
 CPU seconds are those of a process and its children, as the system counts them, so that compiling in two processes at
 once does not look cheaper. Each process starts with its own cache folder.
@@ -23,8 +23,6 @@ _RUNS = 3
 _HERE = "validation.benchmark.measures.first_answers"
 # Sizes of the mesh: float32 does not hold its vertices times a third, and holds them as they are.
 _FLOAT64, _FLOAT32 = "0.3333333333333333", "1.0"
-# Number of calls with one or few rays that are timed together: some milliseconds.
-_CALLS = 1_000
 
 
 class Spent(NamedTuple):
@@ -34,7 +32,7 @@ class Spent(NamedTuple):
     cpu: float
 
 
-def measure(installed: set[str], step: Callable[[str], None]) -> dict[str, Any] | None:
+def measure(step: Callable[[str], None]) -> dict[str, Any] | None:
     """The first results as ``rows`` by name, and ``level``, the level of the kernels compiled ahead.
 
     Each row has ``unit``, the ``values`` of all runs and their ``median``. None where the system does not count the
@@ -52,9 +50,7 @@ def measure(installed: set[str], step: Callable[[str], None]) -> dict[str, Any] 
                 found.setdefault(what, []).append(value)
         step("first answers: kernels compiled for a level beside native ones")
         found |= _level_speed(folder, ahead)
-    step("first answers: a call of one ray")
-    found |= _calls(installed)
-    units = {"cpu": "CPU s", "wall": "s", "us": "us", "ratio": "times"}
+    units = {"cpu": "CPU s", "wall": "s", "ratio": "times"}
     rows = {
         name: {"unit": units[name.rpartition("_")[2]], "values": values, "median": statistics.median(values)}
         for name, values in found.items()
@@ -162,30 +158,3 @@ def trace() -> None:
             found[family.name] = statistics.median(times)
             digest.update(np.concatenate([hits.t, hits.face, hits.u, hits.v]).tobytes())
     print(json.dumps(found | {"digest": digest.hexdigest()}))
-
-
-def _calls(installed: set[str]) -> dict[str, list[float]]:
-    """Microseconds of a call with few rays, in our arrays and in the peers' own, in turn."""
-    import numpy as np
-
-    from renderer.mesh.shapes import icosphere
-    from validation.benchmark.peers import ours
-    from validation.benchmark.peers.contender import Family
-    from validation.benchmark.peers.systems import available
-
-    mesh = icosphere(5)
-    found: dict[str, list[float]] = {}
-    peers = {s.name: s.loaded(mesh.vertices, mesh.faces) for s in available()[0]
-             if s.name in ({ours.OURS, "embree", "open3d"} & {ours.OURS, *installed})}  # fmt: skip
-    for count in (1, 10, 100):
-        rays = Family("few", np.tile([0.1, 0.2, 3.0], (count, 1)), np.tile([0.0, 0.0, -1.0], (count, 1)))
-        queries = {name: query for name, peer in peers.items() if (query := peer.closest(rays)) is not None}
-        for _ in range(_RUNS):
-            for name, query in queries.items():
-                query.trace()
-                began = time.perf_counter()
-                for _ in range(_CALLS):
-                    query.trace()
-                micros = 1e6 * (time.perf_counter() - began) / _CALLS
-                found.setdefault(f"call_of_{count}_{name}_us", []).append(micros)
-    return found

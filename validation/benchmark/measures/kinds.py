@@ -86,7 +86,11 @@ def _distances(octree: Octree, points: Points, ours: Any, theirs: Any) -> Bools:
     return ~(np.abs(theirs - ours) <= rounding(octree, points.points))
 
 
-_RAYS, _THROUGH, _WIDE, _BESIDE = ("camera", "shadow", "random", "bounce"), ("random",), ("wide",), ("box", "near")
+_RAYS = ("camera", "shadow", "random", "bounce", "misses", "short")
+_THROUGH, _WIDE, _BESIDE = ("random",), ("wide",), ("box", "near")
+# Kinds that ask for a first hit, and those families whose users ask no more than whether there is one: on meshes of
+# other kinds than the series, only these ask for any hit.
+FIRST, _ENDED = ("closest", "any"), ("shadow", "short")
 KINDS = {
     kind.name: kind
     for kind in (
@@ -100,6 +104,11 @@ KINDS = {
         Kind("signed", "signed distance", _BESIDE, True, 0.1, lambda p, at: p.signed(at), lambda d: d < 0, _distances),
     )
 }
+
+
+def briefly(family: str, kind: Kind) -> bool:
+    """Whether meshes of other kinds than the series are asked this too."""
+    return kind.name == "closest" or (kind.name == "any" and family in _ENDED)
 
 
 def title(family: str, query: str) -> str:

@@ -1,19 +1,29 @@
-"""Generated meshes of one shape and any size, so that only N differs when costs are compared."""
+"""The meshes of a run: a series of one shape and many sizes, those of other kinds, and files.
 
+Only N differs within the series, so that costs can be compared against faces.
+"""
+
+import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import lattice_faces
+from validation.benchmark.measures.forms import FORMS, short
 from validation.benchmark.peers.contender import Floats
 from validation.hits.rays import float32_exact
 
 QUICK = (1_000, 10_000, 100_000)
 FULL = (*QUICK, 1_000_000, 5_000_000)
 HUGE = (*FULL, 10_000_000)
+# Other kinds: the two of a quick run are those that differ most from spheres, and small.
+QUICK_FORMS = (("thin", 10_000), ("city", 10_000))
+FULL_FORMS = tuple((form, faces) for form in FORMS for faces in (100_000, 1_000_000))
+SERIES, FILE = "spheres", "file"
 _SEED = 7
 
 
@@ -30,7 +40,7 @@ def displaced_spheres(faces: int) -> Mesh:
     points = [c + sphere * (1.0 + 0.035 * _hills(sphere + c))[:, None] for c in corners]
     side = lattice_faces(n + 1, n + 1)
     all_faces = np.concatenate([side + np.int32(i * (n + 1) ** 2) for i in range(6 * len(corners))])
-    return Mesh(float32_exact(np.concatenate(points)), all_faces, name=f"spheres_{_short(faces)}")
+    return Mesh(float32_exact(np.concatenate(points)), all_faces, name=f"{SERIES}_{short(faces)}")
 
 
 def _cube_sphere(n: int) -> Floats:
@@ -54,14 +64,38 @@ def _hills(points: Floats) -> Floats:
     return height
 
 
-def chosen(quick: bool, huge: bool, paths: tuple[Path, ...]) -> Iterator[tuple[Mesh, bool]]:
-    """The meshes of a run, one at a time, and whether each belongs to the generated series."""
+class Chosen(NamedTuple):
+    """A mesh of a run and its kind: ``SERIES``, a name of ``FORMS``, or ``FILE``."""
+
+    mesh: Mesh
+    kind: str
+
+    @property
+    def brief(self) -> bool:
+        """Whether only first hits are asked, and not by slow contenders, so that a run with all kinds ends."""
+        return self.kind in FORMS
+
+
+def chosen(quick: bool, huge: bool, paths: tuple[Path, ...]) -> Iterator[Chosen]:
+    """The meshes of a run, one at a time."""
     for faces in QUICK if quick else HUGE if huge else FULL:
-        yield displaced_spheres(faces), True
+        yield Chosen(displaced_spheres(faces), SERIES)
+    for form, faces in QUICK_FORMS if quick else FULL_FORMS:
+        yield Chosen(FORMS[form](faces), form)
     for path in paths:
-        mesh = load_mesh(path)
-        yield Mesh(float32_exact(mesh.vertices), mesh.faces, name=path.stem), False
+        yield Chosen(from_file(path), FILE)
 
 
-def _short(faces: int) -> str:
-    return f"{faces // 1_000_000}m" if faces >= 1_000_000 else f"{faces // 1_000}k"
+def named(text: str) -> Mesh:
+    """A mesh by its number of faces (of the series), by kind and faces as in ``terrain_100k``, or from a file."""
+    found = re.fullmatch(rf"(?:({'|'.join((SERIES, *FORMS))})_)?(\d+)([km]?)", text)
+    if found is None:
+        return from_file(Path(text))
+    faces = int(found[2]) * {"": 1, "k": 1_000, "m": 1_000_000}[found[3]]
+    return FORMS.get(found[1], displaced_spheres)(faces)
+
+
+def from_file(path: Path) -> Mesh:
+    """A mesh file's, rounded to float32, in which the peers compute."""
+    mesh = load_mesh(path)
+    return Mesh(float32_exact(mesh.vertices), mesh.faces, name=path.stem)

@@ -1,4 +1,4 @@
-"""The record of a run, ``benchmark.json``: its keys, reading and writing. The page is drawn from it alone.
+"""The record of a run, ``benchmark.json``: its keys, reading and writing. The page is drawn from it and ``history``.
 
 schema            SCHEMA; another number is refused
 command, date, commit, quick, seconds      how the record was made; commit is null outside a git checkout
@@ -7,17 +7,28 @@ environment       processor, processors, threads, python, platform, packages (ve
 systems           by name: label, threads, precision, most_rays (null: no limit)
 missing           by name: how to install a peer that is absent
 series            names of the generated meshes, which differ in size only
-open_edges        by mesh that is not closed: how many. Nothing is inside, so it has no rows of contains and signed
+kinds             by mesh: spheres, another kind of ``forms``, or file. Other kinds are asked for first hits only: the
+                  closest by all families, any by shadow and short, and not of contenders with most_rays
+open_edges        by mesh that is not closed, of spheres and files: how many. Nothing is inside, so it has no rows of
+                  contains and signed
 queries[]         one a mesh, family and kind of query
-  mesh, faces, family, query     family: camera, shadow, random, bounce; of points: wide, box, near
+  mesh, faces, family, query     family: camera, shadow, random, bounce, misses, short;
+                                 of points: wide, box, near
                                  query: closest, any, all, count; of points: contains, nearest, signed
-  rays, hit_share, agree         rays or points; those that hit, are inside or are found; agree: some do, and but for
-                                 one in a thousand no contender differs from ours by more than rounding
+  rays, hit_share, agree         rays or points; those that hit, are inside or are found; agree: some do (of misses
+                                 none), and but for one in a thousand no contender differs from ours by more than
+                                 rounding
   contenders        by name: rays, hits, differing (see ``kinds``), seconds (all runs), median, mrays, ns
-  ratios            by peer: the median over the rounds of its time a ray or point over ours
+  ratios            by peer: the median over the rounds of its time a ray or point over ours with all threads
+  ratios_one_thread by peer that has one thread: its time over ours_one_thread
+  efficiency        of first hits: the time of one thread of ours over twice that of two; null for other queries and
+                    on one processor
 fits[]            family, query, contender, and a, b, residual of ns = a log2 N + b
 drop_in[]         call, faces, rays; seconds a ray by contender (all runs), ratios: theirs over the drop-in's
-builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint
+calls[]           rays; micros a call by contender (all runs), median; ratios by peer: its time over ours with all
+                  threads, and over ours_one_thread where it has one
+builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint; ratios_refit: the build
+                  of each peer over our refit
 memory[]          mesh, faces, systems: rest, peak (bytes by which a process grows), own (our own count or null)
 frames            scene, size, max_depth, faces, labels, contenders, ratios, rays (by contender), pictures: ssim,
                   mean_error, pixel_share against ours
@@ -25,6 +36,7 @@ processes         by name: command, seconds, median
 first_answers     level, for which kernels were compiled ahead; rows by name: unit, values, median; null where not run
 ablation, knobs   see ``ablation.run`` and ``study.run``; null where not run
 targets[]         see ``targets.Target``; met and aimed are null where nothing was measured
+heat map          is none of the keys: ``heat`` takes it from queries, builds, memory and calls
 """
 
 import json
@@ -39,11 +51,11 @@ from renderer.process.files import write_atomically
 from validation import environment
 from validation.benchmark.peers.contender import System
 
-SCHEMA = 4
+SCHEMA = 5
 KEYS = (
     "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series",
-    "open_edges", "queries", "fits", "drop_in", "builds", "memory", "frames", "processes", "first_answers", "ablation",
-    "knobs", "targets",
+    "kinds", "open_edges", "queries", "fits", "drop_in", "calls", "builds", "memory", "frames", "processes",
+    "first_answers", "ablation", "knobs", "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 

@@ -17,12 +17,14 @@ class Family:
     """Named rays with an end: ``origins`` and ``directions`` (n, 3) float64, exact in float32.
 
     ``t_max`` is in units of |direction|, one for all rays: inf, or 1 for shadow rays, which end at their light.
+    ``beyond`` says whether faces may lie behind that end, so that who does not know of it finds other hits.
     """
 
     name: str
     origins: Floats
     directions: Floats
     t_max: float = np.inf
+    beyond: bool = False
 
     def __len__(self) -> int:
         return len(self.origins)
@@ -32,7 +34,7 @@ class Family:
         if count >= len(self):
             return self
         rows = _spread(len(self), count)
-        return Family(self.name, self.origins[rows], self.directions[rows], self.t_max)
+        return Family(self.name, self.origins[rows], self.directions[rows], self.t_max, self.beyond)
 
 
 @dataclass(frozen=True)

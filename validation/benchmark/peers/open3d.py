@@ -17,8 +17,10 @@ class Open3DPeer(Peer):
         self._scene.add_triangles(vertices, faces)
         self._ray = o3d.core.Tensor(np.array([[0, 0, 0, 0, 0, 1]], np.float32))
 
-    def closest(self, rays: Family) -> Query:
-        """t, u, v, normal and face of each ray; Open3D has no smaller query."""
+    def closest(self, rays: Family) -> Query | None:
+        """t, u, v, normal and face of each ray, it has no smaller query; None where it would look behind an end."""
+        if rays.beyond:
+            return None
         tensor = _native(rays)
         return Query(lambda: self._scene.cast_rays(tensor), lambda found: found["t_hit"].numpy().astype(np.float64))
 

@@ -11,7 +11,7 @@ from renderer.process.parallel import available_threads
 from renderer.tree.build import SPLITS
 from validation.benchmark.peers.contender import Faces, Family, Floats, HitLists, Peer, Points, Query, System
 
-OURS, OURS_ONE = "ours", "ours_one_thread"
+OURS, OURS_ONE, OURS_TWO = "ours", "ours_one_thread", "ours_two_threads"
 
 
 class Ours(Peer):
@@ -61,20 +61,24 @@ class Ours(Peer):
         """Trace one ray."""
         self.octree.closest_hit(*self._origin)
 
-    def one_thread(self) -> "Ours":
-        """The same octree, not a copy, traced by one thread."""
-        single = copy.copy(self.octree)
-        single.threads = 1
-        return Ours(single)
+    def with_threads(self, threads: int) -> "Ours":
+        """The same octree, not a copy, traced by so many threads."""
+        other = copy.copy(self.octree)
+        other.threads = threads
+        return Ours(other)
 
 
 def systems() -> list[System]:
-    """Our contenders: all threads, and one thread on the same octree."""
-    return [
+    """Our contenders: all threads, and on the same octree one thread, and two where all are more."""
+    found = [
         System(OURS, "ours", available_threads(), "float64", lambda v, f: _builder(v, f, {})),
         System(OURS_ONE, "ours, 1 thread", 1, "float64", lambda v, f: _builder(v, f, {"threads": 1}),
                times_build=False),
     ]  # fmt: skip
+    if available_threads() > 2:
+        found.append(System(OURS_TWO, "ours, 2 threads", 2, "float64", lambda v, f: _builder(v, f, {"threads": 2}),
+                            times_build=False))  # fmt: skip
+    return found
 
 
 def builds() -> list[System]:

@@ -19,8 +19,13 @@ class TrimeshPeer(Peer):
         self._mesh = trimesh.Trimesh(vertices, faces, process=False, validate=False)
         self._caster = untyped.RayMeshIntersector(self._mesh)
 
-    def closest(self, rays: Family) -> Query:
-        """Closest hits: trimesh finds all hits and takes the first; ``read`` computes t from its location."""
+    def closest(self, rays: Family) -> Query | None:
+        """Closest hits: trimesh finds all hits and takes the first; ``read`` computes t from its location.
+
+        None where faces may lie behind a ray's end, which trimesh does not know of.
+        """
+        if rays.beyond:
+            return None
         o, d = rays.origins, rays.directions
 
         def t(found: tuple[Any, Any, Any]) -> Floats:
