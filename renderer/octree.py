@@ -104,8 +104,9 @@ class _Accelerator(Queries):
 class Octree(_Accelerator):
     """An octree over triangles with fitted boxes, eight octants tested at once and blocks of four triangles.
 
-    split      "midpoint": octants about the middle of each box, and the surface area heuristic for the last few faces;
-               "sah": that heuristic throughout, slower to build and a little faster to trace
+    split      "midpoint": octants about the middle of each box, not cut across axes less than half as long as the
+               longest, and the surface area heuristic for the last few faces; "sah": that heuristic throughout, slower
+               to build, with fewer steps for rays among flat walls
     leaf_size  the most faces of a leaf, 1 to 32; one of more than four only where that is the cheaper
     max_depth  the deepest level that the split rule may cut, 1 to 64; below it faces are shared out evenly
     threads    for the build and queries; None takes all processors; results do not depend on it

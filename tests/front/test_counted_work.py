@@ -13,7 +13,7 @@ from renderer.contacts import all_hits as gathering
 from renderer.distance import closest as nearest
 from renderer.inside import winding
 from renderer.kernels.simd import splat8
-from renderer.mesh.shapes import icosphere, torus
+from renderer.mesh.shapes import box, icosphere, torus
 from renderer.trace.intersect import Ray, enter_boxes, largest_of, make_slabs
 from renderer.trace.spawn import BOUNDED
 
@@ -79,7 +79,12 @@ def test_rays_of_a_refitted_tree_take_more_steps_about_as_its_cost_grows() -> No
 
 
 def test_trees_by_the_heuristic_alone_take_fewer_steps() -> None:
-    for mesh in (torus(), torus(1.0, 0.1, 200, 40)):
+    houses = [box((x, y, 0), (x + 0.6, y + 0.6, 1 + (3 * x + y) % 5)) for x in range(-9, 9) for y in range(-9, 9)]
+    town = Mesh(
+        np.concatenate([house.vertices for house in houses]) / 9,
+        np.concatenate([house.faces + i * len(house.vertices) for i, house in enumerate(houses)]),
+    )
+    for mesh in (torus(), town):
         assert steps_of(Octree.from_mesh(mesh, split="sah")) < steps_of(Octree.from_mesh(mesh))
 
 

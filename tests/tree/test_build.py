@@ -67,8 +67,13 @@ def test_one_far_face_at_a_time_ends(split):
 
 
 def cut(kind, seed, count, split):
+    """``cut_of`` a mesh of some kind."""
+    return cut_of(Mesh(*make_mesh(kind, seed, count)), split)
+
+
+def cut_of(mesh, split):
     """The faces (sorted by the cut), their boxes as (F, 2, 3) in the mesh's order, and the parts of one cut."""
-    mesh = Mesh(*make_mesh(kind, seed, count))
+    count = len(mesh.faces)
     boxes = np.empty(count * BOX, np.float32)
     order = Faces(boxes, boxes.view(np.int32), np.empty_like(boxes))
     face_boxes(mesh.vertices, mesh.faces, boxes, order.numbers, 0, count)
@@ -107,6 +112,15 @@ def test_octants_lie_on_their_sides_of_the_middle(kind):
     # A part of several octants has no more faces than a block.
     assert all(len(found) == 1 or end - begin <= BLOCK_FACES for found, (begin, end) in zip(sides, whole, strict=True))
     assert len(whole) == 8
+
+
+@pytest.mark.parametrize(("extent", "octants"), [((9, 5, 5), 8), ((5, 9, 4), 4), ((2, 4, 9), 2), ((9, 4, 5), 4)])
+def test_flat_parts_are_not_cut_across(extent, octants):
+    """An axis less than half as long as the longest: its cuts fall to the cells within."""
+    rng = np.random.default_rng(1)
+    corners = rng.uniform(0.0, 1.0, (400, 1, 3)) * extent + rng.uniform(-0.05, 0.05, (400, 3, 3))
+    numbers, own, tree = cut_of(Mesh(corners.reshape(-1, 3), np.arange(1200).reshape(-1, 3)), "midpoint")
+    assert (tree.halves < 0).sum() == octants and len(numbers) == 400 and own.shape == (400, 2, 3)
 
 
 @pytest.mark.parametrize("kind", ["soup", "soup_float32", "sizes", "lattice"])

@@ -74,12 +74,13 @@ class Build:
         return Part(faces, (self._cut(faces[first], cuts), self._cut(faces[~first], cuts)))
 
     def _middle(self, faces: Indices) -> tuple[Indices, Floats | None]:
-        """The axes, along the longest of the faces' box first, and the middle of the box; of the centres where that
-        separates none; None where that does not either.
+        """The axes, along the longest of the faces' box first, and the middle of the box, infinite along those less
+        than half as long as the longest; of the centres where that separates none; None where that does not either.
         """
         low, high = self.low[faces].min(axis=0), self.high[faces].max(axis=0)
         axes, centres = np.argsort(low - high, kind="stable"), self.centres[faces]
-        for middle in (low + high, (centres.min(axis=0) + centres.max(axis=0)) / 2):
+        of_box = np.where(2 * (high - low) >= (high - low).max(), low + high, np.inf)
+        for middle in (of_box, (centres.min(axis=0) + centres.max(axis=0)) / 2):
             above = centres > middle
             if (above != above[0]).any():
                 return axes, middle
