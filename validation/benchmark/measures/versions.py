@@ -112,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--mesh", nargs="+", default=["100000"], help="as of measures.queries: 100000, city_100k, a file"
     )
-    parser.add_argument("--rays", type=int, default=500_000, metavar="N", help="rays of a family")
+    parser.add_argument("--rays", type=int, default=2_000_000, metavar="N", help="rays of a family")
     parser.add_argument("--threads", type=int, default=2, metavar="N")
     options = parser.parse_args(arguments)
     for mesh in options.mesh:
