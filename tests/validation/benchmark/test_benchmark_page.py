@@ -149,7 +149,8 @@ def test_the_heat_map_is_right_after_the_targets_with_a_cell_for_each_ratio(fold
 def test_the_page_has_the_history_of_ideas_and_a_faulty_one_stops_the_run(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    form = [line[2:] for line in history.FILE.read_text(encoding="utf-8").splitlines() if "=" in line or "[[" in line]
+    shown = [line[2:] for line in history.FILE.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
+    form = [line for line in shown if "=" in line or "[[" in line]
     own = tmp_path / "history.toml"
     own.write_text("\n".join(form).replace("One sentence", "EXAMPLE sentence"), encoding="utf-8")
     monkeypatch.setattr(history, "FILE", own)
