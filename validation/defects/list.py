@@ -66,7 +66,7 @@ HITS = (
     _kernel("hits", "the highest face wins in packets", "nearest_in_blocks",
             "ti == t and fi < face", "ti == t and (face == NO_FACE or fi > face)"),
     _kernel("hits", "float32 shear in the triangle test", "make_shear",
-            "dx / dz", "np.float64(np.float32(dx / dz))"),
+            "dx / dz", "widen(narrow(dx / dz))"),
     _python("hits", "vertices of the triangle test in float32", "fill_blocks",
             "np.float64 if inexact else np.float32", "np.float32"),
     _kernel("hits", "an edge counts for neither side", "see_triangles",

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -474,3 +475,12 @@ def test_files_that_are_understood_otherwise_are_found(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(formats, "load_mesh", other)
     assert broken("formats") == {"an index", "colours of"}
+
+
+def test_a_renderer_that_hits_nothing_is_judged_too() -> None:
+    """Judges of no hits at all had raised, and a defect that loses all of them was no red gate."""
+    none, points = np.empty(0), np.empty((0, 3))
+    exact = places._Exact(none, none, none, points, points, none.astype(bool))
+    hits_ = SimpleNamespace(t=none, u=none, v=none, points=points, normals=points)
+    assert all(kept.shape == (0,) and kept.dtype == bool for kept in places._judged(hits_, exact, 1.0).values())
+    assert errors._near(none, none, none.astype(np.int64), none.astype(np.int64)).dtype == bool

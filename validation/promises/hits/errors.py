@@ -87,7 +87,7 @@ def _near(
     """Whether each t is the quotient within its error, and the error not a thousand roundings."""
     off = [abs(Fraction(a) - Fraction(h) / Fraction(d)) for a, h, d in zip(t, height, long, strict=True)]
     bounded = [bool(np.isfinite(e)) and x <= Fraction(e) for x, e in zip(off, error, strict=True)]
-    kept: NDArray[np.bool_] = np.array(bounded) & (error <= 1e3 * np.spacing(t))
+    kept: NDArray[np.bool_] = np.array(bounded, np.bool_) & (error <= 1e3 * np.spacing(t))
     return kept
 
 

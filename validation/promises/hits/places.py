@@ -70,10 +70,9 @@ def _sized() -> NDArray[np.bool_]:
 
 def _judged(who: Any, exact: _Exact, size: float) -> dict[str, NDArray[np.bool_]]:
     def near(given: Floats, wanted: Floats, unit: float = 1.0) -> NDArray[np.bool_]:
-        off: NDArray[np.bool_] = (
-            np.abs(given - wanted).reshape(len(wanted), -1).max(axis=1, initial=0.0) <= unit * _NEAR
-        )
-        return off
+        off = np.abs(given - wanted)
+        kept: NDArray[np.bool_] = off.max(axis=tuple(range(1, off.ndim)), initial=0.0) <= unit * _NEAR
+        return kept
 
     return {
         "t tells the way in units of the direction": near(who.t, exact.t),
