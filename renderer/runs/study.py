@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from renderer import __version__
 from renderer.errors import expect
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.process.files import check_writable
 from renderer.process.terminal import progress_bar
@@ -59,13 +60,13 @@ class Study:
             octree, points.points, points.normals, leaving=points.leaving, threads=threads, **self.options
         )
 
-    def plan(self, octree: Octree, points: Points, size: int = PART) -> Plan:
+    def plan(self, mesh: Mesh, points: Points, size: int = PART) -> Plan:
         """The study in parts of ``size`` points, with all that its bits depend on."""
         options = {
             name: digest_of(value) if isinstance(value, np.ndarray) else value for name, value in self.options.items()
         }
         made_of = {
-            "kind": self.kind, "options": options, "mesh": digest_of(octree.mesh.vertices, octree.mesh.faces),
+            "kind": self.kind, "options": options, "mesh": digest_of(mesh.vertices, mesh.faces),
             "points": digest_of(points.points, points.normals, points.leaving), "version": __version__,
         }  # fmt: skip
         return Plan(len(points), size, 0, "<f8", made_of)
@@ -85,7 +86,7 @@ def run(octree: Octree, study: Study, points: Points, folder: Path, *, progress:
     Returns all parts, whose bits do not depend on how often the run was killed, nor on threads.
     """
     check_writable(folder.with_name(f"{folder.name}.try"))
-    parts = Parts(folder, study.plan(octree, points))
+    parts = Parts(folder, study.plan(octree.mesh, points))
     missing = parts.missing()
     with progress_bar(len(points), "point", progress) as update:
         if update is not None:

@@ -137,36 +137,39 @@ def test_files_that_are_no_points_or_suns_are_refused(
         assert "--suns: expected" in capsys.readouterr().err
 
 
-def test_a_run_that_is_killed_goes_on_and_ends_with_the_same_bits(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_is_killed_goes_on_and_ends_with_the_same_bits(tmp_path: Path) -> None:
     mesh, result = tmp_path / "city.ply", tmp_path / "sky.npy"
     save_ply(named("city_300"), mesh)
     octree = Octree.from_mesh(load_mesh(mesh))
     rng = np.random.default_rng(0)
     points = rng.uniform(*octree.mesh.bounds, (6 * 64, 3))
     np.save(tmp_path / "p.npy", points)
-    # A part of 64 points; each kill comes when one more part is done, so that the run cannot outpace it.
+    # Parts of 64 points; a run that shall be killed waits for it once so many parts are there.
     program = (
-        "import sys, time; from renderer.runs import parts, study; study.PART = 64; own = parts.Parts.write\n"
-        "study.Study.plan.__defaults__ = (64,)\n"
-        "parts.Parts.write = lambda *a: (own(*a), time.sleep(0.3 if 'slow' in sys.argv[1] else 0))\n"
-        "from renderer.cli import main; sys.exit(main(sys.argv[2:]))"
+        "import sys, time\n"
+        "from renderer.runs import parts, study\n"
+        "study.Study.plan.__defaults__, own, most = (64,), parts.Parts.write, int(sys.argv[1])\n"
+        "def write(self, *part):\n"
+        "    own(self, *part)\n"
+        "    while len(list(self.folder.glob('*.part'))) >= most: time.sleep(0.1)\n"
+        "parts.Parts.write = write\n"
+        "from renderer.cli import main\n"
+        "sys.exit(main(sys.argv[2:]))"
     )
-    arguments = ["study", "sky", mesh, "--points", tmp_path / "p.npy", "-o", result, "--quiet"]
+    arguments = [str(a) for a in ("study", "sky", mesh, "--points", tmp_path / "p.npy", "-o", result, "--quiet")]
     folder = studies.folder_of(result)
-    for kills in (1, 2):
-        child = subprocess.Popen([sys.executable, "-c", program, "slow", *map(str, arguments)])
-        deadline = time.monotonic() + 120
-        while len(list(folder.glob("*.part"))) <= kills and time.monotonic() < deadline:
+    for most in (2, 4):
+        child = subprocess.Popen([sys.executable, "-c", program, str(most), *arguments])
+        while len(list(folder.glob("*.part"))) < most:
             assert child.poll() is None
-            time.sleep(0.01)
+            time.sleep(0.02)
         os.kill(child.pid, signal.SIGKILL)
         child.wait()
-        assert not result.exists() and kills < len(list(folder.glob("*.part"))) < 6
-    done = {path.name: path.stat().st_mtime_ns for path in folder.glob("*.part")}
-    assert done
-    whole = subprocess.run([sys.executable, "-c", program, "quick", *map(str, arguments)], check=False)
+        assert not result.exists()
+    kept = {path.name for path in folder.glob("*.part")}
+    assert kept == {f"{part:08d}.part" for part in range(4)}
+    (folder / "00000001.part").write_bytes(b"spoilt")
+    whole = subprocess.run([sys.executable, "-c", program, "99", *arguments], check=False)
     assert whole.returncode == 0 and not folder.exists()
     expected = sky_view_factor(octree, points, [0.0, 0.0, 1.0])
     assert np.load(result).tobytes() == expected.tobytes()
