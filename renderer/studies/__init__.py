@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from typing import Any
 
+    from renderer.studies.ambient import ambient_occlusion, openness
     from renderer.studies.directions import (
         Pattern,
         cosine_hemisphere,
@@ -20,33 +21,46 @@ if TYPE_CHECKING:
     from renderer.studies.hidden import occlusion
     from renderer.studies.places import FacePoints, face_points
     from renderer.studies.sky import sky_view_factor, sun_hours
+    from renderer.studies.views import Scan, depth_map, scan, visible_faces
 
 __all__ = [
     "FacePoints",
     "Pattern",
+    "Scan",
+    "ambient_occlusion",
     "cosine_hemisphere",
+    "depth_map",
     "face_points",
     "fibonacci_hemisphere",
     "fibonacci_sphere",
     "occlusion",
+    "openness",
     "reinhart",
+    "scan",
     "sky_view_factor",
     "sun_hours",
     "tregenza",
+    "visible_faces",
 ]
 
 _HOMES = {
     "FacePoints": "places",
     "Pattern": "directions",
+    "Scan": "views",
+    "ambient_occlusion": "ambient",
     "cosine_hemisphere": "directions",
+    "depth_map": "views",
     "face_points": "places",
     "fibonacci_hemisphere": "directions",
     "fibonacci_sphere": "directions",
     "occlusion": "hidden",
+    "openness": "ambient",
     "reinhart": "directions",
+    "scan": "views",
     "sky_view_factor": "sky",
     "sun_hours": "sky",
     "tregenza": "directions",
+    "visible_faces": "views",
 }
 
 

@@ -84,7 +84,7 @@ def fibonacci_hemisphere(count: int) -> Pattern:
     >>> fibonacci_hemisphere(2).directions[:, 2]
     array([0.25, 0.75])
     """
-    _check_count("count", count)
+    check_count("count", count)
     height = (np.arange(count) + 0.5) / count
     return Pattern(_spiral(height), np.full(count, 2.0 * np.pi / count))
 
@@ -98,7 +98,7 @@ def fibonacci_sphere(count: int) -> Pattern:
     >>> fibonacci_sphere(4).directions[:, 2]
     array([-0.75, -0.25,  0.25,  0.75])
     """
-    _check_count("count", count)
+    check_count("count", count)
     height = (2.0 * np.arange(count) + 1.0 - count) / count
     return Pattern(_spiral(height), np.full(count, 4.0 * np.pi / count))
 
@@ -115,7 +115,7 @@ def cosine_hemisphere(count: int) -> Pattern:
     >>> (cosine_hemisphere(2).directions[:, 2] ** 2).round(12)
     array([0.25, 0.75])
     """
-    _check_count("count", count)
+    check_count("count", count)
     height = np.sqrt((np.arange(count) + 0.5) / count)
     return Pattern(_spiral(height), np.full(count, np.pi / count))
 
@@ -135,7 +135,8 @@ def turned(directions: Floats, pole: Floats) -> Floats:
     return directions[:, :1] * x + directions[:, 1:2] * y + directions[:, 2:] * z
 
 
-def _check_count(argument: str, count: int) -> None:
+def check_count(argument: str, count: int) -> None:
+    """Raise ``ValueError`` that names the argument unless it is a number of directions."""
     expect(is_count(count) and 1 <= count <= MOST, argument, f"an integer from 1 to {MOST}", repr(count))
 
 

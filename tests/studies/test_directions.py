@@ -9,7 +9,7 @@ import pytest
 from renderer.studies import Pattern, cosine_hemisphere, fibonacci_hemisphere, fibonacci_sphere, reinhart, tregenza
 from renderer.studies.directions import turned
 
-MODULES = ["directions", "hidden", "sky", "places"]
+MODULES = ["ambient", "directions", "hidden", "places", "sky", "views"]
 
 
 @pytest.mark.parametrize("name", MODULES)
