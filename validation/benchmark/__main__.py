@@ -76,6 +76,8 @@ def measure(
     quick: bool, huge: bool, paths: tuple[Path, ...], command: str, step: Callable[[str], None]
 ) -> dict[str, Any]:
     """The whole record; see ``validation.benchmark.page.record``."""
+    from validation.benchmark.limits import counts, machine
+    from validation.benchmark.limits.caches import caches
     from validation.benchmark.measures import ablation, calls, drop_in, first_answers, frames, meshes, processes
     from validation.benchmark.measures.queries import fits
     from validation.benchmark.page import record, targets
@@ -84,15 +86,17 @@ def measure(
 
     began, date, load = time.perf_counter(), datetime.now(UTC), record.load()
     step("contenders")
-    systems, missing = available()
+    (systems, missing), of = available(), caches()
     names = {system.name for system in systems}
     kinds: dict[str, str] = {}
-    rows: dict[str, list[Any]] = {"queries": [], "builds": [], "memory": []}
+    rows: dict[str, list[Any]] = {"queries": [], "builds": [], "memory": [], "limits": []}
     open_edges: dict[str, int] = {}
     for chosen in meshes.chosen(quick, huge, paths):
         mesh, kinds[chosen.mesh.name] = chosen.mesh, chosen.kind
         _measure_mesh(chosen, systems, QUICK_RAYS if quick else RAYS, rows, step)
+        rows["limits"] += counts.measure(mesh, QUICK_RAYS if quick else RAYS, of, step)
         open_edges |= {mesh.name: len(mesh.open_edges)} if not chosen.brief and len(mesh.open_edges) else {}
+    limits = {"caches": of.levels, "told": of.told, "rates": machine.rates(of), "rows": rows.pop("limits")}
     series = [name for name, kind in kinds.items() if kind == meshes.SERIES]
     llvm = "mitsuba_llvm" in names
     found: dict[str, Any] = {
@@ -106,6 +110,7 @@ def measure(
         "processes": processes.measure(llvm, names, step),
         "first_answers": first_answers.measure(step),
         "ablation": ablation.run(quick, step), "knobs": study.run(quick, step),
+        "limits": limits,
     }  # fmt: skip
     return found | {"targets": targets.judged(found), "seconds": time.perf_counter() - began}
 

@@ -92,6 +92,11 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
         brief = found["kinds"][row["mesh"]] in ("scan", "city")
         assert not brief or not {"trimesh", "mitsuba_scalar"} & set(row["contenders"])
     assert [row["rays"] for row in found["calls"]] == [1, 10, 100]
+    assert len(found["limits"]["rows"]) == 6 * 6 and min(found["limits"]["rates"]["bandwidth"]) > 0
+    for row in found["limits"]["rows"]:
+        for counts in (row["ours"], row["embree"]):
+            assert counts["triangles"] <= 4 * counts["blocks"]
+            assert sum(counts["from"]) == pytest.approx(counts["lines"]) and counts["lines"] > 0
     # The mesh by path is none of the series, so no fit knows of it: a fit needs all three others.
     assert {f["contender"] for f in found["fits"]} >= {OURS, OURS_ONE, "embree", "trimesh", "mitsuba_scalar"}
     assert len(found["drop_in"]) == 5 * 2 and all(min(row["ratios"].values()) > 0 for row in found["drop_in"])
@@ -125,6 +130,18 @@ def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: py
     assert "12.34" in capsys.readouterr().out
     for outside in ("http://", "https://", "<script", "<link"):
         assert outside not in text.replace("http://www.w3.org", "")
+
+
+def test_the_limits_say_which_bound_holds_for_each_mesh_and_family(folder: Path) -> None:
+    stored = record.read(folder / "benchmark.json")
+    rates = stored["limits"]["rates"]
+    shown = page.html(stored).split("<h2>Limits</h2>")[1].split("<h2>The drop-in")[0]
+    assert shown.count('<td class="name">compute</td>') == len(stored["limits"]["rows"])
+    rates["overlapped"] = [1e6] * len(rates["overlapped"])
+    shown = page.html(stored).split("<h2>Limits</h2>")[1].split("<h2>The drop-in")[0]
+    assert shown.count('<td class="name">latency</td>') == sum(
+        any(r["ours"]["waits"][1:]) for r in stored["limits"]["rows"]
+    )
 
 
 def test_the_heat_map_is_right_after_the_targets_with_a_cell_for_each_ratio(folder: Path) -> None:
@@ -199,7 +216,7 @@ def test_other_records_are_refused(folder: Path, tmp_path: Path) -> None:
     stored = record.read(folder / "benchmark.json")
     path = tmp_path / "benchmark.json"
     path.write_text(json.dumps(stored | {"schema": 99}))
-    with pytest.raises(ValueError, match="schema 5, got 99"):
+    with pytest.raises(ValueError, match="schema 6, got 99"):
         record.read(path)
     path.write_text(json.dumps({k: v for k, v in stored.items() if k != "fits"}))
     with pytest.raises(ValueError, match="expected the keys"):

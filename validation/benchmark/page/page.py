@@ -6,8 +6,9 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
+from validation.benchmark.limits import roofline
 from validation.benchmark.measures.kinds import DIGITS, FIRST, KINDS, title
-from validation.benchmark.page import figures, heat, pareto
+from validation.benchmark.page import bounds, figures, heat, pareto
 from validation.benchmark.page.history import Idea
 from validation.benchmark.peers.ours import OURS, OURS_ONE
 from validation.report.page import number
@@ -29,6 +30,7 @@ def html(record: Mapping[str, Any], ideas: Sequence[Idea] = ()) -> str:
     shown |= {"heat": {"shades": heat.SHADES, "legend": heat.legend(), "least": heat.MEAN_FACES,
                        "first": heat.first_hits(record), "summary": heat.summary(record),
                        "others": heat.others(record), "few": heat.few(record)}}  # fmt: skip
+    shown |= {"limits": {"rows": bounds.rows(record), "bytes": roofline.RAY_BYTES, "threads": roofline.THREADS}}
     shown |= {"said": {name: kind.said for name, kind in KINDS.items()}, "digits": DIGITS} | _by_fate(ideas)
     return _template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **shown, **plots)
 

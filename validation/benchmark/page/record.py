@@ -35,6 +35,9 @@ frames            scene, size, max_depth, faces, labels, contenders, ratios, ray
 processes         by name: command, seconds, median
 first_answers     level, for which kernels were compiled ahead; rows by name: unit, values, median; null where not run
 ablation, knobs   see ``ablation.run`` and ``study.run``; null where not run
+limits            caches: bytes and ways of the data caches, and told: whether the system told them
+  rates           what ``limits.machine.rates`` measured
+  rows[]          mesh, faces, family; ours, embree: counts a ray, see ``limits.counts.counted``
 targets[]         see ``targets.Target``; met and aimed are null where nothing was measured
 heat map          is none of the keys: ``heat`` takes it from queries, builds, memory and calls
 """
@@ -51,11 +54,11 @@ from renderer.process.files import write_atomically
 from validation import environment
 from validation.benchmark.peers.contender import System
 
-SCHEMA = 5
+SCHEMA = 6
 KEYS = (
     "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series",
     "kinds", "open_edges", "queries", "fits", "drop_in", "calls", "builds", "memory", "frames", "processes",
-    "first_answers", "ablation", "knobs", "targets",
+    "first_answers", "ablation", "knobs", "limits", "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 
