@@ -17,7 +17,7 @@ from renderer.errors import expect
 from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS
 from renderer.process.interrupt import interruptible
 from renderer.process.terminal import flush_output, give_up_output, on_terminal, one_line, say, spell_everything
-from renderer.runs.command import add_study
+from renderer.study_command import add_study
 
 
 @interruptible("octree-render: interrupted")

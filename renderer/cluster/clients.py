@@ -29,7 +29,7 @@ def connected(address: str | None = None, *, workers: int | None = None) -> Iter
         return
     count = checked_threads(workers)
     with (
-        LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster,
         Client(cluster) as client,
     ):
         yield client

@@ -17,6 +17,7 @@ from renderer.octree import Octree
 from renderer.process.files import check_writable
 from renderer.process.terminal import progress_bar
 from renderer.runs.parts import Parts, Plan, digest_of
+from renderer.studies.ambient import ambient_occlusion
 from renderer.studies.sky import sky_view_factor, sun_hours
 
 Floats = NDArray[np.float64]
@@ -72,7 +73,7 @@ class Study:
         return Plan(len(points), size, 0, "<f8", made_of)
 
 
-KINDS: dict[str, Callable[..., Floats]] = {"sky": sky_view_factor, "sun": sun_hours}
+KINDS: dict[str, Callable[..., Floats]] = {"sky": sky_view_factor, "sun": sun_hours, "ao": ambient_occlusion}
 
 
 def folder_of(output: Path) -> Path:

@@ -173,3 +173,9 @@ def test_a_run_that_is_killed_goes_on_and_ends_with_the_same_bits(tmp_path: Path
     assert whole.returncode == 0 and not folder.exists()
     expected = sky_view_factor(octree, points, [0.0, 0.0, 1.0])
     assert np.load(result).tobytes() == expected.tobytes()
+
+
+def test_a_local_cluster_gives_the_same_bits(city: Path, tmp_path: Path) -> None:
+    assert _run("ao", city, "--samples", 64, "-o", tmp_path / "here.npy") == 0
+    assert _run("ao", city, "--samples", 64, "--cluster", "local", "--threads", 1, "-o", tmp_path / "there.npy") == 0
+    assert (tmp_path / "here.npy").read_bytes() == (tmp_path / "there.npy").read_bytes()

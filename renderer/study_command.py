@@ -38,6 +38,7 @@ def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> No
     study.add_argument("--distance", type=float, default=float("inf"), metavar="D", help="how far the mesh hides")
     study.add_argument("--camera", type=Path, metavar="SCENE", help="of a .png: a scene file whose camera it takes")
     study.add_argument("--resolution", type=resolution, default=(960, 720), metavar="WxH", help="of a .png")
+    study.add_argument("--cluster", metavar="ADDRESS", help="a Dask scheduler's, or local: a worker a processor")
     study.add_argument("--threads", type=int, metavar="N", help="default: all processors")
     study.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
     study.set_defaults(command=_study)
@@ -49,7 +50,7 @@ def _study(options: argparse.Namespace) -> None:
 
     from renderer.mesh.load import load_mesh
     from renderer.octree import Octree
-    from renderer.runs.study import Study, folder_of, run
+    from renderer.runs.study import Study
 
     _check_output(options)
     made = _options_of(options)
@@ -57,7 +58,7 @@ def _study(options: argparse.Namespace) -> None:
     octree = Octree.from_mesh(load_mesh(options.mesh), threads=options.threads)
     chosen = _chosen(octree, options)
     began = time.perf_counter()
-    parts = run(octree, Study(options.kind, made), chosen.points, folder_of(options.output), progress=not options.quiet)
+    parts = _run(octree, Study(options.kind, made), chosen.points, options)
     seconds = time.perf_counter() - began
     if options.output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
         parts.join(options.output)
@@ -66,6 +67,20 @@ def _study(options: argparse.Namespace) -> None:
         parts.remove()
     if not options.quiet:
         say(f"{options.output}: {_KINDS[options.kind]} of {len(chosen.points):,} points in {seconds:.2f} s")
+
+
+def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> Any:
+    """All parts of the study, computed here or on a cluster."""
+    from renderer.runs.study import folder_of, run
+
+    folder, progress = folder_of(options.output), not options.quiet
+    if options.cluster is None:
+        return run(octree, study, points, folder, progress=progress)
+    from renderer.cluster import connected, run_on
+
+    local = options.cluster == "local"
+    with connected(None if local else options.cluster, workers=options.threads if local else None) as client:
+        return run_on(client, octree, study, points, folder, progress=progress)
 
 
 def _check_output(options: argparse.Namespace) -> None:
