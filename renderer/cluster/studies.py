@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from renderer.cluster.workers import SentMesh, answer_part
 from renderer.octree import Octree
@@ -27,7 +27,7 @@ def run_on(
     folder: Path,
     *,
     size: int = PART,
-    split: str = "midpoint",
+    split: Literal["midpoint", "sah"] = "midpoint",
     progress: bool = False,
 ) -> Parts:
     """``renderer.runs.study.run`` on the workers of ``client``, a ``distributed.Client``.
@@ -47,7 +47,13 @@ def run_on(
 
 
 def _answers(
-    client: Any, octree: Octree, study: Study, points: Points, parts: Parts, missing: Iterable[int], split: str
+    client: Any,
+    octree: Octree,
+    study: Study,
+    points: Points,
+    parts: Parts,
+    missing: Iterable[int],
+    split: Literal["midpoint", "sah"],
 ) -> Iterator[tuple[int, Any]]:
     """Each missing part's answers, as they come; few parts are under way at a time, so that memory is bounded."""
     from distributed import as_completed

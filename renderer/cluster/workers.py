@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ class SentMesh(NamedTuple):
     digest: str
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
-    split: str
+    split: Literal["midpoint", "sah"]
 
     def octree(self) -> Octree:
         """The tree over it, from this process's own or built now, whose queries take one thread each.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer import __version__
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
@@ -68,7 +68,7 @@ class Study:
         }
         made_of = {
             "kind": self.kind, "options": options, "mesh": digest_of(mesh.vertices, mesh.faces),
-            "points": digest_of(points.points, points.normals, points.leaving), "version": __version__,
+            "points": digest_of(points.points, points.normals, points.leaving), "version": sys.modules["renderer"].__version__,
         }  # fmt: skip
         return Plan(len(points), size, 0, "<f8", made_of)
 
