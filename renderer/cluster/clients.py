@@ -9,6 +9,9 @@ from typing import Any
 from renderer.errors import expect, extra_hint
 from renderer.process.parallel import checked_threads
 
+# To wait for a scheduler's answer.
+SECONDS = 10
+
 
 @contextmanager
 def connected(address: str | None = None, *, workers: int | None = None) -> Iterator[Any]:
@@ -24,7 +27,7 @@ def connected(address: str | None = None, *, workers: int | None = None) -> Iter
         raise ImportError(f"a cluster needs the package distributed; {extra_hint('cluster')}") from error
     if address is not None:
         expect(workers is None, "workers", "None, as the cluster has its own", repr(workers))
-        with Client(address) as client:
+        with Client(address, timeout=SECONDS) as client:
             yield client
         return
     count = checked_threads(workers)

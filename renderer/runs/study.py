@@ -68,7 +68,8 @@ class Study:
         }
         made_of = {
             "kind": self.kind, "options": options, "mesh": digest_of(mesh.vertices, mesh.faces),
-            "points": digest_of(points.points, points.normals, points.leaving), "version": sys.modules["renderer"].__version__,
+            "points": digest_of(points.points, points.normals, points.leaving),
+            "version": sys.modules["renderer"].__version__,
         }  # fmt: skip
         return Plan(len(points), size, 0, "<f8", made_of)
 

@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -135,7 +136,8 @@ def test_a_worker_keeps_few_trees() -> None:
     assert isinstance(trees[0].mesh, Mesh)
 
 
-def test_no_scheduler_and_wrong_arguments_are_told() -> None:
+def test_no_scheduler_and_wrong_arguments_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(import_module("renderer.cluster.clients"), "SECONDS", 0.5)
     with (
         pytest.raises(ValueError, match="workers: expected None, as the cluster has its own"),
         connected("tcp://x:1", workers=2),
