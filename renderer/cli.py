@@ -17,6 +17,7 @@ from renderer.errors import expect
 from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS
 from renderer.process.interrupt import interruptible
 from renderer.process.terminal import flush_output, give_up_output, on_terminal, one_line, say, spell_everything
+from renderer.study_command import add_study
 
 
 @interruptible("octree-render: interrupted")
@@ -129,6 +130,7 @@ def make_parser() -> argparse.ArgumentParser:
     view.add_argument("--port", type=int, default=0, help="default: 0, any free one")
     view.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
     view.set_defaults(command=_view)
+    add_study(commands, _resolution)
     _add_compile(commands)
     return parser
 

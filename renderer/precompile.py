@@ -35,6 +35,7 @@ from renderer.scene.material import Dielectric, Material, Phong
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene, SceneObject
 from renderer.shade.tile import render_tile
+from renderer.studies.hidden import occlusion
 
 _TRIANGLE = Mesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 # An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.
@@ -103,6 +104,10 @@ def _wind() -> None:
         accelerator.contains([0.0, 0.0, 1.0], winding=True)
 
 
+def _study() -> None:
+    occlusion(Octree.from_mesh(_TRIANGLE), [0.1, 0.1, 1.0], None, [[0.0, 0.0, -1.0]])
+
+
 def _search() -> None:
     BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
@@ -131,6 +136,7 @@ _QUERIES = (
     Part("closest points", _find_nearest),
     Part("steps of a search", _count_steps),
     Part("winding numbers", _wind),
+    Part("studies", _study),
     Part("concave polygons", _cut),
 )
 _PICTURES = (Part("pictures", _render), Part("the viewer", _view))

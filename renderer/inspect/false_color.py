@@ -45,7 +45,7 @@ def false_color(image: Image, aov: str, limits: Limits | None = None) -> NDArray
     if aov == "color":
         return srgb(image.radiance)
     if aov == "cost":
-        return _viridis(_STEPS)[_steps(image.rays, low, high)]
+        return shades_of(image.rays, low, high)
     colors = np.empty((*hit.shape, 3), np.uint8)
     colors[~hit] = srgb(image.radiance[~hit])
     if aov == "depth":
@@ -64,6 +64,11 @@ def limits_of(image: Image, aov: str) -> Limits:
     drawn: dict[str, NDArray[Any]] = {"depth": image.depth[image.face >= 0], "cost": image.rays}
     values = drawn.get(aov, np.empty(0))
     return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+
+
+def shades_of(values: NDArray[Any], low: float, high: float) -> NDArray[np.uint8]:
+    """The colours (..., 3) of values on a scale, as those of a cost."""
+    return _viridis(_STEPS)[_steps(values, low, high)]
 
 
 def _steps(values: NDArray[Any], low: float, high: float) -> NDArray[np.intp]:

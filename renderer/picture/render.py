@@ -1,8 +1,7 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
 import warnings
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection
 from numbers import Real
 from typing import Any, Literal
 
@@ -10,7 +9,7 @@ from renderer.errors import expect
 from renderer.picture.image import PLANES, CutWarning, Image
 from renderer.picture.prepare import PreparedScene, prepare_scene, tiles
 from renderer.process.parallel import checked_threads
-from renderer.process.terminal import on_terminal
+from renderer.process.terminal import progress_bar
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.scene.needs import Needs, checked_needs
 from renderer.scene.scene import Scene, checked_settings
@@ -76,7 +75,7 @@ def render(
         prepared = scene
     else:
         prepared = _prepared(scene, chosen.max_depth, accelerator, split, needs, threads)
-    with _bar(tiles(chosen.resolution), progress) as update:
+    with progress_bar(tiles(chosen.resolution), "tile", progress) as update:
         image = prepared.picture(eye, chosen, rule, threads, update, kept)
     if image.cut:
         warnings.warn(image.cut_message(chosen.max_rays), CutWarning, stacklevel=2)
@@ -137,18 +136,3 @@ def _offset(offset: str | float) -> OffsetRule:
         return BOUNDED if offset == "bounded" else OffsetRule(False, MITSUBA_EPSILON)
     expect(isinstance(offset, Real) and 0.0 <= offset < 0.1, "offset", "a number from 0 to below 0.1", offset)
     return OffsetRule(False, float(offset))
-
-
-@contextmanager
-def _bar(count: int, progress: bool) -> Iterator[Callable[[int], object] | None]:
-    """The function to call with the number of tiles done: that of a bar, or None where no terminal shows it.
-
-    There is no hidden bar in place of None, because all bars share a lock, which Ctrl-C may leave taken for good.
-    """
-    if not (progress and on_terminal()):
-        yield None
-        return
-    from tqdm import tqdm  # only a bar needs it
-
-    with tqdm(total=count, unit="tile", leave=False) as bar:
-        yield bar.update

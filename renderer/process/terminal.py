@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import TextIOWrapper
 
@@ -10,6 +10,21 @@ from io import TextIOWrapper
 def on_terminal() -> bool:
     """Whether standard error is a terminal; it may be closed, too, or replaced."""
     return sys.stderr is not None and sys.stderr.isatty()
+
+
+@contextmanager
+def progress_bar(count: int, unit: str, progress: bool) -> Iterator[Callable[[int], object] | None]:
+    """The function to call with the number of units done: that of a bar, or None where no terminal shows it.
+
+    There is no hidden bar in place of None, because all bars share a lock, which Ctrl-C may leave taken for good.
+    """
+    if not (progress and on_terminal()):
+        yield None
+        return
+    from tqdm import tqdm  # only a bar needs it
+
+    with tqdm(total=count, unit=unit, leave=False) as bar:
+        yield bar.update
 
 
 def spell_everything() -> None:

@@ -51,6 +51,15 @@ class OffsetRule(NamedTuple):
 BOUNDED = OffsetRule(True, 0.0)
 
 
+@inlined
+def has_normal(p0, p1, p2):
+    """Whether the corners of a face do not lie on a line, as rounded: its normal is then the same for all rays."""
+    side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
+    n = cross(side2, sub(p2, p0))
+    side = larger(largest_component(side0), larger(largest_component(side1), largest_component(side2)))
+    return largest_component(n) > side * LINE * side
+
+
 @kernel
 def normal_of(p0, p1, p2, d):
     """The unit normal of a face by its winding.
@@ -59,10 +68,9 @@ def normal_of(p0, p1, p2, d):
     one that looks back along d as far as its longest side allows.
     """
     side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
-    n = cross(side2, sub(p2, p0))
+    if has_normal(p0, p1, p2):
+        return normalized(cross(side2, sub(p2, p0)))
     l0, l1, l2 = largest_component(side0), largest_component(side1), largest_component(side2)
-    if largest_component(n) > larger(l0, larger(l1, l2)) * LINE * larger(l0, larger(l1, l2)):
-        return normalized(n)
     longest = normalized(side2 if l2 >= l0 and l2 >= l1 else (side1 if l1 >= l0 else side0))
     across = normalized(sub(scale(longest, dot(d, longest)), d))
     if largest_component(across) == 0.0:
@@ -148,8 +156,10 @@ def _exact_plane(p0, p1, p2, o):
 
 
 @inlined
-def _leave(p0, p1, p2, o, w):
-    """The point o near the plane of a face, moved along the normal to the side of w until it is off for certain."""
+def _plane_below(p0, p1, p2, o, w):
+    """The unit normal of a face that a ray leaves from o in direction w, how far o is above its plane, and how far it
+    must be to be off for certain.
+    """
     double_area, reach, side = length(cross(sub(p1, p0), sub(p2, p0))), 0.0, 0.0
     for p in (p0, p1, p2):
         reach = larger(reach, largest_component(sub(p, o)))
@@ -162,12 +172,49 @@ def _leave(p0, p1, p2, o, w):
         needed += _GAMMA336 * (reach / double_area * reach) * reach
     elif double_area / side > LINE * side:
         n_g, height = _exact_plane(p0, p1, p2, o)
-    away = 1.0 if dot(n_g, w) >= 0.0 else -1.0
+    return n_g, height, needed
+
+
+@inlined
+def _leave(o, plane, away):
+    """The point o near a face, moved along its normal until it is off for certain; to the other side by away = -1."""
+    n_g, height, needed = plane
     missing = needed - away * height
     if missing <= 0.0:
         return o
     step = scale(n_g, away * missing)
     return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
+
+
+@inlined
+def corners_of(vertices, faces, face, unit):
+    """The corners of a face, as tuples, in units in which no product overflows or vanishes."""
+    a, b, c = row3(faces, face)
+    return scale(row3(vertices, a), unit), scale(row3(vertices, b), unit), scale(row3(vertices, c), unit)
+
+
+@kernel
+def leave_face(corners, o, w, unit):
+    """Where a ray from the point o near a face starts in direction w: off the face, see ``leave_faces``.
+
+    ``corners`` are ``corners_of`` the face; o comes and goes in the mesh's own units.
+    """
+    p0, p1, p2 = corners
+    o = scale(o, unit)
+    plane = _plane_below(p0, p1, p2, o, w)
+    return scale(_leave(o, plane, 1.0 if dot(plane[0], w) >= 0.0 else -1.0), 1.0 / unit)
+
+
+@kernel
+def leave_to_both_sides(corners, o, unit):
+    """``leave_face`` for all directions w at once, of a face that ``has_normal``.
+
+    Returns that normal, the start for each w with normal . w >= 0, and the start for all others.
+    """
+    p0, p1, p2 = corners
+    o = scale(o, unit)
+    plane = _plane_below(p0, p1, p2, o, o)
+    return plane[0], scale(_leave(o, plane, 1.0), 1.0 / unit), scale(_leave(o, plane, -1.0), 1.0 / unit)
 
 
 @kernel
@@ -184,10 +231,7 @@ def leave_faces(vertices, faces, origins, directions, leaving, starts, bounds):
     for i in range(begin, end):
         face, o, w = leaving[i], three(points, i * step), row3(pointer(directions), i)
         if face >= 0:
-            a, b, c = row3(pointer(faces), face)
-            p0, p1, p2 = row3(corners, a), row3(corners, b), row3(corners, c)
-            o = _leave(scale(p0, unit), scale(p1, unit), scale(p2, unit), scale(o, unit), w)
-            o = scale(o, 1.0 / unit)
+            o = leave_face(corners_of(corners, pointer(faces), face, unit), o, w, unit)
         row = at(pointer(starts), 3 * i)
         for k in range(3):
             put(row, k, o[k])

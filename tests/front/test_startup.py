@@ -55,6 +55,9 @@ def heavy_after(script: str) -> set[str]:
         ("from renderer.cli import main\ntry: main(['render', '--help'])\nexcept SystemExit: pass", set()),
         ("from renderer import load_mesh, Mesh", {"numpy"}),
         ("from renderer import Octree", {"numpy", "numba"}),
+        ("import renderer.studies", set()),
+        ("from renderer.studies import tregenza", {"numpy"}),
+        ("from renderer.studies import *", {"numpy", "numba"}),
         ("from renderer import *", {"numpy", "numba", "pydantic"}),
     ],
 )
@@ -143,7 +146,7 @@ Octree.from_mesh(box(), threads=2).contains(np.asfortranarray(vertices.astype(np
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(SIGNATURES + script).splitlines()[-1].split(maxsplit=1)
-    assert int(count) == 44 and not new
+    assert int(count) == 46 and not new
 
 
 def test_kernels_of_queries_are_those_of_every_query_of_either_kind():
@@ -155,6 +158,7 @@ before = signatures()
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.queries import Queries
+from renderer.studies import ambient_occlusion, occlusion, sky_view_factor
 ball, rng = icosphere(3), np.random.default_rng(1)
 # In float64 and in float32, of which the kernels of trees have two kinds.
 meshes = [ball, Mesh(ball.vertices.astype(np.float32), ball.faces), Mesh(ball.vertices * 1e-60, ball.faces)]
@@ -173,6 +177,9 @@ for tree in trees:
         tree.visible(a, b), tree.visible(a, b, leaving=faces, reaching=faces)
         tree.contains(a), tree.contains(a, False, "even-odd"), tree.contains(a, winding=True)
         tree.winding_number(a), tree.closest_point(a, 0.5 * size), tree.signed_distance(a)
+        for of in ({}, {"leaving": faces}):
+            occlusion(tree, a, b, b, **of), occlusion(tree, a.astype(np.float32), None, b, packed=True, **of)
+            sky_view_factor(tree, a, up=[1, 2, 3], **of), ambient_occlusion(tree, a, b[::-1], samples=9, **of)
         asked |= {"visible", "contains", "winding_number", "closest_point", "signed_distance"}
     tree.refit(tree.mesh.vertices * 1.5)
 public = {name for name, value in vars(Queries).items() if callable(value) and not name.startswith("_")}
@@ -297,6 +304,6 @@ sys.stderr = Terminal()
 assert main(["compile", "--queries"]) == 0
 shown = sys.stderr.getvalue()
 sys.stderr = sys.__stderr__
-print("brute force" in shown, "/13 " in shown)
+print("brute force" in shown, "/14 " in shown)
 """
     assert output(script).split()[-2:] == ["True", "True"]

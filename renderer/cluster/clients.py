@@ -1,0 +1,38 @@
+"""The connection to a cluster: one that runs, or a local one of a worker process for each processor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from renderer.errors import expect, extra_hint
+from renderer.process.parallel import checked_threads
+
+# To wait for a scheduler's answer.
+SECONDS = 10
+
+
+@contextmanager
+def connected(address: str | None = None, *, workers: int | None = None) -> Iterator[Any]:
+    """A ``distributed.Client`` of the scheduler at ``address`` ("tcp://host:8786"), or of a local cluster, which ends
+    with the block: ``workers`` processes of one thread each, by default one for each processor.
+
+    Raises ``ImportError`` where the extra is not installed, ``ValueError`` for workers of a cluster that runs
+    already, and ``OSError`` where no scheduler answers.
+    """
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise ImportError(f"a cluster needs the package distributed; {extra_hint('cluster')}") from error
+    if address is not None:
+        expect(workers is None, "workers", "None, as the cluster has its own", repr(workers))
+        with Client(address, timeout=SECONDS) as client:
+            yield client
+        return
+    count = checked_threads(workers)
+    with (
+        LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster,
+        Client(cluster) as client,
+    ):
+        yield client

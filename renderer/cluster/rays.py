@@ -1,0 +1,68 @@
+"""Ray queries on dask arrays: lazy, chunk by chunk, each traced where the chunk is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.cluster.workers import SentMesh
+from renderer.errors import expect
+from renderer.octree import Octree
+from renderer.runs.parts import digest_of
+
+# A row of the hits of ``closest_hit``, as ``renderer.Hits`` has them: inf, -1 and nan where a ray hits nothing.
+HIT = np.dtype([("t", "f8"), ("face", "i8"), ("u", "f8"), ("v", "f8")])
+
+
+def closest_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf) -> Any:
+    """The closest hits of rays in dask arrays, a dask array (n,) of the records ``HIT`` with the chunks of the rays.
+
+    origins, directions  (n, 3) dask arrays; the origins' chunks of rows are kept
+    t_min, t_max         numbers for all rays
+
+    Nothing is computed before the result is asked for; ``hits["t"]`` is lazy too. The bits are those of
+    ``octree.closest_hit``. Raises ``ValueError`` for other shapes; a ray that is out of range raises when its chunk
+    is computed.
+    """
+
+    def trace(mesh: SentMesh, o: NDArray[Any], d: NDArray[Any]) -> NDArray[Any]:
+        hits = mesh.octree().closest_hit(o, d, t_min=t_min, t_max=t_max)
+        rows = np.empty(len(o), HIT)
+        for name in ("t", "face", "u", "v"):
+            rows[name] = getattr(hits, name)
+        return rows
+
+    return _by_chunks(octree, origins, directions, trace, HIT)
+
+
+def any_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf) -> Any:
+    """Whether each ray hits anything, a dask array (n,) of bool; see ``closest_hit``."""
+
+    def trace(mesh: SentMesh, o: NDArray[Any], d: NDArray[Any]) -> NDArray[Any]:
+        return mesh.octree().any_hit(o, d, t_min=t_min, t_max=t_max)
+
+    return _by_chunks(octree, origins, directions, trace, np.dtype(bool))
+
+
+def _by_chunks(octree: Octree, origins: Any, directions: Any, trace: Any, dtype: np.dtype[Any]) -> Any:
+    import dask.array as da
+    from dask import delayed
+
+    for name, array in (("origins", origins), ("directions", directions)):
+        expect(isinstance(array, da.Array), name, "a dask array", type(array).__name__)
+        expect(array.ndim == 2 and array.shape[1] == 3, name, "shape (n, 3)", f"shape {array.shape}")
+    same = origins.shape == directions.shape
+    expect(same, "directions", f"shape {origins.shape} as origins have", f"shape {directions.shape}")
+    o = origins.rechunk({1: 3})
+    d = directions.rechunk((o.chunks[0], (3,)))
+    mesh = octree.mesh
+    digest = digest_of(mesh.vertices, mesh.faces)
+    # One task that all chunks need: a cluster keeps what it returns on each worker that asked for it.
+    sent = delayed(SentMesh(digest, mesh.vertices, mesh.faces, "midpoint"), name=f"mesh-{digest}", traverse=False)
+    blocks = [
+        da.from_delayed(delayed(trace)(sent, a, b), (rows,), dtype)
+        for rows, a, b in zip(o.chunks[0], o.to_delayed()[:, 0], d.to_delayed()[:, 0], strict=True)
+    ]
+    return da.concatenate(blocks) if blocks else da.zeros(0, dtype)

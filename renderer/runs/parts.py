@@ -1,0 +1,162 @@
+"""The parts of a long study on disk: what is done stays done when the run is killed, and is not done again.
+
+A folder beside the result has ``manifest.json``, which says what is computed of what, and a file for each part that is
+done: its rows as they are in memory, and behind them their SHA-256. Each file is written beside and renamed, so a part
+is whole or absent; one that a disk has spoilt counts as absent. The result is made of all parts, in order, and the
+folder removed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.process.files import write_atomically
+
+_MANIFEST = "manifest.json"
+_DIGEST_BYTES = 32
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study computes, in parts.
+
+    rows       of the result, one a point
+    size       rows of a part; the last may have fewer
+    width      values of a row; 0: the result has one dimension
+    dtype      of the values, as NumPy spells it
+    made_of    all that the values depend on: numbers, texts, and digests of arrays
+    """
+
+    rows: int
+    size: int
+    width: int
+    dtype: str
+    made_of: Mapping[str, Any]
+
+    @property
+    def parts(self) -> int:
+        """How many there are; one without rows where the result has none."""
+        return max(1, -(-self.rows // self.size))
+
+    def span(self, part: int) -> tuple[int, int]:
+        """The rows of a part: begin and end."""
+        return part * self.size, min(self.rows, (part + 1) * self.size)
+
+    def shape(self, rows: int) -> tuple[int, ...]:
+        """The shape of so many rows."""
+        return (rows, self.width) if self.width else (rows,)
+
+
+class Parts:
+    """The folder of a study under way."""
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        """Begin it, or go on where an earlier run of the same plan was killed.
+
+        Raises ``ValueError`` where the folder is of another plan, and says what differs.
+        """
+        self.folder, self.plan = folder, plan
+        wanted = json.loads(json.dumps(asdict(plan)))
+        path = folder / _MANIFEST
+        if not path.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            text = json.dumps(wanted, indent=1)
+            write_atomically(path, lambda file: file.write(text.encode()))
+            return
+        differing = _differing(_read_manifest(path), wanted)
+        if differing:
+            raise ValueError(
+                f"{folder}: expected the parts of this study, got those of another, whose {', '.join(differing)} "
+                "differ; remove the folder to begin anew"
+            )
+
+    def missing(self) -> list[int]:
+        """The parts that are still to be computed."""
+        return [part for part in range(self.plan.parts) if self._read(part) is None]
+
+    def write(self, part: int, values: NDArray[Any]) -> None:
+        """Keep a part; of the shape and type of the plan."""
+        begin, end = self.plan.span(part)
+        assert values.shape == self.plan.shape(end - begin) and values.dtype == self.plan.dtype
+        content = np.ascontiguousarray(values).tobytes()
+        digest = hashlib.sha256(content).digest()
+        write_atomically(self._path(part), lambda file: file.write(content + digest))
+
+    def join(self, path: Path) -> None:
+        """Write the result as ``.npy``, part by part, and remove the folder. Raises ``OSError`` where one is absent."""
+        write_atomically(path, self._join)
+        self.remove()
+
+    def joined(self) -> NDArray[Any]:
+        """The result in memory."""
+        parts = [self._whole(part) for part in range(self.plan.parts)]
+        values = np.frombuffer(b"".join(parts), self.plan.dtype)
+        return values.reshape(self.plan.shape(self.plan.rows)).copy()
+
+    def remove(self) -> None:
+        """Remove the folder."""
+        with suppress(FileNotFoundError):
+            shutil.rmtree(self.folder)
+
+    def _join(self, file: BinaryIO) -> None:
+        header = {"descr": np.dtype(self.plan.dtype).str, "fortran_order": False,
+                  "shape": self.plan.shape(self.plan.rows)}  # fmt: skip
+        np.lib.format.write_array_header_1_0(file, header)
+        for part in range(self.plan.parts):
+            file.write(self._whole(part))
+
+    def _whole(self, part: int) -> bytes:
+        content = self._read(part)
+        if content is None:
+            raise OSError(f"{self._path(part)}: expected a part of the study, got none that is whole")
+        return content
+
+    def _read(self, part: int) -> bytes | None:
+        """A part's values, None where it is absent or not what was written."""
+        try:
+            content = self._path(part).read_bytes()
+        except FileNotFoundError:
+            return None
+        begin, end = self.plan.span(part)
+        values, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
+        size = (end - begin) * max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
+        return values if len(values) == size and hashlib.sha256(values).digest() == digest else None
+
+    def _path(self, part: int) -> Path:
+        return self.folder / f"{part:08d}.part"
+
+
+def digest_of(*arrays: NDArray[Any]) -> str:
+    """A digest of arrays: of their shapes, types and bytes."""
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(f"{array.shape} {array.dtype.str};".encode())
+        found.update(np.ascontiguousarray(array).data)
+    return found.hexdigest()
+
+
+def _read_manifest(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, UnicodeDecodeError):
+        found = None
+    if not isinstance(found, dict):
+        raise ValueError(f"{path}: expected the manifest of a study, got something else; remove its folder")
+    return found
+
+
+def _differing(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """The names of what is not the same in two manifests, those of ``made_of`` by their own names."""
+    flat = [dict(m) | (m["made_of"] if isinstance(m.get("made_of"), dict) else {}) for m in (stored, wanted)]
+    names = [n for n in sorted(flat[0].keys() | flat[1].keys()) if n != "made_of"]
+    return [n.replace("_", " ") for n in names if flat[0].get(n) != flat[1].get(n)]

@@ -1,0 +1,101 @@
+"""A study as a record that can be stored, sent and repeated: what is asked, of which points, part by part."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import expect
+from renderer.mesh.mesh import Mesh
+from renderer.octree import Octree
+from renderer.process.files import check_writable
+from renderer.process.terminal import progress_bar
+from renderer.runs.parts import Parts, Plan, digest_of
+from renderer.studies.ambient import ambient_occlusion
+from renderer.studies.sky import sky_view_factor, sun_hours
+
+Floats = NDArray[np.float64]
+# Points of a part: with 145 directions some seconds of work on one thread, which is what a kill loses at most.
+PART = 1 << 15
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """The points of a study: ``points`` and ``normals`` (n, 3) float64, and ``leaving`` (n,) int64, -1 for no face."""
+
+    points: Floats
+    normals: Floats
+    leaving: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def part(self, begin: int, end: int) -> Points:
+        """Those of some rows."""
+        return Points(self.points[begin:end], self.normals[begin:end], self.leaving[begin:end])
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What is asked of each point.
+
+    kind        "sky": sky view factor; "sun": hours of sun; "ao": ambient occlusion
+    options     the keyword arguments of the kind's function, other than points, threads and progress
+    """
+
+    kind: str
+    options: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        expect(self.kind in KINDS, "kind", f"one of {list(KINDS)}", repr(self.kind))
+
+    def answer(self, octree: Octree, points: Points, threads: int | None = None) -> Floats:
+        """The answers (n,) for points; each is the same whatever other points are asked with it."""
+        return KINDS[self.kind](
+            octree, points.points, points.normals, leaving=points.leaving, threads=threads, **self.options
+        )
+
+    def plan(self, mesh: Mesh, points: Points, size: int = PART) -> Plan:
+        """The study in parts of ``size`` points, with all that its bits depend on."""
+        options = {
+            name: digest_of(value) if isinstance(value, np.ndarray) else value for name, value in self.options.items()
+        }
+        made_of = {
+            "kind": self.kind, "options": options, "mesh": digest_of(mesh.vertices, mesh.faces),
+            "points": digest_of(points.points, points.normals, points.leaving),
+            "version": sys.modules["renderer"].__version__,
+        }  # fmt: skip
+        return Plan(len(points), size, 0, "<f8", made_of)
+
+
+KINDS: dict[str, Callable[..., Floats]] = {"sky": sky_view_factor, "sun": sun_hours, "ao": ambient_occlusion}
+
+
+def folder_of(output: Path) -> Path:
+    """Where the parts of a result are while it is under way."""
+    return output.with_name(f"{output.name}.parts")
+
+
+def run(octree: Octree, study: Study, points: Points, folder: Path, *, progress: bool = False) -> Parts:
+    """Compute the parts that ``folder`` lacks, one after the other; a run that is killed can be begun again.
+
+    Returns all parts, whose bits do not depend on how often the run was killed, nor on threads.
+    """
+    check_writable(folder.with_name(f"{folder.name}.try"))
+    parts = Parts(folder, study.plan(octree.mesh, points))
+    missing = parts.missing()
+    with progress_bar(len(points), "point", progress) as update:
+        if update is not None:
+            update(len(points) - sum(end - begin for begin, end in map(parts.plan.span, missing)))
+        for part in missing:
+            begin, end = parts.plan.span(part)
+            parts.write(part, study.answer(octree, points.part(begin, end)))
+            if update is not None:
+                update(end - begin)
+    return parts

@@ -1,0 +1,71 @@
+"""Which directions are hidden from points: by the mesh, or by the points' own horizons."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.arrays import flag_argument
+from renderer.errors import expect
+from renderer.queries import Queries
+from renderer.studies.share import answer, answer_bits, check_asked, check_directions, check_weights, limits_of
+from renderer.studies.sweep import Sky
+
+
+def occlusion(
+    octree: Queries,
+    points: ArrayLike,
+    normals: ArrayLike | None,
+    directions: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    leaving: ArrayLike | None = None,
+    packed: bool = False,
+    distance: float = np.inf,
+    threads: int | None = None,
+    progress: bool = False,
+) -> NDArray[np.float64] | NDArray[np.uint8]:
+    """The share of directions that is HIDDEN from each point, (...) float64 from 0 to 1; or one bit for each of them.
+
+    A direction d is hidden from a point where d . n <= 0, as float64 computes it of its unit normal n: it is at the
+    point's horizon or below. Else it is hidden where a ray this way hits anything, as ``octree.any_hit`` tells.
+
+    points      (..., 3), finite
+    normals     (..., 3) as points, or one (3,) for all; not zero, of any length; None: no point has a horizon
+    directions  (k, 3), the same for all points, of any length as those of rays
+    weights     (k,) >= 0, not all 0: what each direction counts; None: all the same
+    leaving     the face that each point lies on, (...) or one for all, -1 for none. The ray starts off this face by
+                more than rounding errors, on the side that the direction goes to: no epsilon is needed. A point on the
+                surface without it is hidden from all directions by the surface that it lies on; for points whose faces
+                are not known, ``leaving=octree.closest_point(points).face``
+    packed      True: (..., ceil(k / 8)) uint8 with a set bit for each hidden direction, in the order of
+                ``numpy.unpackbits(..., axis=-1, count=k)``. There are no weights then
+    distance    how far the mesh hides, in scene units
+    threads     None: as many as the octree has
+    progress    a bar on standard error when that is a terminal
+
+    The share is the sum of the weights of the hidden directions over the sum of all, both in the order of directions:
+    exactly 0 where all is open and 1 where all is hidden. A point's bits depend neither on threads nor on the other
+    points. Nothing of the size n x k is made but the bits. Raises ``ValueError`` naming argument and row.
+
+    >>> import numpy as np
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> from renderer.studies import occlusion
+    >>> octree = Octree.from_mesh(box((0, 0, 0), (1, 1, 1)))
+    >>> around = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> occlusion(octree, [[3, 0.5, 0.25], [9, 9, 9]], None, around)
+    array([0.25, 0.  ])
+    >>> bits = occlusion(octree, [[3, 0.5, 0.25]], [0, 0, 1], around, packed=True)
+    >>> np.unpackbits(bits, axis=-1, count=4)
+    array([[1, 1, 1, 0]], dtype=uint8)
+    """
+    asked = check_asked(octree, points, normals, leaving, threads, progress)
+    ways = check_directions("directions", directions)
+    limits = limits_of(distance, ways)
+    if flag_argument("packed", packed):
+        expect(weights is None, "weights", "None, as bits have none", "an array")
+        return answer_bits(octree, asked, Sky(ways, np.ones(len(ways)), limits, False, False))
+    values = check_weights("weights", weights, len(ways))
+    expect(bool(values.any()), "weights", "one that is not 0", "all 0")
+    return answer(octree, asked, Sky(ways, values, limits, False, False), hidden=True, share=True)

@@ -1,0 +1,142 @@
+"""Studies from Python: checked arguments, tiles on threads, and results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.arrays import flag_argument, real_argument
+from renderer.errors import expect
+from renderer.limits import LONGEST, SHORTEST
+from renderer.points.argument import check_points, farthest_of
+from renderer.points.curve import order_along_curve
+from renderer.process.parallel import checked_threads, for_chunks
+from renderer.process.terminal import progress_bar
+from renderer.queries import Queries
+from renderer.studies.sweep import TILE, Answers, Places, Sky, make_sweep_memory, sweep
+from renderer.trace.batch import check_faces
+
+Floats = NDArray[np.float64]
+
+# Points that are put in order together: 16 bytes each for it, and a second of sorting.
+_BLOCK = 1 << 22
+# The points of a chunk, at most and at least, where there are enough for all threads.
+_MOST, _LEAST = 64 * TILE, 16
+
+
+class Asked(NamedTuple):
+    """Where a study is made, and how: points (n, 3) with the leading dimensions that were given, and the threads."""
+
+    places: Places
+    shape: tuple[int, ...]
+    threads: int
+    progress: bool
+
+
+def check_asked(
+    octree: Queries,
+    points: ArrayLike,
+    normals: ArrayLike | None,
+    leaving: ArrayLike | None,
+    threads: int | None,
+    progress: bool,
+) -> Asked:
+    """The arguments that all studies have, checked. Raises ``ValueError`` naming argument and row."""
+    expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
+    rows, shape = check_points("points", points, farthest_of(octree.tree.scale))
+    faces = np.empty(0, np.int64)
+    if leaving is not None:
+        faces = check_faces("leaving", leaving, shape, len(octree.mesh.faces))
+    workers = octree.threads if threads is None else checked_threads(threads)
+    places = Places(rows, _check_normals(normals, shape), faces)
+    return Asked(places, shape, workers, flag_argument("progress", progress))
+
+
+def _check_normals(normals: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
+    """One normal a point, or one for all; none for None."""
+    if normals is None:
+        return np.empty((0, 3))
+    given, own = check_points("normals", normals)
+    fits = own in (shape, ())
+    expect(fits, "normals", f"shape {(*shape, 3)} as points have, or (3,)", f"shape {(*own, 3)}")
+    bad = ~given.any(axis=1)
+    if bad.any():
+        expect(False, "normals", "vectors that are not zero", f"{given[bad][0].tolist()} in row {int(bad.argmax())}")
+    return given
+
+
+def check_directions(argument: str, directions: ArrayLike) -> Floats:
+    """Directions (k, 3), k >= 1, in the range of those of rays. Raises ``ValueError`` naming argument and row."""
+    rows, shape = check_points(argument, directions)
+    expect(len(shape) == 1 and len(rows) > 0, argument, "shape (k, 3), k >= 1", f"shape {(*shape, 3)}")
+    largest = np.abs(rows).max(axis=1)
+    bad = ~((largest >= SHORTEST) & (largest <= LONGEST))
+    if bad.any():
+        row = int(bad.argmax())
+        expected = f"finite, non-zero vectors, the largest component from {SHORTEST:.3g} to {LONGEST:.3g}"
+        expect(False, argument, expected, f"{rows[row].tolist()} in row {row}")
+    return rows
+
+
+def check_weights(argument: str, weights: ArrayLike | None, count: int) -> Floats:
+    """Weights (k,) >= 0 and finite, one a direction; ones for None. Raises ``ValueError`` naming argument and row."""
+    if weights is None:
+        return np.ones(count)
+    given = real_argument(argument, weights)
+    expect(given.shape == (count,), argument, f"shape ({count},), one a direction", f"shape {given.shape}")
+    rows: Floats = np.array(given, np.float64)
+    bad = ~((rows >= 0.0) & (rows < np.inf))
+    if bad.any():
+        row = int(bad.argmax())
+        expect(False, argument, "finite numbers >= 0", f"{rows[row]} in row {row}")
+    return rows
+
+
+def lengths_of(directions: Floats) -> Floats:
+    """The lengths of vectors (k, 3), without overflow."""
+    largest = np.abs(directions).max(axis=1, keepdims=True)
+    return largest[:, 0] * np.sqrt(((directions / largest) ** 2).sum(axis=1))
+
+
+def limits_of(distance: float, directions: Floats) -> Floats:
+    """The t at which rays in these directions are as far as ``distance``, which must be a number >= 0, or inf."""
+    given = real_argument("distance", distance)
+    expect(given.ndim == 0 and bool(given >= 0.0), "distance", "a number >= 0", repr(distance))
+    return float(given) / lengths_of(directions)
+
+
+def answer(octree: Queries, asked: Asked, sky: Sky, *, hidden: bool, share: bool) -> Floats:
+    """The sums over the hidden or open directions of each point, as they are or as shares of all; see ``Answers``."""
+    sums = np.empty(len(asked.places.points))
+    run(octree, asked, sky, Answers(sums, np.empty((0, 1), np.uint8), hidden, share))
+    return sums.reshape(asked.shape)
+
+
+def answer_bits(octree: Queries, asked: Asked, sky: Sky) -> NDArray[np.uint8]:
+    """A bit for each point and direction that is hidden from it."""
+    width = -(-len(sky.directions) // 8)
+    bits = np.zeros((len(asked.places.points), width), np.uint8)
+    run(octree, asked, sky, Answers(np.empty(0), bits, True, False))
+    return bits.reshape(*asked.shape, width)
+
+
+def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
+    """Let all points look in all directions, and write to ``answers``: points in an order of our own, on threads."""
+    mesh, tree = octree._built
+    count = len(asked.places.points)
+    arrays = mesh.vertices, mesh.faces
+    with progress_bar(count, "point", asked.progress) as update:
+        for first in range(0, count, _BLOCK):
+            order = first + order_along_curve(asked.places.points[first : first + _BLOCK])
+
+            def look(begin: int, end: int, order: NDArray[np.int64] = order) -> Iterator[None]:
+                rows, state, memory = order[begin:end], (0, 0), make_sweep_memory(tree.depth)
+                while state[0] < len(rows):
+                    state = sweep(tree.words, arrays, asked.places, sky, answers, rows, state, memory)
+                    yield
+
+            size = min(_MOST, max(_LEAST, len(order) // (16 * asked.threads)))
+            for_chunks(look, len(order), size, asked.threads, update)

@@ -1,0 +1,306 @@
+"""Points times directions that are never written down: a tile of points, and one direction after the other.
+
+A tile is up to TILE points that are near each other. All of them look in one direction, then in the next, so the rays
+that are traced together are parallel and start side by side: packets. What a point's horizon hides is no ray. A point
+adds its directions up in their order, whatever tile it is in, and rays do not know of each other: so the bits of its
+result do not depend on the points beside it.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import at, get, pointer, put, smaller
+from renderer.kernels.vec3 import add, cross, dot, normalized, row3, scale, three
+from renderer.trace.layout import cache_aligned
+from renderer.trace.leaf import tree_pointers
+from renderer.trace.rays import HitPointers, RayPointers, hit_pointers
+from renderer.trace.spawn import corners_of, has_normal, leave_face, leave_to_both_sides
+from renderer.trace.traverse import Memory, Scratch, make_memory, make_scratch, search_blocks, trace
+
+TILE = 256
+# Points with directions that are listed, and their rays traced, together: of a whole tile some directions, of a few
+# points many.
+RAYS = 1024
+# And in one call, or one more list: some 10 ms, so that Ctrl-C and other threads need not wait for long.
+RAYS_A_CALL = 1 << 14
+# For each point of a tile: where a ray starts that goes to the side of its face's normal, and to the other side; that
+# normal; the frame, whose third vector is the point's own normal; the sum so far; and that of all directions.
+_ABOVE, _BELOW, _FACING, _FRAME = 0, 3 * TILE, 6 * TILE, 9 * TILE
+_SUM, _WHOLE, _POINT_DOUBLES = 18 * TILE, 19 * TILE, 20 * TILE
+# Its row, its face, and how its rays start.
+_ROW, _FACE, _START, _POINT_INTEGERS = 0, TILE, 2 * TILE, 3 * TILE
+# At the point itself; on one of two sides of a face; or by a rule that needs each direction, as of a face whose corners
+# lie on a line.
+_AT_POINT, _BY_SIDE, _BY_DIRECTION = range(3)
+
+
+class Places(NamedTuple):
+    """Where rays start. normals has one row for all, or none where there is no horizon; leaving may have no row.
+
+    points (n, 3), normals (n, 3), (1, 3) or (0, 3) float64, not zero; leaving (n,) or (0,) int64, -1 for no face
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    leaving: NDArray[np.int64]
+
+
+class Sky(NamedTuple):
+    """The directions that every point looks in.
+
+    directions  (k, 3) float64
+    values      (k,) float64: what each adds to the sums
+    limits      (k,) float64: beyond which t nothing hides
+    turned      whether directions are those of each point's own frame, whose z is its normal
+    cosine      whether values are multiplied by the cosine between direction and normal
+    """
+
+    directions: NDArray[np.float64]
+    values: NDArray[np.float64]
+    limits: NDArray[np.float64]
+    turned: bool
+    cosine: bool
+
+
+class Answers(NamedTuple):
+    """Where results go: each of the arrays may have no row.
+
+    sums    (n,) float64: the sum over the hidden directions, or the open ones
+    bits    (n, ceil(k / 8)) uint8, zeros before: a bit for each hidden direction, as ``numpy.packbits`` has them
+    hidden  whether the hidden directions are added up, not the open ones
+    share   whether sums are divided by that over all directions, those below the horizon included
+    """
+
+    sums: NDArray[np.float64]
+    bits: NDArray[np.uint8]
+    hidden: bool
+    share: bool
+
+
+class SweepMemory(NamedTuple):
+    """The memory of one thread: its tile's points, its rays, what they hit, and what tracing needs."""
+
+    doubles: NDArray[np.float64]
+    integers: NDArray[np.int64]
+    hits: NDArray[np.float64]
+    trace: Memory
+
+
+class _Work(NamedTuple):
+    """Pointers into a ``SweepMemory``: the tile's points; origins, directions and t_max of rays; the points with
+    directions that are listed, (direction * TILE + point) * 2, and 1 more for those that have a ray; and their values.
+    """
+
+    points: Any
+    numbers: Any
+    origins: Any
+    directions: Any
+    limits: Any
+    values: Any
+    zero: Any
+    listed: Any
+    found: HitPointers
+    scratch: Scratch
+
+
+def make_sweep_memory(depth: int) -> SweepMemory:
+    """Memory for tiles against a tree of ``depth`` levels."""
+    return SweepMemory(
+        cache_aligned(_POINT_DOUBLES + 8 * RAYS + 8, np.float64),
+        cache_aligned(_POINT_INTEGERS + RAYS, np.int64),
+        cache_aligned(RAYS // 8, np.float64),
+        make_memory(depth, RAYS),
+    )
+
+
+@inlined
+def _work_in(memory):
+    doubles, integers = pointer(memory.doubles), pointer(memory.integers)
+    origins = at(doubles, _POINT_DOUBLES)
+    directions, limits, values = at(origins, 3 * RAYS), at(origins, 6 * RAYS), at(origins, 7 * RAYS)
+    zero = at(origins, 8 * RAYS)
+    put(zero, 0, 0.0)
+    return _Work(
+        doubles, integers, origins, directions, limits, values, zero, at(integers, _POINT_INTEGERS),
+        hit_pointers(memory.hits, 0), make_scratch(memory.trace),
+    )  # fmt: skip
+
+
+@inlined
+def _put3(base, first, a):
+    put(base, first, a[0])
+    put(base, first + 1, a[1])
+    put(base, first + 2, a[2])
+
+
+@inlined
+def _frame_of(normal):
+    """Unit vectors across each other, the third one along ``normal``; they depend on it alone."""
+    n = normalized(normal)
+    x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
+    # The axis that is farthest from it.
+    on_x, on_y = x <= y and x <= z, y <= z
+    axis = (1.0 if on_x else 0.0), (0.0 if on_x or not on_y else 1.0), (0.0 if on_x or on_y else 1.0)
+    first = normalized(cross(axis, n))
+    return first, cross(n, first), n
+
+
+@kernel
+def _begin_tile(mesh, places, rows, begin, count, work, unit):
+    """Read ``count`` points, those in ``rows`` from ``begin`` on, and prepare where their rays start."""
+    vertices, faces = pointer(mesh[0]), pointer(mesh[1])
+    points, normals, leaving = pointer(places.points), pointer(places.normals), pointer(places.leaving)
+    step = np.int64(len(places.normals) > 1)
+    for i in range(count):
+        row = rows[begin + i]
+        face = get(leaving, row) if len(places.leaving) > 0 else np.int64(-1)
+        o, start = row3(points, row), _AT_POINT
+        put(work.numbers, _ROW + i, row)
+        put(work.numbers, _FACE + i, face)
+        _put3(work.points, _ABOVE + 3 * i, o)
+        if face >= 0:
+            corners = corners_of(vertices, faces, face, unit)
+            start = _BY_DIRECTION
+            if has_normal(corners[0], corners[1], corners[2]):
+                start = _BY_SIDE
+                normal, above, below = leave_to_both_sides(corners, o, unit)
+                _put3(work.points, _FACING + 3 * i, normal)
+                _put3(work.points, _ABOVE + 3 * i, above)
+                _put3(work.points, _BELOW + 3 * i, below)
+        put(work.numbers, _START + i, start)
+        if len(places.normals) > 0:
+            first, second, third = _frame_of(row3(normals, row * step))
+            _put3(work.points, _FRAME + 9 * i, first)
+            _put3(work.points, _FRAME + 9 * i + 3, second)
+            _put3(work.points, _FRAME + 9 * i + 6, third)
+        put(work.points, _SUM + i, 0.0)
+        put(work.points, _WHOLE + i, 0.0)
+
+
+@inlined
+def _start_of(mesh, places, work, i, d, unit):
+    """Where the ray of point ``i`` in direction d starts."""
+    start = get(work.numbers, _START + i)
+    if start == _AT_POINT:
+        return three(work.points, _ABOVE + 3 * i)
+    if start == _BY_SIDE:
+        side = _ABOVE if dot(three(work.points, _FACING + 3 * i), d) >= 0.0 else _BELOW
+        return three(work.points, side + 3 * i)
+    corners = corners_of(pointer(mesh[0]), pointer(mesh[1]), get(work.numbers, _FACE + i), unit)
+    return leave_face(corners, row3(pointer(places.points), get(work.numbers, _ROW + i)), d, unit)
+
+
+@inlined
+def _mark(answers, work, k, i):
+    """Set the bit of direction ``k`` for point ``i``."""
+    row = get(work.numbers, _ROW + i)
+    answers.bits[row, k >> 3] |= np.uint8(0x80 >> (k & 7))
+
+
+@inlined
+def _note(answers, work, k, i, value, hides):
+    """Take down whether direction ``k``, worth ``value``, is hidden from point ``i``."""
+    if hides == answers.hidden:
+        put(work.points, _SUM + i, get(work.points, _SUM + i) + value)
+    if hides and len(answers.bits) > 0:
+        _mark(answers, work, k, i)
+
+
+@kernel
+def _aim(mesh, places, sky, work, begun, count, unit):
+    """List a tile's ``count`` points with one direction more; ``begun`` are that, and the entries and rays so far.
+
+    Returns the entries and rays with them. What is below the horizon of a point has no ray.
+    """
+    k, listed, rays = begun
+    given, weight, limit = row3(pointer(sky.directions), k), sky.values[k], sky.limits[k]
+    has_horizon = len(places.normals) > 0
+    for i in range(count):
+        d, height, value = given, 1.0, weight
+        if sky.turned:
+            frame = at(work.points, _FRAME + 9 * i)
+            across = add(scale(row3(frame, 0), given[0]), scale(row3(frame, 1), given[1]))
+            d, height = add(across, scale(row3(frame, 2), given[2])), given[2]
+        elif has_horizon:
+            height = dot(three(work.points, _FRAME + 9 * i + 6), given)
+        if sky.cosine:
+            value *= abs(height)
+        put(work.points, _WHOLE + i, get(work.points, _WHOLE + i) + value)
+        seen = height > 0.0
+        if seen:
+            _put3(work.origins, 3 * rays, _start_of(mesh, places, work, i, d, unit))
+            _put3(work.directions, 3 * rays, d)
+            put(work.limits, rays, limit)
+        put(work.values, listed, value)
+        put(work.listed, listed, (k * TILE + i) * 2 + np.int64(seen))
+        listed += 1
+        rays += np.int64(seen)
+    return listed, rays
+
+
+@kernel
+def _settle(answers, work, listed):
+    """Take down what the listed points see, once their rays are traced: for each point in the order of directions."""
+    ray = np.int64(0)
+    for entry in range(listed):
+        code, hides = get(work.listed, entry), True
+        if code & 1 != 0:
+            hides = get(work.found.hit, ray)
+            ray += 1
+        k, i = (code >> 1) // TILE, (code >> 1) % TILE
+        if hides == answers.hidden:
+            put(work.points, _SUM + i, get(work.points, _SUM + i) + get(work.values, entry))
+        if hides and len(answers.bits) > 0:
+            row = get(work.numbers, _ROW + i)
+            answers.bits[row, k >> 3] |= np.uint8(0x80 >> (k & 7))
+
+
+@kernel
+def _end_tile(answers, work, count):
+    """Write the sums of a tile's points."""
+    if len(answers.sums) == 0:
+        return
+    for i in range(count):
+        total, whole = get(work.points, _SUM + i), get(work.points, _WHOLE + i)
+        answers.sums[get(work.numbers, _ROW + i)] = total / whole if answers.share else total
+
+
+@inlined
+def _trace(tree, work, rays):
+    """Find which rays hit anything."""
+    batch = RayPointers(work.origins, work.directions, work.zero, work.limits, 3, 3, 0, 1, tree.scale)
+    if tree.has_nodes:
+        trace(tree, batch, work.found, 0, rays, work.scratch, np.bool_(True))
+    else:
+        search_blocks(tree, batch, work.found, 0, rays, np.bool_(True))
+
+
+@kernel
+def sweep(words, mesh, places, sky, answers, rows, state, memory):
+    """Let the points in ``rows``, one tile after the other, look in all directions; some rays more with each call.
+
+    ``words`` are the tree's, ``mesh`` its vertices and faces. ``state`` is (0, 0) in the first call, and later what the
+    last one returned, with the same memory: the begin of the tile under way, and its next direction. All is done at
+    (len(rows), 0).
+    """
+    tree, work = tree_pointers(words), _work_in(memory)
+    begin, k = state
+    count = smaller(np.int64(TILE), len(rows) - begin)
+    if k == 0:
+        _begin_tile(mesh, places, rows, begin, count, work, tree.scale)
+    traced = np.int64(0)
+    while k < len(sky.values) and traced < RAYS_A_CALL:
+        listed, rays = np.int64(0), np.int64(0)
+        while k < len(sky.values) and listed + count <= RAYS:
+            listed, rays = _aim(mesh, places, sky, work, (k, listed, rays), count, tree.scale)
+            k += 1
+        _trace(tree, work, rays)
+        _settle(answers, work, listed)
+        traced += listed
+    if k < len(sky.values):
+        return begin, k
+    _end_tile(answers, work, count)
+    return begin + count, np.int64(0)

@@ -1,0 +1,197 @@
+"""What is seen from one place: faces from an eye, depths from a camera, points from a scanner."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.arrays import flag_argument
+from renderer.errors import expect, is_count
+from renderer.mesh.mesh import face_normals
+from renderer.points.argument import check_points, farthest_of
+from renderer.process.terminal import progress_bar
+from renderer.queries import Queries
+from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
+from renderer.studies.share import check_directions, lengths_of, limits_of
+from renderer.trace.hits import points_on
+
+Floats = NDArray[np.float64]
+
+# Rays that are written down together: a tenth of a second of tracing, some dozens of megabytes.
+_ROWS = 1 << 18
+# The most parts of a face's sides.
+_MOST_CUTS = 64
+
+
+class Camera(Protocol):
+    """A camera: the affine map from film to rays (6, 3), as ``PerspectiveCamera.rows`` has it."""
+
+    def rows(self, width: int, height: int) -> Floats:
+        """Origin, its steps along x and y, direction, and its steps."""
+
+
+class Scan(NamedTuple):
+    """Where the rays of a scanner met the mesh: m of k rays, in their order.
+
+    points     (m, 3) float64
+    normals    (m, 3) float64, unit vectors by the faces' winding
+    distances  (m,) float64 from the scanner, in scene units
+    faces      (m,) int64
+    rays       (m,) int64, the rows of their directions
+    """
+
+    points: Floats
+    normals: Floats
+    distances: Floats
+    faces: NDArray[np.int64]
+    rays: NDArray[np.int64]
+
+
+def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: bool = False) -> NDArray[np.bool_]:
+    """Which faces are seen from an eye (3,), (F,) bool: whether a ray from one of some points of each reaches it.
+
+    cuts  each face is cut into cuts^2 equal triangles, 1 to 64 along a side, whose centroids are these points; 1: its
+          centroid alone
+
+    A face that is seen only between these points counts as hidden; one that counts as seen is seen there. Rays leave
+    the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
+    only what looks to the eye. An eye on the surface sees past what is nearer than 2^-40 of the largest coordinate; see
+    ``octree.visible``, which is asked. A face without area is not seen. Raises ``ValueError`` naming the argument.
+
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> from renderer.studies import visible_faces
+    >>> octree = Octree.from_mesh(box())
+    >>> visible_faces(octree, [0.5, 0.5, 9]).nonzero()[0]
+    array([10, 11])
+    """
+    _expect_octree(octree)
+    place = _one_place("eye", eye, octree)
+    expect(is_count(cuts) and 1 <= cuts <= _MOST_CUTS, "cuts", f"an integer from 1 to {_MOST_CUTS}", repr(cuts))
+    mesh = octree.mesh
+    seen = np.zeros(len(mesh.faces), np.bool_)
+    with progress_bar(len(seen), "face", flag_argument("progress", progress)) as update:
+        for begin in range(0, len(seen), _ROWS):
+            corners = mesh.vertices[mesh.faces[begin : begin + _ROWS]]
+            left = begin + np.flatnonzero(face_normals(corners).any(axis=1))
+            for u, v in _centroids(cuts):
+                points = points_on(mesh, left, np.full(len(left), u), np.full(len(left), v))
+                reached = octree.visible(points, place, leaving=left)
+                seen[left[reached]] = True
+                left = left[~reached]
+            if update is not None:
+                update(len(corners))
+    return seen
+
+
+def depth_map(octree: Queries, camera: Camera, width: int, height: int, *, progress: bool = False) -> Floats:
+    """The distance from a camera to what each pixel's centre shows, (height, width) float64; inf where that is nothing.
+
+    Along the ray, as ``Image.depth`` of a picture has it, and with its bits; not along the camera's axis.
+
+    camera         a ``PerspectiveCamera``, an ``OrthographicCamera``, or anything with their ``rows``
+    width, height  pixels, 1 to 2^16
+
+    Raises ``ValueError`` naming the argument.
+
+    >>> from renderer import Octree, PerspectiveCamera
+    >>> from renderer.mesh.shapes import box
+    >>> from renderer.studies import depth_map
+    >>> camera = PerspectiveCamera(eye=(0.5, 0.25, 3), target=(0.5, 0.25, 0))
+    >>> depth_map(Octree.from_mesh(box()), camera, 3, 1)
+    array([[inf,  2., inf]])
+    """
+    _expect_octree(octree)
+    for argument, value in (("width", width), ("height", height)):
+        expect(is_count(value) and 1 <= value <= 1 << 16, argument, "an integer from 1 to 65536", repr(value))
+    expect(callable(getattr(camera, "rows", None)), "camera", "a camera", type(camera).__name__)
+    rows, depth = camera.rows(width, height), np.empty((height, width))
+    lines, x = max(1, _ROWS // width), np.arange(width)[:, None] + 0.5
+    with progress_bar(height, "line", flag_argument("progress", progress)) as update:
+        for top in range(0, height, lines):
+            y = np.arange(top, min(top + lines, height))[:, None, None] + 0.5
+            # In the order in which pictures add them up, so that bits are the same.
+            origins = rows[0] + (rows[1] * x + rows[2] * y)
+            directions = rows[3] + (rows[4] * x + rows[5] * y)
+            depth[top : top + lines] = octree.closest_hit(origins, _unit(directions)).t
+            if update is not None:
+                update(len(y))
+    return depth
+
+
+def scan(
+    octree: Queries,
+    origin: ArrayLike,
+    pattern: Pattern | ArrayLike | int = 100_000,
+    *,
+    distance: float = np.inf,
+    progress: bool = False,
+) -> Scan:
+    """The point cloud that a scanner at ``origin`` (3,) measures, without noise: the first hit of each ray.
+
+    pattern   directions (k, 3) of any length, a ``directions.Pattern`` of them, or their number, 1 to 2^24, for
+              ``directions.fibonacci_sphere``
+    distance  how far the scanner reaches, in scene units
+
+    A scanner on the surface meets it at a distance of 0. Raises ``ValueError`` naming the argument.
+
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> from renderer.studies import scan
+    >>> cloud = scan(Octree.from_mesh(box()), [0.5, 0.25, 3], [[0, 0, -2], [0, 0, 1]])
+    >>> cloud.points, cloud.distances, cloud.rays
+    (array([[0.5 , 0.25, 1.  ]]), array([2.]), array([0]))
+    """
+    _expect_octree(octree)
+    place = _one_place("origin", origin, octree)
+    ways = _ways(pattern)
+    reach = limits_of(distance, ways)
+    parts: list[Scan] = []
+    with progress_bar(len(ways), "ray", flag_argument("progress", progress)) as update:
+        for begin in range(0, len(ways), _ROWS):
+            some = ways[begin : begin + _ROWS]
+            hits = octree.closest_hit(place, some, t_max=reach[begin : begin + _ROWS])
+            rays = np.flatnonzero(hits.hit)
+            away = hits.t[rays] * lengths_of(some[rays])
+            parts.append(Scan(hits.points[rays], hits.normals[rays], away, hits.face[rays], begin + rays))
+            if update is not None:
+                update(len(some))
+    return Scan(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def _expect_octree(octree: Queries) -> None:
+    expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
+
+
+def _one_place(argument: str, place: ArrayLike, octree: Queries) -> Floats:
+    rows, shape = check_points(argument, place, farthest_of(octree.tree.scale))
+    expect(shape == (), argument, "shape (3,)", f"shape {(*shape, 3)}")
+    return rows[0]
+
+
+def _ways(pattern: Pattern | ArrayLike | int) -> Floats:
+    if isinstance(pattern, Pattern):
+        return check_directions("pattern", pattern.directions)
+    if isinstance(pattern, int):
+        check_count("pattern", pattern)
+        return fibonacci_sphere(pattern).directions
+    return check_directions("pattern", pattern)
+
+
+def _centroids(cuts: int) -> Iterator[tuple[float, float]]:
+    """The barycentrics u and v of the centroids of the cuts^2 equal parts of a triangle."""
+    for i in range(cuts):
+        for j in range(cuts - i):
+            yield (i + 1.0 / 3.0) / cuts, (j + 1.0 / 3.0) / cuts
+            if i + j < cuts - 1:
+                yield (i + 2.0 / 3.0) / cuts, (j + 2.0 / 3.0) / cuts
+
+
+def _unit(vectors: Floats) -> Floats:
+    """``vec3.normalized`` of vectors (..., 3) that are not zero, with its bits."""
+    scaled = vectors * (1.0 / np.abs(vectors).max(axis=-1, keepdims=True))
+    x, y, z = (scaled[..., k : k + 1] for k in range(3))
+    return scaled * (1.0 / np.sqrt(x * x + y * y + z * z))

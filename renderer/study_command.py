@@ -1,0 +1,160 @@
+"""``octree-render study``: arguments in, a study's result as an array, a coloured mesh, or a picture."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from renderer.errors import expect
+from renderer.process.terminal import say
+
+FORMATS = (".npy", ".ply", ".png")
+_KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
+_GRID = "points as seen from above (z up), so far apart, on what they see first"
+
+
+def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> None:
+    """Add the command to a parser's ``commands``; ``resolution`` reads WxH."""
+    study = commands.add_parser(
+        "study",
+        help="what points of a mesh see: the sky, the sun, their surroundings",
+        description="Compute what points of a mesh see. Parts are kept beside the output until all are done: the same "
+        "command again goes on where one was killed, and ends with the same bits.",
+    )
+    study.add_argument("kind", choices=_KINDS, help="; ".join(f"{k}: {said}" for k, said in _KINDS.items()))
+    study.add_argument("mesh", type=Path, help="a mesh file (.ply, .obj, .stl, .glb), z up")
+    where = study.add_mutually_exclusive_group()
+    where.add_argument("--faces", action="store_true", help="the middle of each face, the default")
+    where.add_argument("--vertices", action="store_true", help="the same, as means of each vertex's faces")
+    where.add_argument("--grid", type=float, metavar="SPACING", help=_GRID)
+    where.add_argument("--points", type=Path, metavar="FILE", help=".npy, (n, 3), or (n, 6) with normals")
+    study.add_argument("-o", "--output", type=Path, required=True, help=".npy, .ply or, of faces, .png")
+    study.add_argument(
+        "--patches", type=int, default=145, metavar="N", help="sky: 145, 577 or any number of directions"
+    )
+    study.add_argument("--definition", choices=("cosine", "geometric"), default="cosine", help="sky: what is weighed")
+    study.add_argument("--suns", type=Path, metavar="FILE", help="sun: a text of rows x y z hours, to the sun")
+    study.add_argument("--samples", type=int, default=256, metavar="N", help="ao: directions a point")
+    study.add_argument("--distance", type=float, default=float("inf"), metavar="D", help="how far the mesh hides")
+    study.add_argument("--camera", type=Path, metavar="SCENE", help="of a .png: a scene file whose camera it takes")
+    study.add_argument("--resolution", type=resolution, default=(960, 720), metavar="WxH", help="of a .png")
+    study.add_argument("--cluster", metavar="ADDRESS", help="a Dask scheduler's, or local: a worker a processor")
+    study.add_argument("--threads", type=int, metavar="N", help="default: all processors")
+    study.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
+    study.set_defaults(command=_study)
+
+
+def _study(options: argparse.Namespace) -> None:
+    # Imported here so that --help and --version need no compiler.
+    import time
+
+    from renderer.mesh.load import load_mesh
+    from renderer.octree import Octree
+    from renderer.runs.study import Study
+
+    _check_output(options)
+    made = _options_of(options)
+    camera = _camera(options)
+    octree = Octree.from_mesh(load_mesh(options.mesh), threads=options.threads)
+    chosen = _chosen(octree, options)
+    began = time.perf_counter()
+    parts = _run(octree, Study(options.kind, made), chosen.points, options)
+    seconds = time.perf_counter() - began
+    if options.output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
+        parts.join(options.output)
+    else:
+        _write(options, octree.mesh, chosen, parts.joined(), camera)
+        parts.remove()
+    if not options.quiet:
+        say(f"{options.output}: {_KINDS[options.kind]} of {len(chosen.points):,} points in {seconds:.2f} s")
+
+
+def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> Any:
+    """All parts of the study, computed here or on a cluster."""
+    from renderer.runs.study import folder_of, run
+
+    folder, progress = folder_of(options.output), not options.quiet
+    if options.cluster is None:
+        return run(octree, study, points, folder, progress=progress)
+    from renderer.cluster import connected, run_on
+
+    local = options.cluster == "local"
+    with connected(None if local else options.cluster, workers=options.threads if local else None) as client:
+        return run_on(client, octree, study, points, folder, progress=progress)
+
+
+def _check_output(options: argparse.Namespace) -> None:
+    """What can be told before any work."""
+    from renderer.process.files import check_writable
+
+    output, suffix = options.output, options.output.suffix.lower()
+    expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
+    expect(output.resolve() != options.mesh.resolve(), "--output", "another file than the mesh", str(output))
+    on_mesh = options.grid is None and options.points is None
+    expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply for points that are not a mesh's", str(output))
+    expect(suffix == ".png" or options.camera is None, "--camera", "a .png to be seen by it", str(output))
+    expect((options.suns is not None) == (options.kind == "sun"), "--suns", "a file for the kind sun, and no other",
+           "none" if options.suns is None else f"one for {options.kind}")  # fmt: skip
+    check_writable(output)
+
+
+def _options_of(options: argparse.Namespace) -> dict[str, Any]:
+    """The keyword arguments of the study."""
+    from renderer.runs.chosen import suns_of
+
+    of: dict[str, Any] = {"distance": options.distance}
+    if options.kind == "sky":
+        return of | {"patches": options.patches, "definition": options.definition}
+    if options.kind == "sun":
+        return of | dict(zip(("sun_directions", "weights"), suns_of(options.suns), strict=True))
+    return of | {"samples": options.samples}
+
+
+def _camera(options: argparse.Namespace) -> Any:
+    from renderer.scene.scene import load_scene
+
+    return None if options.camera is None else load_scene(options.camera).camera
+
+
+def _chosen(octree: Any, options: argparse.Namespace) -> Any:
+    from renderer.runs import chosen
+
+    if options.points is not None:
+        return chosen.of_file(octree, options.points)
+    if options.grid is not None:
+        return chosen.on_grid(octree, options.grid)
+    return chosen.on_vertices(octree) if options.vertices else chosen.on_faces(octree)
+
+
+def _write(options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, camera: Any) -> None:
+    """Write a result that is more than the answers of the points."""
+    from renderer.runs import drawing
+
+    suffix = options.output.suffix.lower()
+    if chosen.of_faces is None and chosen.of_vertices is None:
+        drawing.write_ply(options.output, chosen.points.points, None, answers, of_faces=False)
+        return
+    of_faces = chosen.of_faces is not None
+    values = chosen.of_faces(answers) if of_faces else chosen.of_vertices(answers)
+    if suffix == ".npy":
+        drawing.write_npy(options.output, values)
+    elif suffix == ".ply":
+        drawing.write_ply(options.output, mesh.vertices, mesh.faces, values, of_faces)
+    else:
+        seen = values if of_faces else values[mesh.faces].mean(axis=1)
+        picture = drawing.draw(_picture(mesh, camera, options), mesh, seen, _KINDS[options.kind])
+        drawing.write_png(options.output, picture)
+
+
+def _picture(mesh: Any, camera: Any, options: argparse.Namespace) -> Any:
+    """The faces and normals that a camera sees; without one, from the south-west and above."""
+    from renderer.picture.render import render
+    from renderer.runs.views import from_above
+    from renderer.scene.material import Phong
+    from renderer.scene.scene import Scene, SceneObject
+
+    thing = SceneObject(mesh=mesh, material="grey", normals="flat")
+    eye = from_above(mesh, options.resolution) if camera is None else camera
+    scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[thing], ambient=1)
+    return render(scene, resolution=options.resolution, samples=1, max_depth=0, planes=("face", "normal"),
+                  threads=options.threads, progress=not options.quiet)  # fmt: skip

@@ -1,0 +1,147 @@
+"""Studies and rays on a cluster have the bits of those on this machine, whatever workers die."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import dask.array as da
+import numpy as np
+import pytest
+
+from renderer import Mesh, Octree
+from renderer.cluster import any_hit, closest_hit, connected, run_on
+from renderer.runs.chosen import on_faces
+from renderer.runs.study import Study, run
+from validation.benchmark.measures.meshes import named
+
+SIZE = 64
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Any]:
+    with connected(workers=2) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def octree() -> Octree:
+    return Octree.from_mesh(named("city_2000"))
+
+
+def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Octree, tmp_path: Path) -> None:
+    points, study = on_faces(octree).points, Study("sky", {"patches": 145})
+    expected = study.answer(octree, points)
+    here = run(octree, study, points, tmp_path / "here").joined()
+    assert here.tobytes() == expected.tobytes()
+    there = run_on(client, octree, study, points, tmp_path / "there", size=SIZE)
+    assert there.plan.parts > 10 and there.joined().tobytes() == expected.tobytes()
+
+
+def test_a_worker_that_is_killed_changes_no_bit(octree: Octree, tmp_path: Path) -> None:
+    """A real process, killed as soon as parts come in."""
+    points, study = on_faces(octree).points, Study("sky", {"patches": 2305})
+    folder, killed = tmp_path / "parts", list[int]()
+    with connected(workers=2) as client:
+        pids = sorted(client.run(os.getpid).values())
+
+        def kill() -> None:
+            while len(list(folder.glob("*.part"))) < 2:
+                time.sleep(0.005)
+            os.kill(pids[0], signal.SIGKILL)
+            killed.append(pids[0])
+
+        killer = threading.Thread(target=kill, daemon=True)
+        killer.start()
+        parts = run_on(client, octree, study, points, folder, size=SIZE)
+        killer.join(timeout=60)
+    assert killed == pids[:1]
+    assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
+
+
+def test_parts_of_a_scheduler_that_is_gone_are_not_computed_again(octree: Octree, tmp_path: Path) -> None:
+    """A run that ends with its scheduler goes on from the manifest on another one."""
+    points, study, folder = on_faces(octree).points, Study("sky", {}), tmp_path / "parts"
+    with connected(workers=1) as client:
+        seen = _StopAfter(3, folder)
+        with pytest.raises(KeyboardInterrupt):
+            run_on(seen.wrapped(client), octree, study, points, folder, size=SIZE)
+    kept = {path: path.stat().st_mtime_ns for path in folder.glob("*.part")}
+    assert len(kept) >= 3
+    with connected(workers=1) as client:
+        parts = run_on(client, octree, study, points, folder, size=SIZE)
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
+
+
+class _StopAfter:
+    """A client whose ``submit`` raises as Ctrl-C does, once so many parts are on disk."""
+
+    def __init__(self, parts: int, folder: Path) -> None:
+        self._parts, self._folder = parts, folder
+
+    def wrapped(self, client: Any) -> Any:
+        self._client = client
+        return self
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "submit" and len(list(self._folder.glob("*.part"))) >= self._parts:
+            raise KeyboardInterrupt
+        return getattr(self._client, name)
+
+
+def test_hits_of_dask_arrays_stay_lazy_and_keep_chunks(client: Any, octree: Octree) -> None:
+    rng = np.random.default_rng(3)
+    lower, upper = octree.mesh.bounds
+    origins, directions = rng.uniform(lower, upper, (1000, 3)), rng.standard_normal((1000, 3))
+    expected = octree.closest_hit(origins, directions, t_max=50.0)
+    lazy = closest_hit(octree, da.from_array(origins, (300, 2)), da.from_array(directions, (128, 3)), t_max=50.0)
+    assert isinstance(lazy, da.Array) and lazy.chunks == ((300, 300, 300, 100),)
+    hits = lazy.compute(scheduler=client)
+    for name in ("t", "face", "u", "v"):
+        assert np.ascontiguousarray(hits[name]).tobytes() == getattr(expected, name).tobytes()
+    assert lazy["t"].compute(scheduler="threads").tobytes() == expected.t.tobytes()
+    some = any_hit(octree, da.from_array(origins, 250), da.from_array(directions, 250), t_max=50.0)
+    assert (some.compute(scheduler=client) == expected.hit).all() and 0 < expected.hit.sum() < 1000
+
+
+@pytest.mark.parametrize(
+    "origins, directions, said",
+    [(np.zeros((2, 3)), da.zeros((2, 3)), "origins: expected a dask array, got ndarray"),
+     (da.zeros((2, 2)), da.zeros((2, 2)), r"origins: expected shape \(n, 3\), got shape \(2, 2\)"),
+     (da.zeros((2, 3)), da.zeros((3, 3)), r"directions: expected shape \(2, 3\) as origins have")],
+)  # fmt: skip
+def test_arrays_of_other_shapes_are_refused(octree: Octree, origins: Any, directions: Any, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        closest_hit(octree, origins, directions)
+
+
+def test_a_ray_out_of_range_raises_when_its_chunk_is_computed(octree: Octree) -> None:
+    lazy = closest_hit(octree, da.zeros((4, 3)), da.zeros((4, 3)))
+    with pytest.raises(ValueError, match="directions: expected"):
+        lazy.compute(scheduler="threads")
+
+
+def test_a_worker_keeps_few_trees() -> None:
+    from renderer.cluster import workers
+
+    vertices, faces = np.eye(3), np.array([[0, 1, 2]], np.int32)
+    trees = [workers.SentMesh(str(i), vertices, faces, "midpoint").octree() for i in range(4)]
+    assert len(workers._TREES) <= 2 and trees[0] is not trees[1]
+    assert workers.SentMesh("3", vertices, faces, "midpoint").octree() is trees[3]
+    assert isinstance(trees[0].mesh, Mesh)
+
+
+def test_no_scheduler_and_wrong_arguments_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(import_module("renderer.cluster.clients"), "SECONDS", 0.5)
+    with (
+        pytest.raises(ValueError, match="workers: expected None, as the cluster has its own"),
+        connected("tcp://x:1", workers=2),
+    ):
+        pass
+    with pytest.raises(OSError, match=r"127\.0\.0\.1"), connected("tcp://127.0.0.1:9"):
+        pass

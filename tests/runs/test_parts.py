@@ -1,0 +1,84 @@
+"""Parts on disk: what is whole is kept, what is not is done again, and another study's folder is refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from renderer.runs.parts import Parts, Plan, digest_of
+
+PLAN = Plan(rows=10, size=4, width=0, dtype="<f8", made_of={"kind": "sky", "options": {"patches": 145}})
+ROWS = np.arange(10.0)
+
+
+def _write(parts: Parts, part: int) -> None:
+    begin, end = parts.plan.span(part)
+    parts.write(part, ROWS[begin:end])
+
+
+def test_a_run_goes_on_where_it_was_killed_and_joins_the_parts_in_order(tmp_path: Path) -> None:
+    folder, result = tmp_path / "r.npy.parts", tmp_path / "r.npy"
+    assert Parts(folder, PLAN).missing() == [0, 1, 2]
+    _write(Parts(folder, PLAN), 2)
+    _write(Parts(folder, PLAN), 0)
+    again = Parts(folder, PLAN)
+    assert again.missing() == [1]
+    with pytest.raises(OSError, match=r"00000001\.part: expected a part of the study, got none that is whole"):
+        again.join(result)
+    assert not result.exists()
+    _write(again, 1)
+    assert (again.joined() == ROWS).all()
+    again.join(result)
+    assert (np.load(result) == ROWS).all() and not folder.exists()
+
+
+@pytest.mark.parametrize("spoil", [lambda b: b[:-1], lambda b: b"", lambda b: bytes([b[0] ^ 1]) + b[1:],
+                                   lambda b: b[:-1] + bytes([b[-1] ^ 1]), lambda b: b + b"0"])  # fmt: skip
+def test_a_part_that_a_disk_has_spoilt_is_done_again(tmp_path: Path, spoil: object) -> None:
+    parts = Parts(tmp_path / "parts", PLAN)
+    _write(parts, 1)
+    path = tmp_path / "parts" / "00000001.part"
+    path.write_bytes(spoil(path.read_bytes()))  # type: ignore[operator]
+    assert Parts(tmp_path / "parts", PLAN).missing() == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    "other, said",
+    [(replace(PLAN, rows=11), "rows"), (replace(PLAN, size=5), "size"),
+     (replace(PLAN, made_of={"kind": "sun", "options": {"patches": 145}}), "kind"),
+     (replace(PLAN, made_of={"kind": "sky", "options": {"patches": 577}}), "options"),
+     (replace(PLAN, made_of={"kind": "sky", "options": {"patches": 145}, "mesh": "1"}), "mesh")],
+)  # fmt: skip
+def test_parts_of_another_study_are_refused_and_kept(tmp_path: Path, other: Plan, said: str) -> None:
+    _write(Parts(tmp_path / "parts", PLAN), 0)
+    with pytest.raises(ValueError, match=f"whose {said} differ; remove the folder"):
+        Parts(tmp_path / "parts", other)
+    assert Parts(tmp_path / "parts", PLAN).missing() == [1, 2]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", "\x00"])
+def test_a_manifest_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(ValueError, match="expected the manifest of a study"):
+        Parts(tmp_path, PLAN)
+
+
+def test_rows_of_several_values_and_no_rows(tmp_path: Path) -> None:
+    bits = Plan(rows=3, size=2, width=5, dtype="|u1", made_of={})
+    values = np.arange(15, dtype=np.uint8).reshape(3, 5)
+    parts = Parts(tmp_path / "bits", bits)
+    parts.write(0, values[:2])
+    parts.write(1, values[2:])
+    parts.join(tmp_path / "bits.npy")
+    assert (np.load(tmp_path / "bits.npy") == values).all()
+    none = Parts(tmp_path / "none", replace(PLAN, rows=0))
+    none.write(0, np.empty(0))
+    none.join(tmp_path / "none.npy")
+    assert np.load(tmp_path / "none.npy").shape == (0,)
+
+
+def test_digests_tell_shapes_types_and_bytes_apart() -> None:
+    arrays = [np.zeros(4), np.zeros((2, 2)), np.zeros(8, np.float32), np.array([0.0, 0.0, 0.0, -0.0])]
+    assert len({digest_of(a) for a in arrays} | {digest_of(arrays[0], arrays[0])}) == 5
+    assert digest_of(np.arange(6).reshape(2, 3).T) == digest_of(np.ascontiguousarray(np.arange(6).reshape(2, 3).T))

@@ -1,0 +1,103 @@
+"""Patterns of directions: their numbers, symmetries, and how well they integrate."""
+
+import doctest
+import importlib
+
+import numpy as np
+import pytest
+
+from renderer.studies import Pattern, cosine_hemisphere, fibonacci_hemisphere, fibonacci_sphere, reinhart, tregenza
+from renderer.studies.directions import turned
+
+MODULES = ["ambient", "directions", "hidden", "places", "sky", "views"]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_the_examples_of_the_docstrings_hold(name):
+    module = importlib.import_module(f"renderer.studies.{name}")
+    results = doctest.testmod(module)
+    assert results.failed == 0 and results.attempted > 0
+
+
+PATTERNS = {
+    "tregenza": (tregenza(), 2.0 * np.pi),
+    "reinhart": (reinhart(), 2.0 * np.pi),
+    "reinhart 4": (reinhart(4), 2.0 * np.pi),
+    "fibonacci 1": (fibonacci_hemisphere(1), 2.0 * np.pi),
+    "fibonacci": (fibonacci_hemisphere(1000), 2.0 * np.pi),
+    "sphere": (fibonacci_sphere(1000), 4.0 * np.pi),
+    "cosine": (cosine_hemisphere(1000), np.pi),
+}
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_directions_are_unit_vectors_that_share_the_whole(name):
+    pattern, whole = PATTERNS[name]
+    assert pattern.directions.dtype == pattern.weights.dtype == np.float64
+    assert pattern.directions.shape == (*pattern.weights.shape, 3)
+    np.testing.assert_allclose(np.linalg.norm(pattern.directions, axis=1), 1.0, rtol=0, atol=4e-16)
+    # n roundings of sums of up to 4 pi.
+    assert abs(pattern.weights.sum() - whole) < 1e-12
+    assert name == "sphere" or (pattern.directions[:, 2] > 0.0).all()
+    assert len(np.unique(pattern.directions, axis=0)) == len(pattern.weights)
+
+
+def test_tregenza_has_its_rows():
+    pattern = tregenza()
+    heights, counts = np.unique(np.degrees(np.arcsin(pattern.directions[:, 2])).round(9), return_counts=True)
+    assert heights.tolist() == [6.0, 18.0, 30.0, 42.0, 54.0, 66.0, 78.0, 90.0]
+    assert counts.tolist() == [30, 30, 24, 24, 18, 12, 6, 1]
+    assert pattern.directions[0, 0] == 0.0 and pattern.directions[1, 0] > 0.0  # to +y, then clockwise
+    for low, high, row in [(0, 12, slice(0, 30)), (72, 84, slice(138, 144)), (84, 90, slice(144, 145))]:
+        band = 2.0 * np.pi * (np.sin(np.radians(high)) - np.sin(np.radians(low)))
+        assert abs(pattern.weights[row].sum() - band) < 1e-14
+
+
+@pytest.mark.parametrize("pattern", [tregenza(), reinhart()])
+def test_rows_have_the_symmetries_of_their_numbers_of_patches(pattern):
+    """To the last bit: rows of a multiple of four patches look along walls, and as far to each side as to any other."""
+    ways = pattern.directions
+    for height in np.unique(ways[:-1, 2]):
+        row = ways[ways[:, 2] == height]
+        ring = {tuple(d) for d in row.tolist()}
+        assert {(-x + 0.0, y, z) for x, y, z in ring} == ring and (0.0, row[:, 1].max(), height) in ring
+        if len(row) % 4 == 0:
+            assert {(y, -x + 0.0, z) for x, y, z in ring} == ring
+
+
+@pytest.mark.parametrize("make", [fibonacci_hemisphere, cosine_hemisphere, reinhart])
+def test_patterns_integrate_smooth_functions_better_the_more_directions_they_have(make):
+    """x^2 over the hemisphere is 2 pi / 3 by solid angle, and pi / 4 by cosine."""
+    exact = np.pi / 4.0 if make is cosine_hemisphere else 2.0 * np.pi / 3.0
+    numbers = (2, 4, 8) if make is reinhart else (100, 1000, 10000)
+    errors = []
+    for number in numbers:
+        pattern = make(number)
+        errors.append(abs((pattern.weights * pattern.directions[:, 0] ** 2).sum() / exact - 1.0))
+        # The patches are sqrt(2 pi / k) wide, and a smooth function errs by the square of that: 2 pi / k at most.
+        assert errors[-1] < 2.0 * np.pi / len(pattern.weights)
+    assert errors[2] < errors[0] / 10.0
+
+
+def test_turned_patterns_look_about_their_pole():
+    ways = fibonacci_hemisphere(50).directions
+    for pole in ([0, 0, 1], [0, 0, 5e-300], [0, 1, 0], [1, 2, -3], [0, 0, -1]):
+        turn = turned(ways, np.array(pole, float))
+        unit = np.array(pole) / np.linalg.norm(np.array(pole) / np.abs(pole).max()) / np.abs(pole).max()
+        np.testing.assert_allclose(turn @ unit, ways[:, 2], atol=1e-15)
+        # No mirror image: the angles between directions and their order stay.
+        assert np.linalg.det(np.linalg.lstsq(ways, turn, rcond=None)[0]) > 0.99
+    assert (turned(ways, np.array([0.0, 0.0, 2.0])) == ways).all()
+
+
+@pytest.mark.parametrize("make", [fibonacci_hemisphere, fibonacci_sphere, cosine_hemisphere, reinhart])
+@pytest.mark.parametrize("bad", [0, -1, 2**24 + 1, 1.5, True, "9", None])
+def test_numbers_of_directions_that_are_none(make, bad):
+    name = "subdivision" if make is reinhart else "count"
+    with pytest.raises(ValueError, match=f"^{name}: expected an integer from 1 to .*, got "):
+        make(bad)
+
+
+def test_patterns_are_tuples_of_directions_and_weights():
+    directions, weights = tregenza()
+    assert Pattern(directions, weights).weights is weights

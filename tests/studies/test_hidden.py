@@ -1,0 +1,218 @@
+"""Which directions are hidden: the bits of rays that are written down, whatever the tiles, threads and places."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from meshes import make_mesh, meshes
+
+from renderer import BruteForce, Mesh, Octree
+from renderer.mesh.shapes import box, icosphere, torus
+from renderer.studies import face_points, fibonacci_sphere, occlusion
+from renderer.studies.sweep import RAYS, TILE
+
+
+def written_down(octree, points, normals, directions, leaving=None, distance=np.inf):
+    """(n, k) bools of the same question by rays that are all written down."""
+    count, size = len(points), len(directions)
+    starts, ways = np.repeat(points, size, axis=0), np.tile(directions, (count, 1))
+    faces = None if leaving is None else np.repeat(leaving, size)
+    reach = distance / np.linalg.norm(ways, axis=1)
+    hit = octree.any_hit(starts, ways, t_max=reach, leaving=faces).reshape(count, size)
+    return hit if normals is None else hit | ~(normals @ directions.T > 0.0)
+
+
+def unpacked(bits, count):
+    return np.unpackbits(bits, axis=-1, count=count).astype(bool)
+
+
+@given(meshes, st.integers(0, 2**20), st.integers(1, 40), st.integers(1, 30), st.booleans(), st.booleans())
+def test_bits_are_those_of_rays_that_are_written_down(mesh, seed, count, size, with_normals, leaves):
+    vertices, faces = mesh
+    octree, rng = Octree(vertices, faces), np.random.default_rng(seed)
+    extent = float(np.abs(vertices).max(initial=1.0))
+    points, normals = extent * rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
+    directions = rng.normal(size=(size, 3)) * 10.0 ** rng.integers(-3, 4, (size, 1))
+    leaving = None
+    if leaves and len(faces):
+        leaving = rng.integers(-1, len(faces), count)
+        on = octree.mesh.triangles[leaving].mean(axis=1)
+        points = np.where((leaving >= 0)[:, None], on, points)
+    # Of unit length to the last bit or not, the horizon is the same but for directions along it.
+    bits = occlusion(octree, points, normals if with_normals else None, directions, leaving=leaving, packed=True)
+    expected = written_down(octree, points, normals if with_normals else None, directions, leaving)
+    np.testing.assert_array_equal(unpacked(bits, size), expected)
+    brute = BruteForce(vertices, faces)
+    again = occlusion(brute, points, normals if with_normals else None, directions, leaving=leaving, packed=True)
+    np.testing.assert_array_equal(again, bits)
+
+
+@pytest.mark.parametrize("count", [1, 15, TILE - 1, TILE, TILE + 1, 3 * TILE + 7])
+@pytest.mark.parametrize("size", [1, 7, 8, 9, 145])
+def test_bits_at_the_sizes_of_tiles(count, size):
+    octree, rng = Octree.from_mesh(torus()), np.random.default_rng(count)
+    place = face_points(octree.mesh)
+    some = rng.integers(0, len(place.points), count)
+    points, normals, leaving = place.points[some], place.normals[some], place.faces[some]
+    directions = fibonacci_sphere(size).directions
+    bits = occlusion(octree, points, normals, directions, leaving=leaving, packed=True)
+    assert bits.shape == (count, -(-size // 8))
+    expected = written_down(octree, points, normals, directions, leaving)
+    np.testing.assert_array_equal(unpacked(bits, size), expected)
+    assert count < 15 or size < 9 or 0 < expected.mean() < 1
+
+
+def test_a_point_may_look_in_more_directions_than_are_listed_at_once():
+    octree = Octree.from_mesh(torus())
+    directions, points = fibonacci_sphere(3 * RAYS + 5).directions, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    bits = occlusion(octree, points, None, directions, packed=True)
+    expected = written_down(octree, points, None, directions)
+    np.testing.assert_array_equal(unpacked(bits, len(directions)), expected)
+    assert 0 < expected[0].mean() < 1 and expected[1].all()
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_shares_are_sums_in_the_order_of_directions(weighted):
+    octree, rng = Octree.from_mesh(torus()), np.random.default_rng(5)
+    points, directions = rng.uniform(-1.5, 1.5, (700, 3)), rng.normal(size=(53, 3))
+    weights = rng.random(53) if weighted else None
+    expected = np.zeros(700)
+    counted = np.ones(53) if weights is None else weights
+    hidden = written_down(octree, points, None, directions)
+    for k in range(53):
+        expected += np.where(hidden[:, k], counted[k], 0.0)
+    share = occlusion(octree, points, None, directions, weights=weights)
+    np.testing.assert_array_equal(share, expected / np.cumsum(counted)[-1])
+    assert share.dtype == np.float64 and 0.0 < share.mean() < 1.0
+
+
+def test_bits_depend_neither_on_threads_nor_on_the_other_points():
+    octree, rng = Octree.from_mesh(torus()), np.random.default_rng(6)
+    points, normals = rng.uniform(-1.5, 1.5, (2000, 3)), rng.normal(size=(2000, 3))
+    directions, weights = fibonacci_sphere(61).directions, rng.random(61)
+    whole = occlusion(octree, points, normals, directions, weights=weights, threads=1)
+    for threads in (2, 5):
+        again = occlusion(octree, points, normals, directions, weights=weights, threads=threads)
+        np.testing.assert_array_equal(again, whole)
+    for rows in (slice(0, 1), slice(3, 40), slice(777, 2000), rng.permutation(2000)):
+        part = occlusion(octree, points[rows], normals[rows], directions, weights=weights)
+        np.testing.assert_array_equal(part, whole[rows])
+
+
+@pytest.mark.parametrize("shift", [(2.0**19, 5.0 * 2.0**20, 0.0), (-(2.0**21), 2.0**19, 2.0**10)])
+def test_bits_stay_where_mesh_and_points_are_shifted_exactly(shift):
+    """As to the coordinates of a map: float32 would have steps of half a metre there."""
+    rng = np.random.default_rng(7)
+    # Whole multiples of 2^-20, so that the shift rounds nothing.
+    ball = np.round(torus().vertices * 2.0**20) / 2.0**20
+    points = np.round(rng.uniform(-1.5, 1.5, (500, 3)) * 2.0**20) / 2.0**20
+    near, far = Octree(ball, torus().faces), Octree(ball + shift, torus().faces)
+    assert ((ball + shift) - shift == ball).all() and ((points + shift) - shift == points).all()
+    faces = near.closest_point(points).face
+    directions = rng.normal(size=(99, 3))
+    for leaving in (None, faces):
+        seen = occlusion(near, points, None, directions, leaving=leaving, packed=True)
+        np.testing.assert_array_equal(
+            occlusion(far, points + shift, None, directions, leaving=leaving, packed=True), seen
+        )
+        assert 0.0 < np.unpackbits(seen).mean() < 1.0
+
+
+def test_points_on_faces_are_not_hidden_by_their_own():
+    ball = icosphere(3)
+    octree, place = Octree.from_mesh(ball), face_points(ball)
+    directions = fibonacci_sphere(200).directions
+    hidden = occlusion(octree, place.points, place.normals, directions, leaving=place.faces, packed=True)
+    below = ~(place.normals @ directions.T > 0.0)
+    np.testing.assert_array_equal(unpacked(hidden, 200), below)
+    from_inside = occlusion(octree, place.points, -place.normals, directions, leaving=place.faces)
+    np.testing.assert_array_equal(from_inside, 1.0)
+    # Without its face a point is somewhere near the surface.
+    assert occlusion(octree, place.points, place.normals, directions).mean() > 0.6
+
+
+def test_nothing_hides_beyond_the_distance():
+    octree = Octree.from_mesh(box())
+    points, ways = [[3.0, 0.5, 0.25]], [[-1.0, 0.0, 0.0], [-0.125, 0.0, 0.0], [-8.0, 0.0, 0.0]]
+    assert occlusion(octree, points, None, ways, distance=2.0).tolist() == [1.0]
+    assert occlusion(octree, points, None, ways, distance=np.nextafter(2.0, 0.0)).tolist() == [0.0]
+    assert occlusion(octree, points, None, ways, distance=0).tolist() == [0.0]
+
+
+def test_leading_dimensions_are_kept():
+    octree = Octree.from_mesh(box())
+    points = np.random.default_rng(8).normal(size=(4, 5, 3))
+    ways = np.eye(3)
+    share = occlusion(octree, points, None, ways)
+    assert share.shape == (4, 5)
+    np.testing.assert_array_equal(share.ravel(), occlusion(octree, points.reshape(-1, 3), None, ways))
+    assert occlusion(octree, points, None, ways, packed=True).shape == (4, 5, 1)
+    assert occlusion(octree, points[0, 0], [0, 0, 1], ways).shape == ()
+    assert occlusion(octree, np.empty((0, 3)), None, ways).shape == (0,)
+    assert occlusion(Octree.from_mesh(Mesh([], [])), points, None, ways).sum() == 0.0
+
+
+def test_one_normal_and_one_face_stand_for_all_points():
+    octree = Octree.from_mesh(torus())
+    points, ways = np.random.default_rng(9).normal(size=(30, 3)), fibonacci_sphere(40).directions
+    one = occlusion(octree, points, [0, 3, 0], ways, leaving=-1)
+    np.testing.assert_array_equal(one, occlusion(octree, points, np.tile([0.0, 0.5, 0.0], (30, 1)), ways))
+
+
+def test_faces_without_a_plane_are_left_as_any_hit_leaves_them():
+    """Corners on a line, as rounded: where the ray starts depends on its direction."""
+    vertices, faces = make_mesh("soup", 4, 40)
+    vertices, faces = (
+        np.concatenate([vertices, [[0, 0, 0], [1, 1, 1], [2, 2, 2]]]),
+        np.append(faces, [[120, 121, 122]], 0),
+    )
+    octree, points = Octree(vertices, faces), np.tile([0.75, 0.75, 0.75], (20, 1))
+    directions, leaving = fibonacci_sphere(300).directions, np.full(20, len(faces) - 1)
+    bits = occlusion(octree, points, None, directions, leaving=leaving, packed=True)
+    np.testing.assert_array_equal(unpacked(bits, 300), written_down(octree, points, None, directions, leaving))
+
+
+GOOD = {"points": np.zeros((4, 3)), "normals": np.ones((4, 3)), "directions": np.eye(3)}
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "said"),
+    [
+        ("points", [[0, np.nan, 0]], "finite numbers .* in row 0"),
+        ("points", [[0, 0]], "shape"),
+        ("points", "abc", "real numbers"),
+        ("normals", np.zeros((4, 3)), r"not zero, got \[0.0, 0.0, 0.0\] in row 0"),
+        ("normals", np.ones((3, 3)), r"shape \(4, 3\) as points have, or \(3,\), got shape \(3, 3\)"),
+        ("normals", [[0, 0, np.inf]] * 4, "finite"),
+        ("directions", np.zeros((2, 3)), "non-zero vectors.* in row 0"),
+        ("directions", [[1, 0, 0], [1e-200, 0, 0]], "in row 1"),
+        ("directions", np.empty((0, 3)), "k >= 1"),
+        ("directions", [1, 0, 0], r"shape \(k, 3\)"),
+        ("weights", [1, 1], r"shape \(3,\), one a direction, got shape \(2,\)"),
+        ("weights", [1, -1, 1], "finite numbers >= 0, got -1.0 in row 1"),
+        ("weights", [0, 0, 0], "one that is not 0"),
+        ("weights", [1, np.nan, 1], "in row 1"),
+        ("leaving", 12, "faces from 0 to 11, or -1"),
+        ("leaving", [0, 1], "shape"),
+        ("leaving", 0.5, "integer"),
+        ("packed", 1, "True or False"),
+        ("distance", -1, ">= 0"),
+        ("distance", np.nan, ">= 0"),
+        ("distance", [1, 2], "a number"),
+        ("threads", 0, "integer >= 1"),
+        ("progress", "yes", "True or False"),
+        ("octree", box(), "an Octree"),
+    ],
+)
+def test_bad_arguments_are_named(argument, value, said):
+    given = {"octree": Octree.from_mesh(box()), **GOOD, argument: value}
+    with pytest.raises(
+        ValueError, match=rf"^{argument}: expected .*{said}|^{argument}: expected .*, got .*{said}"
+    ) as e:
+        occlusion(given.pop("octree"), given.pop("points"), given.pop("normals"), given.pop("directions"), **given)
+    assert "got" in str(e.value)
+
+
+def test_bits_have_no_weights():
+    with pytest.raises(ValueError, match=r"^weights: expected None, as bits have none"):
+        occlusion(Octree.from_mesh(box()), [0, 0, 0], None, np.eye(3), weights=[1, 1, 1], packed=True)

@@ -1,0 +1,111 @@
+"""Faces seen from an eye, depths from a camera, points from a scanner."""
+
+import numpy as np
+import pytest
+
+from renderer import Mesh, Octree, OrthographicCamera, PerspectiveCamera, Phong, Scene, SceneObject, render
+from renderer.mesh.shapes import box, grid, icosphere, torus
+from renderer.studies import depth_map, fibonacci_sphere, scan, views, visible_faces
+
+CAMERAS = [
+    PerspectiveCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), fov=40.0),
+    OrthographicCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), height=2.5),
+]
+
+
+@pytest.mark.parametrize("eye", [(3.0, 0.0, 0.0), (1.0, 2.0, -4.0), (0.0, 0.0, 1e6)])
+def test_of_a_convex_body_the_faces_that_look_to_the_eye_are_seen(eye):
+    ball = icosphere(4)
+    facing = np.einsum("ij,ij->i", ball.face_normals(), np.array(eye) - ball.triangles.mean(axis=1))
+    assert np.abs(facing).min() > 1e-9
+    for cuts in (1, 3):
+        np.testing.assert_array_equal(visible_faces(Octree.from_mesh(ball), eye, cuts=cuts), facing > 0.0)
+
+
+def test_all_faces_are_seen_from_inside_a_convex_body_and_sheets_from_behind():
+    assert visible_faces(Octree.from_mesh(icosphere(3)), [0.1, 0.2, 0.3]).all()
+    for y in (1.0, -1.0):
+        assert visible_faces(Octree.from_mesh(grid(3, 3)), [0.1, y, 0.0]).all()
+
+
+def test_more_points_a_face_find_what_is_seen_in_part():
+    """A floor face whose middle is hidden by a plate above it."""
+    plate = Mesh([[-0.2, -0.2, 0.5], [0.2, -0.2, 0.5], [0.0, 0.3, 0.5]], [[0, 1, 2]])
+    floor = Mesh([[-3, -3, 0], [3, -3, 0], [0, 6, 0]], [[0, 1, 2]])
+    octree = Octree.from_mesh(Mesh.concatenate([floor, plate]))
+    assert visible_faces(octree, [0.0, 0.0, 9.0]).tolist() == [False, True]
+    assert visible_faces(octree, [0.0, 0.0, 9.0], cuts=4).tolist() == [True, True]
+
+
+def test_faces_without_area_are_not_seen_and_blocks_change_nothing(monkeypatch):
+    body = torus()
+    flat = Mesh(np.concatenate([body.vertices, [[0, 9, 0]]]), np.concatenate([body.faces, [[len(body.vertices)] * 3]]))
+    octree = Octree.from_mesh(flat)
+    seen = visible_faces(octree, [0.0, 3.0, 0.5], cuts=2)
+    assert not seen[-1] and 0.2 < seen.mean() < 0.8
+    depth, cloud = depth_map(octree, CAMERAS[0], 31, 23), scan(octree, [0, 3, 0.5], 5000)
+    monkeypatch.setattr(views, "_ROWS", 100)
+    np.testing.assert_array_equal(visible_faces(octree, [0.0, 3.0, 0.5], cuts=2), seen)
+    np.testing.assert_array_equal(depth_map(octree, CAMERAS[0], 31, 23), depth)
+    for ours, theirs in zip(scan(octree, [0, 3, 0.5], 5000), cloud, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize("cuts", [1, 2, 5])
+def test_the_points_of_a_cut_face_are_the_centroids_of_equal_parts(cuts):
+    places = np.array(list(views._centroids(cuts)))
+    assert len(places) == cuts**2 == len(np.unique(places.round(12), axis=0))
+    assert (places > 0.0).all() and (places.sum(axis=1) < 1.0).all()
+    np.testing.assert_allclose(places.mean(axis=0), 1.0 / 3.0, rtol=1e-14)
+
+
+@pytest.mark.parametrize("camera", CAMERAS, ids=["perspective", "orthographic"])
+def test_depths_have_the_bits_of_pictures(camera):
+    body = torus()
+    scene = Scene(camera=camera, materials={"m": Phong()}, objects=[SceneObject(mesh=body, material="m")], ambient=1.0)
+    depth = depth_map(Octree.from_mesh(body), camera, 61, 47)
+    np.testing.assert_array_equal(depth, render(scene, resolution=(61, 47), samples=1).depth)
+    assert depth.shape == (47, 61) and 0.1 < np.isfinite(depth).mean() < 0.9
+
+
+def test_a_scan_has_the_hits_of_its_rays():
+    octree, pattern = Octree.from_mesh(torus()), fibonacci_sphere(3000)
+    cloud = scan(octree, [0.0, 2.0, 0.5], pattern)
+    hits = octree.closest_hit([0.0, 2.0, 0.5], pattern.directions)
+    np.testing.assert_array_equal(cloud.rays, np.flatnonzero(hits.hit))
+    np.testing.assert_array_equal(cloud.points, hits.points[hits.hit])
+    np.testing.assert_array_equal(cloud.faces, hits.face[hits.hit])
+    np.testing.assert_array_equal(cloud.normals, hits.normals[hits.hit])
+    np.testing.assert_allclose(cloud.distances, np.linalg.norm(cloud.points - [0.0, 2.0, 0.5], axis=1), rtol=1e-13)
+    for same in (3000, 5.0 * pattern.directions):
+        np.testing.assert_array_equal(scan(octree, [0.0, 2.0, 0.5], same).rays, cloud.rays)
+    assert 0 < len(cloud.rays) < 3000
+    # Between two of them, so that no rounding matters.
+    reach = np.sort(cloud.distances)[[50, 51]].mean()
+    near = scan(octree, [0.0, 2.0, 0.5], 2.0 * pattern.directions, distance=reach)
+    np.testing.assert_array_equal(near.rays, cloud.rays[cloud.distances <= reach])
+    assert 0 < len(near.rays) < len(cloud.rays)
+    assert len(scan(octree, [0.0, 2.0, 0.5], [[0, 1, 0]]).points) == 0
+
+
+@pytest.mark.parametrize(
+    ("ask", "argument", "said"),
+    [
+        (lambda o: visible_faces(o, [0, 0]), "eye", "shape"),
+        (lambda o: visible_faces(o, [[0, 0, 0]]), "eye", r"shape \(3,\)"),
+        (lambda o: visible_faces(o, [0, np.nan, 0]), "eye", "finite"),
+        (lambda o: visible_faces(o, [0, 0, 9], cuts=0), "cuts", "from 1 to 64"),
+        (lambda o: visible_faces(o, [0, 0, 9], progress=3), "progress", "True or False"),
+        (lambda o: visible_faces(box(), [0, 0, 9]), "octree", "an Octree"),
+        (lambda o: depth_map(o, CAMERAS[0], 0, 5), "width", "from 1 to 65536"),
+        (lambda o: depth_map(o, CAMERAS[0], 5, 2.5), "height", "from 1 to 65536"),
+        (lambda o: depth_map(o, "camera", 5, 5), "camera", "a camera, got str"),
+        (lambda o: scan(o, [[0, 0, 9]]), "origin", "shape"),
+        (lambda o: scan(o, [0, 0, 9], 0), "pattern", "an integer from 1"),
+        (lambda o: scan(o, [0, 0, 9], [[0, 0, 0]]), "pattern", "in row 0"),
+        (lambda o: scan(o, [0, 0, 9], distance=-1), "distance", "a number >= 0"),
+    ],
+)
+def test_bad_arguments_are_named(ask, argument, said):
+    with pytest.raises(ValueError, match=rf"^{argument}: expected .*{said}"):
+        ask(Octree.from_mesh(box()))
