@@ -242,7 +242,7 @@ def _aim(mesh, places, sky, work, begun, count, unit):
 
 
 @kernel
-def _settle(answers, work, listed):
+def _take_down(answers, work, listed):
     """Take down what the listed points see, once their rays are traced: for each point in the order of directions."""
     ray = np.int64(0)
     for entry in range(listed):
@@ -298,7 +298,7 @@ def sweep(words, mesh, places, sky, answers, rows, state, memory):
             listed, rays = _aim(mesh, places, sky, work, (k, listed, rays), count, tree.scale)
             k += 1
         _trace(tree, work, rays)
-        _settle(answers, work, listed)
+        _take_down(answers, work, listed)
         traced += listed
     if k < len(sky.values):
         return begin, k
