@@ -152,7 +152,7 @@ def describe(loaded: LoadedReference) -> dict[str, Any]:
 def _check(target: _Target, rays: RayFamily, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
     # Trace the rays and compare with every reference.
     hits = target.octree.closest_hit(rays.origins, rays.directions)
-    ours = HitArrays(hits.t, hits.face)
+    ours = HitArrays.told(hits.t, hits.face)
     found = _find(target, rays, ours, effort)
 
     # Count the rays on which we are wrong, or which rounding decides.

@@ -55,6 +55,15 @@ class HitArrays:
             got = f"t = {self.t[bad[0]]}, face = {self.face[bad[0]]}"
             raise ValueError(f"t, face: expected a finite t exactly where face >= 0, got {got} in row {bad[0]}")
 
+    @classmethod
+    def told(cls, t: Floats, face: Ints) -> "HitArrays":
+        """The hits that a renderer under test told: one that contradicts itself is made a hit at t = -1.
+
+        That is right for no ray, so it is judged wrong, where an exception would judge nothing.
+        """
+        bad = (face >= 0) != np.isfinite(t)
+        return cls(np.where(bad, -1.0, t), np.where(bad, np.maximum(face, 0), face))
+
     @property
     def hit(self) -> NDArray[np.bool_]:
         return self.face >= 0

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from validation.hits.rays import RayFamily
 from validation.oracle import exact
+from validation.oracle.distance import way_from
 from validation.oracle.exact import ExactHit
 from validation.oracle.rounding import FLOAT64_ROUNDOFF, RayView, t_bounds
 
@@ -131,7 +132,7 @@ def theirs_right(
     closest = iter(_on_planes(farther, corners, roundoff))
     for (row, d, hit), (t, bound) in zip(both, named, strict=True):
         slack = bound if d.theirs_face in hit.faces_at_t else bound + next(closest)[1]
-        right[row] = t is not None and t >= 0 and abs(Fraction(d.theirs_t or 0.0) - t) <= bound and t - hit.t <= slack
+        right[row] = t is not None and t >= 0 and way_from(d.theirs_t or 0.0, t) <= bound and t - hit.t <= slack
     return right
 
 
@@ -166,9 +167,9 @@ def _rows_to_judge(
             if hit is not None or name >= 0:
                 rows.append(row)
         # Every bound is at least 10 u |t|: compute the triangle's own only beyond 8 u (the rounding of hit.t takes 1).
-        elif not abs(ours - float(hit.t)) <= 8 * FLOAT64_ROUNDOFF * abs(ours):
+        elif not abs(ours - float(hit.t)) <= 8 * FLOAT64_ROUNDOFF * abs(ours) < np.inf:
             named.append(row)
-            errors.append(float(abs(Fraction(ours) - hit.t)))
+            errors.append(float(way_from(ours, hit.t)))
     if named:
         triangles, origins, directions = corners[face[named]], rays.origins[named], rays.directions[named]
         triples = zip(triangles, origins, directions, strict=True)

@@ -59,6 +59,15 @@ def nearest(point: Vector, triangles: Sequence[Sequence[Vector]]) -> tuple[Fract
     return least, [i for i, square in enumerate(squares) if square == least]
 
 
+def way_from(value: float, exact: Fraction) -> Fraction | float:
+    """The way from a float64 to a rational number, exactly; inf where the float64 is not finite, as t of a lost hit.
+
+    >>> way_from(0.75, Fraction(1)), way_from(math.inf, Fraction(1))
+    (Fraction(1, 4), inf)
+    """
+    return abs(Fraction(value) - exact) if math.isfinite(value) else math.inf
+
+
 def ulps_from_root(value: float, square: Fraction) -> float:
     """The way from a float64 to the root of a rational number, in units of the root's last place.
 

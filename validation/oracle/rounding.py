@@ -4,6 +4,7 @@ The exact determinants of ``validation.oracle.exact`` and derived bounds on thei
 decides whether an answer is the exact one, and if not, whether rounding permits it.
 """
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validation.oracle import exact
+from validation.oracle.distance import way_from
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -61,7 +63,7 @@ class RayView:
         named = next((f for f in hits if f.face == face), None)
         if t is None or named is None or named.t is None:
             return t is None and not hits
-        if not abs(Fraction(t) - named.t) <= named.t_bound:
+        if not way_from(t, named.t) <= named.t_bound:
             return False
         return all(named.t - f.t <= named.t_bound + f.t_bound for f in hits if f.t is not None)
 
@@ -75,9 +77,9 @@ class RayView:
         if t is None:
             return not stops
         named = next((f for f in self.seen if f.face == face), None)
-        if named is None or not t >= 0:
+        if named is None or not 0.0 <= t < math.inf:
             return False
-        if named.t is not None and not abs(Fraction(t) - named.t) <= named.t_bound:
+        if named.t is not None and not way_from(t, named.t) <= named.t_bound:
             return False
         return all(Fraction(t) - stop <= bound + named.t_bound for stop, bound in stops)
 

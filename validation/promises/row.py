@@ -7,5 +7,9 @@ from numpy.typing import NDArray
 
 
 def row(promise: str, judge: str, kept: NDArray[np.bool_]) -> dict[str, Any]:
-    """The row of a promise that was kept where ``kept`` says so."""
-    return {"promise": promise, "judge": judge, "asked": int(kept.size), "broken": int(np.count_nonzero(~kept))}
+    """The row of a promise that was kept where ``kept`` says so; one that was never asked was broken.
+
+    An empty array has any type, as that of an empty list does: where no ray hits, a judge of hits has none to judge.
+    """
+    broken = int(np.count_nonzero(~kept)) if kept.size else 1
+    return {"promise": promise, "judge": judge, "asked": int(kept.size), "broken": broken}

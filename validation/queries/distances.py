@@ -84,8 +84,10 @@ def check_distances(count: int, job: Job) -> list[dict[str, Any]]:
 def _is_closed(mesh: Mesh, points: Floats, distance: Floats) -> NDArray[np.bool_]:
     """Whether each point finds the surface within its own distance, and nothing within less."""
     octree = Octree.from_mesh(mesh)
-    within = octree.closest_point(points, max_distance=distance).distance
-    less = octree.closest_point(points, max_distance=np.nextafter(distance, 0.0)).found
+    # What is no distance is refused as a limit.
+    limit = np.where(distance >= 0.0, distance, 0.0)
+    within = octree.closest_point(points, max_distance=limit).distance
+    less = octree.closest_point(points, max_distance=np.nextafter(limit, 0.0)).found
     return (within == distance) & ~(less & (distance > 0.0))
 
 

@@ -20,6 +20,7 @@ from validation.hits import watertight
 from validation.hits.compare import HitArrays
 from validation.hits.rays import RayFamily
 from validation.oracle import exact
+from validation.oracle.distance import way_from
 from validation.oracle.exact import ExactHit
 from validation.oracle.rounding import t_bounds
 from validation.references.embree import Embree
@@ -147,7 +148,7 @@ def answer(kernel: str, sample: Sample) -> HitArrays:
     rays = sample.rays
     if kernel == "ours":
         hits = Octree(sample.vertices, sample.faces).closest_hit(rays.origins, rays.directions)
-        return HitArrays(hits.t, hits.face)
+        return HitArrays.told(hits.t, hits.face)
     embree = Embree(sample.vertices, sample.faces, robust=kernel == "embree_robust")
     t, face = embree.closest_hit(rays.origins, rays.directions)
     # In default mode an overflow can leave a face with a t that is not finite, which cannot be compared.
@@ -161,7 +162,7 @@ def errors_of(found: HitArrays, sample: Sample, truth: list[ExactHit | None]) ->
     both = np.flatnonzero(found.hit & hit)
     pairs = [(ray, float(found.t[ray]), h) for ray in both.tolist() if (h := truth[ray]) is not None]
     right = [found.face[ray] in h.faces_at_t for ray, _, h in pairs]
-    errors = [abs(Fraction(t) - h.t) for _, t, h in pairs]
+    errors = [way_from(t, h.t) for _, t, h in pairs]
     bounds = _bounds(sample, found.face[both], both)
     beyond = [ok and not error <= bound for ok, error, bound in zip(right, errors, bounds, strict=True)]
     ulps = [float(e / Fraction(float(np.spacing(float(h.t))))) for e, (_, _, h) in zip(errors, pairs, strict=True)]

@@ -19,6 +19,7 @@ from validation.hits.verdicts import (
     SETTLED,
     THEIRS_RIGHT,
     VERDICTS,
+    judgements,
 )
 from validation.oracle import exact
 from validation.oracle.rounding import FLOAT64_ROUNDOFF
@@ -332,3 +333,19 @@ def test_malformed_hits_are_refused():
         compare(answer(1.0, 0), THEIRS, VERTICES, FACES, RAYS)
     with pytest.raises(ValueError, match="equal numbers of rays"):
         exact_errors(OURS, EXACT[:-1], VERTICES, FACES, RAYS)
+
+
+@pytest.mark.parametrize(("ray", "t", "face"), [(HIT, np.inf, 0), (HIT, np.nan, 0), (HIT, 1.0, -1), (MISS, 1.0, -1)])
+def test_what_contradicts_itself_is_judged_wrong(ray, t, face):
+    """It was refused before it was judged, and a judge that raises finds nothing."""
+    told, named = OURS.t.copy(), OURS.face.copy()
+    told[ray], named[ray] = t, face if face < 0 else OURS.face[ray]
+    lost = HitArrays.told(told, named)
+    assert exact_errors(lost, EXACT, VERTICES, FACES, RAYS).wrong == judged(lost).ours_wrong == 1
+
+
+@pytest.mark.parametrize("t", [np.inf, np.nan])
+def test_a_hit_at_no_number_has_no_judgement_but_wrong(t):
+    told = OURS.t.copy()
+    told[HIT] = t
+    assert judgements(told, OURS.face, EXACT, VERTICES, FACES, RAYS, 9) == {HIT: "wrong"}

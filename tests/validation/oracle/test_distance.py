@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from validation.oracle.distance import rational, squared_distance
+from validation.oracle.distance import rational, squared_distance, way_from
 
 TRIANGLE = rational([[0, 0, 0], [4, 0, 0], [0, 3, 0]])
 
@@ -39,3 +39,9 @@ def test_no_sample_of_the_face_is_nearer_and_some_is_as_near():
         distance = float(squared_distance(*rational([point.tolist()]), rational(corners.tolist()))) ** 0.5
         nearest = np.linalg.norm(weights @ corners - point, axis=1).min()
         assert distance <= nearest <= distance + 0.1
+
+
+@pytest.mark.parametrize(("value", "way"), [(0.75, Fraction(1, 4)), (1.5, Fraction(1, 2)), (np.inf, np.inf)])
+def test_the_way_from_a_number_is_exact_and_infinite_from_none(value, way):
+    assert way_from(value, Fraction(1)) == way
+    assert way_from(-np.inf, Fraction(1)) == way_from(np.nan, Fraction(1)) == np.inf

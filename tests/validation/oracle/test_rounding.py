@@ -173,3 +173,11 @@ def test_a_face_behind_the_origin_is_not_permitted():
     behind = RayView(square, np.array([[0, 1, 2]]), (0.75, 0.25, 1.0), (0.0, 0.0, 1.0), FLOAT64_ROUNDOFF)
     assert behind.closest is None and behind.is_right(None, None)
     assert not behind.is_permitted(-1.0, 0)
+
+
+@pytest.mark.parametrize("t", [np.inf, -np.inf, np.nan])
+def test_a_hit_at_no_number_is_neither_right_nor_permitted(t):
+    square = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+    for origin in ((0.75, 0.25, 1.0), (0.75, 0.25, -1.0), (0.5, 0.25, 0.0)):
+        ray = RayView(square, np.array([[0, 1, 2]]), origin, (0.0, 0.0, -1.0), FLOAT64_ROUNDOFF)
+        assert not ray.is_right(t, 0) and not ray.is_permitted(t, 0)

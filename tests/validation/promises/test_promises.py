@@ -13,6 +13,7 @@ from renderer.inspect import tree_boxes
 from renderer.mesh import ears, obj, polygons
 from renderer.octree import Octree
 from renderer.picture import image, pack, prepare
+from renderer.queries import Queries
 from renderer.scene import scene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
@@ -52,6 +53,7 @@ from validation.promises.pictures import (
     saved,
     shining,
 )
+from validation.promises.row import row
 
 CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "places": lambda: places.check_places(np.random.default_rng(5), 256),
@@ -484,3 +486,46 @@ def test_a_renderer_that_hits_nothing_is_judged_too() -> None:
     hits_ = SimpleNamespace(t=none, u=none, v=none, points=points, normals=points)
     assert all(kept.shape == (0,) and kept.dtype == bool for kept in places._judged(hits_, exact, 1.0).values())
     assert errors._near(none, none, none.astype(np.int64), none.astype(np.int64)).dtype == bool
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # an infinity less itself, where a hit is lost
+@pytest.mark.parametrize("every", [1, 2], ids=["all of them", "every other one"])
+@pytest.mark.parametrize("name", ["places", "bounds", "errors", "limits", "alone", "planes", "batches", "refits"])
+def test_hits_that_are_lost_are_broken_promises_and_no_exceptions(
+    name: str, every: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Judges that raise judge nothing: a defect with which half of the hits were lost turned no gate red."""
+    sound = Queries.closest_hit
+
+    def losing(*given: Any, **options: Any) -> hits.Hits:
+        found = sound(*given, **options)
+        lost = np.arange(found.t.size).reshape(found.t.shape) % every == 0
+        some = {"t": (found.t, np.inf), "face": (found.face, -1), "u": (found.u, np.nan), "v": (found.v, np.nan)}
+        if found.t_error is not None:
+            some["t_error"] = (found.t_error, np.nan)
+        return replace(found, **{key: np.where(lost, none, values) for key, (values, none) in some.items()})
+
+    monkeypatch.setattr(Queries, "closest_hit", losing)
+    assert broken(name)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of the last place of an infinity
+@pytest.mark.parametrize("member", ["t", "t_error"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_hits_at_no_number_are_broken_promises(member: str, value: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    for query in ("closest_hit", "all_hits"):
+        sound = getattr(Queries, query)
+
+        def spoilt(*given: Any, sound: Any = sound, **options: Any) -> Any:
+            found = sound(*given, **options)
+            return replace(found, **{member: np.full_like(getattr(found, member), value)})
+
+        monkeypatch.setattr(Queries, query, spoilt)
+    # An error of t that is infinite bounds any, but is not that of the ray.
+    assert broken("errors") >= {"t_error is", "t_error of"} | ({"t_error bounds"} if np.isnan(value) else set())
+
+
+def test_a_promise_that_was_never_asked_is_broken() -> None:
+    assert row("a promise", "nobody", np.array([]))["broken"] == 1
+    assert row("a promise", "somebody", np.array([True, False]))["broken"] == 1
+    assert row("a promise", "somebody", np.array([True]))["broken"] == 0

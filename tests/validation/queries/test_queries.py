@@ -139,3 +139,18 @@ def test_open3d_is_asked_where_it_is_installed(monkeypatch, installed):
     monkeypatch.setattr("validation.queries.inside.peers", peers.__wrapped__)
     (row, *_) = check_inside(240, 240, 4, JOB)
     assert list(row["others"]) == [TRIMESH, LIBIGL, *([OPEN3D] if installed else [])]
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of infinities less each other
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
+def test_distances_that_are_none_are_wrong(monkeypatch, value):
+    """What is asked again within them is refused by the renderer itself."""
+    asked = Octree.closest_point
+
+    def changed(self, points, *most, **limits):
+        found = asked(self, points, *most, **limits)
+        found.distance[:] = value
+        return found
+
+    monkeypatch.setattr(Octree, "closest_point", changed)
+    assert set(wrong(check_distances(4, JOB)).values()) == {4} and len(meshes()) == len(check_distances(4, JOB))

@@ -1,13 +1,17 @@
 """The stability curves: ours passes, and a shift, a miss or a wrong face is found by the gates."""
 
 import json
+from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
+from renderer.octree import Octree
 from validation.hits.compare import HitArrays
 from validation.oracle import exact
 from validation.stability import sweeps as stability
+from validation.stability.cases.judgement import ulp_errors
 
 EFFORT = stability.SweepEffort(rays=20, leaks=300)
 
@@ -98,3 +102,13 @@ def test_the_record_is_json_and_complete(monkeypatch):
     farthest = record["offset"]["points"][-1]
     assert farthest["embree_robust"]["wrong_share"] == 1.0 and farthest["embree_robust"]["relative_max"] is None
     assert farthest["ours"]["wrong_share"] == 0.0
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of the last place of an infinity
+@pytest.mark.parametrize("t", [np.inf, np.nan])
+def test_hits_at_no_number_are_beyond_the_bound(t, monkeypatch):
+    sound = Octree.closest_hit
+    monkeypatch.setattr(Octree, "closest_hit", lambda *rays: replace(hits := sound(*rays), t=np.full_like(hits.t, t)))
+    wrong, beyond = judged(SWEEPS["scale"], 1.0, monkeypatch, lambda found: found)
+    assert wrong.passed and beyond.value == 20
+    assert ulp_errors(np.array([t, 2.0]), [Fraction(2)] * 2).tolist() == [np.inf, 0.0]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.oracle.distance import way_from
 from validation.promises.row import row
 from validation.promises.squares import squares
 
@@ -50,10 +51,7 @@ def _bounded(tracer: Octree | BruteForce, heights: NDArray[np.float64], long: fl
     found = tracer.all_hits([[heights[0] / 8, heights[0] / 4, 0.0]], [[0.0, 0.0, long]], contacts=False, t_error=True)
     assert found.t_error is not None
     exact = [Fraction(heights[face // 2]) / Fraction(long) for face in found.face.tolist()]
-    near = [
-        abs(Fraction(t) - whole) <= Fraction(error)
-        for t, whole, error in zip(found.t, exact, found.t_error, strict=True)
-    ]
+    near = [way_from(t, whole) <= error for t, whole, error in zip(found.t, exact, found.t_error, strict=True)]
     return np.array([*near, len(near) == len(heights)])
 
 
@@ -85,8 +83,8 @@ def _near(
     t: NDArray[np.float64], error: NDArray[np.float64], height: NDArray[np.float64], long: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Whether each t is the quotient within its error, and the error not a thousand roundings."""
-    off = [abs(Fraction(a) - Fraction(h) / Fraction(d)) for a, h, d in zip(t, height, long, strict=True)]
-    bounded = [bool(np.isfinite(e)) and x <= Fraction(e) for x, e in zip(off, error, strict=True)]
+    off = [way_from(a, Fraction(h) / Fraction(d)) for a, h, d in zip(t, height, long, strict=True)]
+    bounded = [bool(np.isfinite(e)) and x <= e for x, e in zip(off, error, strict=True)]
     kept: NDArray[np.bool_] = np.array(bounded, np.bool_) & (error <= 1e3 * np.spacing(t))
     return kept
 
@@ -105,6 +103,9 @@ def _along(rng: Generator) -> NDArray[np.bool_]:
         hit = Octree(corners, [[0, 1, 2]]).closest_hit([origin], [direction], t_error=True)
         if hit.hit[0]:
             assert hit.t_error is not None
+            if not (np.isfinite(hit.t[0]) and np.isfinite(hit.t_error[0])):
+                kept.append(False)
+                continue
             first, last = _passage(corners, origin, direction)
             t, error = Fraction(hit.t[0]), Fraction(hit.t_error[0])
             kept += [t - error <= first, last <= t + error, first > last or error <= max(t - first, last - t) + _WIDER]

@@ -11,6 +11,7 @@ from renderer import BruteForce, Hits, Mesh, Octree
 from validation.hits.compare import ExactErrors, HitArrays, exact_errors
 from validation.hits.rays import RayFamily, float32_exact
 from validation.oracle import exact
+from validation.oracle.distance import way_from
 from validation.references.embree import Embree
 
 Floats = NDArray[np.float64]
@@ -47,7 +48,7 @@ def embree_says(mesh: Mesh, rays: RayFamily, say: Callable[[Floats, Ints], str])
 def against_exact(mesh: Mesh, rays: RayFamily, hits: Hits | HitArrays) -> ExactErrors:
     """Compare every ray with exact arithmetic, t within the bound that rounding explains."""
     truth = exact.closest_hits(mesh.vertices, mesh.faces, rays.origins, rays.directions)
-    return exact_errors(HitArrays(hits.t, hits.face), truth, mesh.vertices, mesh.faces, rays)
+    return exact_errors(HitArrays.told(hits.t, hits.face), truth, mesh.vertices, mesh.faces, rays)
 
 
 def as_exact(errors: ExactErrors) -> bool:
@@ -84,7 +85,7 @@ def octrees(mesh: Mesh) -> list[Octree]:
 def ulp_errors(t: Floats, true: Iterable[Fraction]) -> Floats:
     """|t - true| in units of the last place of the true distance."""
     pairs = zip(t.tolist(), true, strict=True)
-    return np.array([float(abs(Fraction(a) - b) / Fraction(float(np.spacing(float(b))))) for a, b in pairs])
+    return np.array([float(way_from(a, b) / Fraction(float(np.spacing(float(b))))) for a, b in pairs])
 
 
 def of(good: ArrayLike, what: str = "hits") -> str:
