@@ -109,7 +109,7 @@ HITS = (
             "best, _ = search_singly(tree, ray, limit, stack)",
             "(t, face, u, v, w), _ = search_singly(tree, ray, limit, stack)\n"
             "best = t * (1.0 + 2.0**-52), face, u, v, w"),
-    _python("hits", "bad rays are let through", "_run",
+    _python("hits", "bad rays are let through", "query._run",
             "if bad:\n"
             "    reject(rays, min(bad), tree.scale)",
             "if False:\n"
