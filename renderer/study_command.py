@@ -10,6 +10,8 @@ from renderer.process.terminal import say
 
 FORMATS = (".npy", ".ply", ".png")
 _KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
+# Options that one kind alone has, which are its function's.
+_OWN = {"sky": ("patches", "definition"), "sun": ("suns",), "ao": ("samples",)}
 _GRID = "points as seen from above (z up), so far apart, on what they see first"
 
 
@@ -29,12 +31,10 @@ def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> No
     where.add_argument("--grid", type=float, metavar="SPACING", help=_GRID)
     where.add_argument("--points", type=Path, metavar="FILE", help=".npy, (n, 3), or (n, 6) with normals")
     study.add_argument("-o", "--output", type=Path, required=True, help=".npy, .ply or, of faces, .png")
-    study.add_argument(
-        "--patches", type=int, default=145, metavar="N", help="sky: 145, 577 or any number of directions"
-    )
-    study.add_argument("--definition", choices=("cosine", "geometric"), default="cosine", help="sky: what is weighed")
+    study.add_argument("--patches", type=int, metavar="N", help="sky: any number of directions; default: 145")
+    study.add_argument("--definition", choices=("cosine", "geometric"), help="sky: what is weighed; default: cosine")
     study.add_argument("--suns", type=Path, metavar="FILE", help="sun: a text of rows x y z hours, to the sun")
-    study.add_argument("--samples", type=int, default=256, metavar="N", help="ao: directions a point")
+    study.add_argument("--samples", type=int, metavar="N", help="ao: directions a point; default: 256")
     study.add_argument("--distance", type=float, default=float("inf"), metavar="D", help="how far the mesh hides")
     study.add_argument("--camera", type=Path, metavar="SCENE", help="of a .png: a scene file whose camera it takes")
     study.add_argument("--resolution", type=resolution, default=(960, 720), metavar="WxH", help="of a .png")
@@ -93,8 +93,11 @@ def _check_output(options: argparse.Namespace) -> None:
     on_mesh = options.grid is None and options.points is None
     expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply for points that are not a mesh's", str(output))
     expect(suffix == ".png" or options.camera is None, "--camera", "a .png to be seen by it", str(output))
-    expect((options.suns is not None) == (options.kind == "sun"), "--suns", "a file for the kind sun, and no other",
-           "none" if options.suns is None else f"one for {options.kind}")  # fmt: skip
+    for kind, names in _OWN.items():
+        for name in names:
+            given = options.kind != kind and getattr(options, name) is not None
+            expect(not given, f"--{name}", f"none, as it is the kind {kind}'s", f"one for {options.kind}")
+    expect(options.kind != "sun" or options.suns is not None, "--suns", "a file for the kind sun", "none")
     check_writable(output)
 
 
@@ -103,11 +106,9 @@ def _options_of(options: argparse.Namespace) -> dict[str, Any]:
     from renderer.runs.chosen import suns_of
 
     of: dict[str, Any] = {"distance": options.distance}
-    if options.kind == "sky":
-        return of | {"patches": options.patches, "definition": options.definition}
     if options.kind == "sun":
         return of | dict(zip(("sun_directions", "weights"), suns_of(options.suns), strict=True))
-    return of | {"samples": options.samples}
+    return of | {name: value for name in _OWN[options.kind] if (value := getattr(options, name)) is not None}
 
 
 def _camera(options: argparse.Namespace) -> Any:

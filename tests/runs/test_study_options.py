@@ -1,0 +1,169 @@
+"""Each option of ``octree-render study``: what it takes, its default, and what it changes."""
+
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image as Pillow
+
+from renderer import Octree, load_mesh, load_scene, render
+from renderer.cli import main
+from renderer.mesh.load import save_ply
+from renderer.process.parallel import available_threads
+from renderer.studies import ambient_occlusion, face_points, sky_view_factor, sun_hours
+from validation.benchmark.measures.meshes import named
+
+SCENE = """
+ambient = 1.0
+[camera]
+eye = {eye}
+target = {target}
+fov = 40
+[materials.grey]
+diffuse = 0.5
+[[objects]]
+mesh = "city.ply"
+material = "grey"
+"""
+
+
+@pytest.fixture(scope="module")
+def city(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("options") / "city.ply"
+    save_ply(named("city_300"), path)
+    return path
+
+
+def study(*arguments: object) -> None:
+    assert main(["study", *map(str, arguments)]) == 0
+
+
+def on_faces(city: Path, of: Any, *arguments: Any, **options: Any) -> Any:
+    """What the library answers for the middles of faces."""
+    octree = Octree.from_mesh(load_mesh(city))
+    points, normals, faces = face_points(octree.mesh)
+    found = np.full(len(octree.mesh.faces), np.nan)
+    found[faces] = of(octree, points, normals, *arguments, leaving=faces, **options)
+    return found
+
+
+@pytest.mark.parametrize(
+    "kind, own, given",
+    [("sky", sky_view_factor, {"patches": 100}), ("sky", sky_view_factor, {"patches": 577}),
+     ("sky", sky_view_factor, {"definition": "geometric"}), ("sky", sky_view_factor, {"distance": 0.05}),
+     ("ao", ambient_occlusion, {"samples": 100}), ("ao", ambient_occlusion, {"distance": 0.05})],
+)  # fmt: skip
+def test_what_a_study_is_told_is_handed_on_and_the_rest_left_to_the_library(
+    city: Path, tmp_path: Path, kind: str, own: Any, given: dict[str, Any]
+) -> None:
+    told = [word for name, value in given.items() for word in (f"--{name}", value)]
+    study(kind, city, "-o", tmp_path / "told.npy", *told, "--quiet")
+    study(kind, city, "--faces", "-o", tmp_path / "default.npy", "--quiet")
+    np.testing.assert_array_equal(np.load(tmp_path / "told.npy"), on_faces(city, own, **given))
+    np.testing.assert_array_equal(np.load(tmp_path / "default.npy"), on_faces(city, own))
+    assert (np.load(tmp_path / "told.npy") != np.load(tmp_path / "default.npy")).any()
+
+
+def test_suns_have_an_hour_each_unless_told_and_the_mesh_hides_as_far_as_told(city: Path, tmp_path: Path) -> None:
+    (tmp_path / "suns.txt").write_text("1 0 0.2\n-1 0 0.2\n")
+    study("sun", city, "--suns", tmp_path / "suns.txt", "--distance", 0.05, "-o", tmp_path / "sun.npy", "--quiet")
+    suns, found = [[1, 0, 0.2], [-1, 0, 0.2]], np.load(tmp_path / "sun.npy")
+    np.testing.assert_array_equal(found, on_faces(city, sun_hours, suns, distance=0.05))
+    assert (found != on_faces(city, sun_hours, suns)).any()
+
+
+def test_vertices_have_means_of_their_faces_by_area(city: Path, tmp_path: Path) -> None:
+    study("sky", city, "--vertices", "-o", tmp_path / "v.npy", "--quiet")
+    mesh, values = load_mesh(city), on_faces(city, sky_view_factor)
+    total, area = np.zeros((2, len(mesh.vertices)))
+    for corners, value in zip(mesh.faces, values, strict=True):
+        a, b, c = mesh.vertices[corners]
+        size = float(np.linalg.norm(np.cross(b - a, c - a)))
+        if np.isfinite(value):
+            total[corners] += size * value
+            area[corners] += size
+    np.testing.assert_allclose(np.load(tmp_path / "v.npy"), total / area, rtol=1e-12)
+
+
+def test_a_picture_has_the_camera_of_a_scene_and_the_size_that_it_is_told(city: Path, tmp_path: Path) -> None:
+    lower, upper = load_mesh(city).bounds
+    target = (lower + upper) / 2
+    eye = target + np.array([0.0, 0.0, 1.5 * float((upper - lower).max())])
+    path = city.with_name("scene.toml")
+    path.write_text(SCENE.format(eye=eye.tolist(), target=target.tolist()))
+    study("sky", city, "-o", tmp_path / "a.png", "--quiet")
+    study("sky", city, "-o", tmp_path / "b.png", "--camera", path, "--resolution", "120x80", "--quiet")
+    default, seen = (np.array(Pillow.open(tmp_path / name)) for name in ("a.png", "b.png"))
+    assert default.shape[1] == 960 and 720 < default.shape[0] < 800
+    faces = render(load_scene(path), resolution=(120, 80), samples=1, planes=("face",)).face
+    assert seen.shape[1] == 120 and ((seen[:80] != 255).any(axis=2) == (faces >= 0)).all()
+    assert 0.1 < float((faces >= 0).mean()) < 0.9
+
+
+@pytest.mark.parametrize("told, threads", [((), available_threads()), (("--threads", 1), 1)])
+def test_threads_are_all_processors_unless_told(
+    city: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: tuple[object, ...], threads: int
+) -> None:
+    seen: list[int] = []
+    runs = import_module("renderer.runs.study")
+    own = runs.run
+
+    def run(octree: Octree, *arguments: Any, **options: Any) -> Any:
+        seen.append(octree.threads)
+        return own(octree, *arguments, **options)
+
+    monkeypatch.setattr(runs, "run", run)
+    study("sky", city, "-o", tmp_path / "a.npy", *told, "--quiet")
+    assert seen == [threads]
+
+
+def test_a_study_says_what_it_wrote_unless_quiet(
+    city: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study("sky", city, "-o", tmp_path / "a.npy", "--quiet")
+    assert capsys.readouterr() == ("", "")
+    study("sky", city, "-o", tmp_path / "a.npy")
+    said = "".join(capsys.readouterr())
+    count = int(np.isfinite(np.load(tmp_path / "a.npy")).sum())
+    assert f"a.npy: sky view factor of {count:,} points in" in said
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["sky", "m.ply"], ["stars", "m.ply", "-o", "a.npy"], ["sky", "-o", "a.npy"], [],
+     ["sky", "m.ply", "-o", "a.npy", "--faces", "--vertices"], ["sky", "m.ply", "-o", "a.npy", "--grid", "x"],
+     ["sky", "m.ply", "-o", "a.npy", "--grid", "1", "--points", "p.npy"],
+     ["sky", "m.ply", "-o", "a.npy", "--faces", "--grid", "1"],
+     ["sky", "m.ply", "-o", "a.npy", "--vertices", "--points", "p.npy"],
+     ["sky", "m.ply", "-o", "a.npy", "--patches", "x"], ["sky", "m.ply", "-o", "a.npy", "--definition", "x"],
+     ["ao", "m.ply", "-o", "a.npy", "--samples", "x"], ["sky", "m.ply", "-o", "a.npy", "--distance", "x"],
+     ["sky", "m.ply", "-o", "a.png", "--resolution", "x"], ["sky", "m.ply", "-o", "a.npy", "--threads", "x"]],
+)  # fmt: skip
+def test_arguments_that_make_no_sense_are_usage_errors(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["study", *arguments])
+    assert stopped.value.code == 2 and "usage: octree-render study" in capsys.readouterr().err
+
+
+def test_without_a_cluster_dask_is_not_imported(city: Path, tmp_path: Path) -> None:
+    arguments = ["study", "sky", str(city), "-o", str(tmp_path / "a.npy"), "--quiet"]
+    program = (
+        "import sys\nfrom renderer.cli import main\n"
+        f"code = main({arguments!r})\nsys.exit(code or ('dask' in sys.modules or 'distributed' in sys.modules) * 9)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_a_cluster_that_does_not_answer_is_one_line(
+    city: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(import_module("renderer.cluster.clients"), "SECONDS", 0.5)
+    told = ["study", "sky", str(city), "-o", str(tmp_path / "a.npy"), "--cluster", "tcp://127.0.0.1:9", "--quiet"]
+    assert main(told) != 0
+    assert "127.0.0.1:9" in capsys.readouterr().err and not (tmp_path / "a.npy").exists()
