@@ -30,7 +30,10 @@ def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> No
     where.add_argument("--vertices", action="store_true", help="the same, as means of each vertex's faces")
     where.add_argument("--grid", type=float, metavar="SPACING", help=_GRID)
     where.add_argument("--points", type=Path, metavar="FILE", help=".npy, (n, 3), or (n, 6) with normals")
-    study.add_argument("-o", "--output", type=Path, required=True, help=".npy, .ply or, of faces, .png")
+    study.add_argument(
+        "-o", "--output", type=Path, required=True, action="append", metavar="FILE",
+        help=".npy, .ply or, of faces, .png; may be given more than once",
+    )  # fmt: skip
     study.add_argument("--patches", type=int, metavar="N", help="sky: any number of directions; default: 145")
     study.add_argument("--definition", choices=("cosine", "geometric"), help="sky: what is weighed; default: cosine")
     study.add_argument("--suns", type=Path, metavar="FILE", help="sun: a text of rows x y z hours, to the sun")
@@ -60,20 +63,23 @@ def _study(options: argparse.Namespace) -> None:
     began = time.perf_counter()
     parts = _run(octree, Study(options.kind, made), chosen.points, options)
     seconds = time.perf_counter() - began
-    if options.output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
-        parts.join(options.output)
-    else:
-        _write(options, octree.mesh, chosen, parts.joined(), camera)
-        parts.remove()
+    for output in options.output:
+        if output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
+            parts.join(output)
+        else:
+            _write(output, options, octree.mesh, chosen, parts.joined(), camera)
+    # Only now, so that a file that cannot be written costs no study.
+    parts.remove()
     if not options.quiet:
-        say(f"{options.output}: {_KINDS[options.kind]} of {len(chosen.points):,} points in {seconds:.2f} s")
+        outputs = ", ".join(map(str, options.output))
+        say(f"{outputs}: {_KINDS[options.kind]} of {len(chosen.points):,} points in {seconds:.2f} s")
 
 
 def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> Any:
     """All parts of the study, computed here or on a cluster."""
     from renderer.runs.study import folder_of, run
 
-    folder, progress = folder_of(options.output), not options.quiet
+    folder, progress = folder_of(options.output[0]), not options.quiet
     if options.cluster is None:
         return run(octree, study, points, folder, progress=progress)
     from renderer.cluster import connected, run_on
@@ -87,18 +93,23 @@ def _check_output(options: argparse.Namespace) -> None:
     """What can be told before any work."""
     from renderer.process.files import check_writable
 
-    output, suffix = options.output, options.output.suffix.lower()
-    expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
-    expect(output.resolve() != options.mesh.resolve(), "--output", "another file than the mesh", str(output))
     on_mesh = options.grid is None and options.points is None
-    expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply for points that are not a mesh's", str(output))
-    expect(suffix == ".png" or options.camera is None, "--camera", "a .png to be seen by it", str(output))
+    suffixes = [output.suffix.lower() for output in options.output]
+    for output, suffix in zip(options.output, suffixes, strict=True):
+        expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
+        for file in (options.mesh, options.points):
+            other = file is None or output.resolve() != file.resolve()
+            expect(other, "--output", "another file than those that are read", str(output))
+        expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply for points that are not a mesh's", str(output))
+    seen = options.camera is None or ".png" in suffixes
+    expect(seen, "--camera", "a .png to be seen by it", ", ".join(map(str, options.output)))
     for kind, names in _OWN.items():
         for name in names:
             given = options.kind != kind and getattr(options, name) is not None
             expect(not given, f"--{name}", f"none, as it is the kind {kind}'s", f"one for {options.kind}")
     expect(options.kind != "sun" or options.suns is not None, "--suns", "a file for the kind sun", "none")
-    check_writable(output)
+    for output in options.output:
+        check_writable(output)
 
 
 def _options_of(options: argparse.Namespace) -> dict[str, Any]:
@@ -127,24 +138,24 @@ def _chosen(octree: Any, options: argparse.Namespace) -> Any:
     return chosen.on_vertices(octree) if options.vertices else chosen.on_faces(octree)
 
 
-def _write(options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, camera: Any) -> None:
+def _write(output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, camera: Any) -> None:
     """Write a result that is more than the answers of the points."""
     from renderer.runs import drawing
 
-    suffix = options.output.suffix.lower()
+    suffix = output.suffix.lower()
     if chosen.of_faces is None and chosen.of_vertices is None:
-        drawing.write_ply(options.output, chosen.points.points, None, answers, of_faces=False)
+        drawing.write_ply(output, chosen.points.points, None, answers, of_faces=False)
         return
     of_faces = chosen.of_faces is not None
     values = chosen.of_faces(answers) if of_faces else chosen.of_vertices(answers)
     if suffix == ".npy":
-        drawing.write_npy(options.output, values)
+        drawing.write_npy(output, values)
     elif suffix == ".ply":
-        drawing.write_ply(options.output, mesh.vertices, mesh.faces, values, of_faces)
+        drawing.write_ply(output, mesh.vertices, mesh.faces, values, of_faces)
     else:
         seen = values if of_faces else values[mesh.faces].mean(axis=1)
         picture = drawing.draw(_picture(mesh, camera, options), mesh, seen, _KINDS[options.kind])
-        drawing.write_png(options.output, picture)
+        drawing.write_png(output, picture)
 
 
 def _picture(mesh: Any, camera: Any, options: argparse.Namespace) -> Any:
@@ -157,5 +168,7 @@ def _picture(mesh: Any, camera: Any, options: argparse.Namespace) -> Any:
     thing = SceneObject(mesh=mesh, material="grey", normals="flat")
     eye = from_above(mesh, options.resolution) if camera is None else camera
     scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[thing], ambient=1)
-    return render(scene, resolution=options.resolution, samples=1, max_depth=0, planes=("face", "normal"),
+    # Four places a pixel, whose colours are averaged.
+    twice = (2 * options.resolution[0], 2 * options.resolution[1])
+    return render(scene, resolution=twice, samples=1, max_depth=0, planes=("face", "normal"),
                   threads=options.threads, progress=not options.quiet)  # fmt: skip

@@ -93,9 +93,8 @@ class Parts:
         write_atomically(self._path(part), lambda file: file.write(content + digest))
 
     def join(self, path: Path) -> None:
-        """Write the result as ``.npy``, part by part, and remove the folder. Raises ``OSError`` where one is absent."""
+        """Write the result as ``.npy``, part by part. Raises ``OSError`` where one is absent."""
         write_atomically(path, self._join)
-        self.remove()
 
     def joined(self) -> NDArray[Any]:
         """The result in memory."""

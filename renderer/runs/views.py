@@ -12,11 +12,18 @@ _TOWARDS_EYE, _FOV, _MARGIN = (-0.55, -0.75, 0.75), 40.0, 1.02
 
 
 def from_above(mesh: Mesh, resolution: tuple[int, int]) -> PerspectiveCamera:
-    """The camera from which the ball around the mesh fills the smaller side of the picture."""
-    lower, upper = mesh.bounds
-    radius = float(np.linalg.norm(mesh.extent)) / 2.0 or 1.0
-    target = (lower + upper) / 2.0
-    half = math.tan(math.radians(_FOV) / 2.0) * min(1.0, resolution[0] / resolution[1])
+    """The camera so near that all vertices just fit into the picture."""
     towards = np.array(_TOWARDS_EYE) / np.linalg.norm(_TOWARDS_EYE)
-    eye = target + towards * (_MARGIN * radius / math.sin(math.atan(half)))
-    return PerspectiveCamera(eye=tuple(eye), target=tuple(target), up=(0.0, 0.0, 1.0), fov=_FOV)
+    right = np.cross((0.0, 0.0, 1.0), towards)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(towards, right), towards])
+    middle = (mesh.bounds[0] + mesh.bounds[1]) / 2.0
+    x, y, z = axes @ (mesh.vertices - middle).T
+    # A vertex is in the picture where |x - ex| <= wide * (ez - z), and so in y: each of the four sides bounds the eye.
+    tall = math.tan(math.radians(_FOV) / 2.0) / _MARGIN
+    wide = tall * resolution[0] / resolution[1]
+    east, west = (float((side + wide * z).max()) for side in (x, -x))
+    north, south = (float((side + tall * z).max()) for side in (y, -y))
+    far = max((east + west) / (2.0 * wide), (north + south) / (2.0 * tall)) or 1.0
+    eye = middle + np.array([(east - west) / 2.0, (north - south) / 2.0, far]) @ axes
+    return PerspectiveCamera(eye=tuple(eye), target=tuple(eye - far * towards), up=(0.0, 0.0, 1.0), fov=_FOV)

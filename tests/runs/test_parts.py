@@ -30,7 +30,9 @@ def test_a_run_goes_on_where_it_was_killed_and_joins_the_parts_in_order(tmp_path
     _write(again, 1)
     assert (again.joined() == ROWS).all()
     again.join(result)
-    assert (np.load(result) == ROWS).all() and not folder.exists()
+    assert (np.load(result) == ROWS).all()
+    again.remove()
+    assert not folder.exists()
 
 
 @pytest.mark.parametrize("spoil", [lambda b: b[:-1], lambda b: b"", lambda b: bytes([b[0] ^ 1]) + b[1:],

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image as Pillow
+from plyfile import PlyData
 
 from renderer import Octree, load_mesh, load_scene, render
 from renderer.cli import main
@@ -76,6 +77,31 @@ def test_suns_have_an_hour_each_unless_told_and_the_mesh_hides_as_far_as_told(ci
     assert (found != on_faces(city, sun_hours, suns)).any()
 
 
+def test_several_outputs_are_of_one_study(city: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runs, asked = import_module("renderer.runs.study"), []
+    own = runs.run
+    monkeypatch.setattr(runs, "run", lambda *told, **options: asked.append(told) or own(*told, **options))
+    np.save(tmp_path / "p.npy", load_mesh(city).vertices)
+    for where, names in (((), ("a.npy", "a.ply", "a.png")), (("--points", tmp_path / "p.npy"), ("b.npy", "b.ply"))):
+        study("sky", city, *where, *(word for name in names for word in ("-o", tmp_path / name)), "--quiet")
+    assert len(asked) == 2
+    assert {path.name for path in tmp_path.iterdir()} == {"a.npy", "a.ply", "a.png", "b.npy", "b.ply", "p.npy"}
+    for name, element in (("a", "face"), ("b", "vertex")):
+        values = PlyData.read(tmp_path / f"{name}.ply")[element]["value"]
+        np.testing.assert_array_equal(np.load(tmp_path / f"{name}.npy"), values)
+
+
+def test_what_is_read_is_not_written_over(city: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    points = tmp_path / "p.npy"
+    np.save(points, load_mesh(city).vertices)
+    before = points.read_bytes(), city.read_bytes()
+    for output, where in ((points, ("--points", points)), (city, ())):
+        told = ["study", "sky", city, *where, "-o", tmp_path / "a.npy", "-o", output, "--quiet"]
+        assert main([str(word) for word in told]) == 2
+        assert "--output: expected another file" in capsys.readouterr().err
+    assert (points.read_bytes(), city.read_bytes()) == before and not (tmp_path / "a.npy").exists()
+
+
 def test_vertices_have_means_of_their_faces_by_area(city: Path, tmp_path: Path) -> None:
     study("sky", city, "--vertices", "-o", tmp_path / "v.npy", "--quiet")
     mesh, values = load_mesh(city), on_faces(city, sky_view_factor)
@@ -99,9 +125,11 @@ def test_a_picture_has_the_camera_of_a_scene_and_the_size_that_it_is_told(city: 
     study("sky", city, "-o", tmp_path / "b.png", "--camera", path, "--resolution", "120x80", "--quiet")
     default, seen = (np.array(Pillow.open(tmp_path / name)) for name in ("a.png", "b.png"))
     assert default.shape[1] == 960 and 720 < default.shape[0] < 800
-    faces = render(load_scene(path), resolution=(120, 80), samples=1, planes=("face",)).face
-    assert seen.shape[1] == 120 and ((seen[:80] != 255).any(axis=2) == (faces >= 0)).all()
-    assert 0.1 < float((faces >= 0).mean()) < 0.9
+    # A pixel is the mean of four.
+    faces = render(load_scene(path), resolution=(240, 160), samples=1, planes=("face",)).face
+    shown = (faces >= 0).reshape(80, 2, 120, 2).any(axis=(1, 3))
+    assert seen.shape[1] == 120 and ((seen[:80] != 255).any(axis=2) == shown).all()
+    assert 0.1 < float(shown.mean()) < 0.9
 
 
 @pytest.mark.parametrize("told, threads", [((), available_threads()), (("--threads", 1), 1)])
