@@ -68,11 +68,18 @@ def _study(options: argparse.Namespace) -> None:
             parts.join(output)
         else:
             _write(output, options, octree.mesh, chosen, parts.joined(), camera)
+    if not options.quiet:
+        say(_said(options, parts, seconds))
     # Only now, so that a file that cannot be written costs no study.
     parts.remove()
-    if not options.quiet:
-        outputs = ", ".join(map(str, options.output))
-        say(f"{outputs}: {_KINDS[options.kind]} of {len(chosen.points):,} points in {seconds:.2f} s")
+
+
+def _said(options: argparse.Namespace, parts: Any, seconds: float) -> str:
+    """What was made; of points that see nothing, as those within bodies do, how many, so that this is not silent."""
+    outputs = ", ".join(map(str, options.output))
+    blind = 0 if options.kind == "sun" else parts.count(0.0)
+    told = f"; {blind:,} see nothing, as points inside a body" if blind else ""
+    return f"{outputs}: {_KINDS[options.kind]} of {parts.plan.rows:,} points in {seconds:.2f} s{told}"
 
 
 def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> Any:

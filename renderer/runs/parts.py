@@ -102,6 +102,11 @@ class Parts:
         values = np.frombuffer(b"".join(parts), self.plan.dtype)
         return values.reshape(self.plan.shape(self.plan.rows)).copy()
 
+    def count(self, value: float) -> int:
+        """How many values of all parts are this one."""
+        parts = (np.frombuffer(self._whole(part), self.plan.dtype) for part in range(self.plan.parts))
+        return sum(int(np.count_nonzero(values == value)) for values in parts)
+
     def remove(self) -> None:
         """Remove the folder."""
         with suppress(FileNotFoundError):

@@ -14,6 +14,7 @@ from plyfile import PlyData
 from renderer import Octree, load_mesh, load_scene, render
 from renderer.cli import main
 from renderer.mesh.load import save_ply
+from renderer.mesh.shapes import box
 from renderer.process.parallel import available_threads
 from renderer.studies import ambient_occlusion, face_points, sky_view_factor, sun_hours
 from validation.benchmark.measures.meshes import named
@@ -158,6 +159,22 @@ def test_a_study_says_what_it_wrote_unless_quiet(
     said = "".join(capsys.readouterr())
     count = int(np.isfinite(np.load(tmp_path / "a.npy")).sum())
     assert f"a.npy: sky view factor of {count:,} points in" in said
+
+
+def test_points_that_see_nothing_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two within the cube, one above it."""
+    save_ply(box(), tmp_path / "cube.ply")
+    np.save(tmp_path / "p.npy", [[0.5, 0.5, 0.5], [0.25, 0.5, 0.75], [0.5, 0.5, 2.0]])
+    (tmp_path / "suns.txt").write_text("0 0 1\n")
+    told = [tmp_path / "cube.ply", "--points", tmp_path / "p.npy", "-o", tmp_path / "a.npy"]
+    for kind, counted in (("sky", True), ("ao", True), ("sun", False)):
+        study(kind, *told, *(("--suns", tmp_path / "suns.txt") if kind == "sun" else ()))
+        said = "".join(capsys.readouterr())
+        assert ("; 2 see nothing, as points inside a body" in said) == counted and "of 3 points" in said
+        assert np.load(tmp_path / "a.npy").tolist() == [0, 0, 1]
+    np.save(tmp_path / "p.npy", [[0.5, 0.5, 2.0]])
+    study("sky", *told)
+    assert "see nothing" not in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize(
