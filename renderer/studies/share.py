@@ -130,12 +130,14 @@ def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
     arrays = mesh.vertices, mesh.faces
     with progress_bar(count, "point", asked.progress) as update:
         for first in range(0, count, _BLOCK):
-            order = first + order_along_curve(asked.places.points[first : first + _BLOCK])
+            order, steps = order_along_curve(asked.places.points[first : first + _BLOCK])
+            order = first + order
 
-            def look(begin: int, end: int, order: NDArray[np.int64] = order) -> Iterator[None]:
-                rows, state, memory = order[begin:end], (0, 0), make_sweep_memory(tree.depth)
+            def look(begin: int, end: int, way: tuple[NDArray[np.int64], ...] = (order, steps)) -> Iterator[None]:
+                rows, jumps = (part[begin:end] for part in way)
+                state, memory = (0, 0), make_sweep_memory(tree.depth)
                 while state[0] < len(rows):
-                    state = sweep(tree.words, arrays, asked.places, sky, answers, rows, state, memory)
+                    state = sweep(tree.words, arrays, asked.places, sky, answers, rows, jumps, state, memory)
                     yield
 
             size = min(_MOST, max(_LEAST, len(order) // (16 * asked.threads)))
