@@ -1,4 +1,4 @@
-"""Points that look in the 145 directions of Tregenza's sky over a city and a terrain: ours beside Open3D and embreex.
+"""Points that look in the 145 directions of Tregenza's sky over a city and a terrain: ours beside Open3D.
 
 ``python -m validation.benchmark.measures.studies`` prints both. Peers get their rays as arrays, as they ask for them;
 what a point's own plane hides is left out. Their rays start off the surface by an epsilon, ours by its own rule, so
@@ -54,16 +54,11 @@ def scene(form: str, faces: int, count: int) -> tuple[Any, Floats, Floats, NDArr
 
 def testers(mesh: Any, threads: int) -> dict[str, Test]:
     """The any-hit queries of the peers that are installed: rays (n, 6) float32 to bools."""
-    found: dict[str, Test] = {}
     try:
-        import open3d as o3d
-
-        tracer = o3d.t.geometry.RaycastingScene(nthreads=threads)
-        tracer.add_triangles(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
-        found["open3d"] = lambda rays: tracer.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
+        from validation.benchmark.peers.open3d import occlusion_test
     except ImportError:
-        pass
-    return found
+        return {}
+    return {"open3d": occlusion_test(mesh.vertices, mesh.faces, threads)}
 
 
 def ask_peer(
@@ -78,14 +73,16 @@ def ask_peer(
         rows = order[first : first + batch]
         start, up = (points[rows] + epsilon * normals[rows]).astype(np.float32), normals[rows] @ ways.T > 0.0
         seen = up.T if by_direction else up
-        at, toward = np.nonzero(seen)[:: -1 if by_direction else 1]
-        rays = np.empty((len(at), 6), np.float32)
-        rays[:, :3], rays[:, 3:] = start[at], single[toward]
+        rays = np.empty((*seen.shape, 6), np.float32)
+        rays[..., :3] = start if by_direction else start[:, None]
+        rays[..., 3:] = single[:, None] if by_direction else single
+        rays = rays[seen]
         called = time.perf_counter()
         hit = test(rays)
         bare += time.perf_counter() - called
-        hidden = ~up
-        hidden[at, toward] = hit
+        hidden = ~seen
+        hidden[seen] = hit
+        hidden = hidden.T if by_direction else hidden
         bits[rows] = np.packbits(hidden, axis=1)
     return bare, time.perf_counter() - began, bits
 
