@@ -307,10 +307,10 @@ def _trace(tree, work, rays, together):
 
 
 @kernel
-def _tile_from(steps, begin):
-    """The number of points of the tile that begins there: up to the longest step of the curve."""
-    count = smaller(np.int64(TILE), len(steps) - begin)
-    if begin + count == len(steps):
+def _tile_from(rows, steps, begin):
+    """The number of points of the tile that begins there: with steps given, up to the longest step of the curve."""
+    count = smaller(np.int64(TILE), len(rows) - begin)
+    if begin + count >= len(steps):
         return count
     longest, end = steps[begin + count], count
     for i in range(_LEAST_TILE, count):
@@ -323,17 +323,18 @@ def _tile_from(steps, begin):
 def sweep(words, mesh, places, sky, answers, rows, steps, state, memory):
     """Let the points in ``rows``, one tile after the other, look in all directions; some rays more with each call.
 
-    ``words`` are the tree's, ``mesh`` its vertices and faces. ``steps`` are those of the curve to the rows.
+    ``words`` are the tree's, ``mesh`` its vertices and faces. ``steps`` are those of the curve to the rows, none
+    where the points are too far apart for their rays to be traced together.
     ``state`` is (0, 0) in the first call, and later what the
     last one returned, with the same memory: the begin of the tile under way, and its next direction. All is done at
     (len(rows), 0).
     """
     tree, work = tree_pointers(words), _work_in(memory)
     begin, k = state
-    count = _tile_from(steps, begin)
+    count = _tile_from(rows, steps, begin)
     if k == 0:
         _begin_tile(mesh, places, rows, begin, count, work, tree.scale)
-    traced, parallel = np.int64(0), tree.has_nodes and not sky.turned and count >= _TOGETHER
+    traced, parallel = np.int64(0), len(steps) > 0 and tree.has_nodes and not sky.turned and count >= _TOGETHER
     while k < len(sky.values) and traced < RAYS_A_CALL:
         together = parallel and get(work.numbers, _LEFT) > 0
         listed, rays, most = np.int64(0), np.int64(0), count if together else np.int64(RAYS)

@@ -241,12 +241,12 @@ def test_bits_of_points_that_are_traced_together(mesh, seed, count, apart, leave
 @pytest.mark.parametrize("spread", [1e-3, 0.05, 1.0])
 def test_bits_over_many_small_faces(spread):
     """Tiles that share their way, fill more than one list of leaves, and give up, as their points are apart."""
-    height = np.random.default_rng(11).uniform(0.0, 0.02, (120, 120))
-    octree = Octree.from_mesh(heightfield_mesh(height, spacing=1.0 / 120))
+    height = np.random.default_rng(11).uniform(0.0, 0.06, (40, 40))
+    octree = Octree.from_mesh(heightfield_mesh(height, spacing=1.0 / 40))
     rng = np.random.default_rng(12)
-    points = np.column_stack([0.5 + spread * rng.uniform(-0.5, 0.5, (600, 2)), rng.uniform(0.0, 0.02, 600)])
+    points = np.column_stack([0.5 + spread * rng.uniform(-0.5, 0.5, (1600, 2)), rng.uniform(0.0, 0.06, 1600)])
     directions = tregenza().directions
     bits = occlusion(octree, points, [0, 0, 1], directions, packed=True)
-    expected = written_down(octree, points, np.tile([0.0, 0.0, 1.0], (600, 1)), directions)
+    expected = written_down(octree, points, np.tile([0.0, 0.0, 1.0], (1600, 1)), directions)
     np.testing.assert_array_equal(unpacked(bits, 145), expected)
     assert 0.1 < expected.mean() < 0.95
