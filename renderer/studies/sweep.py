@@ -213,22 +213,6 @@ def _start_of(mesh, places, work, i, d, unit):
     return leave_face(corners, row3(pointer(places.points), get(work.numbers, _ROW + i)), d, unit)
 
 
-@inlined
-def _mark(answers, work, k, i):
-    """Set the bit of direction ``k`` for point ``i``."""
-    row = get(work.numbers, _ROW + i)
-    answers.bits[row, k >> 3] |= np.uint8(0x80 >> (k & 7))
-
-
-@inlined
-def _note(answers, work, k, i, value, hides):
-    """Take down whether direction ``k``, worth ``value``, is hidden from point ``i``."""
-    if hides == answers.hidden:
-        put(work.points, _SUM + i, get(work.points, _SUM + i) + value)
-    if hides and len(answers.bits) > 0:
-        _mark(answers, work, k, i)
-
-
 @kernel
 def _aim(mesh, places, sky, work, begun, count, unit):
     """List a tile's ``count`` points with one direction more; ``begun`` are that, and the entries and rays so far.

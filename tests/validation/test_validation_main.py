@@ -109,14 +109,14 @@ class TestUserFiles:
         assert [name for name, fake in sections.items() if fake.jobs] == ["images"]
         left_out = metrics(tmp_path)["left_out"]
         assert left_out["hits"] == "no file was given by --mesh"
-        assert left_out.keys() == {"hits", "queries", "promises", "stability", "efficiency"}
+        assert left_out.keys() == {"hits", "queries", "studies", "promises", "stability", "efficiency"}
         page = (tmp_path / "index.html").read_text(encoding="utf-8")
         assert all(reason in page for reason in left_out.values())
 
     def test_scene_and_mesh(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
         assert command.main(["--scene", str(SCENE), "--mesh", str(MESH), "--output", str(tmp_path)]) == 0
         assert sections["hits"].jobs[0].meshes == (MESH,)
-        assert metrics(tmp_path)["left_out"].keys() == {"queries", "promises", "stability", "efficiency"}
+        assert metrics(tmp_path)["left_out"].keys() == {"queries", "studies", "promises", "stability", "efficiency"}
 
     @pytest.mark.parametrize(
         ("option", "text"), [("--scene", "camera = 3"), ("--mesh", "ply?"), ("--gate", "[hits]\nmagic = 1")]

@@ -48,7 +48,7 @@ def town(houses: int = 5, ground: int = 24) -> Mesh:
     for x, y in np.ndindex(houses, houses):
         low = np.array([x, y]) + rng.integers(-80, 80, 2) / 1024.0 - 0.25
         w, d, h = np.append(rng.integers(400, 620, 2), rng.integers(400, 2600)) / 1024.0
-        a, b = np.array([*low, 0.0]), np.array([*(low + (w, d)), h])
+        a, b = np.array([*low, 0.0]), np.array([*(low + np.array([w, d])), h])
         for corner, along, up in (
             (a, (w, 0, 0), (0, 0, h)), ((b[0], a[1], 0.0), (0, d, 0), (0, 0, h)),
             ((b[0], b[1], 0.0), (-w, 0, 0), (0, 0, h)), ((a[0], b[1], 0.0), (0, -d, 0), (0, 0, h)),
@@ -93,7 +93,9 @@ def slivers(faces: int = 400) -> Mesh:
 
 def bodies() -> dict[str, Mesh]:
     """The meshes on which every bit is judged."""
-    balls = [icosphere(3).vertices * r + c for r, c in ((1.0, (0, 0, 0)), (0.5, (1.2, 0.3, 0.9)), (0.7, (-1, 1.1, 0.2)))]
+    balls = [
+        icosphere(3).vertices * r + c for r, c in ((1.0, (0, 0, 0)), (0.5, (1.2, 0.3, 0.9)), (0.7, (-1, 1.1, 0.2)))
+    ]
     return {
         "town": town(),
         "terrain": terrain(),

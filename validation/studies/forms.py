@@ -20,8 +20,8 @@ _PLACES = 16
 # Tregenza's and Reinhart's patches, and numbers of a lattice.
 PATCHES = (145, 577)
 COUNTS = (64, 256, 1024, 4096, 16384, 65536)
-# Chance alone has -1/2. Points of a lattice that even, of which those along a boundary are right or wrong, have -3/4 for
-# a boundary as rough as chance; boundaries that run along its spiral do worse.
+# Chance alone has -1/2. Of an even lattice only the points along a boundary are right or wrong by chance, sqrt(n) of n,
+# which gives -3/4; boundaries that run along its spiral do worse.
 SLOPE = -0.6
 
 

@@ -34,7 +34,7 @@ UTM = np.array([691_008.0, 5_335_040.0, 519.0])
 
 
 def _within(mesh: Mesh) -> Floats:
-    """A point within each face, whose coordinates are exact where its corners' have 14 binary digits behind the point."""
+    """A point within each face, whose coordinates are exact where its corners' are whole multiples of 2^-14."""
     a, b, c = mesh.triangles.transpose(1, 0, 2)
     points: Floats = a + (b - a) / 4.0 + (c - a) / 4.0
     return points
@@ -172,7 +172,8 @@ def faces_that_an_eye_sees() -> Asked:
 def clouds_and_depths() -> Asked:
     """Distances of a scan and a depth map are those of exact hits, within 4 ulp of t, and none where none is."""
     mesh = bodies()["balls"]
-    octree, origin, ways = Octree.from_mesh(mesh), np.array([0.25, -4.0, 0.5]), fibonacci_sphere(600).directions
+    octree, origin = Octree.from_mesh(mesh), np.array([0.25, -4.0, 0.5])
+    ways = fibonacci_sphere(600).directions * np.linspace(0.25, 8.0, 600)[:, None]
     cloud = scan(octree, origin, ways)
     known = closest_hits(mesh.vertices, mesh.faces, np.tile(origin, (len(ways), 1)), ways)
     expected = np.array([float(hit.t) if hit else np.inf for hit in known]) * np.linalg.norm(ways, axis=1)

@@ -8,8 +8,9 @@ from validation.gates import Gate
 from validation.job import Job, Task
 from validation.studies import bits, forms, holds, picture
 
-# Points and directions of each mesh whose bits are judged.
-_QUICK, _FULL = (400, 145), (2_000, 577)
+# Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
+# faces are traced together.
+_QUICK, _FULL = (6_000, 64), (6_000, 577)
 JUDGES = ("closed forms", "Embree robust", "exact arithmetic")
 _BITS = "exact: of each bit on which Embree differs, and of a sample of the others, exact arithmetic says who is right"
 _BOUND = "the bound: as if every patch along the boundary were wrong by half of its weight, all to one side"
@@ -42,6 +43,7 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
           for row in held),
     ]  # fmt: skip
     record = {"forms": shares, "slopes": slopes, "bits": bit_rows, "holds": held, "picture": drawn,
+              "patches": list(forms.PATCHES),
               "costs": dict.fromkeys(JUDGES)}  # fmt: skip
     return record, gates
 
