@@ -49,8 +49,8 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
         raise MeshError(f"{path}: expected a suffix of {', '.join(_PARSERS)}, got {path.suffix!r}")
     try:
         content = read_whole(path)
-    except (OSError, ValueError) as error:  # ValueError: a null byte in the path
-        raise MeshError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    except OSError as error:
+        raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from error
     try:
         repairs: list[Repairs] | None = [] if repair else None
         mesh = parse_mesh(content, path.suffix.lower(), repairs)

@@ -213,7 +213,7 @@ def load_scene(path: str | Path) -> Scene:
         table = tomllib.loads(read_whole(path).decode("utf-8-sig"))
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, a null byte, too many digits
+    except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, too many digits
         raise SceneError(f"{path}: expected TOML, got a syntax error: {error}") from None
     return _checked(table, path)
 

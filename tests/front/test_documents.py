@@ -20,14 +20,14 @@ from validation.thresholds import HitLimits
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 DOCS = sorted((ROOT / "docs").glob("*.md"))
-PAGES = [README, *DOCS, ROOT / "reports" / "README.md"]
+PAGES = [README, *DOCS, ROOT / "reports" / "README.md", *sorted(ROOT.glob("[CS]*.md"))]
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
 # A line of a block to type, without its comment, and commands within a sentence or a table.
 TYPED = re.compile(r"^    (\S.*?)(?:\s+#.*)?$", re.MULTILINE)
 SAID = re.compile(r"`([^`\n]+)`")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 NAMED = re.compile(
-    r"(?<![\w/.-])((?:renderer|validation|tests|docs|scenes|reports|\.ci)/(?:[\w./-]*\w/?)?)(?:::(\w+))?"
+    r"(?<![\w/.-])((?:renderer|validation|tests|docs|scenes|reports|recipe|\.ci|\.github)/(?:[\w./-]*\w/?)?)(?:::(\w+))?"
 )
 HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
 # What commands write, and so may be absent.

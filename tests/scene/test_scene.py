@@ -334,7 +334,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     latin.write_bytes(b'x = "\xe9"')
     with pytest.raises(SceneError, match=re.escape(f"{latin}: expected TOML")):
         load_scene(str(latin))
-    with pytest.raises(SceneError, match="null byte"):
+    with pytest.raises(SceneError, match="cannot be read: embedded null byte"):
         load_scene("a\0b.toml")
 
 
