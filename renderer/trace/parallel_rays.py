@@ -218,7 +218,7 @@ def _list_leaves(tree, beam, limit, parallel, top):
 
 
 @inlined
-def _test_leaf(tree, prepared, meeting, leaf):
+def _test_listed_leaf(tree, prepared, meeting, leaf):
     """Test the rays in ``meeting`` against a leaf, which hides those it hits. Returns the bits of those in doubt."""
     doubtful = np.int64(0)
     while meeting != 0:
@@ -245,7 +245,7 @@ def _test_list(tree, prepared, parallel, listed, beam):
             bits &= bits - 1
             meeting = meet_box(parallel.nodes, octant, floats, 0) | (meet_box(parallel.nodes, octant, floats, 8) << 8)
             if meeting != 0:
-                doubtful |= _test_leaf(tree, prepared, meeting, np.int64(get(parallel.links, octant + CHILDREN)))
+                doubtful |= _test_listed_leaf(tree, prepared, meeting, np.int64(get(parallel.links, octant + CHILDREN)))
     return doubtful
 
 

@@ -70,7 +70,7 @@ def test_all_gates_hold(tmp_path: Path, sections: dict[str, Fake], capsys: pytes
     assert command.main(["--output", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     # Two steps and one gate a section.
-    assert [line[:7] for line in lines[:-1]] == [f"[{k:2}/12]" for k in range(1, 13)]
+    assert [line[:7] for line in lines[:-1]] == [f"[{k:2}/14]" for k in range(1, 15)]
     assert lines[-1].startswith("validation: PASS, 6 of 6 gates in ")
     assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 6, "failed": 0}
     assert ET.parse(tmp_path / "junit.xml").getroot().get("failures") == "0"

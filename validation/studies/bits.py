@@ -32,7 +32,7 @@ def check_bits(name: str, points: int, directions: int) -> dict[str, Any]:
     rows = np.sort(rng.choice(len(place.points), min(points, len(place.points)), replace=False))
     start, normal, face = place.points[rows], place.normals[rows], place.faces[rows]
     ways = fibonacci_sphere(directions).directions
-    packed = occlusion(Octree.from_mesh(mesh), start, normal, ways, leaving=face, packed=True)
+    packed: Any = occlusion(Octree.from_mesh(mesh), start, normal, ways, leaving=face, packed=True)
     ours = np.unpackbits(packed, axis=-1, count=directions).astype(np.bool_)
     height = normal @ ways.T
     point, way = np.nonzero(height > _LEVEL)

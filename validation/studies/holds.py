@@ -45,13 +45,17 @@ def _count(same: Any) -> Asked:
     return right.size, int((~right).sum())
 
 
+def _bits(octree: Octree, points: Floats, normals: Floats, *, leaving: NDArray[np.int64]) -> Any:
+    return occlusion(octree, points, normals, tregenza().directions, packed=True, leaving=leaving)
+
+
 def moved_to_utm() -> Asked:
     """Mesh and points moved by the same whole numbers have the same bits."""
     asked, wrong = 0, 0
     for mesh in (town(), terrain()):
         points, normals, faces = _within(mesh), mesh.face_normals(), np.arange(len(mesh.faces))
         near, far = Octree.from_mesh(mesh), Octree.from_mesh(Mesh(mesh.vertices + UTM, mesh.faces))
-        for study in (sky_view_factor, lambda *a, **k: occlusion(*a, tregenza().directions, packed=True, **k)):
+        for study in (sky_view_factor, _bits):
             here = study(near, points, normals, leaving=faces)
             there = study(far, points + UTM, normals, leaving=faces)
             number, bad = _count(here == there)
@@ -85,7 +89,8 @@ def no_light_through_touching_walls() -> Asked:
     for point in points:
         ways = np.concatenate([aims - point, fibonacci_sphere(200).directions])
         ways = ways[np.abs(ways).max(axis=1) > 0.0]
-        hidden = np.unpackbits(occlusion(octree, [point], None, ways, packed=True), axis=-1, count=len(ways))
+        packed: Any = occlusion(octree, [point], None, ways, packed=True)
+        hidden = np.unpackbits(packed, axis=-1, count=len(ways))
         asked, wrong = asked + hidden.size, wrong + int((hidden == 0).sum())
     return asked, wrong
 
@@ -144,7 +149,7 @@ def weights_and_distances_of_directions() -> Asked:
     directions are: a wall at x = 2 hides the two directions to it, and not beyond 1.
     """
     octree = Octree.from_mesh(box((2.0, -FAR, -FAR), (3.0, FAR, FAR)))
-    ways, weights = [[3, 0, 0], [-1, 0, 0], [0.25, 0, 0], [0, 0, 7]], [1.0, 2.0, 4.0, 8.0]
+    ways, weights = np.array([[3, 0, 0], [-1, 0, 0], [0.25, 0, 0], [0, 0, 7]]), [1.0, 2.0, 4.0, 8.0]
     points = [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0]]
     found = [
         occlusion(octree, points, None, ways, weights=weights),

@@ -6,7 +6,7 @@ from typing import Any
 
 from validation.gates import Gate
 from validation.job import Job, Task
-from validation.studies import bits, forms, holds, picture
+from validation.studies import bits, bodies, forms, holds, picture
 
 # Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
 # faces are traced together.
@@ -29,7 +29,7 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     found = iter(job.each(_tasks(job)))
     shares = [next(found) for _ in forms.forms()]
     slopes = next(found)["curves"]
-    bit_rows = [next(found) for _ in bits.bodies()]
+    bit_rows = [next(found) for _ in bodies.bodies()]
     held = [next(found) for _ in holds.CHECKS]
     drawn = next(found)
     gates = [
@@ -55,7 +55,7 @@ def _tasks(job: Job) -> list[Task]:
           for index, (form, _) in enumerate(forms.forms())),
         Task("studies: error against directions", partial(forms.check_slope, job.quick)),
         *(Task(f"studies: bits of {name}", partial(bits.check_bits, name, points, directions))
-          for name in bits.bodies()),
+          for name in bodies.bodies()),
         *(Task(f"studies: {name}", partial(holds.check, name)) for name in holds.CHECKS),
         Task("studies: picture", partial(picture.write, Path(job.folder) / PICTURE)),
     ]  # fmt: skip
