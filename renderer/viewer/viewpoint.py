@@ -41,7 +41,8 @@ def seen_from(camera: Camera, bounds: ArrayLike) -> tuple[float, float, float]:
     """
     if isinstance(camera, PerspectiveCamera):
         return camera.eye
-    middle, size = np.mean(bounds, axis=0), float(np.ptp(bounds, axis=0).max())
+    corners = np.asarray(bounds, np.float64)
+    middle, size = corners.mean(axis=0), float(np.ptp(corners, axis=0).max())
     away = size + float(np.abs(np.subtract(camera.eye, middle)).max())
     return _vector(middle - _FAR * away * camera.frame()[2])
 

@@ -9,9 +9,9 @@ const MAX_PIXEL_RATIO = 2;
 
 // How graphics without a graphics processor call themselves.
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
-// The most boxes that are drawn at a time. A processor draws some two hundred a millisecond, and a picture of the
-// overlay should take it a tenth of a second; a graphics processor draws fifty times as many.
-const BOXES = { software: 2000, hardware: 100000 };
+// The most boxes that are drawn at a time. Two cores draw one to three a millisecond, so that a picture takes them less
+// than a second; a graphics processor is bounded by the memory of their lines and panes, 46 MB.
+const BOXES = { software: 1000, hardware: 100000 };
 
 // What the veil darkens towards, as sRGB.
 const NIGHT = [0.03, 0.06, 0.13];

@@ -25,7 +25,7 @@ export class Panel {
   load(scene) {
     this.scene = scene;
     const { fields } = this;
-    fields.file.replaceChildren(...scene.files.map((f) => element("option", { value: f, textContent: f })));
+    fields.file.replaceChildren(...scene.files.map((f) => element("option", { value: f, textContent: f.replace(/\.toml$/, "") })));
     fields.file.value = scene.name;
     fields.max_depth.value = Math.min(scene.render.max_depth, fields.max_depth.max);
     this.offerSamples(scene.render.samples);
