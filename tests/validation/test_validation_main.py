@@ -71,10 +71,10 @@ def test_all_gates_hold(tmp_path: Path, sections: dict[str, Fake], capsys: pytes
     lines = capsys.readouterr().out.splitlines()
     # Two steps and one gate a section.
     assert [line[:7] for line in lines[:-1]] == [f"[{k:2}/14]" for k in range(1, 15)]
-    assert lines[-1].startswith("validation: PASS, 6 of 6 gates in ")
-    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 6, "failed": 0}
+    assert lines[-1].startswith("validation: PASS, 7 of 7 gates in ")
+    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 7, "failed": 0}
     assert ET.parse(tmp_path / "junit.xml").getroot().get("failures") == "0"
-    assert "6 of 6 gates hold" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "7 of 7 gates hold" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
