@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from renderer.octree import Octree
 from renderer.points.curve import order_along_curve
 from renderer.process import child
+from renderer.process.parallel import available_threads
 from renderer.studies import occlusion, tregenza
 from renderer.studies.directions import turned
 from validation.benchmark.measures.forms import FORMS
@@ -37,6 +38,15 @@ _RUNS = 5
 _EPSILON = 1e-4
 # Rays that are written down, for the rate of ``Octree.any_hit``.
 _WRITTEN = 16_000
+# The kinds of mesh that studies are made for; their faces, and as many points, in full and in quick runs.
+KINDS = ("city", "terrain")
+SIZE, QUICK_SIZE = 1_000_000, 50_000
+
+
+def run(quick: bool, step: Callable[[str], None]) -> list[dict[str, Any]]:
+    """The rows of the benchmark, on all threads."""
+    size = QUICK_SIZE if quick else SIZE
+    return [measure(kind, size, size, available_threads(), step) for kind in KINDS]
 
 
 def scene(form: str, faces: int, count: int) -> tuple[Any, Floats, Floats, NDArray[np.int64], Floats]:
@@ -186,9 +196,9 @@ def text(row: dict[str, Any]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m validation.benchmark.measures.studies", description=__doc__)
-    parser.add_argument("--mesh", nargs="+", choices=sorted(FORMS), default=["city", "terrain"])
-    parser.add_argument("--faces", type=int, default=1_000_000)
-    parser.add_argument("--points", type=int, default=1_000_000)
+    parser.add_argument("--mesh", nargs="+", choices=sorted(FORMS), default=list(KINDS))
+    parser.add_argument("--faces", type=int, default=SIZE)
+    parser.add_argument("--points", type=int, default=SIZE)
     parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args(arguments)
     for form in options.mesh:

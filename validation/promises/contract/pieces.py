@@ -1,5 +1,5 @@
-"""The public contract, piece by piece: the docstrings of what ``renderer`` and its studies export, the fields of scenes,
-and the help of the commands.
+"""The public contract, piece by piece: the docstrings of what ``renderer`` and its studies export, the fields of
+scenes, and the help of the commands.
 """
 
 import argparse
