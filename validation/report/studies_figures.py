@@ -10,7 +10,7 @@ def figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
     """A figure with a title (also its caption) and an ``<svg>`` element."""
     curves, patches = record["slopes"], record["patches"]
     series = [Series(f"{c['subject']}, lattice, N^{c['slope']:.2f}", c["counts"], c["rms"]) for c in curves]
-    series += [Series(f"{c['subject']}, Tregenza and Reinhart", patches, c["patches"]) for c in curves]
+    series += [Series(f"{c['subject']}, patches", patches, c["patches"]) for c in curves]
     first = curves[0]
     chance = [first["rms"][0] * (n / first["counts"][0]) ** -0.5 for n in first["counts"]]
     series.append(Series("as by chance, N^-0.50", first["counts"], chance, PLAIN))

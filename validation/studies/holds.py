@@ -145,7 +145,7 @@ def hours_behind_walls() -> Asked:
 
 
 def weights_and_distances_of_directions() -> Asked:
-    """A share is the sum of hidden weights over that of all; ``distance`` is in units of the scene, however long the
+    """A share is the sum of hidden weights over that of all; a distance is in units of the scene, however long the
     directions are: a wall at x = 2 hides the two directions to it, and not beyond 1.
     """
     octree = Octree.from_mesh(box((2.0, -FAR, -FAR), (3.0, FAR, FAR)))
