@@ -2,7 +2,7 @@
 
 ``python -m validation.benchmark.measures.studies`` prints both. Peers get their rays as arrays, as they ask for them;
 what a point's own plane hides is left out. Their rays start off the surface by an epsilon, ours by its own rule, so
-some bits differ. Memory is measured in processes of their own.
+some bits differ. Memory is measured in processes of their own. Ours has the tree of ``octree-render study``.
 """
 
 import argparse
@@ -23,6 +23,7 @@ from renderer.process import child
 from renderer.process.parallel import available_threads
 from renderer.studies import occlusion, tregenza
 from renderer.studies.directions import turned
+from renderer.study_command import SPLIT
 from validation.benchmark.measures.forms import FORMS
 from validation.benchmark.measures.memory import most_resident, resident
 
@@ -101,7 +102,7 @@ def measure(form: str, faces: int, count: int, threads: int, step: Callable[[str
     """One row: seconds of ours (the median) and of each peer (its best way), differing bits, rates and memory."""
     mesh, points, normals, on, ways = scene(form, faces, count)
     step(f"{form}: octree")
-    octree, name = Octree.from_mesh(mesh), f"{form}, {len(mesh.faces)} faces"
+    octree, name = Octree.from_mesh(mesh, split=SPLIT), f"{form}, {len(mesh.faces)} faces"
 
     def ours() -> NDArray[Any]:
         return occlusion(octree, points, normals, ways, leaving=on, packed=True, threads=threads)
@@ -166,7 +167,7 @@ def memory(form: str, faces: int, count: int, threads: int) -> int:
 def grow(form: str, faces: str, count: str, threads: str) -> None:
     """Entry point of the child process of ``memory``: print the bytes."""
     mesh, points, normals, on, ways = scene(form, int(faces), int(count))
-    octree = Octree.from_mesh(mesh)
+    octree = Octree.from_mesh(mesh, split=SPLIT)
     occlusion(octree, points[:2000], normals[:2000], ways, leaving=on[:2000], packed=True, threads=int(threads))
     before = resident()
     occlusion(octree, points, normals, ways, leaving=on, packed=True, threads=int(threads))
