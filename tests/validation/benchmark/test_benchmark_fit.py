@@ -105,9 +105,9 @@ def _record() -> dict[str, Any]:
             {"rays": 10, "median": {"ours": 5.0, "embree": 4.0}, "ratios": {"embree": 0.75}},
         ],
         "studies": [
-            {"mesh": "city", "rays": 80, "seconds": 2.0, "written": 20.0, "memory": 5, "array": 100,
+            {"mesh": "city", "rays": 80, "seconds": 2.0, "shadow": 20.0, "memory": 5, "array": 100,
              "peers": {"open3d": {"whole": 4.0}}},
-            {"mesh": "terrain", "rays": 90, "seconds": 3.0, "written": 60.0, "memory": 20, "array": 100,
+            {"mesh": "terrain", "rays": 90, "seconds": 3.0, "shadow": 60.0, "memory": 20, "array": 100,
              "peers": {"open3d": {"whole": 12.0}}},
         ],
         "frames": {"size": 512, "ratios": {frames.LISTS: 1.5}},
@@ -170,7 +170,7 @@ def test_studies_take_the_worst_mesh(targets: dict[str, dict[str, Any]]) -> None
     assert (beside["measured"], beside["where"], beside["met"], beside["aimed"]) == (2.0, "city", True, False)
     memory = targets[f"{name}, memory, of rays that are written down"]
     assert (memory["measured"], memory["where"], memory["met"]) == (0.2, "terrain", False)
-    rate = targets[f"{name}, rays a second of any_hit, of rays that are written down"]
+    rate = targets[f"{name}, rays a second, of shadow rays of a picture"]
     assert (rate["measured"], rate["where"], rate["met"]) == (0.5, "terrain", False)
 
 

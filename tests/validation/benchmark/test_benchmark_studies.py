@@ -32,7 +32,13 @@ def test_a_row_and_its_lines():
     steps = []
     row = measure("city", 2_000, 300, 2, steps.append)
     assert row["points"] == 300 and row["directions"] == 145 and 0 < row["rays"] < 300 * 145
-    assert row["seconds"] > 0.0 and row["written"] > 0.0 and row["array"] == 24 * 300 * 145 and row["memory"] >= 0
+    assert (
+        row["seconds"] > 0.0
+        and row["written"] > 0.0
+        and row["shadow"] > 0.0
+        and row["array"] == 24 * 300 * 145
+        and row["memory"] >= 0
+    )
     assert steps[0] == "city: octree" and steps[-1] == "city: memory"
     for peer in row["peers"].values():
         assert peer["bare"] > 0.0 and peer["differing"] < 0.01 * row["rays"]

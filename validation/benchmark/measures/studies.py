@@ -24,6 +24,7 @@ from renderer.process.parallel import available_threads
 from renderer.studies import occlusion, tregenza
 from renderer.studies.directions import turned
 from renderer.study_command import SPLIT
+from validation.benchmark.measures.families import families
 from validation.benchmark.measures.forms import FORMS
 from validation.benchmark.measures.memory import most_resident, resident
 
@@ -102,7 +103,7 @@ def measure(form: str, faces: int, count: int, threads: int, step: Callable[[str
     """One row: seconds of ours (the median) and of each peer (its best way), differing bits, rates and memory."""
     mesh, points, normals, on, ways = scene(form, faces, count)
     step(f"{form}: octree")
-    octree, name = Octree.from_mesh(mesh, split=SPLIT), f"{form}, {len(mesh.faces)} faces"
+    octree, name = Octree.from_mesh(mesh, split=SPLIT, threads=threads), f"{form}, {len(mesh.faces)} faces"
 
     def ours() -> NDArray[Any]:
         return occlusion(octree, points, normals, ways, leaving=on, packed=True, threads=threads)
@@ -136,7 +137,7 @@ def measure(form: str, faces: int, count: int, threads: int, step: Callable[[str
     return {
         "mesh": name, "points": count, "directions": len(ways), "rays": live, "threads": threads,
         "seconds": statistics.median(times), "peers": peers,
-        "written": written(octree, (points, normals, ways), on),
+        "written": written(octree, (points, normals, ways), on), "shadow": shadow(octree, count),
         "memory": memory(form, faces, count, threads), "array": 24 * count * len(ways),
     }  # fmt: skip
 
@@ -155,6 +156,17 @@ def written(octree: Octree, where: tuple[Floats, Floats, Floats], on: NDArray[np
         octree.any_hit(starts, toward, leaving=leaving)
         times.append(time.perf_counter() - began)
     return len(rows) / statistics.median(times)
+
+
+def shadow(octree: Octree, count: int) -> float:
+    """Shadow rays a second, of as many as points: from what a camera sees to one light, in the order of pixels."""
+    family = families(octree, count)[1]
+    times = []
+    for _ in range(1 + _RUNS):
+        began = time.perf_counter()
+        octree.any_hit(family.origins, family.directions, t_max=family.t_max)
+        times.append(time.perf_counter() - began)
+    return count / statistics.median(times[1:])
 
 
 def memory(form: str, faces: int, count: int, threads: int) -> int:
@@ -181,7 +193,8 @@ def text(row: dict[str, Any]) -> str:
         f"{row['mesh']}: {row['points']} points, {row['directions']} directions, {row['rays']} rays above horizons, "
         f"{row['threads']} threads",
         f"  ours {row['seconds']:.2f} s, {rate / 1e6:.1f} million rays/s, {rate / row['written']:.2f} times any_hit's "
-        f"{row['written'] / 1e6:.1f} with rays written down; "
+        f"{row['written'] / 1e6:.1f} with rays written down, {rate / row['shadow']:.2f} times the "
+        f"{row['shadow'] / 1e6:.1f} of shadow rays; "
         f"{row['memory'] / 1e6:.0f} MB, {row['memory'] / row['array']:.3f} of an array of all rays",
     ]
     for label, peer in row["peers"].items():

@@ -27,8 +27,8 @@ fits[]            family, query, contender, and a, b, residual of ns = a log2 N 
 drop_in[]         call, faces, rays; seconds a ray by contender (all runs), ratios: theirs over the drop-in's
 calls[]           rays; micros a call by contender (all runs), median; ratios by peer: its time over ours with all
                   threads, and over ours_one_thread where it has one
-studies[]         mesh, points, directions, rays (those above horizons), threads, seconds; written: rays a second of
-                  any_hit; memory, array: bytes that it takes, and that all rays would; see ``measures.studies``
+studies[]         mesh, points, directions, rays (those above horizons), threads, seconds; written, shadow: rays a
+                  second of any_hit; memory, array: bytes that it takes, and that all rays would
   peers           by name: bare (seconds of its calls), whole, batch, by_direction, differing bits
 builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint; ratios_refit: the build
                   of each peer over our refit
