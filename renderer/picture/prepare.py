@@ -63,7 +63,8 @@ class PreparedScene:
         band: tuple[int, int] | None = None,
     ) -> Image:
         """The picture that ``camera`` takes, by checked settings; see ``render``. Of a ``band`` of rows, first and
-        end, only these: with the bits that they have in the whole picture, and in the memory of their own pixels.
+        end, only these: with the bits that they have in the whole picture, and in little more memory than their own
+        pixels take.
 
         ``finished(tiles)`` is called after each tile, and with 0 at least every 16,384 rays of a long one, shadow rays
         not counted, by one thread at a time. What it raises stops the others and is raised here.

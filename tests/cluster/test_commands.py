@@ -1,5 +1,7 @@
 """``--cluster`` by the command line: the same files, and one line for what is wrong."""
 
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -64,3 +66,12 @@ def test_parts_of_another_picture_are_refused_and_kept(tmp_path: Path, capsys: p
     told = capsys.readouterr().err
     assert "a.npy.parts: expected the parts of this run, got those of another" in told and told.count("\n") == 1
     assert [path.name for path in folder.iterdir()] == ["manifest.json"]
+
+
+def test_a_picture_without_a_cluster_imports_no_dask(tmp_path: Path) -> None:
+    program = (
+        "import sys\nfrom renderer.cli import main\n"
+        f"code = main({[*PICTURE, '-o', str(tmp_path / 'a.npy'), '--quiet']!r})\n"
+        "sys.exit(code or ('dask' in sys.modules or 'distributed' in sys.modules) * 9)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
