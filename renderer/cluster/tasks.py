@@ -113,10 +113,13 @@ class _Crew:
         self._forget()
 
     def dismiss(self) -> None:
-        """Cancel what is under way."""
-        with suppress(Exception):  # of a client or scheduler that is gone
-            if self._client.status == "running":
-                self._client.cancel(list(self.under_way), force=True)
+        """Let go of what is under way and of what was sent, which Dask then cancels and drops.
+
+        An error's traceback may hold it for longer, so it is released by name.
+        """
+        for future in [*self.under_way, *self._sent.values()]:
+            with suppress(Exception):  # of a client that is closed
+                future.release()
         self.under_way.clear()
         self._sent.clear()
 

@@ -44,6 +44,23 @@ if __name__ == "__main__":
     sys.exit(main())
 """
 
+# The command with small parts, whose workers are killed once, when the second part is there.
+KILLING = """
+import multiprocessing, sys
+from renderer.runs import parts, pictures
+if __name__ == "__main__":
+    pictures.RAYS, own, killed = 80 * 16 * 8, parts.Parts.write, []
+    def write(self, *part):
+        own(self, *part)
+        if not killed and len(list(self.folder.glob("*.part"))) >= 2:
+            killed.extend(multiprocessing.active_children())
+            for worker in killed: worker.kill()
+            print("killed", len(killed))
+    parts.Parts.write = write
+    from renderer.cli import main
+    sys.exit(main())
+"""
+
 
 @pytest.fixture(scope="module")
 def glass() -> Scene:
@@ -99,20 +116,16 @@ def test_a_command_that_is_killed_twice_ends_with_the_bytes_of_one_that_was_not(
     assert {path.name for path in tmp_path.iterdir()} == {"a.npy", "b.npy", "command.py"}
 
 
-def test_the_only_worker_is_killed_and_the_scene_is_sent_again(glass: Scene, tmp_path: Path) -> None:
-    """What the worker was sent dies with it, and Dask has no other copy."""
-    folder, asked, killed = tmp_path / "parts", list[str](), list[int]()
-    with connected(workers=1) as client:
-
-        def kill(name: str) -> None:
-            asked.append(name)
-            if not killed and len(list(folder.glob("*.part"))) >= 2:
-                killed.extend(client.run(os.getpid).values())
-                os.kill(killed[0], signal.SIGKILL)
-
-        run = render_on(Watched(client, kill), glass, folder, band=4, **GLASS)
-    assert len(killed) == 1 and asked.count("scatter") == 2
-    assert run.image().radiance.tobytes() == render(glass, **GLASS).radiance.tobytes()
+def test_the_only_worker_is_killed_and_nothing_is_said(tmp_path: Path) -> None:
+    """What the worker was sent dies with it: it is sent again, and no log of Dask's stands on the terminal."""
+    (tmp_path / "command.py").write_text(KILLING)
+    command = ["render", "scenes/glass.toml", "--resolution", "80x60", "--samples", "16", "-o"]
+    told = [*command, str(tmp_path / "a.npy"), "--cluster", "--threads", "1"]
+    with process(str(tmp_path / "command.py"), *told, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
+        said, wrong = child.communicate(timeout=PATIENCE)
+    assert child.returncode == 0 and wrong == "" and "killed 1" in said
+    assert main([*command, str(tmp_path / "b.npy"), "--quiet"]) == 0
+    assert (tmp_path / "a.npy").read_bytes() == (tmp_path / "b.npy").read_bytes()
 
 
 @contextmanager

@@ -1,5 +1,7 @@
 """Pictures and animations on a cluster have the bits of those on this machine, also when a run goes on."""
 
+import time
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +56,12 @@ def test_a_picture_goes_on_where_it_was_stopped(client: Any, glass: Scene, tmp_p
         if name == "submit" and len(list(folder.glob("*.part"))) >= 2:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as stopped:
         render_on(Watched(client, stop), glass, folder, band=4, **OPTIONS)
+    end = time.monotonic() + 60.0
+    while any(str(key).startswith("SentScene") for key in client.futures):  # while somebody looks at the error
+        assert time.monotonic() < end and stopped.value
+        time.sleep(0.01)
     kept = {path: path.stat().st_mtime_ns for path in folder.glob("*.part")}
     asked: list[str] = []
     image = render_on(Watched(client, asked.append), glass, folder, band=4, **OPTIONS).image()
@@ -67,17 +73,34 @@ def test_a_picture_goes_on_where_it_was_stopped(client: Any, glass: Scene, tmp_p
     assert again == []
 
 
-def test_frames_that_differ_in_the_camera_share_what_is_sent(client: Any, glass: Scene, tmp_path: Path) -> None:
+def test_frames_that_differ_in_the_camera_share_what_is_sent(
+    client: Any, glass: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pictures, digests = import_module("renderer.cluster.pictures"), list[str]()
+    own = pictures.digest_of_scene
+    monkeypatch.setattr(pictures, "digest_of_scene", lambda *of: digests.append(own(*of)) or digests[-1])
     dimmed = glass.altered(ambient=(0.0, 0.0, 0.0))
     scenes = [s.altered(camera=camera_at(x)) for s, x in ((glass, -3.0), (glass, 0.0), (glass, 3.0), (dimmed, 3.0))]
     outputs = [tmp_path / f"{number}.npy" for number in range(4)]
     asked: list[str] = []
     frames_on(Watched(client, asked.append), iter(scenes), outputs, tmp_path / "frames", band=16, **OPTIONS)
-    assert asked.count("scatter") == 2 and asked.count("submit") == 4 * 3
+    assert asked.count("scatter") == 2 and asked.count("submit") == 4 * 3 and len(digests) == 2
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0.npy", "1.npy", "2.npy", "3.npy"]
     for scene, output in zip(scenes, outputs, strict=True):
         render(scene, **OPTIONS).save(tmp_path / "expected.npy")
         assert output.read_bytes() == (tmp_path / "expected.npy").read_bytes()
+
+
+def test_scenes_of_frames_that_are_done_are_dropped(client: Any, glass: Scene, tmp_path: Path) -> None:
+    """Of animations whose scenes all differ: four tasks are under way, so at most four scenes, and the one before."""
+    scenes = [glass.altered(ambient=(0.0, 0.0, x / 16.0)) for x in range(12)]
+    outputs, held = [tmp_path / f"{number}.npy" for number in range(12)], list[int]()
+
+    def count(name: str) -> None:
+        held.append(sum(str(key).startswith("SentScene") for key in client.futures))
+
+    frames_on(Watched(client, count), scenes, outputs, tmp_path / "frames", resolution=(8, 8))
+    assert 1 <= max(held) <= 5
 
 
 def test_frames_go_on_where_they_were_stopped(client: Any, glass: Scene, tmp_path: Path) -> None:
