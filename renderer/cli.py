@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from renderer import __version__
+from renderer.cluster_command import add_cluster, render_on_cluster
 from renderer.errors import expect
 from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS
 from renderer.process.interrupt import interruptible
@@ -117,6 +118,7 @@ def make_parser() -> argparse.ArgumentParser:
     render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto")
     render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help="how the octree is cut")
     render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
+    add_cluster(render)
     render.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
     render.set_defaults(command=_render)
     info = commands.add_parser("info", help="say what a scene holds and what its octree looks like")
@@ -173,32 +175,38 @@ def _render(options: argparse.Namespace) -> None:
     scene = load_scene(options.scene)
     _check_output_is_no_input(options, scene)
     _scene_to_write(options)
-    compile_in_two()
-    warnings.simplefilter("ignore", CutWarning)  # reported below, on one line
-    image = render(
-        scene,
-        resolution=options.resolution,
-        samples=options.samples,
-        max_depth=options.max_depth,
-        min_weight=options.min_weight,
-        max_rays=options.max_rays,
-        accelerator=options.accelerator,
-        split=options.split,
-        planes=PLANES if options.output.suffix.lower() == ".exr" else ("rays",),
-        threads=options.threads,
-        progress=not options.quiet,
-    )
-    _save(image, options.output)
+    asked: dict[str, Any] = {
+        "resolution": options.resolution,
+        "samples": options.samples,
+        "max_depth": options.max_depth,
+        "min_weight": options.min_weight,
+        "max_rays": options.max_rays,
+        "accelerator": options.accelerator,
+        "split": options.split,
+        "planes": PLANES if options.output.suffix.lower() == ".exr" else ("rays",),
+    }
+    if options.cluster is None:
+        compile_in_two()
+        warnings.simplefilter("ignore", CutWarning)  # reported below, on one line
+        image = render(scene, **asked, threads=options.threads, progress=not options.quiet)
+        _save(image, options.output)
+    else:
+        run, image = render_on_cluster(scene, asked, options)
+        image.save(options.output)
+        # Only now, so that a file that cannot be written costs no picture.
+        run.remove()
     if image.cut:
         print(f"octree-render: {image.cut_message(options.max_rays or scene.render.max_rays)}", file=sys.stderr)
     if not options.quiet:
         height, width = image.rays.shape
         rays = int(image.rays.sum())
-        say(
-            f"{options.output}: {width} x {height}, {rays} rays in {image.render_seconds:.2f} s "
-            f"({rays / image.render_seconds / 1e6:.1f} million a second), scene ready in "
-            f"{image.build_seconds:.2f} s"
+        # On a cluster a run may have found parts of an earlier one, and workers built their trees meanwhile.
+        speed = (
+            f"({rays / image.render_seconds / 1e6:.1f} million a second), scene ready in {image.build_seconds:.2f} s"
+            if options.cluster is None
+            else "on the cluster"
         )
+        say(f"{options.output}: {width} x {height}, {rays} rays in {image.render_seconds:.2f} s {speed}")
 
 
 def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:

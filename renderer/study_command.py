@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
+from renderer.cluster_command import add_cluster, on_cluster
 from renderer.errors import expect
 from renderer.process.terminal import say
 
@@ -43,7 +44,7 @@ def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> No
     study.add_argument("--distance", type=float, default=float("inf"), metavar="D", help="how far the mesh hides")
     study.add_argument("--camera", type=Path, metavar="SCENE", help="of a .png: a scene file whose camera it takes")
     study.add_argument("--resolution", type=resolution, default=(960, 720), metavar="WxH", help="of a .png")
-    study.add_argument("--cluster", metavar="ADDRESS", help="a Dask scheduler's, or local: a worker a processor")
+    add_cluster(study)
     study.add_argument("--threads", type=int, metavar="N", help="default: all processors")
     study.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
     study.set_defaults(command=_study)
@@ -91,10 +92,9 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
     folder, progress = folder_of(options.output[0]), not options.quiet
     if options.cluster is None:
         return run(octree, study, points, folder, progress=progress)
-    from renderer.cluster import connected, run_on
+    from renderer.cluster import run_on
 
-    local = options.cluster == "local"
-    with connected(None if local else options.cluster, workers=options.threads if local else None) as client:
+    with on_cluster(options) as client:
         return run_on(client, octree, study, points, folder, split=SPLIT, progress=progress)
 
 

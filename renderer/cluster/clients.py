@@ -32,7 +32,13 @@ def connected(address: str | None = None, *, workers: int | None = None) -> Iter
         return
     count = checked_threads(workers)
     with (
-        LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster,
+        LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            preload=["renderer.cluster.local_worker"],
+        ) as cluster,
         Client(cluster) as client,
     ):
         yield client

@@ -1,8 +1,9 @@
-"""What a worker keeps: the meshes that it was sent, with their trees, which it builds once each."""
+"""What a worker keeps: the meshes and scenes that it was sent, with their trees, which it builds once each."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -10,10 +11,14 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from renderer.picture.prepare import PreparedScene, prepare_scene
+from renderer.runs.pictures import Picture
+from renderer.scene.needs import Needs
+from renderer.scene.scene import Scene
 
-# The trees of a worker, by the digests of their meshes; the latest ones, because a worker serves many runs.
+# The trees of a worker, by the digests of what they are over; the latest ones, because a worker serves many runs.
 _MOST = 2
-_TREES: dict[str, Octree] = {}
+_TREES: dict[str, Any] = {}
 _LOCK = threading.Lock()
 
 
@@ -30,18 +35,53 @@ class SentMesh(NamedTuple):
 
         Other threads that need it wait.
         """
-        key = f"{self.digest} {self.split}"
-        with _LOCK:
-            if key not in _TREES:
-                while len(_TREES) >= _MOST:
-                    del _TREES[next(iter(_TREES))]
-                # Arrays that came over the wire cannot be written, which kernels would be compiled anew for.
-                mesh = Mesh(np.array(self.vertices), np.array(self.faces))
-                _TREES[key] = Octree.from_mesh(mesh, split=self.split, threads=1)
-            return _TREES[key]
+
+        def build() -> Octree:
+            # Arrays that came over the wire cannot be written, which kernels would be compiled anew for.
+            mesh = Mesh(np.array(self.vertices), np.array(self.faces))
+            return Octree.from_mesh(mesh, split=self.split, threads=1)
+
+        octree: Octree = _kept(f"{self.digest} {self.split}", build)
+        return octree
+
+
+class SentScene(NamedTuple):
+    """A scene as it travels: its digest, itself with its meshes in the world, what is to be ready, and its tree's kind.
+
+    ``digest`` is that of ``renderer.runs.pictures.digest_of_scene``, and the rest as ``renderer.render`` has it.
+    """
+
+    digest: str
+    scene: Scene
+    needs: Needs
+    accelerator: str
+    split: Literal["midpoint", "sah"]
+
+    def prepared(self) -> PreparedScene:
+        """The scene made ready, from this process's own or now. Other threads that need it wait."""
+
+        def prepare() -> PreparedScene:
+            return prepare_scene(self.scene, self.needs, self.accelerator, self.split, threads=1)
+
+        prepared: PreparedScene = _kept(f"{self.digest} {self.needs} {self.accelerator} {self.split}", prepare)
+        return prepared
+
+
+def _kept(key: str, make: Callable[[], Any]) -> Any:
+    with _LOCK:
+        if key not in _TREES:
+            while len(_TREES) >= _MOST:
+                del _TREES[next(iter(_TREES))]
+            _TREES[key] = make()
+        return _TREES[key]
 
 
 def answer_part(mesh: SentMesh, study: Any, points: Any) -> NDArray[np.float64]:
     """The answers to a study's part; a task."""
     answers: NDArray[np.float64] = study.answer(mesh.octree(), points, threads=1)
     return answers
+
+
+def render_rows(scene: SentScene, picture: Picture, begin: int, end: int) -> NDArray[np.uint8]:
+    """Some rows of a picture; a task."""
+    return picture.rows(scene.prepared(), begin, end, threads=1)

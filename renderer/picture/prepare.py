@@ -60,22 +60,26 @@ class PreparedScene:
         threads: int,
         finished: Callable[[int], object] | None = None,
         planes: Collection[str] = PLANES,
+        band: tuple[int, int] | None = None,
     ) -> Image:
-        """The picture that ``camera`` takes, by checked settings; see ``render``.
+        """The picture that ``camera`` takes, by checked settings; see ``render``. Of a ``band`` of rows, first and
+        end, only these: with the bits that they have in the whole picture, and in little more memory than their own
+        pixels take.
 
         ``finished(tiles)`` is called after each tile, and with 0 at least every 16,384 rays of a long one, shadow rays
         not counted, by one thread at a time. What it raises stops the others and is raised here.
         """
         clock = Stopwatch()
         width, height = chosen.resolution
+        first_row, end_row = (0, height) if band is None else band
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
         settings, arrays = kernel_settings_of(self.needs, chosen, offset), self.arrays
         if self.needs.refraction and camera is not self.scene.camera:
             arrays = arrays._replace(media=media_around(self.scene, camera))
-        across, cut = -(-width // TILE), np.zeros(tiles(chosen.resolution), np.int64)
+        across, cut = -(-width // TILE), np.zeros(tiles((width, end_row - first_row)), np.int64)
 
         def render_in(film: Film, first: int) -> Iterator[None]:
-            x, y = first % across * TILE, first // across * TILE
+            x, y = first % across * TILE, first_row + first // across * TILE
             tall, wide = film.radiance.shape[:2]
             tile = (x, y, min(x + TILE, wide), min(y + TILE, tall))
             memory = tile_memory(self.tree.depth, settings, _bundles_in_a_row(self.tree))
@@ -86,8 +90,9 @@ class PreparedScene:
         # The kernel is loaded before the picture takes its memory: without any left, LLVM ends the process.
         for _ in render_in(_film(1, 0, planes), 0):
             pass
-        film = _film(width, height, planes)
+        film = _film(width, end_row, planes, first_row)
         for_chunks(lambda first, _end: render_in(film, first), len(cut), 1, threads, finished)
+        film = _film_from(first_row, film)
         return Image(*film, build_seconds=self.build_seconds, render_seconds=clock.seconds(), cut=int(cut.sum()))
 
 
@@ -154,12 +159,22 @@ def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: OffsetRule)
     return Settings(bounces, chosen.min_weight, offset, media, chosen.shadows, chosen.max_rays)
 
 
-def _film(width: int, height: int, planes: Collection[str]) -> Film:
+def _film_from(row: int, film: Film) -> Film:
+    """The film without the rows before one."""
+    planes: tuple[Any, ...] = tuple(plane[row:] for plane in film)
+    return Film(*planes)
+
+
+def _film(width: int, height: int, planes: Collection[str], first: int = 0) -> Film:
+    """A film of ``height`` rows; those before the ``first`` are never written to, and so take no memory."""
     depth, normal, face, rays = ((height, width) if name in planes else (0, 0) for name in PLANES[1:])
-    return Film(
+    film = Film(
         radiance=np.zeros((height, width, 3), np.float32),
-        depth=np.full(depth, np.inf),
+        depth=np.empty(depth),
         normal=np.zeros((*normal, 3), np.float32),
-        face=np.full(face, -1, np.int32),
+        face=np.empty(face, np.int32),
         rays=np.zeros(rays, np.int32),
     )
+    film.depth[first:] = np.inf
+    film.face[first:] = -1
+    return film

@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Collection
 from numbers import Real
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from renderer.errors import expect
 from renderer.picture.image import PLANES, CutWarning, Image
@@ -12,7 +12,7 @@ from renderer.process.parallel import checked_threads
 from renderer.process.terminal import progress_bar
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.scene.needs import Needs, checked_needs
-from renderer.scene.scene import Scene, checked_settings
+from renderer.scene.scene import RenderSettings, Scene, checked_settings
 from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule
 from renderer.tree.build import SPLITS
 
@@ -58,27 +58,19 @@ def render(
     >>> render(scene, resolution=(3, 3)).face[1].tolist()
     [-1, 0, -1]
     """
-    threads, rule = checked_threads(threads), _offset(offset)
+    threads = checked_threads(threads)
     expect(isinstance(scene, Scene | PreparedScene), "scene", "a Scene or a PreparedScene", type(scene).__name__)
     source = scene.scene if isinstance(scene, PreparedScene) else scene
-    eye = source.camera if camera is None else camera
-    expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
-    chosen = checked_settings(source.render, settings)
-    try:
-        kept: tuple[Any, ...] = (planes,) if isinstance(planes, str) else tuple(planes)
-    except TypeError:  # also of what claims to be iterable and is not
-        kept = (None,)
-    known = not isinstance(planes, str) and all(isinstance(p, str) and p in PLANES for p in kept)
-    expect(known, "planes", f"some of {', '.join(PLANES)}", repr(planes))
+    view = checked_view(source, camera, offset, planes, settings)
     if isinstance(scene, PreparedScene):
         _expect_usual(accelerator, split, needs)
         prepared = scene
     else:
-        prepared = _prepared(scene, chosen.max_depth, accelerator, split, needs, threads)
-    with progress_bar(tiles(chosen.resolution), "tile", progress) as update:
-        image = prepared.picture(eye, chosen, rule, threads, update, kept)
+        prepared = _prepared(scene, view.chosen.max_depth, accelerator, split, needs, threads)
+    with progress_bar(tiles(view.chosen.resolution), "tile", progress) as update:
+        image = prepared.picture(view.camera, view.chosen, view.offset, threads, update, view.planes)
     if image.cut:
-        warnings.warn(image.cut_message(chosen.max_rays), CutWarning, stacklevel=2)
+        warnings.warn(image.cut_message(view.chosen.max_rays), CutWarning, stacklevel=2)
     return image
 
 
@@ -109,6 +101,38 @@ def prepare(
     return _prepared(scene, depth, accelerator, split, needs, checked_threads(threads))
 
 
+class View(NamedTuple):
+    """What a picture shows of its scene: a camera, settings, the offset rule and the planes to keep, all checked."""
+
+    camera: Camera
+    chosen: RenderSettings
+    offset: OffsetRule
+    planes: tuple[str, ...]
+
+
+def checked_view(
+    source: Scene, camera: Camera | None, offset: str | float, planes: Collection[str], settings: dict[str, Any]
+) -> View:
+    """The view that ``render`` is asked for. Raises ``ValueError`` naming the argument."""
+    eye = source.camera if camera is None else camera
+    expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
+    chosen = checked_settings(source.render, settings)
+    try:
+        kept: tuple[Any, ...] = (planes,) if isinstance(planes, str) else tuple(planes)
+    except TypeError:  # also of what claims to be iterable and is not
+        kept = (None,)
+    known = not isinstance(planes, str) and all(isinstance(p, str) and p in PLANES for p in kept)
+    expect(known, "planes", f"some of {', '.join(PLANES)}", repr(planes))
+    return View(eye, chosen, _offset(offset), kept)
+
+
+def check_tree(accelerator: object, split: object) -> None:
+    """Raise ``ValueError`` unless these are what ``render`` takes."""
+    named = isinstance(accelerator, str) and accelerator in ("auto", "octree", "brute")
+    expect(named, "accelerator", "'auto', 'octree' or 'brute'", repr(accelerator))
+    expect(isinstance(split, str) and split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
+
+
 def _prepared(
     scene: Scene,
     max_depth: int,
@@ -117,9 +141,7 @@ def _prepared(
     needs: Needs | None,
     threads: int,
 ) -> PreparedScene:
-    named = isinstance(accelerator, str) and accelerator in ("auto", "octree", "brute")
-    expect(named, "accelerator", "'auto', 'octree' or 'brute'", repr(accelerator))
-    expect(isinstance(split, str) and split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
+    check_tree(accelerator, split)
     return prepare_scene(scene, checked_needs(needs, scene, max_depth), accelerator, split, threads)
 
 

@@ -1,4 +1,4 @@
-"""The parts of a long study on disk: what is done stays done when the run is killed, and is not done again.
+"""The parts of a long run on disk: what is done stays done when the run is killed, and is not done again.
 
 A folder beside the result has ``manifest.json``, which says what is computed of what, and a file for each part that is
 done: its rows as they are in memory, and behind them their SHA-256. Each file is written beside and renamed, so a part
@@ -28,9 +28,9 @@ _DIGEST_BYTES = 32
 
 @dataclass(frozen=True)
 class Plan:
-    """What a study computes, in parts.
+    """What a run computes, in parts.
 
-    rows       of the result, one a point
+    rows       of the result, one a point of a study, or a row of pixels
     size       rows of a part; the last may have fewer
     width      values of a row; 0: the result has one dimension
     dtype      of the values, as NumPy spells it
@@ -58,7 +58,7 @@ class Plan:
 
 
 class Parts:
-    """The folder of a study under way."""
+    """The folder of a run under way."""
 
     def __init__(self, folder: Path, plan: Plan) -> None:
         """Begin it, or go on where an earlier run of the same plan was killed.
@@ -76,7 +76,7 @@ class Parts:
         differing = _differing(_read_manifest(path), wanted)
         if differing:
             raise ValueError(
-                f"{folder}: expected the parts of this study, got those of another, whose {', '.join(differing)} "
+                f"{folder}: expected the parts of this run, got those of another, whose {', '.join(differing)} "
                 "differ; remove the folder to begin anew"
             )
 
@@ -91,6 +91,11 @@ class Parts:
         content = np.ascontiguousarray(values).tobytes()
         digest = hashlib.sha256(content).digest()
         write_atomically(self._path(part), lambda file: file.write(content + digest))
+
+    def read(self, part: int) -> NDArray[Any]:
+        """The values of a part. Raises ``OSError`` where it is absent."""
+        begin, end = self.plan.span(part)
+        return np.frombuffer(self._whole(part), self.plan.dtype).reshape(self.plan.shape(end - begin))
 
     def join(self, path: Path) -> None:
         """Write the result as ``.npy``, part by part. Raises ``OSError`` where one is absent."""
@@ -122,7 +127,7 @@ class Parts:
     def _whole(self, part: int) -> bytes:
         content = self._read(part)
         if content is None:
-            raise OSError(f"{self._path(part)}: expected a part of the study, got none that is whole")
+            raise OSError(f"{self._path(part)}: expected a part of the run, got none that is whole")
         return content
 
     def _read(self, part: int) -> bytes | None:
@@ -155,7 +160,7 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     except (ValueError, UnicodeDecodeError):
         found = None
     if not isinstance(found, dict):
-        raise ValueError(f"{path}: expected the manifest of a study, got something else; remove its folder")
+        raise ValueError(f"{path}: expected the manifest of a run, got something else; remove its folder")
     return found
 
 

@@ -4,7 +4,6 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import dask.array as da
 import numpy as np
 import pytest
+from watched import Watched
 
 from renderer import Mesh, Octree
 from renderer.cluster import any_hit, closest_hit, connected, run_on
@@ -20,12 +20,6 @@ from renderer.runs.study import Study, run
 from validation.benchmark.measures.meshes import named
 
 SIZE = 64
-
-
-@pytest.fixture(scope="module")
-def client() -> Iterator[Any]:
-    with connected(workers=2) as client:
-        yield client
 
 
 @pytest.fixture(scope="module")
@@ -66,32 +60,19 @@ def test_a_worker_that_is_killed_changes_no_bit(octree: Octree, tmp_path: Path) 
 def test_parts_of_a_scheduler_that_is_gone_are_not_computed_again(octree: Octree, tmp_path: Path) -> None:
     """A run that ends with its scheduler goes on from the manifest on another one."""
     points, study, folder = on_faces(octree).points, Study("sky", {}), tmp_path / "parts"
-    with connected(workers=1) as client:
-        seen = _StopAfter(3, folder)
-        with pytest.raises(KeyboardInterrupt):
-            run_on(seen.wrapped(client), octree, study, points, folder, size=SIZE)
+
+    def stop(name: str) -> None:
+        if name == "submit" and len(list(folder.glob("*.part"))) >= 3:
+            raise KeyboardInterrupt
+
+    with connected(workers=1) as client, pytest.raises(KeyboardInterrupt):
+        run_on(Watched(client, stop), octree, study, points, folder, size=SIZE)
     kept = {path: path.stat().st_mtime_ns for path in folder.glob("*.part")}
     assert len(kept) >= 3
     with connected(workers=1) as client:
         parts = run_on(client, octree, study, points, folder, size=SIZE)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
     assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
-
-
-class _StopAfter:
-    """A client whose ``submit`` raises as Ctrl-C does, once so many parts are on disk."""
-
-    def __init__(self, parts: int, folder: Path) -> None:
-        self._parts, self._folder = parts, folder
-
-    def wrapped(self, client: Any) -> Any:
-        self._client = client
-        return self
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "submit" and len(list(self._folder.glob("*.part"))) >= self._parts:
-            raise KeyboardInterrupt
-        return getattr(self._client, name)
 
 
 def test_hits_of_dask_arrays_stay_lazy_and_keep_chunks(client: Any, octree: Octree) -> None:

@@ -84,9 +84,9 @@ def test_the_kernel_is_loaded_before_a_picture_takes_its_memory():
 import renderer.picture.prepare as prepare
 from renderer import load_scene, render
 make, loaded = prepare._film, []
-def make_film(width, height, planes):
+def make_film(width, height, planes, first=0):
     loaded.append((height, bool(vars(prepare.render_tile).get("entry") and prepare.render_tile.entry.signatures)))
-    return make(width, height, planes)
+    return make(width, height, planes, first)
 prepare._film = make_film
 render(load_scene("scenes/stairs.toml"), resolution=(8, 8))
 assert loaded[-1] == (8, True), loaded

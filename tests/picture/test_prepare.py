@@ -1,11 +1,21 @@
 """A prepared scene: its pictures are those of the scene itself, and its tree is built once."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import settings as limits
+from hypothesis import strategies as st
 
 import renderer
 from renderer import OrthographicCamera, PerspectiveCamera, load_scene, prepare, render
+from renderer.picture.image import PLANES
 from renderer.picture.prepare import Octree
+from renderer.scene.scene import checked_settings
+from renderer.trace.spawn import BOUNDED
 
 SCENES = ("glass", "stairs", "mirrors")
 CAMERAS = (
@@ -40,6 +50,44 @@ def test_a_scene_that_asks_for_no_bounce_is_ready_for_some():
     still = scene.altered(render=scene.render.model_copy(update={"max_depth": 0}))
     options = {"resolution": (16, 12), "max_depth": 6}
     assert same(render(prepare(still), **options), render(scene, **options))
+
+
+@pytest.mark.parametrize("name", SCENES)
+@given(data=st.data())
+@limits(max_examples=8)
+def test_a_band_of_rows_has_the_bits_that_it_has_in_the_picture(name, data):
+    height = data.draw(st.integers(1, 90))
+    first = data.draw(st.integers(0, height - 1))
+    end = data.draw(st.integers(first + 1, height))
+    ready = prepare(load_scene(f"scenes/{name}.toml"))
+    chosen = checked_settings(ready.scene.render, {"resolution": (41, height), "samples": 4, "max_depth": 3})
+    whole, band = (ready.picture(ready.scene.camera, chosen, BOUNDED, 2, band=rows) for rows in (None, (first, end)))
+    for plane in PLANES:
+        assert getattr(band, plane).tobytes() == getattr(whole, plane)[first:end].tobytes(), plane
+
+
+def test_a_band_takes_little_more_memory_than_its_own_rows():
+    """The last rows of a tall picture, in a process of its own: a film of them all would take 335 MB."""
+    script = """
+from renderer import load_scene, prepare
+from renderer.scene.scene import checked_settings
+from renderer.trace.spawn import BOUNDED
+def resident():
+    return int(open("/proc/self/statm").read().split()[1]) * 4096
+ready = prepare(load_scene("scenes/stairs.toml"))
+def band(height):
+    chosen = checked_settings(ready.scene.render, {"resolution": (512, height)})
+    return ready.picture(ready.scene.camera, chosen, BOUNDED, 1, band=(height - 8, height))
+small = band(16)
+before = resident()
+tall = band(16384)
+assert tall.depth.shape == (8, 512)
+print(resident() - before)
+"""
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("no /proc to read the memory from")
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert int(told.stdout) < 335e6 / 10
 
 
 def test_the_tree_is_built_once(monkeypatch):

@@ -24,7 +24,7 @@ def test_a_run_goes_on_where_it_was_killed_and_joins_the_parts_in_order(tmp_path
     _write(Parts(folder, PLAN), 0)
     again = Parts(folder, PLAN)
     assert again.missing() == [1]
-    with pytest.raises(OSError, match=r"00000001\.part: expected a part of the study, got none that is whole"):
+    with pytest.raises(OSError, match=r"00000001\.part: expected a part of the run, got none that is whole"):
         again.join(result)
     assert not result.exists()
     _write(again, 1)
@@ -62,7 +62,7 @@ def test_parts_of_another_study_are_refused_and_kept(tmp_path: Path, other: Plan
 @pytest.mark.parametrize("text", ["", "[]", "{", "\x00"])
 def test_a_manifest_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "manifest.json").write_text(text)
-    with pytest.raises(ValueError, match="expected the manifest of a study"):
+    with pytest.raises(ValueError, match="expected the manifest of a run"):
         Parts(tmp_path, PLAN)
 
 

@@ -222,7 +222,7 @@ PICTURES = (
                      "from renderer.shade.records import IOR\n"
                      "rows[:, IOR] *= 1.501 / 1.5")),
     _python("pictures", "film shifted by half a pixel", "PreparedScene.picture",
-            *_before("film = _film(width, height, planes)",
+            *_before("film = _film(width, end_row, planes, first_row)",
                      "rows[3] -= 0.5 * rows[4]")),
     _kernel("pictures", "the budget of rays is not kept", "_may_leave",
             "get(work.traced, pixel) >= settings.max_rays", "get(work.traced, pixel) > 2 * settings.max_rays"),

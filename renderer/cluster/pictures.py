@@ -1,0 +1,205 @@
+"""Pictures on a cluster: a task for each band of rows, which are kept on this machine's disk as they come."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Literal
+
+from renderer.cluster.tasks import Task, results
+from renderer.cluster.workers import SentScene, render_rows
+from renderer.errors import expect
+from renderer.picture.image import PLANES, check_picture_path
+from renderer.picture.render import check_tree, checked_view
+from renderer.process.files import as_path, write_atomically
+from renderer.process.terminal import progress_bar
+from renderer.runs.pictures import Picture, PictureRun, checked_band, digest_of_scene
+from renderer.scene.camera import Camera
+from renderer.scene.needs import needs_of
+from renderer.scene.scene import Scene
+
+
+def render_on(
+    client: Any,
+    scene: Scene,
+    folder: str | Path,
+    *,
+    camera: Camera | None = None,
+    band: int | None = None,
+    progress: bool = False,
+    **options: Any,
+) -> PictureRun:
+    """``renderer.render`` on the workers of ``client``, a ``distributed.Client``: bands of rows as parts in ``folder``.
+
+    band     rows of a part; None chooses. It changes no bit
+    options  ``accelerator``, ``split``, ``offset``, ``planes`` and the settings, as ``render`` takes them
+
+    Returns the run, whose ``image()`` is the picture and whose ``remove()`` removes the folder, to be called when the
+    picture is saved. The scene goes to each worker once. Parts that a killed run left are not rendered again, and a
+    worker that dies loses its parts under way, which others render: the bits are those of ``render``. Raises
+    ``ValueError`` naming the argument, or where the folder is of another picture, and ``OSError`` where the scheduler
+    is gone, or without a worker for 10 seconds; the same call then goes on.
+    """
+    sent, picture = _Sender(options).picture(scene, camera)
+    run = PictureRun(as_path("folder", folder), picture, band)
+    missing = run.parts.missing()
+    with (
+        progress_bar(run.parts.plan.parts, "part", progress) as update,
+        closing(results(client, render_rows, _tasks(None, sent, run, missing))) as found,
+    ):
+        if update is not None:
+            update(run.parts.plan.parts - len(missing))
+        for (_, part), rows in found:
+            run.parts.write(part, rows)
+            if update is not None:
+                update(1)
+    return run
+
+
+def frames_on(
+    client: Any,
+    scenes: Iterable[Scene],
+    outputs: Sequence[str | Path],
+    folder: str | Path,
+    *,
+    band: int | None = None,
+    progress: bool = False,
+    **options: Any,
+) -> None:
+    """Render the frames of an animation, each to its own of the files ``outputs``, as ``render_on`` does one picture.
+
+    scenes   one for each output, read when their turn comes; those that differ in the camera alone, as
+             ``scene.altered(camera=...)`` makes them, are sent once
+    outputs  .png, .exr or .npy, as ``Image.save`` writes them
+    folder   for parts of frames under way, and what frames are done: the same call goes on where one was killed, and
+             renders no frame again whose file is what it wrote. It is removed when all are done
+
+    Frames are worked on together, so that no worker waits for the last part of one. Errors are those of ``render_on``.
+    """
+    frames = _Frames(as_path("folder", folder), outputs, band, options)
+    with (
+        progress_bar(len(frames.outputs), "frame", progress) as update,
+        closing(results(client, render_rows, frames.tasks(scenes))) as found,
+    ):
+        shown = 0
+        for (number, part), rows in found:
+            frames.write(number, part, rows)
+            if update is not None:
+                update(frames.done - shown)
+                shown = frames.done
+    frames.remove()
+
+
+class _Sender:
+    """What workers are to be sent for pictures with the same options."""
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        settings = dict(options)
+        self._accelerator: str = settings.pop("accelerator", "auto")
+        self._split: Literal["midpoint", "sah"] = settings.pop("split", "midpoint")
+        check_tree(self._accelerator, self._split)
+        self._offset, self._planes = settings.pop("offset", "bounded"), settings.pop("planes", PLANES)
+        self._settings = settings
+        self._latest: SentScene | None = None
+
+    def picture(self, scene: Scene, camera: Camera | None = None) -> tuple[SentScene, Picture]:
+        """The scene as it is sent, the one before where it differs in the camera alone, and the picture of it."""
+        expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
+        view = checked_view(scene, camera, self._offset, self._planes, self._settings)
+        needs = needs_of(scene, view.chosen.max_depth)
+        latest = self._latest
+        if latest is None or latest.needs != needs or not _same_but_for_camera(scene, latest.scene):
+            # The copy has its meshes, which a worker on another machine may find no file of.
+            sent = scene.altered()
+            digest = digest_of_scene(sent, needs)
+            latest = self._latest = SentScene(digest, sent, needs, self._accelerator, self._split)
+        return latest, Picture(view, latest.digest)
+
+
+def _same_but_for_camera(scene: Scene, other: Scene) -> bool:
+    shown = ("materials", "lights", "ambient", "background")
+    return scene.instances is other.instances and all(getattr(scene, n) == getattr(other, n) for n in shown)
+
+
+def _tasks(number: int | None, sent: SentScene, run: PictureRun, missing: Iterable[int]) -> Iterator[Task]:
+    for part in missing:
+        yield Task((number, part), sent, (run.picture, *run.parts.plan.span(part)))
+
+
+class _Frames:
+    """The frames of an animation: those under way, and what is written of those that are done."""
+
+    def __init__(self, folder: Path, outputs: Sequence[str | Path], band: int | None, options: dict[str, Any]) -> None:
+        self.outputs = [as_path("outputs", output) for output in outputs]
+        names = {output.resolve() for output in self.outputs}
+        expect(len(names) == len(self.outputs), "outputs", "a file for each frame", "one of them twice")
+        for output in self.outputs:
+            check_picture_path(output)
+        self._folder, self._band = folder, None if band is None else checked_band(band)
+        self._sender = _Sender(options)
+        self._under_way: dict[int, tuple[PictureRun, set[int]]] = {}
+        self.done = 0
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def tasks(self, scenes: Iterable[Scene]) -> Iterator[Task]:
+        """The tasks of all frames that are not done, one after the other."""
+        count = 0
+        for number, scene in enumerate(scenes):
+            count += 1
+            expect(count <= len(self.outputs), "scenes", f"{len(self.outputs)}, as outputs are", "more")
+            sent, picture = self._sender.picture(scene)
+            if self._is_done(number, picture):
+                self.done += 1
+                continue
+            run = PictureRun(self._folder / f"{number:06d}.parts", picture, self._band)
+            missing = run.parts.missing()
+            self._under_way[number] = run, set(missing)
+            if not missing:
+                self._end(number)
+            yield from _tasks(number, sent, run, missing)
+        expect(count == len(self.outputs), "scenes", f"{len(self.outputs)}, as outputs are", str(count))
+
+    def write(self, number: int, part: int, rows: Any) -> None:
+        """Keep a part, and save its frame if it was the last one."""
+        run, missing = self._under_way[number]
+        run.parts.write(part, rows)
+        missing.discard(part)
+        if not missing:
+            self._end(number)
+
+    def remove(self) -> None:
+        """Remove the folder, which has no more than what was said to be done."""
+        for number in range(len(self.outputs)):
+            self._said(number).unlink(missing_ok=True)
+        self._folder.rmdir()
+
+    def _end(self, number: int) -> None:
+        run, _ = self._under_way.pop(number)
+        output = self.outputs[number]
+        run.image().save(output)
+        said = {"plan": asdict(run.picture.plan(1)), "sha256": _digest(output)}
+        text = json.dumps(said)
+        write_atomically(self._said(number), lambda file: file.write(text.encode()))
+        run.remove()
+        self.done += 1
+
+    def _is_done(self, number: int, picture: Picture) -> bool:
+        """Whether its file is the one that an earlier run wrote of this very picture."""
+        try:
+            said = json.loads(self._said(number).read_text(encoding="utf-8"))
+            same = said["plan"] == json.loads(json.dumps(asdict(picture.plan(1))))
+            return bool(same and said["sha256"] == _digest(self.outputs[number]))
+        except (OSError, ValueError, KeyError, TypeError):
+            return False
+
+    def _said(self, number: int) -> Path:
+        return self._folder / f"{number:06d}.done"
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,181 @@
+"""Tasks on a cluster: few under way at a time, each result as it comes, and what is lost with a worker done again.
+
+The data that many tasks share are sent to all workers once. Dask computes tasks again whose worker died, but has no
+copy of data that were on no other worker: these are sent again from here, and all after a scheduler came back.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+from renderer.cluster import clients
+from renderer.errors import expect
+
+Results = Generator[tuple[Any, Any], None, None]
+
+# Tasks under way for each thread of the cluster: one that is computed, one that has arrived and waits.
+_AHEAD = 2
+# Times that a task that raises is tried again, and times that lost data are sent again.
+_RETRIES = 5
+# Seconds between looks at the cluster while nothing comes.
+_MOMENT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A call of the tasks' function: ``function(shared, *arguments)``.
+
+    name     what the caller knows it by
+    shared   the data that it shares with others, which have a ``digest``; equal ones are sent once
+    """
+
+    name: Any
+    shared: Any
+    arguments: tuple[Any, ...]
+
+
+def results(client: Any, function: Callable[..., Any], tasks: Iterable[Task]) -> Results:
+    """Each task's name and result, as they come; ``client`` is a ``distributed.Client``, ``tasks`` are read as needed.
+
+    Raises what a task raises, again and again, and ``OSError`` with one line where the scheduler is gone or no worker
+    is left for 10 seconds. Tasks under way are cancelled at the end, whatever ends it.
+    """
+    expect(hasattr(client, "nthreads"), "client", "a distributed.Client", type(client).__name__)
+    waiting, crew = iter(tasks), _Crew(client, function)
+    try:
+        while True:
+            crew.look()
+            for task in islice(waiting, crew.room()):
+                crew.submit(task)
+            if not crew.under_way:
+                return
+            yield from crew.finished()
+    finally:
+        crew.dismiss()
+
+
+class _Crew:
+    """The workers of a client, with what was sent to them and is under way."""
+
+    def __init__(self, client: Any, function: Callable[..., Any]) -> None:
+        self._client, self._function = client, function
+        self.under_way: dict[Any, Task] = {}
+        self._sent: dict[str, Any] = {}
+        self._times_sent: dict[str, int] = {}
+        self._threads, self._looked = 0, float("-inf")
+
+    def look(self) -> None:
+        """See how many threads the cluster has, now and then; wait for the first worker, and not for ever."""
+        if self._client.status == "running" and time.monotonic() < self._looked + _MOMENT:
+            return
+        patience = time.monotonic() + clients.SECONDS
+        while not (threads := self._count()):
+            if self._client.status == "closed" or time.monotonic() > patience:
+                raise OSError(self._missing())
+            time.sleep(_MOMENT / 10.0)
+        self._threads, self._looked = threads, time.monotonic()
+
+    def room(self) -> int:
+        """How many more tasks may be under way."""
+        return max(0, _AHEAD * self._threads - len(self.under_way))
+
+    def submit(self, task: Task) -> None:
+        """Let a worker begin it, when it has time; the data first, unless they are there."""
+        sent = self._sent.get(task.shared.digest)
+        if sent is None or sent.status != "finished":
+            sent = self._send(task.shared)
+        future = self._client.submit(self._function, sent, *task.arguments, pure=False, retries=_RETRIES)
+        self.under_way[future] = task
+
+    def finished(self) -> Iterator[tuple[Any, Any]]:
+        """Wait a moment for tasks to end, and give the results of those that did; what was lost begins again."""
+        from distributed import wait
+
+        # Of tasks that were cancelled, no scheduler, or nothing within the moment: each future's status says more.
+        with suppress(CancelledError, OSError, ValueError):
+            wait(list(self.under_way), timeout=_MOMENT, return_when="FIRST_COMPLETED")
+        for future in [future for future in self.under_way if future.status != "pending"]:
+            task = self.under_way.pop(future)
+            done, result = self._result(future)
+            if done:
+                self._times_sent.clear()
+                yield task.name, result
+            else:
+                self._looked = float("-inf")
+                self.look()
+                self.submit(task)
+        self._forget()
+
+    def dismiss(self) -> None:
+        """Let go of what is under way and of what was sent, which Dask then cancels and drops.
+
+        An error's traceback may hold it for longer, so it is released by name.
+        """
+        for future in [*self.under_way, *self._sent.values()]:
+            with suppress(Exception):  # of a client that is closed
+                future.release()
+        self.under_way.clear()
+        self._sent.clear()
+
+    def _result(self, future: Any) -> tuple[bool, Any]:
+        """Whether there is a result, and the result; there is none where it was lost. Raises what the task raised."""
+        from distributed import KilledWorker
+
+        raised = future.status == "error"
+        if future.status != "finished" and not raised:
+            return False, None
+        try:
+            return True, future.result(timeout=clients.SECONDS)
+        except KilledWorker as error:
+            ended = f"ended {error.allowed_failures + 1} workers, one after the other"
+            raise OSError(f"a part {ended}; is their memory too small for it?") from None
+        except (CancelledError, OSError):  # its worker died after all, or the scheduler
+            if raised:
+                raise
+            return False, None
+
+    def _send(self, shared: Any) -> Any:
+        """Send data to all workers; the same ones again and again only where workers die."""
+        while True:
+            times = self._times_sent[shared.digest] = self._times_sent.get(shared.digest, 0) + 1
+            if times > 1 + _RETRIES:
+                lost = f"lost what it was sent {times - 1} times, before any result came"
+                raise OSError(f"the cluster at {self._address()} {lost}")
+            try:
+                # In a list, as the parts of a tuple would be sent one by one. By reference where a worker is this
+                # process, so never written.
+                [sent] = self._client.scatter([shared], broadcast=True, hash=False, timeout=clients.SECONDS)
+            except (CancelledError, OSError):  # workers or the scheduler died meanwhile
+                self._looked = float("-inf")
+                self.look()
+            else:
+                self._sent[shared.digest] = sent
+                return sent
+
+    def _forget(self) -> None:
+        """Let workers drop data that no task under way needs, but the latest."""
+        needed = {task.shared.digest for task in self.under_way.values()}
+        for digest in list(self._sent)[:-1]:
+            if digest not in needed:
+                del self._sent[digest]
+
+    def _count(self) -> int:
+        """The threads of all workers; 0 where there are none, or no scheduler at the moment."""
+        if self._client.status != "running":
+            return 0
+        with suppress(OSError):  # that it ends just now
+            return sum(self._client.nthreads().values())
+        return 0
+
+    def _missing(self) -> str:
+        what = "has no worker" if self._client.status == "running" else "does not answer"
+        return f"the scheduler at {self._address()} {what}, for {clients.SECONDS} seconds"
+
+    def _address(self) -> str:
+        return str(self._client.scheduler.address) if self._client.scheduler is not None else "its address"
