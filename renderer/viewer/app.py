@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -39,6 +40,7 @@ class Viewer:
     """
 
     def __init__(self, shown: ShownScene) -> None:
+        self.id = token_hex(8)  # which no other server has
         self.shown = shown
         self._scenes = WeakValueDictionary({shown.id: shown})
         self.sessions: set[Session] = set()
@@ -64,7 +66,8 @@ class Viewer:
 
     async def description(self, request: Request) -> Response:
         """GET /scene?id=ID."""
-        return JSONResponse(await run_in_threadpool(description, self._asked_for(request)))
+        told = await run_in_threadpool(description, self._asked_for(request))
+        return JSONResponse(told | {"server": self.id})
 
     async def mesh(self, request: Request) -> Response:
         """GET /mesh?id=ID."""

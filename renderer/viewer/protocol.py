@@ -120,12 +120,13 @@ class Pick(_Message):
 
 
 class Hello(_Message):
-    """A page that begins, or has lost its connection, wants to know its scene: ``file`` where that is one of those
-    offered, loaded anew only if it was edited; else the server's own.
+    """A page that begins, or has lost its connection, wants to know its scene: ``file``, loaded anew only if it was
+    edited, where it had that from this ``server`` and it is offered still; else the server's own.
     """
 
     type: Literal["hello"]
     file: _FileName = ""
+    server: Annotated[str, Field(max_length=64)] = ""
 
 
 class OpenScene(_Message):

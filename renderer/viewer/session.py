@@ -60,6 +60,7 @@ class Newest(Generic[T]):
 class SceneHost(Protocol):
     """The holder of the scenes that connections show."""
 
+    id: str
     shown: ShownScene
 
     async def open(self, file: str, fresh: bool) -> ShownScene:
@@ -215,8 +216,11 @@ class Session:
     async def _open_scenes(self) -> None:
         while True:
             wanted = await self.scenes.take()
+            # A page of another server's begins anew here.
+            foreign = isinstance(wanted, Hello) and wanted.server != self.host.id
+            file = "" if foreign else wanted.file
             try:
-                await self.show_scene(await self.host.open(wanted.file, isinstance(wanted, OpenScene)))
+                await self.show_scene(await self.host.open(file, isinstance(wanted, OpenScene)))
             except Exception as error:  # as above
                 await self.complain(error)
                 if isinstance(wanted, Hello):  # a page that begins has no scene to go on with

@@ -47,7 +47,7 @@ CAMERA = {"type": "camera", "m": M, "fovy": 0.7, "height": 1e-3}
 # The keys of a message that may be left out.
 OPTIONAL = {"settings", "walk", "height"}
 # A message that may name no file.
-HELLO = {"type": "hello", "file": "a b.toml"}
+HELLO = {"type": "hello", "file": "a b.toml", "server": "0123456789abcdef"}
 
 
 def said(message: Any) -> str:
@@ -70,7 +70,7 @@ def test_a_message_is_what_it_says(message: dict[str, Any], kind: type) -> None:
     read = parse(said(message))
     assert type(read) is kind
     assert json.loads(read.model_dump_json()) == message
-    for key in message.keys() - OPTIONAL - ({"file"} if message is HELLO else set()):
+    for key in message.keys() - OPTIONAL - ({"file", "server"} if message is HELLO else set()):
         with pytest.raises(ValueError, match=f"{key}|discriminator 'type'"):
             parse(said({name: value for name, value in message.items() if name != key}))
     with pytest.raises(ValueError, match="surplus: Extra inputs are not permitted, got 1"):

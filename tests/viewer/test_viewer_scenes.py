@@ -48,13 +48,13 @@ def shows_only(page: Viewer, file: Path) -> None:
     assert np.array_equal(page.pixels("picture")[0, 0, :3], srgb(scene.background))
 
 
-@pytest.mark.parametrize("name", ["blocks.toml", "other.toml"])
+@pytest.mark.parametrize("name", ["b/blocks.toml", "b/other.toml", "a/other.toml"])
 def test_a_page_shows_the_scene_of_a_server_that_restarts(browser: Any, tmp_path: Path, name: str) -> None:
     """It kept the boxes, the depths and the camera of the scene before, under the new pictures."""
     port = free_port()
-    files = [tmp_path / folder / name for folder, name in (("a", "blocks.toml"), ("b", name))]
+    files = [tmp_path / "a/blocks.toml", tmp_path / name]
     for file, text in zip(files, (SCENE, OTHER), strict=True):
-        file.parent.mkdir()
+        file.parent.mkdir(exist_ok=True)
         file.write_text(text)
     with served(files[0], port) as address:
         page = Viewer(browser, address).open()
@@ -213,3 +213,34 @@ def test_an_orthographic_camera_moves(parallel: Viewer, name: str) -> None:
     parallel.page.wait_for_selector("#card:not([hidden])")
     parallel.settled("octree")
     assert parallel.pixels("gl")[..., 3].any()  # the ray's way over the traced picture
+
+
+def test_the_page_says_what_it_waits_for_and_then_no_more(browser: Any, url: str) -> None:
+    page = Viewer(browser, url)
+    page.page.add_init_script("window.held = true; " + NEVER.replace('"/mesh"', '"/scene"'))
+    try:
+        page.page.goto(page.url)
+        page.page.wait_for_selector("body[data-connected=true]")
+        assert page.page.inner_text("#busy") == "Opening the scene …"
+        page.page.evaluate("() => { window.held = false; }")
+        page.page.evaluate("() => { viewer.connection.socket.close(); }")  # after which it asks again
+        page.page.wait_for_selector("body[data-ready]")
+        page.settled("octree")
+        page.page.wait_for_function("() => viewer.layer.loaded")
+        assert page.page.is_hidden("#busy")
+        page.page.evaluate("() => { viewer.open('none.toml'); }")
+        assert page.page.inner_text("#busy") == "Opening none.toml …"
+        page.page.locator("#notices p", has_text="scene.file").wait_for()
+        assert page.page.is_hidden("#busy")
+    finally:
+        page.context.close()
+
+
+def test_no_wait_is_said_for_what_no_longer_comes(viewer: Viewer) -> None:
+    """The line stood for ever where a mode was chosen, or brute force cancelled, before the first picture came."""
+    for end in ("viewer.setMode('gl')", "viewer.cancel()", "viewer.forget()"):
+        viewer.page.evaluate("() => { viewer.busy.begin('tracing', 'x'); viewer.progress.show(0.5); }")
+        viewer.page.evaluate(f"() => {{ {end}; }}")
+        assert viewer.page.is_hidden("#busy")
+    viewer.page.evaluate("() => { viewer.loadMesh(); }")
+    viewer.page.wait_for_function("() => viewer.layer.loaded")

@@ -568,14 +568,19 @@ def test_a_page_is_told_the_scene_that_it_had_and_no_other_server_has_its_id(fol
                 ("plain.toml", "plain"),
                 ("typo.toml", "blocks"),
             ):
-                client.send(type="hello", file=file)
+                server = json.loads(fetched(viewing.url, "scene"))["server"]
+                client.send(type="hello", file=file, server=server)
                 if file == "typo.toml":
                     assert "shinyness" in client.told("error")["message"]
                     name = "plain"  # the one before
                 scene = json.loads(fetched(viewing.url, f"scene?id={client.told('scene')['id']}"))
                 assert scene["name"] == f"{name}.toml"
                 seen.append(scene["id"])
-    assert seen[0] == seen[1] and seen[2] == seen[3] and len(set(seen)) == 4
+            # Pages of a server that ended begin anew.
+            client.send(type="hello", file="plain.toml", server="another")
+            seen.append(client.told("scene")["id"])
+    own, plain = seen[0], seen[2]
+    assert seen[:5] == [own, own, plain, plain, own] and len(set(seen)) == 4
 
 
 @pytest.mark.parametrize("edited", ["scene", "mesh"])
@@ -590,7 +595,7 @@ def test_a_file_is_loaded_again_where_it_was_edited(folder: Path, tmp_path: Path
                 (tmp_path / "a.toml").write_text(text.replace("shininess = 40", "shininess = 4"))
             elif change:
                 (tmp_path / "block.ply").write_bytes((MODELS / "teapot.ply").read_bytes())
-            client.send(type="hello", file="a.toml")
+            client.send(type="hello")
             ids.append(client.told("scene")["id"])
         assert client.final().payload != before.payload
         client.send(type="scene", file="a.toml")  # which loads it whatever has changed

@@ -122,6 +122,7 @@ class Viewer {
     this.picture.clear();
     this.layer?.begin(this.scene);
     this.stopSaving();
+    for (const name of ["mesh", "tracing"]) this.busy.end(name);
   }
 
   async loadMesh() {
@@ -136,7 +137,9 @@ class Viewer {
       this.dirty ||= this.mode === "phong"; // whose colours had no faces before
       this.request();
     } catch (error) {
-      if (this.scene === scene && error.status !== 404) this.notices.say(`The model cannot be shown: ${error.message}`);
+      if (this.scene !== scene) return;
+      this.meshOf = null; // so that the next change of mode tries again
+      if (error.status !== 404) this.notices.say(`The model cannot be shown: ${error.message}`);
     } finally {
       if (this.scene === scene) this.busy.end("mesh");
     }
@@ -232,6 +235,7 @@ class Viewer {
     if (this.mode === "brute" && mode !== "brute") this.progress.show(null);
     if (!TRACED.includes(mode)) {
       this.stopSaving();
+      this.busy.end("tracing");
       this.loadMesh();
     }
     input.checked = true;
@@ -362,7 +366,7 @@ class Viewer {
         { name: "rays", set: this.rays.path, hidden: HIDDEN.rays, fades: false },
       ] });
     }
-    if (this.mode === "gl" && this.layer.loaded) this.note({ seq: this.seq, step: 0, last: true }, this.view());
+    if (this.mode === "gl" && this.layer?.loaded) this.note({ seq: this.seq, step: 0, last: true }, this.view());
     // A picture of an earlier camera stands for a while only, unless another drawing has replaced it by then.
     this.standing = live && !current && Boolean(this.layer?.loaded);
     if (this.standing) setTimeout(() => this.standing && this.request(), STALE);
@@ -422,7 +426,7 @@ class Viewer {
       scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
       camera: ({ name, text }) => saveText(name, text),
       error: ({ message: text }) => {
-        this.busy.end("opening");
+        for (const name of ["opening", "tracing"]) this.busy.end(name);
         this.notices.say(text);
         if (this.scene) this.panel.fields.file.value = this.scene.name; // the one that is still shown
       },
@@ -440,8 +444,9 @@ class Viewer {
     document.body.dataset.connected = String(open);
     if (open) {
       this.notices.clear("lost");
-      // The server may be another one by now, with another scene.
-      this.connection.send({ type: "hello", file: this.scene?.name ?? remembered()?.name ?? "" });
+      // The server may be another one by now, which shows its own scene.
+      const { name: file, server } = kept(this.scene, this.camera) ?? remembered() ?? { name: "", server: "" };
+      this.connection.send({ type: "hello", file, server });
     } else {
       this.announced = null;
       this.busy.end("opening");
@@ -456,6 +461,7 @@ class Viewer {
     this.dirty = false; // nor is a change wanted that was waiting for the camera to rest
     this.sent.delete(this.seq);
     this.stopSaving();
+    this.busy.end("tracing");
     this.progress.show(null);
     this.notices.say("Brute force cancelled; the next movement starts it again.");
   }

@@ -19,8 +19,9 @@ export function remembered() {
   }
 }
 
-// The name of a scene, its own camera, and the one that it is seen by; null for no scene.
-export const kept = (scene, camera) => scene && { name: scene.name, own: scene.camera, camera: camera.state };
+// The name of a scene, its server, its own camera, and the one that it is seen by; null for no scene.
+export const kept = (scene, camera) =>
+  scene && { name: scene.name, server: scene.server, own: scene.camera, camera: camera.state };
 
 // Whether the camera of `before` is to stay for `scene`: not where its file has another one now.
 export const stays = (before, scene) =>
