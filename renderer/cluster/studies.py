@@ -11,7 +11,7 @@ from renderer.cluster.workers import SentMesh, answer_part
 from renderer.octree import Octree
 from renderer.process.terminal import progress_bar
 from renderer.runs.parts import Parts, digest_of
-from renderer.runs.study import PART, Points, Study
+from renderer.runs.study import PART, Points, Study, parts_of
 
 # Parts under way for each thread of the cluster: one that is computed, one that has arrived and waits.
 _AHEAD = 2
@@ -35,7 +35,7 @@ def run_on(
     Parts are written here, whole, as they come; those that a killed run left are not computed again. A worker that dies
     loses its parts under way, which others compute. The bits are those of a run on this machine alone.
     """
-    parts = Parts(folder, study.plan(octree.mesh, points, size))
+    parts = parts_of(octree, study, points, folder, size)
     missing = parts.missing()
     with progress_bar(len(points), "point", progress) as update:
         for part, answers in _answers(client, octree, study, points, parts, missing, split):
@@ -65,7 +65,7 @@ def _answers(
     waiting, part_of = iter(missing), dict[Any, int]()
 
     def submit(part: int) -> Any:
-        some = points.part(*parts.plan.span(part))
+        some = points.part(parts.rows(part))
         future = client.submit(answer_part, sent, study, some, pure=False, retries=_RETRIES)
         part_of[future] = part
         return future
