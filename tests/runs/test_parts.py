@@ -103,6 +103,6 @@ def test_rows_go_where_an_order_says(tmp_path: Path, monkeypatch: pytest.MonkeyP
     parts.join(tmp_path / "r.npy")
     assert np.load(tmp_path / "r.npy").tobytes() == values.tobytes()
     (tmp_path / "parts" / "00000002.part").unlink()
-    with pytest.raises(OSError, match=r"00000002\.part: expected a part of the study"):
+    with pytest.raises(OSError, match=r"00000002\.part: expected a part of the run"):
         parts.join(tmp_path / "none.npy")
     assert not (tmp_path / "none.npy").exists()
