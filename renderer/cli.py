@@ -266,13 +266,13 @@ def _view(options: argparse.Namespace) -> None:
     from renderer.viewer.view import view
 
     _scene_to_write(options)
-    with view(options.scene, host=options.host, port=options.port, browser=False) as viewing:
+    served = view(options.scene, host=options.host, port=options.port, browser=False)
+    # Ctrl-C is the usual way to end it, so no failure, from the moment on that the address stands there.
+    with served as viewing, suppress(KeyboardInterrupt):
         say(f"{options.scene} is shown at {viewing.url} until Ctrl-C", flush=True)
-        # The usual way to end it, so no failure.
-        with suppress(KeyboardInterrupt):
-            if not options.no_browser:
-                viewing.open_browser()
-            viewing.wait()
+        if not options.no_browser:
+            viewing.open_browser()
+        viewing.wait()
 
 
 def _info(options: argparse.Namespace) -> None:

@@ -3,12 +3,14 @@
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from renderer.errors import expect
 from renderer.process.terminal import say
 
 FORMATS = (".npy", ".ply", ".png")
+# This tree takes half as long again to build, and a million rays over a million faces make up for it.
+SPLIT: Literal["sah"] = "sah"
 _KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
 # Options that one kind alone has, which are its function's.
 _OWN = {"sky": ("patches", "definition"), "sun": ("suns",), "ao": ("samples",)}
@@ -58,7 +60,7 @@ def _study(options: argparse.Namespace) -> None:
     _check_output(options)
     made = _options_of(options)
     camera = _camera(options)
-    octree = Octree.from_mesh(load_mesh(options.mesh), threads=options.threads)
+    octree = Octree.from_mesh(load_mesh(options.mesh), split=SPLIT, threads=options.threads)
     chosen = _chosen(octree, options)
     began = time.perf_counter()
     parts = _run(octree, Study(options.kind, made), chosen.points, options)
@@ -93,7 +95,7 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
 
     local = options.cluster == "local"
     with connected(None if local else options.cluster, workers=options.threads if local else None) as client:
-        return run_on(client, octree, study, points, folder, progress=progress)
+        return run_on(client, octree, study, points, folder, split=SPLIT, progress=progress)
 
 
 def _check_output(options: argparse.Namespace) -> None:

@@ -67,9 +67,9 @@ materials = ["stone"]
 
 
 @contextmanager
-def served(scene: Path) -> Iterator[str]:
+def served(scene: Path, port: int = 0) -> Iterator[str]:
     """Where `octree-render view` serves ``scene``, as long as the context lasts."""
-    command = [sys.executable, "-m", "renderer.cli", "view", str(scene), "--port", "0", "--no-browser"]
+    command = [sys.executable, "-m", "renderer.cli", "view", str(scene), "--port", str(port), "--no-browser"]
     root = str(Path(__file__).parent.parent)
     environment = {**os.environ, "PYTHONPATH": root, "PYTHONUNBUFFERED": "1"}
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment)
@@ -116,6 +116,10 @@ class Viewer:
         self.page.wait_for_selector("body[data-ready]")
         self.settled("octree")
         return self
+
+    def shows(self, name: str) -> None:
+        """Wait until the page shows the scene of that name."""
+        self.page.wait_for_function("(name) => window.viewer.scene?.name === name", arg=name)
 
     def wait_until(self, seen: Callable[[], bool]) -> None:
         """Until it is seen; fails where that takes longer than PATIENCE."""

@@ -21,6 +21,7 @@ SECTIONS = (
     Section("images", "validation.pictures.section", "scene"),
     Section("hits", "validation.hits.section", "mesh"),
     Section("queries", "validation.queries.section"),
+    Section("studies", "validation.studies.section"),
     Section("promises", "validation.promises.section"),
     Section("stability", "validation.stability.section"),
     Section("efficiency", "validation.efficiency.section"),

@@ -11,13 +11,16 @@ from renderer.kernels.jit import inlined, kernel
 _BITS = 21
 
 
-def order_along_curve(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The rows of finite points (n, 3) in the order of Morton's curve over their bounds, (n,) int64.
+def order_along_curve(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The rows of finite points (n, 3) in the order of Morton's curve over their bounds, and the steps to each of them.
+
+    Both are (n,) int64. A step is the exclusive or of two keys, 0 for the first row: the larger, the larger is the cell
+    that the curve leaves there.
 
     Points of one cell, of 2^63 in the bounds, stay in the order of their rows.
     """
     if not len(points):
-        return np.empty(0, np.int64)
+        return np.empty(0, np.int64), np.empty(0, np.int64)
     lower, upper = points.min(axis=0), points.max(axis=0)
     with np.errstate(divide="ignore", over="ignore"):
         # One rate for all axes, so that a cell is a cube.
@@ -25,7 +28,9 @@ def order_along_curve(points: NDArray[np.float64]) -> NDArray[np.int64]:
     grid = np.append(lower, rate if np.isfinite(rate) else 0.0)
     keys = np.empty(len(points), np.int64)
     _write_keys(points, grid, keys)
-    return np.argsort(keys, kind="stable")
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    return order, keys ^ np.append(keys[:1], keys[:-1])
 
 
 @kernel

@@ -45,7 +45,7 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], o
 
 
 def read_whole(path: Path) -> bytes:
-    """The bytes of a file. Raises ``OSError`` for a device, which may have no end, and a null byte in the name."""
+    """The bytes of a file. Raises ``OSError`` also for a device, which may have no end, and a name with a null byte."""
     if "\0" in str(path):  # else a ValueError, whose words differ between versions of Python
         raise OSError(errno.EINVAL, "embedded null byte", str(path))
     mode = path.stat().st_mode

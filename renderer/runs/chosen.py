@@ -113,6 +113,8 @@ def suns_of(path: Path) -> tuple[Floats, Floats]:
     try:
         text = path.read_text(encoding="utf-8").replace(",", " ")
         rows = np.array([line.split() for line in text.splitlines() if line.split("#")[0].strip()], np.float64)
+    except OSError as error:
+        raise _unreadable("--suns", path, error) from None
     except ValueError as error:
         raise ValueError(f"--suns: expected rows of 3 or 4 numbers, got {path}: {error}") from None
     good = rows.ndim == 2 and rows.shape[1] in (3, 4)
@@ -129,9 +131,15 @@ def _face_points(mesh: Mesh) -> tuple[Points, NDArray[np.int64]]:
 def _read_array(argument: str, path: Path) -> NDArray[Any]:
     try:
         array = np.load(path, allow_pickle=False)
+    except OSError as error:
+        raise _unreadable(argument, path, error) from None
     except (ValueError, EOFError) as error:
         raise ValueError(f"{argument}: expected an .npy file, got {path}: {error}") from None
     expect(isinstance(array, np.ndarray), argument, "one array in an .npy file", str(path))
     real = np.issubdtype(array.dtype, np.floating) or np.issubdtype(array.dtype, np.integer)
     expect(real, argument, "real numbers", f"{array.dtype} in {path}")
     return np.asarray(array)
+
+
+def _unreadable(argument: str, path: Path, error: OSError) -> ValueError:
+    return ValueError(f"{argument}: expected a file that can be read, got {path}: {error.strerror or error}")

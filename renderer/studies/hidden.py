@@ -41,7 +41,7 @@ def occlusion(
     packed      True: (..., ceil(k / 8)) uint8 with a set bit for each hidden direction, in the order of
                 ``numpy.unpackbits(..., axis=-1, count=k)``. There are no weights then
     distance    how far the mesh hides, in scene units
-    threads     None: as many as the octree has
+    threads     None: as many as the octree has; they share the points, of which each is one thread's
     progress    a bar on standard error when that is a terminal
 
     The share is the sum of the weights of the hidden directions over the sum of all, both in the order of directions:

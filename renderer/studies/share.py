@@ -23,6 +23,9 @@ Floats = NDArray[np.float64]
 
 # Points that are put in order together: 16 bytes each for it, and a second of sorting.
 _BLOCK = 1 << 22
+# Rays are traced together where a point has at most so many faces of the mesh: measured with 1, which gains 12 to 26 %,
+# and with 30 and more, which loses 3 to 58 %.
+_DENSE = 2
 # The points of a chunk, at most and at least, where there are enough for all threads.
 _MOST, _LEAST = 64 * TILE, 16
 
@@ -130,12 +133,16 @@ def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
     arrays = mesh.vertices, mesh.faces
     with progress_bar(count, "point", asked.progress) as update:
         for first in range(0, count, _BLOCK):
-            order = first + order_along_curve(asked.places.points[first : first + _BLOCK])
+            order, steps = order_along_curve(asked.places.points[first : first + _BLOCK])
+            order = first + order
+            # Else the way that a tile's rays share costs more than it saves: up to 58 % with a point for 30 faces.
+            steps = steps if _DENSE * count >= len(mesh.faces) else steps[:0]
 
-            def look(begin: int, end: int, order: NDArray[np.int64] = order) -> Iterator[None]:
-                rows, state, memory = order[begin:end], (0, 0), make_sweep_memory(tree.depth)
+            def look(begin: int, end: int, way: tuple[NDArray[np.int64], ...] = (order, steps)) -> Iterator[None]:
+                rows, jumps = (part[begin:end] for part in way)
+                state, memory = (0, 0), make_sweep_memory(tree.depth)
                 while state[0] < len(rows):
-                    state = sweep(tree.words, arrays, asked.places, sky, answers, rows, state, memory)
+                    state = sweep(tree.words, arrays, asked.places, sky, answers, rows, jumps, state, memory)
                     yield
 
             size = min(_MOST, max(_LEAST, len(order) // (16 * asked.threads)))

@@ -16,11 +16,25 @@ from renderer.kernels.simd import at, get, pointer, put, smaller
 from renderer.kernels.vec3 import add, cross, dot, normalized, row3, scale, three
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
+from renderer.trace.parallel_rays import (
+    Parallel,
+    ParallelMemory,
+    make_parallel_memory,
+    parallel_pointers,
+    trace_parallel,
+)
 from renderer.trace.rays import HitPointers, RayPointers, hit_pointers
 from renderer.trace.spawn import corners_of, has_normal, leave_face, leave_to_both_sides
 from renderer.trace.traverse import Memory, Scratch, make_memory, make_scratch, search_blocks, trace
 
 TILE = 256
+# A tile ends where the curve leaves the largest cell, but not before so many points: else its parts may be far apart,
+# and the beam around them wide. With 256 points whatever the cells, beams list three times as many leaves.
+_LEAST_TILE = 32
+# From so many points on, their rays in one direction are traced with a beam around all of them.
+_TOGETHER = 16
+# So often may that be given up in a tile before it is no longer tried.
+_TRIES = 4
 # Points with directions that are listed, and their rays traced, together: of a whole tile some directions, of a few
 # points many.
 RAYS = 1024
@@ -30,8 +44,9 @@ RAYS_A_CALL = 1 << 14
 # normal; the frame, whose third vector is the point's own normal; the sum so far; and that of all directions.
 _ABOVE, _BELOW, _FACING, _FRAME = 0, 3 * TILE, 6 * TILE, 9 * TILE
 _SUM, _WHOLE, _POINT_DOUBLES = 18 * TILE, 19 * TILE, 20 * TILE
-# Its row, its face, and how its rays start.
-_ROW, _FACE, _START, _POINT_INTEGERS = 0, TILE, 2 * TILE, 3 * TILE
+# Its row, its face, how its rays start, and the leaf that hid its last direction, or 0; and once for the tile, how
+# often tracing its rays together may still be tried.
+_ROW, _FACE, _START, _HIDER, _LEFT, _POINT_INTEGERS = 0, TILE, 2 * TILE, 3 * TILE, 4 * TILE, 4 * TILE + 8
 # At the point itself; on one of two sides of a face; or by a rule that needs each direction, as of a face whose corners
 # lie on a line.
 _AT_POINT, _BY_SIDE, _BY_DIRECTION = range(3)
@@ -87,6 +102,7 @@ class SweepMemory(NamedTuple):
     integers: NDArray[np.int64]
     hits: NDArray[np.float64]
     trace: Memory
+    parallel: ParallelMemory
 
 
 class _Work(NamedTuple):
@@ -104,6 +120,7 @@ class _Work(NamedTuple):
     listed: Any
     found: HitPointers
     scratch: Scratch
+    parallel: Parallel
 
 
 def make_sweep_memory(depth: int) -> SweepMemory:
@@ -113,6 +130,7 @@ def make_sweep_memory(depth: int) -> SweepMemory:
         cache_aligned(_POINT_INTEGERS + RAYS, np.int64),
         cache_aligned(RAYS // 8, np.float64),
         make_memory(depth, RAYS),
+        make_parallel_memory(depth, TILE),
     )
 
 
@@ -125,7 +143,7 @@ def _work_in(memory):
     put(zero, 0, 0.0)
     return _Work(
         doubles, integers, origins, directions, limits, values, zero, at(integers, _POINT_INTEGERS),
-        hit_pointers(memory.hits, 0), make_scratch(memory.trace),
+        hit_pointers(memory.hits, 0), make_scratch(memory.trace), parallel_pointers(memory.parallel),
     )  # fmt: skip
 
 
@@ -154,12 +172,14 @@ def _begin_tile(mesh, places, rows, begin, count, work, unit):
     vertices, faces = pointer(mesh[0]), pointer(mesh[1])
     points, normals, leaving = pointer(places.points), pointer(places.normals), pointer(places.leaving)
     step = np.int64(len(places.normals) > 1)
+    put(work.numbers, _LEFT, _TRIES)
     for i in range(count):
         row = rows[begin + i]
         face = get(leaving, row) if len(places.leaving) > 0 else np.int64(-1)
         o, start = row3(points, row), _AT_POINT
         put(work.numbers, _ROW + i, row)
         put(work.numbers, _FACE + i, face)
+        put(work.numbers, _HIDER + i, 0)
         _put3(work.points, _ABOVE + 3 * i, o)
         if face >= 0:
             corners = corners_of(vertices, faces, face, unit)
@@ -193,22 +213,6 @@ def _start_of(mesh, places, work, i, d, unit):
     return leave_face(corners, row3(pointer(places.points), get(work.numbers, _ROW + i)), d, unit)
 
 
-@inlined
-def _mark(answers, work, k, i):
-    """Set the bit of direction ``k`` for point ``i``."""
-    row = get(work.numbers, _ROW + i)
-    answers.bits[row, k >> 3] |= np.uint8(0x80 >> (k & 7))
-
-
-@inlined
-def _note(answers, work, k, i, value, hides):
-    """Take down whether direction ``k``, worth ``value``, is hidden from point ``i``."""
-    if hides == answers.hidden:
-        put(work.points, _SUM + i, get(work.points, _SUM + i) + value)
-    if hides and len(answers.bits) > 0:
-        _mark(answers, work, k, i)
-
-
 @kernel
 def _aim(mesh, places, sky, work, begun, count, unit):
     """List a tile's ``count`` points with one direction more; ``begun`` are that, and the entries and rays so far.
@@ -234,6 +238,8 @@ def _aim(mesh, places, sky, work, begun, count, unit):
             _put3(work.origins, 3 * rays, _start_of(mesh, places, work, i, d, unit))
             _put3(work.directions, 3 * rays, d)
             put(work.limits, rays, limit)
+            if rays < TILE:
+                put(work.parallel.hiders, rays, get(work.numbers, _HIDER + i))
         put(work.values, listed, value)
         put(work.listed, listed, (k * TILE + i) * 2 + np.int64(seen))
         listed += 1
@@ -249,6 +255,8 @@ def _take_down(answers, work, listed):
         code, hides = get(work.listed, entry), True
         if code & 1 != 0:
             hides = get(work.found.hit, ray)
+            if ray < TILE:
+                put(work.numbers, _HIDER + (code >> 1) % TILE, get(work.parallel.hiders, ray))
             ray += 1
         k, i = (code >> 1) // TILE, (code >> 1) % TILE
         if hides == answers.hidden:
@@ -269,9 +277,13 @@ def _end_tile(answers, work, count):
 
 
 @inlined
-def _trace(tree, work, rays):
-    """Find which rays hit anything."""
+def _trace(tree, work, rays, together):
+    """Find which rays hit anything; ``together`` says that they are those of one direction."""
     batch = RayPointers(work.origins, work.directions, work.zero, work.limits, 3, 3, 0, 1, tree.scale)
+    if together and rays > 0:
+        if trace_parallel(tree, batch, work.found, rays, work.scratch, work.parallel):
+            return
+        put(work.numbers, _LEFT, get(work.numbers, _LEFT) - 1)
     if tree.has_nodes:
         trace(tree, batch, work.found, 0, rays, work.scratch, np.bool_(True))
     else:
@@ -279,25 +291,41 @@ def _trace(tree, work, rays):
 
 
 @kernel
-def sweep(words, mesh, places, sky, answers, rows, state, memory):
+def _tile_from(rows, steps, begin):
+    """The number of points of the tile that begins there: with steps given, up to the longest step of the curve."""
+    count = smaller(np.int64(TILE), len(rows) - begin)
+    if begin + count >= len(steps):
+        return count
+    longest, end = steps[begin + count], count
+    for i in range(_LEAST_TILE, count):
+        if steps[begin + i] > longest:
+            longest, end = steps[begin + i], i
+    return end
+
+
+@kernel
+def sweep(words, mesh, places, sky, answers, rows, steps, state, memory):
     """Let the points in ``rows``, one tile after the other, look in all directions; some rays more with each call.
 
-    ``words`` are the tree's, ``mesh`` its vertices and faces. ``state`` is (0, 0) in the first call, and later what the
+    ``words`` are the tree's, ``mesh`` its vertices and faces. ``steps`` are those of the curve to the rows, none
+    where the points are too far apart for their rays to be traced together.
+    ``state`` is (0, 0) in the first call, and later what the
     last one returned, with the same memory: the begin of the tile under way, and its next direction. All is done at
     (len(rows), 0).
     """
     tree, work = tree_pointers(words), _work_in(memory)
     begin, k = state
-    count = smaller(np.int64(TILE), len(rows) - begin)
+    count = _tile_from(rows, steps, begin)
     if k == 0:
         _begin_tile(mesh, places, rows, begin, count, work, tree.scale)
-    traced = np.int64(0)
+    traced, parallel = np.int64(0), len(steps) > 0 and tree.has_nodes and not sky.turned and count >= _TOGETHER
     while k < len(sky.values) and traced < RAYS_A_CALL:
-        listed, rays = np.int64(0), np.int64(0)
-        while k < len(sky.values) and listed + count <= RAYS:
+        together = parallel and get(work.numbers, _LEFT) > 0
+        listed, rays, most = np.int64(0), np.int64(0), count if together else np.int64(RAYS)
+        while k < len(sky.values) and listed + count <= most:
             listed, rays = _aim(mesh, places, sky, work, (k, listed, rays), count, tree.scale)
             k += 1
-        _trace(tree, work, rays)
+        _trace(tree, work, rays, together)
         _take_down(answers, work, listed)
         traced += listed
     if k < len(sky.values):

@@ -94,13 +94,13 @@ def _most(floats, row):
 
 
 @inlined
-def _lowest_origin(floats, axis):
+def lowest_origin(floats, axis):
     row = axis * WIDTH
     return smaller(_least(floats, NEAR_ORIGIN + row), _least(floats, FAR_ORIGIN + row))
 
 
 @inlined
-def _highest_origin(floats, axis):
+def highest_origin(floats, axis):
     row = axis * WIDTH
     return larger(_most(floats, NEAR_ORIGIN + row), _most(floats, FAR_ORIGIN + row))
 
@@ -113,7 +113,7 @@ def make_beam(rays):
     u, v = (w + 1) % 3, (w + 2) % 3
     forward = get(rays.doubles, DIRECTION_Z) > 0.0
     flip = 0 if forward else 8
-    low_w, high_w = _lowest_origin(floats, w), _highest_origin(floats, w)
+    low_w, high_w = lowest_origin(floats, w), highest_origin(floats, w)
     least_u, most_u = _least(floats, SLOPE_U), _most(floats, SLOPE_U)
     least_v, most_v = _least(floats, SLOPE_V), _most(floats, SLOPE_V)
     return Beam(
@@ -123,10 +123,10 @@ def make_beam(rays):
         16 * v,
         high_w if forward else low_w,
         low_w if forward else high_w,
-        _lowest_origin(floats, u),
-        _highest_origin(floats, u),
-        _lowest_origin(floats, v),
-        _highest_origin(floats, v),
+        lowest_origin(floats, u),
+        highest_origin(floats, u),
+        lowest_origin(floats, v),
+        highest_origin(floats, v),
         least_u - (abs(least_u) * _WIDER + _LEAST_SLOPE),
         most_u + (abs(most_u) * _WIDER + _LEAST_SLOPE),
         least_v - (abs(least_v) * _WIDER + _LEAST_SLOPE),
@@ -157,7 +157,7 @@ def enter_beam(nodes, base, beam, limit):
 
 
 @inlined
-def _meet_box(nodes, at, floats, half):
+def meet_box(nodes, at, floats, half):
     """The bits of eight rays, from ``half`` on, that meet the octant whose first word is ``at``: ``enter_boxes``."""
     t0, t1 = load8(floats, LOWER + half), load8(floats, LIMIT + half)
     for axis in range(3):
@@ -186,7 +186,7 @@ def _middle_entry(nodes, base, beam, rays, t0):
 
 
 @inlined
-def _push_sorted(node, bits, t0, key, stack, top):
+def push_sorted(node, bits, t0, key, stack, top):
     """Push the octants in ``bits`` of a node, the one with the least key last. An entry is t0 over the octant's number.
 
     The place of an octant is the number of those behind it, so no branch depends on the keys. A NaN counts as -inf,
@@ -232,7 +232,7 @@ def child_of(tree, octant):
 @inlined
 def meet_octant(tree, rays, at):
     """The bits of the rays that meet the octant whose first word is ``at``."""
-    return _meet_box(tree.nodes, at, rays.floats, 0) | (_meet_box(tree.nodes, at, rays.floats, 8) << 8)
+    return meet_box(tree.nodes, at, rays.floats, 0) | (meet_box(tree.nodes, at, rays.floats, 8) << 8)
 
 
 @kernel
@@ -252,7 +252,7 @@ def trace_packet(tree, rays, stack, any_hit):
         if any_hit:
             top = _push_all(node, bits, t0, stack, top)
         elif bits != 0:
-            top = _push_sorted(node, bits, t0, _middle_entry(nodes, base, beam, rays, t0), stack, top)
+            top = push_sorted(node, bits, t0, _middle_entry(nodes, base, beam, rays, t0), stack, top)
         # Take octants off the stack and test their leaves, until one leads to a node.
         while True:
             if left == 0:
@@ -266,12 +266,12 @@ def trace_packet(tree, rays, stack, any_hit):
                 break
             meeting = meet_octant(tree, rays, at)
             if meeting != 0:
-                doubtful |= _test_leaf(tree, rays, meeting, node, any_hit)
+                doubtful |= test_leaf(tree, rays, meeting, node, any_hit)
                 limit = _most(floats, LIMIT)
 
 
 @inlined
-def _test_leaf(tree, rays, meeting, leaf, any_hit):
+def test_leaf(tree, rays, meeting, leaf, any_hit):
     """Test the rays in ``meeting`` against a leaf. Returns the bits of those in doubt."""
     doubtful = np.int64(0)
     while meeting != 0:

@@ -6,9 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
@@ -31,37 +33,50 @@ _TRY_LATER = 1013  # RFC 6455's registry of close codes
 
 
 class Viewer:
-    """The state that all connections share: the scene on show, and the threads that compute."""
+    """The state that all connections share: the scene that new ones show, and the threads that compute.
+
+    A connection holds the scene that it shows; ``_scenes`` finds it by its id as long as one does.
+    """
 
     def __init__(self, shown: ShownScene) -> None:
         self.shown = shown
+        self._scenes = WeakValueDictionary({shown.id: shown})
         self.sessions: set[Session] = set()
         self._threads = ThreadPoolExecutor(_THREADS_A_SESSION * MAX_CONNECTIONS, "viewer")
         self._one_opens = asyncio.Lock()
 
-    async def open(self, file: str) -> None:
-        """Show another scene file to all. Raises ``ValueError`` and changes nothing where that fails."""
+    async def open(self, file: str, fresh: bool) -> ShownScene:
+        """The scene of one of the files offered, as ``SceneHost`` says."""
         async with self._one_opens:
-            path = self.shown.beside(file)
-            self.shown = await run_in_threadpool(open_file, path)
-        told = [session.tell_of_scene() for session in self.sessions]
-        await asyncio.gather(*told, return_exceptions=True)  # one may just be leaving
+            known = [self.shown, *(session.shown for session in self.sessions)]
+            shown = await run_in_threadpool(_opened, self.shown, known, file, fresh)
+            if shown.path == self.shown.path:
+                self.shown = shown
+            self._scenes[shown.id] = shown
+            return shown
 
-    async def description(self, _request: Request) -> Response:
-        """GET /scene."""
-        return JSONResponse(await run_in_threadpool(description, self.shown))
+    def _asked_for(self, request: Request) -> ShownScene:
+        """The scene with the id of the request, or without one the server's own. Raises a 404 where it is gone."""
+        wanted = request.query_params.get("id", self.shown.id)
+        if (shown := self._scenes.get(wanted)) is None:
+            raise HTTPException(404, f"id: expected that of a scene that is shown, got {wanted[:40]!r}")
+        return shown
 
-    async def mesh(self, _request: Request) -> Response:
-        """GET /mesh."""
-        return _stream(mesh_payload(self.shown.prepared))
+    async def description(self, request: Request) -> Response:
+        """GET /scene?id=ID."""
+        return JSONResponse(await run_in_threadpool(description, self._asked_for(request)))
+
+    async def mesh(self, request: Request) -> Response:
+        """GET /mesh?id=ID."""
+        return _stream(mesh_payload(self._asked_for(request).prepared))
 
     async def boxes(self, request: Request) -> Response:
-        """GET /octree?level=K."""
-        level = request.query_params.get("level", "0")
+        """GET /octree?id=ID&level=K."""
+        shown, level = self._asked_for(request), request.query_params.get("level", "0")
         # No tree has levels of three digits.
         if not (level.isascii() and level.isdigit() and len(level) < 3):
             return PlainTextResponse(f"level: expected an integer from 0 to 99, got {level[:40]!r}", 400)
-        return _stream(await run_in_threadpool(boxes_payload, self.shown.prepared, int(level)))
+        return _stream(await run_in_threadpool(boxes_payload, shown.prepared, int(level)))
 
     async def connect(self, socket: WebSocket) -> None:
         """The WebSocket: one session, until the page leaves."""
@@ -86,6 +101,18 @@ class Viewer:
     async def stop(self) -> None:
         """Begin nothing more."""
         self._threads.shutdown(wait=False, cancel_futures=True)
+
+
+def _opened(own: ShownScene, known: list[ShownScene], file: str, fresh: bool) -> ShownScene:
+    """The scene of ``file``, beside the server's ``own``: one of those ``known`` where it will do, or loaded anew."""
+    if own.path is None and not fresh:
+        return own
+    path = own.beside(file) if fresh or file in own.files else own.path
+    assert path is not None  # which mypy cannot tell
+    for scene in known:
+        if scene.path == path and not fresh and not scene.edited:
+            return scene
+    return open_file(path)
 
 
 def _stream(payload: Payload) -> Response:

@@ -15,7 +15,7 @@ from renderer.picture.image import Image
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer.protocol import FACE_COLORS, JPEG, RGBA, CameraMessage, packed
 from renderer.viewer.shown import ShownScene, render_settings, varied
-from renderer.viewer.viewpoint import camera_of
+from renderer.viewer.viewpoint import camera_of, seen_from
 
 # Longest sides of the first passes: a sixteenth and a quarter of the pixels of a picture of 512 x 512.
 COARSE = (128, 256)
@@ -67,7 +67,8 @@ def answer(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Calla
     began, limits = time.perf_counter(), None
     if view.mode == "phong":
         prepared = varied(shown.prepared, view.settings)
-        payload = face_colors(prepared.arrays, camera_of(view.m, view.fovy).eye, shown.threads).tobytes()
+        eye = seen_from(camera_of(view.m, view.fovy, height=view.height), prepared.mesh.bounds)
+        payload = face_colors(prepared.arrays, eye, shown.threads).tobytes()
         kind, pace = FACE_COLORS, 0.0
     else:
         image = picture(shown, view, wanted, finished)
@@ -86,7 +87,8 @@ def picture(
     """The same picture that ``render`` gives for the view's camera and settings."""
     prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)
     settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, wanted.last)
-    return prepared.picture(camera_of(view.m, view.fovy), settings, BOUNDED, shown.threads, finished)
+    camera = camera_of(view.m, view.fovy, height=view.height)
+    return prepared.picture(camera, settings, BOUNDED, shown.threads, finished)
 
 
 def _scaled(side: int, longest: int, of: int) -> int:

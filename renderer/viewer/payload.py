@@ -32,6 +32,7 @@ def description(shown: ShownScene) -> dict[str, Any]:
     scene, mesh = shown.scene, shown.prepared.mesh
     settings, stats = scene.render, shown.prepared.octree.stats
     return {
+        "id": shown.id,
         "name": shown.name,
         "files": shown.files,
         "camera": scene.camera.model_dump(),

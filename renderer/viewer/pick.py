@@ -22,8 +22,10 @@ _MAX_BOXES = 512
 def picked(shown: ShownScene, pick: Pick) -> dict[str, Any]:
     """The message for ``pick``: the ray through the pixel's centre; null for values that a miss does not have."""
     prepared = varied(shown.prepared, pick.settings)
-    rows = camera_of(pick.m, pick.fovy).rows(pick.w, pick.h)
-    origin, direction = rows[0], rows[3] + (pick.x + 0.5) * rows[4] + (pick.y + 0.5) * rows[5]
+    rows = camera_of(pick.m, pick.fovy, height=pick.height).rows(pick.w, pick.h)
+    origin, direction = (
+        row + (pick.x + 0.5) * in_x + (pick.y + 0.5) * in_y for row, in_x, in_y in (rows[:3], rows[3:])
+    )
     direction = direction / np.linalg.norm(direction)
     x, y, z = direction.tolist()
     hits = prepared.octree.closest_hit(origin[None], direction[None])

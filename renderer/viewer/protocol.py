@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator, model_validator
 
+from renderer.limits import FARTHEST
 from renderer.scene.camera import sample_offsets
 from renderer.scene.fields import FiniteVector
 
@@ -27,6 +28,8 @@ _Sequence = Annotated[int, Field(ge=0, lt=2**32)]
 _Side = Annotated[int, Field(ge=1, le=MAX_SIDE)]
 _Matrix = Annotated[list[_Number], Field(min_length=16, max_length=16)]
 _Fovy = Annotated[float, Field(ge=MIN_FOVY, le=MAX_FOVY)]
+_Height = Annotated[float, Field(gt=0.0, le=FARTHEST)] | None
+_FileName = Annotated[str, Field(max_length=255)]  # the longest file name
 
 Mode = Literal["gl", "phong", "brute", "octree"]
 MODES: tuple[Mode, ...] = ("gl", "phong", "brute", "octree")
@@ -65,13 +68,17 @@ class ViewSettings(_Message):
 
 
 class CameraMessage(_Message):
-    """A view to show: ``m`` camera to world as in ``viewpoint``, ``fovy`` in radians, ``w`` x ``h`` pixels."""
+    """A view to show: ``m`` camera to world as in ``viewpoint``, ``fovy`` in radians, ``w`` x ``h`` pixels.
+
+    A ``height``, in scene units, makes the camera an orthographic one.
+    """
 
     type: Literal["view"]
     seq: _Sequence
     mode: Mode
     m: _Matrix
     fovy: _Fovy
+    height: _Height = None
     w: _Side
     h: _Side
     settings: ViewSettings = ViewSettings()
@@ -100,6 +107,7 @@ class Pick(_Message):
     y: Annotated[int, Field(ge=0, lt=MAX_SIDE)]
     m: _Matrix
     fovy: _Fovy
+    height: _Height = None
     w: _Side
     h: _Side
     settings: ViewSettings = ViewSettings()
@@ -111,11 +119,20 @@ class Pick(_Message):
         return self
 
 
+class Hello(_Message):
+    """A page that begins, or has lost its connection, wants to know its scene: ``file`` where that is one of those
+    offered, loaded anew only if it was edited; else the server's own.
+    """
+
+    type: Literal["hello"]
+    file: _FileName = ""
+
+
 class OpenScene(_Message):
-    """Load another of the scene files offered."""
+    """Load one of the scene files offered, as it is now."""
 
     type: Literal["scene"]
-    file: Annotated[str, Field(max_length=255)]  # the longest file name
+    file: _FileName
 
 
 class SaveCamera(_Message):
@@ -124,10 +141,11 @@ class SaveCamera(_Message):
     type: Literal["camera"]
     m: _Matrix
     fovy: _Fovy
+    height: _Height = None
     walk: bool = False
 
 
-Message = CameraMessage | Ack | Cancel | Pick | OpenScene | SaveCamera
+Message = CameraMessage | Ack | Cancel | Pick | Hello | OpenScene | SaveCamera
 _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from renderer.picture.prepare import tiles
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
-from renderer.viewer.protocol import Ack, CameraMessage, Cancel, OpenScene, Pick, SaveCamera, parse
+from renderer.viewer.protocol import Ack, CameraMessage, Cancel, Hello, OpenScene, Pick, SaveCamera, parse
 from renderer.viewer.shown import ShownScene
 from renderer.viewer.viewpoint import camera_of, camera_toml
 
@@ -58,12 +58,14 @@ class Newest(Generic[T]):
 
 
 class SceneHost(Protocol):
-    """The holder of the scene that is shown to all connections."""
+    """The holder of the scenes that connections show."""
 
     shown: ShownScene
 
-    async def open(self, file: str) -> None:
-        """Show another scene file to all. Raises ``ValueError`` and changes nothing where that fails."""
+    async def open(self, file: str, fresh: bool) -> ShownScene:
+        """The scene of one of the files offered, or for "" the server's own; loaded anew where it was edited since it
+        was loaded, and always if ``fresh``. Raises ``ValueError``.
+        """
 
 
 @dataclass
@@ -76,16 +78,20 @@ class Connection:
 
 @dataclass(eq=False)
 class Session:
-    """One connection. ``threads`` computes a picture, the one before it whose last tiles end, and a click."""
+    """One connection, which shows a scene of its own: at first the server's.
+
+    ``threads`` computes a picture, the one before it whose last tiles end, and a click.
+    """
 
     host: SceneHost
     connection: Connection
     threads: Executor
     views: Newest[CameraMessage] = field(default_factory=Newest)
     picks: Newest[Pick] = field(default_factory=Newest)
-    scenes: Newest[str] = field(default_factory=Newest)
+    scenes: Newest[Hello | OpenScene] = field(default_factory=Newest)
 
     def __post_init__(self) -> None:
+        self.shown = self.host.shown
         self._awaited: tuple[int, int] | None = None
         self._acknowledged = asyncio.Event()
         self._acknowledged.set()
@@ -96,7 +102,7 @@ class Session:
         try:
             message = parse(text)
             if isinstance(message, CameraMessage):
-                camera_of(message.m, message.fovy)
+                camera_of(message.m, message.fovy, height=message.height)
                 self.views.put(message)
             elif isinstance(message, Ack):
                 if (message.seq, message.step) == self._awaited:
@@ -107,8 +113,8 @@ class Session:
                 self.picks.put(message)
             elif isinstance(message, SaveCamera):
                 await self._tell(type="camera", name="camera.toml", text=self._camera(message))
-            elif isinstance(message, OpenScene):
-                self.scenes.put(message.file)
+            elif isinstance(message, Hello | OpenScene):
+                self.scenes.put(message)
         except ValueError as error:
             await self.complain(error)
 
@@ -123,10 +129,11 @@ class Session:
         """Send the page an error's message, on one line."""
         await self._tell(type="error", message=" ".join(str(error).split()) or type(error).__name__)
 
-    async def tell_of_scene(self) -> None:
-        """Say that another scene is shown. Views of the one before are dropped."""
+    async def show_scene(self, shown: ShownScene) -> None:
+        """Show ``shown`` from now on, and say which that is. Views of the one before are dropped."""
+        self.shown = shown
         self.views.put(None)
-        await self._tell(type="scene")
+        await self._tell(type="scene", id=shown.id)
 
     async def _show_views(self) -> None:
         while True:
@@ -160,7 +167,7 @@ class Session:
 
     async def _computed(self, view: CameraMessage, wanted: Pass, stubborn: bool) -> Answer:
         """The pass's answer. A newer view does not wait for the tiles under way, which end soon; no others begin."""
-        shown, left, done = self.host.shown, threading.Event(), 0
+        shown, left, done = self.shown, threading.Event(), 0
 
         def finished(tiles: int) -> None:
             nonlocal done
@@ -200,27 +207,29 @@ class Session:
         while True:
             pick = await self.picks.take()
             try:
-                running = asyncio.get_running_loop().run_in_executor(self.threads, picked, self.host.shown, pick)
+                running = asyncio.get_running_loop().run_in_executor(self.threads, picked, self.shown, pick)
                 await self._tell(**await running)
             except Exception as error:  # as above
                 await self.complain(error)
 
     async def _open_scenes(self) -> None:
         while True:
-            file = await self.scenes.take()
+            wanted = await self.scenes.take()
             try:
-                await self.host.open(file)
+                await self.show_scene(await self.host.open(wanted.file, isinstance(wanted, OpenScene)))
             except Exception as error:  # as above
                 await self.complain(error)
+                if isinstance(wanted, Hello):  # a page that begins has no scene to go on with
+                    await self.show_scene(self.shown)
 
     def _camera(self, message: SaveCamera) -> str:
         """The camera as TOML. Its target is the point of its axis nearest the scene's middle, if that lies ahead."""
-        camera = camera_of(message.m, message.fovy)
+        camera = camera_of(message.m, message.fovy, height=message.height)
         if not message.walk:
-            middle = np.mean(self.host.shown.prepared.mesh.bounds, axis=0)
+            middle = np.mean(self.shown.prepared.mesh.bounds, axis=0)
             ahead = float((middle - camera.eye) @ camera.frame()[2])
             if ahead > 0.0:
-                camera = camera_of(message.m, message.fovy, ahead)
+                camera = camera_of(message.m, message.fovy, ahead, message.height)
         return camera_toml(camera)
 
     async def _tell(self, **message: Any) -> None:

@@ -1,7 +1,11 @@
-"""A scene on show: prepared once for all connections, and varied by the settings of their panels."""
+"""A scene on show: prepared once for its connections, and varied by the settings of their panels."""
 
-from dataclasses import dataclass, replace
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from secrets import token_hex
+from typing import NamedTuple
 
 from renderer.errors import expect
 from renderer.lazy import lazy
@@ -16,6 +20,17 @@ from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer.protocol import ViewSettings
 
+# The most bytes of a file that may be a saved camera alone, of which the viewer writes some 300.
+_CAMERA_BYTES = 4096
+
+
+class _Mark(NamedTuple):
+    """What tells a file from one that was edited since: nanoseconds of its last change, bytes, and its number."""
+
+    changed: int
+    size: int
+    number: int
+
 
 @dataclass(frozen=True, eq=False)
 class ShownScene:
@@ -23,12 +38,16 @@ class ShownScene:
 
     path      the scene file, or None for a scene made in Python
     prepared  the scene over its octree, ready for any number of bounces
+    marks     the files that it was loaded from, as they were then
+    id        what tells it from every other scene, also from the same file loaded anew or by another server
     """
 
     scene: Scene
     path: Path | None
     prepared: PreparedScene
     threads: int
+    marks: dict[Path, _Mark | None] = field(default_factory=dict)
+    id: str = field(default_factory=lambda: token_hex(8))
 
     @property
     def name(self) -> str:
@@ -37,14 +56,24 @@ class ShownScene:
 
     @property
     def files(self) -> list[str]:
-        """The scene files that may be opened: those beside this one, but for pipes and names that are no text."""
+        """The scene files that may be opened: this one and those beside it, but for pipes, names that are no text and
+        files of a camera alone, as the viewer saves them.
+        """
+        if self.path is None:
+            return []
         # A pipe without a writer would be waited for.
-        names = [path.name for path in self.path.parent.glob("*.toml") if not path.is_fifo()] if self.path else []
-        return sorted(name for name in names if name.encode(errors="replace").decode() == name)
+        beside = {path.name for path in self.path.parent.glob("*.toml") if not path.is_fifo() and not _is_camera(path)}
+        return sorted(name for name in beside | {self.path.name} if name.encode(errors="replace").decode() == name)
+
+    @property
+    def edited(self) -> bool:
+        """Whether a file that it was loaded from has changed since."""
+        return _marks(self.marks) != self.marks
 
     def beside(self, file: str) -> Path:
         """The path of one of ``files``. Raises ``ValueError`` for any other."""
-        expect(self.path is not None and file in self.files, "scene.file", f"one of {self.files}", repr(file))
+        files = self.files
+        expect(self.path is not None and file in files, "scene.file", f"one of {files}", repr(file))
         assert self.path is not None  # which mypy cannot tell
         return self.path.parent / file
 
@@ -53,6 +82,27 @@ class ShownScene:
         """The same scene with every ray tested against every face."""
         octree = build_octree(self.prepared.mesh, "brute", "midpoint", self.prepared.needs, self.threads)
         return replace(self.prepared, octree=octree, tree=tree_for(octree, self.prepared.needs))
+
+
+def _marks(paths: Iterable[Path]) -> dict[Path, _Mark | None]:
+    """The marks of files; None of one that is not there."""
+    return {path: _mark(path) for path in paths}
+
+
+def _mark(path: Path) -> _Mark | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return _Mark(found.st_mtime_ns, found.st_size, found.st_ino)
+
+
+def _is_camera(path: Path) -> bool:
+    """Whether a file holds the table of a camera and nothing else."""
+    try:
+        return path.stat().st_size <= _CAMERA_BYTES and tomllib.loads(path.read_text("utf-8-sig")).keys() == {"camera"}
+    except (OSError, ValueError, RecursionError):
+        return False  # opening it says what is wrong
 
 
 def prepare_shown(scene: Scene, path: Path | None = None) -> ShownScene:
@@ -74,7 +124,10 @@ def prepare_shown(scene: Scene, path: Path | None = None) -> ShownScene:
 
 def open_file(path: Path) -> ShownScene:
     """Load a scene file and make it ready. Raises ``ValueError``, which ``SceneError`` is, naming file and fault."""
-    return prepare_shown(load_scene(path), path)
+    marks = _marks([path])
+    scene = load_scene(path)
+    marks |= _marks(entry.mesh for entry in scene.objects if isinstance(entry.mesh, Path))
+    return replace(prepare_shown(scene, path), marks=marks)
 
 
 def varied(prepared: PreparedScene, settings: ViewSettings) -> PreparedScene:

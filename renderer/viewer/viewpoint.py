@@ -1,4 +1,4 @@
-"""The page's camera as a ``PerspectiveCamera``, and as the table of a scene file.
+"""The page's camera as a ``Camera``, and as the table of a scene file.
 
 The page sends its camera as a matrix from camera to world, sixteen numbers column by column: unit vectors to the right,
 up and back, and the eye, each with a fourth number.
@@ -8,15 +8,20 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from renderer.errors import expect
-from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+
+# From so many times the scene's size and distance away, rays to one point are parallel to a millionth.
+_FAR = 1e6
 
 
-def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0) -> PerspectiveCamera:
+def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0, height: float | None = None) -> Camera:
     """The camera with matrix ``m`` (16) and vertical field of view ``fovy`` (radians, between 0 and pi).
 
-    Its target lies ``distance`` before the eye. Raises ``ValueError`` naming the argument.
+    With a ``height`` it is an orthographic one, whose film is so high (scene units) and ``fovy`` says nothing. Its
+    target lies ``distance`` before the eye. Raises ``ValueError`` naming the argument.
     """
     columns = np.array(m, np.float64).reshape(4, 4)
     rest = columns[:, 3].tolist()
@@ -24,10 +29,25 @@ def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0) -> Perspec
     up, back, eye = columns[1, :3], columns[2, :3], columns[3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is not finite
         target = eye - distance * back
-    return PerspectiveCamera(eye=_vector(eye), target=_vector(target), up=_vector(up), fov=math.degrees(fovy))
+    at = {"eye": _vector(eye), "target": _vector(target), "up": _vector(up)}
+    if height is not None:
+        return OrthographicCamera(**at, height=float(height))
+    return PerspectiveCamera(**at, fov=math.degrees(fovy))
 
 
-def camera_toml(camera: PerspectiveCamera) -> str:
+def seen_from(camera: Camera, bounds: ArrayLike) -> tuple[float, float, float]:
+    """The point from which ``camera`` sees a scene within ``bounds`` (2, 3): its eye, or one far behind it where all
+    rays are parallel.
+    """
+    if isinstance(camera, PerspectiveCamera):
+        return camera.eye
+    corners = np.asarray(bounds, np.float64)
+    middle, size = corners.mean(axis=0), float(np.ptp(corners, axis=0).max())
+    away = size + float(np.abs(np.subtract(camera.eye, middle)).max())
+    return _vector(middle - _FAR * away * camera.frame()[2])
+
+
+def camera_toml(camera: Camera) -> str:
     """The table [camera] with which ``load_scene`` makes ``camera`` again, to the bit.
 
     >>> print(camera_toml(PerspectiveCamera(eye=(0, 1, 4), target=(0, 0, 0), fov=40)))
@@ -40,7 +60,11 @@ def camera_toml(camera: PerspectiveCamera) -> str:
     """
     # Python writes the shortest decimal that reads back as the same float64, in a form that TOML shares.
     rows = [f"{name} = {list(getattr(camera, name))!r}" for name in ("eye", "target", "up")]
-    return "\n".join(["[camera]", *rows, f"fov = {camera.fov!r}", ""])
+    if isinstance(camera, PerspectiveCamera):
+        own = [f"fov = {camera.fov!r}"]
+    else:
+        own = ['type = "orthographic"', f"height = {camera.height!r}"]
+    return "\n".join(["[camera]", *rows, *own, ""])
 
 
 def _vector(values: np.ndarray) -> tuple[float, float, float]:

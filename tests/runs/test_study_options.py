@@ -212,3 +212,13 @@ def test_a_cluster_that_does_not_answer_is_one_line(
     told = ["study", "sky", str(city), "-o", str(tmp_path / "a.npy"), "--cluster", "tcp://127.0.0.1:9", "--quiet"]
     assert main(told) != 0
     assert "127.0.0.1:9" in capsys.readouterr().err and not (tmp_path / "a.npy").exists()
+
+
+@pytest.mark.parametrize(("kind", "option"), [("sky", "--points"), ("sun", "--suns")])
+def test_a_file_that_cannot_be_read_is_told_with_its_option(
+    city: Path, tmp_path: Path, kind: str, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for missing, why in ((tmp_path / "none", "No such file or directory"), (tmp_path, "Is a directory")):
+        assert main(["study", kind, str(city), option, str(missing), "-o", str(tmp_path / "a.npy"), "--quiet"]) == 2
+        said = f"octree-render: {option}: expected a file that can be read, got {missing}: {why}\n"
+        assert capsys.readouterr().err == said

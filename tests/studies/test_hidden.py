@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from meshes import make_mesh, meshes
 
 from renderer import BruteForce, Mesh, Octree
+from renderer.mesh.heightfield import heightfield_mesh
 from renderer.mesh.shapes import box, icosphere, torus
-from renderer.studies import face_points, fibonacci_sphere, occlusion
+from renderer.studies import face_points, fibonacci_sphere, occlusion, tregenza
 from renderer.studies.sweep import RAYS, TILE
 
 
@@ -216,3 +217,36 @@ def test_bad_arguments_are_named(argument, value, said):
 def test_bits_have_no_weights():
     with pytest.raises(ValueError, match=r"^weights: expected None, as bits have none"):
         occlusion(Octree.from_mesh(box()), [0, 0, 0], None, np.eye(3), weights=[1, 1, 1], packed=True)
+
+
+@given(meshes, st.integers(0, 2**20), st.integers(16, 90), st.sampled_from([1e-3, 0.1, 1.0]), st.booleans())
+def test_bits_of_points_that_are_traced_together(mesh, seed, count, apart, leaves):
+    """Points near each other and far apart, directions that turn little from one to the next, and along the axes."""
+    vertices, faces = mesh
+    octree, rng = Octree(vertices, faces), np.random.default_rng(seed)
+    extent = float(np.abs(vertices).max(initial=1.0))
+    points = extent * (rng.normal(size=3) + apart * rng.normal(size=(count, 3)))
+    turn = np.linspace(0.0, 2.0 * np.pi, 13)
+    ways = np.concatenate([np.stack([np.sin(turn), np.cos(turn), 0.0 * turn + rng.normal()], 1), np.eye(3), -np.eye(3)])
+    leaving = None
+    if leaves and len(faces):
+        leaving = rng.integers(0, len(faces), count)
+        points = octree.mesh.triangles[leaving].mean(axis=1)
+    reach = extent * float(rng.choice([0.5, np.inf]))
+    bits = occlusion(octree, points, None, ways, leaving=leaving, packed=True, distance=reach)
+    expected = written_down(octree, points, None, ways, leaving, reach)
+    np.testing.assert_array_equal(unpacked(bits, len(ways)), expected)
+
+
+@pytest.mark.parametrize("spread", [1e-3, 0.05, 1.0])
+def test_bits_over_many_small_faces(spread):
+    """Tiles that share their way, fill more than one list of leaves, and give up, as their points are apart."""
+    height = np.random.default_rng(11).uniform(0.0, 0.06, (40, 40))
+    octree = Octree.from_mesh(heightfield_mesh(height, spacing=1.0 / 40))
+    rng = np.random.default_rng(12)
+    points = np.column_stack([0.5 + spread * rng.uniform(-0.5, 0.5, (1600, 2)), rng.uniform(0.0, 0.06, 1600)])
+    directions = tregenza().directions
+    bits = occlusion(octree, points, [0, 0, 1], directions, packed=True)
+    expected = written_down(octree, points, np.tile([0.0, 0.0, 1.0], (1600, 1)), directions)
+    np.testing.assert_array_equal(unpacked(bits, 145), expected)
+    assert 0.1 < expected.mean() < 0.95

@@ -70,11 +70,11 @@ def test_all_gates_hold(tmp_path: Path, sections: dict[str, Fake], capsys: pytes
     assert command.main(["--output", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     # Two steps and one gate a section.
-    assert [line[:7] for line in lines[:-1]] == [f"[{k:2}/12]" for k in range(1, 13)]
-    assert lines[-1].startswith("validation: PASS, 6 of 6 gates in ")
-    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 6, "failed": 0}
+    assert [line[:7] for line in lines[:-1]] == [f"[{k:2}/14]" for k in range(1, 15)]
+    assert lines[-1].startswith("validation: PASS, 7 of 7 gates in ")
+    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 7, "failed": 0}
     assert ET.parse(tmp_path / "junit.xml").getroot().get("failures") == "0"
-    assert "6 of 6 gates hold" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "7 of 7 gates hold" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
@@ -109,14 +109,14 @@ class TestUserFiles:
         assert [name for name, fake in sections.items() if fake.jobs] == ["images"]
         left_out = metrics(tmp_path)["left_out"]
         assert left_out["hits"] == "no file was given by --mesh"
-        assert left_out.keys() == {"hits", "queries", "promises", "stability", "efficiency"}
+        assert left_out.keys() == {"hits", "queries", "studies", "promises", "stability", "efficiency"}
         page = (tmp_path / "index.html").read_text(encoding="utf-8")
         assert all(reason in page for reason in left_out.values())
 
     def test_scene_and_mesh(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
         assert command.main(["--scene", str(SCENE), "--mesh", str(MESH), "--output", str(tmp_path)]) == 0
         assert sections["hits"].jobs[0].meshes == (MESH,)
-        assert metrics(tmp_path)["left_out"].keys() == {"queries", "promises", "stability", "efficiency"}
+        assert metrics(tmp_path)["left_out"].keys() == {"queries", "studies", "promises", "stability", "efficiency"}
 
     @pytest.mark.parametrize(
         ("option", "text"), [("--scene", "camera = 3"), ("--mesh", "ply?"), ("--gate", "[hits]\nmagic = 1")]

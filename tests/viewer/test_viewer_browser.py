@@ -2,7 +2,6 @@
 
 import re
 import tomllib
-from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image as Pillow
-from viewer_page import CHROMIUM, FLAGS, SCENE, Viewer, served
+from viewer_page import CHROMIUM, Viewer
 
 from renderer import load_scene, render
 from renderer.inspect.face_phong import face_colors
@@ -21,57 +20,10 @@ from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.needs import needs_of
 from renderer.shade.records import MATERIAL_COLUMNS
 
-playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
-
-
-@pytest.fixture(scope="module")
-def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a scene, another one and one that cannot be loaded."""
-    folder = tmp_path_factory.mktemp("scenes")
-    (folder / "blocks.toml").write_text(SCENE)
-    (folder / "other.toml").write_text(SCENE.replace("[0.45, 0.62, 0.82]", "[0.9, 0.5, 0.1]"))
-    (folder / "broken.toml").write_text(SCENE.replace("fov = 38", "fov = 400"))
-    return folder
-
-
-@pytest.fixture(scope="module")
-def url(scenes: Path) -> Iterator[str]:
-    with served(scenes / "blocks.toml") as address:
-        yield address
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as engine:
-        chromium = engine.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture(scope="module")
-def opened(browser: Any, url: str) -> Iterator[Viewer]:
-    """The page that most tests share, because opening one takes a second."""
-    page = Viewer(browser, url).open()
-    yield page
-    page.context.close()
-
-
-@pytest.fixture
-def viewer(opened: Viewer) -> Viewer:
-    """The shared page as it was when it opened."""
-    opened.restart()
-    return opened
-
-
-@pytest.fixture(autouse=True)
-def no_faults() -> Iterator[None]:
-    """No page may complain on its console, nor leave this machine."""
-    Viewer.faults.clear()
-    yield
-    assert Viewer.faults == []
 
 
 def picture_of(scenes: Path, shown: dict[str, Any], **settings: Any) -> Image:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from renderer.limits import FARTHEST
 from renderer.viewer.protocol import (
     JPEG,
     MAX_FOVY,
@@ -19,6 +20,7 @@ from renderer.viewer.protocol import (
     Ack,
     CameraMessage,
     Cancel,
+    Hello,
     OpenScene,
     Pick,
     SaveCamera,
@@ -38,11 +40,14 @@ SETTINGS = {
     "light": [0, -1.5, 0.25],
     "pixels": "jpeg",
 }
-VIEW = {"type": "view", "seq": 7, "mode": "octree", "m": M, "fovy": 0.7, "w": 320, "h": 240, "settings": SETTINGS}
-PICK = {"type": "pick", "seq": 8, "x": 319, "y": 239, "m": M, "fovy": 0.7, "w": 320, "h": 240, "settings": SETTINGS}
-CAMERA = {"type": "camera", "m": M, "fovy": 0.7}
+SIZE = {"w": 320, "h": 240}
+VIEW = {"type": "view", "seq": 7, "mode": "octree", "m": M, "fovy": 0.7, "height": 2.5, **SIZE, "settings": SETTINGS}
+PICK = {"type": "pick", "seq": 8, "x": 319, "y": 239, "m": M, "fovy": 0.7, "height": 2, **SIZE, "settings": SETTINGS}
+CAMERA = {"type": "camera", "m": M, "fovy": 0.7, "height": 1e-3}
 # The keys of a message that may be left out.
-OPTIONAL = {"settings", "walk"}
+OPTIONAL = {"settings", "walk", "height"}
+# A message that may name no file.
+HELLO = {"type": "hello", "file": "a b.toml"}
 
 
 def said(message: Any) -> str:
@@ -55,6 +60,7 @@ def said(message: Any) -> str:
         (VIEW, CameraMessage),
         (PICK, Pick),
         (CAMERA | {"walk": True}, SaveCamera),
+        (HELLO, Hello),
         ({"type": "ack", "seq": 7, "step": 2}, Ack),
         ({"type": "cancel"}, Cancel),
         ({"type": "scene", "file": "a b.toml"}, OpenScene),
@@ -64,7 +70,7 @@ def test_a_message_is_what_it_says(message: dict[str, Any], kind: type) -> None:
     read = parse(said(message))
     assert type(read) is kind
     assert json.loads(read.model_dump_json()) == message
-    for key in message.keys() - OPTIONAL:
+    for key in message.keys() - OPTIONAL - ({"file"} if message is HELLO else set()):
         with pytest.raises(ValueError, match=f"{key}|discriminator 'type'"):
             parse(said({name: value for name, value in message.items() if name != key}))
     with pytest.raises(ValueError, match="surplus: Extra inputs are not permitted, got 1"):
@@ -86,6 +92,7 @@ def test_what_is_left_out_is_as_a_scene_is_first_shown() -> None:
         ("seq", [0, 2**32 - 1]),
         ("mode", list(MODES)),
         ("fovy", [MIN_FOVY, 1, MAX_FOVY]),
+        ("height", [5e-324, 1, FARTHEST, None]),
         ("w", [1, MAX_SIDE]),
         ("h", [1, MAX_SIDE]),
         ("m", [[0] * 16, [-1e308] * 16]),
@@ -100,6 +107,7 @@ BAD = [
     ("seq", [-1, 2**32, 1.5, "1", True, None], "seq"),
     ("mode", ["", "GL", "ray", 1, None, ["gl"]], "mode"),
     ("fovy", [0, -0.7, 0.0009, 3.11, 1e999, math.nan, "0.7", None], "fovy"),
+    ("height", [0, -0.0, -1, FARTHEST * 2, 1e999, math.nan, "2", True], "height"),
     ("w", [0, -1, 1025, 10**30, 320.5, "320", True, None], "w"),
     ("h", [0, -1, 1025, 10**30, 320.5, "240", True, None], "h"),
     ("m", [M[:15], [*M, 0.0], [], None, "1" * 16, {str(i): 1 for i in range(16)}], "m"),
@@ -149,8 +157,9 @@ def test_a_pick_lies_in_its_picture(pixel: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("file", ["a" * 256, None, 1, ["a.toml"]])
 def test_a_scene_has_a_name_that_a_file_may_have(file: Any) -> None:
-    with pytest.raises(ValueError, match=r"^scene\.file: "):
-        parse(said({"type": "scene", "file": file}))
+    for kind in ("scene", "hello"):
+        with pytest.raises(ValueError, match=rf"^{kind}\.file: "):
+            parse(said({"type": kind, "file": file}))
 
 
 @pytest.mark.parametrize(
@@ -194,7 +203,7 @@ def test_whatever_comes_is_a_message_or_a_value_error(text: str) -> None:
         read = parse(text)
     except ValueError:
         return
-    assert isinstance(read, CameraMessage | Pick | Ack | Cancel | OpenScene | SaveCamera)
+    assert isinstance(read, CameraMessage | Pick | Ack | Cancel | Hello | OpenScene | SaveCamera)
 
 
 def test_the_header_is_32_bytes_little_endian() -> None:

@@ -78,7 +78,16 @@ def measure(
     """The whole record; see ``validation.benchmark.page.record``."""
     from validation.benchmark.limits import counts, machine
     from validation.benchmark.limits.caches import caches
-    from validation.benchmark.measures import ablation, calls, drop_in, first_answers, frames, meshes, processes
+    from validation.benchmark.measures import (
+        ablation,
+        calls,
+        drop_in,
+        first_answers,
+        frames,
+        meshes,
+        processes,
+        studies,
+    )
     from validation.benchmark.measures.queries import fits
     from validation.benchmark.page import record, targets
     from validation.benchmark.parameters import study
@@ -105,7 +114,7 @@ def measure(
         "systems": record.described(systems), "missing": missing, "series": series, "kinds": kinds,
         "open_edges": open_edges, **rows,
         "fits": fits(rows["queries"], series), "drop_in": drop_in.run(quick, step),
-        "calls": calls.measure(systems, step),
+        "calls": calls.measure(systems, step), "studies": studies.run(quick, step),
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
         "first_answers": first_answers.measure(step),

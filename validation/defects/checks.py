@@ -26,6 +26,7 @@ from validation.references.table import REFERENCES
 from validation.scenes import SCENES
 from validation.stability import sweeps
 from validation.stability.section import CASES, check_case
+from validation.studies import section as study_section
 from validation.thresholds import Thresholds
 
 SEED = 2029
@@ -115,9 +116,15 @@ def queries(job: Job) -> list[Gate]:
     return found
 
 
+def studies(job: Job) -> list[Gate]:
+    """Closed forms, bits beside Embree and what holds exactly."""
+    return study_section.run(job)[1]
+
+
 # A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
     "hits": (promised(promises.HITS), hits, extreme(1, 32), extreme(46, 46), extreme(49, 52), sweep, curves),
     "queries": (promised(promises.QUERIES), queries, extreme(51, 54)),
+    "studies": (studies,),
     "pictures": (promised(promises.PICTURES), pictures, extreme(33, 45), extreme(47, 48)),
 }

@@ -5,7 +5,7 @@ from typing import Literal
 
 from validation.defects.inject import Replacement
 
-Group = Literal["hits", "queries", "pictures"]
+Group = Literal["hits", "queries", "studies", "pictures"]
 
 
 @dataclass(frozen=True)
@@ -366,4 +366,86 @@ PICTURES = (
             "self.needs.refraction and camera is not self.scene.camera", "False"),
 )  # fmt: skip
 
-DEFECTS = HITS + QUERIES + PICTURES
+STUDIES = (
+    _kernel(
+        "studies", "what lies at a point's horizon is open", "sweep._aim", "seen = height > 0.0", "seen = height >= 0.0"
+    ),
+    _kernel(
+        "studies",
+        "the first direction of all is hidden",
+        "sweep._aim",
+        "seen = height > 0.0",
+        "seen = height > 0.0 and k > 0",
+    ),
+    _kernel(
+        "studies",
+        "bits stand the other way round in their bytes",
+        "sweep._take_down",
+        "np.uint8(0x80 >> (k & 7))",
+        "np.uint8(1 << (k & 7))",
+    ),
+    _kernel(
+        "studies",
+        "rays of studies leave a face on its other side",
+        "sweep._start_of",
+        "dot(three(work.points, _FACING + 3 * i), d) >= 0.0",
+        "dot(three(work.points, _FACING + 3 * i), d) < 0.0",
+    ),
+    _kernel(
+        "studies",
+        "the whole is without what the horizon hides",
+        "sweep._aim",
+        "put(work.points, _WHOLE + i, get(work.points, _WHOLE + i) + value)",
+        "put(work.points, _WHOLE + i, get(work.points, _WHOLE + i) + (value if height > 0.0 else 0.0))",
+    ),
+    _kernel(
+        "studies",
+        "a list of leaves lacks its last one",
+        "parallel_rays._list_leaves",
+        "_end_list(parallel, listed)",
+        "listed = max(listed - 1, 0)\n_end_list(parallel, listed)",
+    ),
+    _kernel(
+        "studies",
+        "the leaf that hid a ray hides the next one unasked",
+        "parallel_rays._try_hiders",
+        "hidden = face != NO_FACE",
+        "hidden = face != NO_FACE or leaf < 0",
+    ),
+    _python(
+        "studies",
+        "patches weigh the same at all heights",
+        "sky_view_factor",
+        "cosine = definition == 'cosine'",
+        "cosine = False",
+    ),
+    _python(
+        "studies",
+        "distances in units of the directions",
+        "share.limits_of",
+        "return float(given) / lengths_of(directions)",
+        "return float(given) + 0.0 * lengths_of(directions)",
+    ),
+    _python(
+        "studies",
+        "every sun stands for an hour",
+        "sun_hours",
+        "hours = check_weights('weights', weights, len(suns))",
+        "hours = np.ones(len(suns))",
+    ),
+    _python(
+        "studies",
+        "a scan's distances in units of its directions",
+        "views.scan",
+        "away = hits.t[rays] * lengths_of(some[rays])",
+        "away = 1.0 * hits.t[rays]",
+    ),
+    _python(
+        "studies",
+        "an eye sees faces by their middles, near or hidden",
+        "visible_faces",
+        "seen[left[reached]] = True",
+        "seen[left] = True",
+    ),
+)
+DEFECTS = HITS + QUERIES + STUDIES + PICTURES

@@ -24,7 +24,7 @@ EQUIVALENT: dict[str, str] = {
     "dot_pairs(across, cross_pairs(face.first, face.along))": "a scalar product of pairs has the same bits either way",
     "renderer.distance.rational #0: 48 -> 49":
         "a subtraction and two sums change a bound by at most 4 * 2^-53 of it, and 2^-49 is still more",
-    "renderer.trace.packet._test_leaf #0: put(rays.floats, LIMIT + r, np.float32(-np.inf)) -> pass":
+    "renderer.trace.packet.test_leaf #0: put(rays.floats, LIMIT + r, np.float32(-np.inf)) -> pass":
         "a ray that has its hit is tested on in vain: more work, the same answers",
     "renderer.distance.block_distance #1: -48 -> (48)":
         "the bound from above is so loose that it leaves out no face: more work, the same answers",

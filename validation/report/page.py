@@ -8,7 +8,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation.report import efficiency_figures, monte_carlo_figure
+from validation.report import efficiency_figures, monte_carlo_figure, studies_figures
 from validation.report.plots import stability_figures
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -18,6 +18,7 @@ FIGURES: dict[str, Callable[..., Any]] = {
     "figures": stability_figures,
     "efficiency_figures": efficiency_figures.figures,
     "monte_carlo_figure": monte_carlo_figure.figure,
+    "studies_figures": studies_figures.figures,
 }
 
 # The sections in the page's order: title and template, which reads the section's record as m.<section>.
@@ -25,6 +26,7 @@ PARTIALS = {
     "images": ("Pictures", "pictures.html"),
     "hits": ("Hits", "hits.html"),
     "queries": ("Queries", "queries.html"),
+    "studies": ("Studies", "studies.html"),
     "promises": ("Promises", "promises.html"),
     "stability": ("Stability", "stability.html"),
     "efficiency": ("Efficiency", "efficiency.html"),

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
@@ -96,12 +97,23 @@ def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
         rows[-1].set_xlabel(x_label)
         named = {name: h for axes in rows[::-1] for h, name in zip(*axes.get_legend_handles_labels(), strict=True)}
         names = dict.fromkeys(name for axes in rows for name in axes.get_legend_handles_labels()[1])
-        columns = len(names) if len(names) <= 4 else 3
-        figure.legend([named[n] for n in names], list(names), loc="outside upper center", ncols=columns, frameon=False)
+        _add_legend(figure, {name: named[name] for name in names})
         text = io.StringIO()
         metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
         figure.savefig(text, format="svg", metadata=metadata)
     return _inline(text.getvalue(), title, f"plot-{identity}")
+
+
+def _add_legend(figure: Figure, handles: Mapping[str, Any]) -> None:
+    """A legend above the axes, in as many columns as the figure is wide enough for."""
+    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+    for columns in range(len(handles) if len(handles) <= 4 else 3, 0, -1):
+        legend = figure.legend(
+            handles.values(), handles.keys(), loc="outside upper center", ncols=columns, frameon=False
+        )
+        if columns == 1 or legend.get_window_extent(renderer).width <= figure.bbox.width:
+            return
+        legend.remove()
 
 
 def stability_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:

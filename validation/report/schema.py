@@ -99,6 +99,7 @@ class Metrics(_Strict):
     images: SectionRecord | None = None
     hits: SectionRecord | None = None
     queries: SectionRecord | None = None
+    studies: SectionRecord | None = None
     promises: SectionRecord | None = None
     stability: SectionRecord | None = None
     efficiency: SectionRecord | None = None

@@ -3,8 +3,8 @@ import { add, cross, norm, scale, sub, unit, dot } from "./matrix.js";
 
 // Just short of the pole, where the horizontal would be undefined.
 const STEEPEST = (89.5 * Math.PI) / 180;
-// Of an orthographic scene's stand-in: narrow enough to look nearly parallel.
-const NARROW = (20 * Math.PI) / 180;
+// An angle that the server allows, for orthographic cameras, which have none.
+const UNUSED = 1;
 
 // Around a scene that fits, a margin of a twentieth is left.
 const ROOM = 1.05;
@@ -25,11 +25,28 @@ export class Camera {
     this.axes = [cross(vertical, depth), vertical, depth];
     const offset = sub(eye, target);
     const back = unit(offset);
-    this.fovy = type === "orthographic" ? NARROW : (fov * Math.PI) / 180;
-    this.distance = type === "orthographic" ? height / 2 / Math.tan(NARROW / 2) : norm(offset);
+    // The height of an orthographic camera's film; null for perspective.
+    this.height = type === "orthographic" ? height : null;
+    this.fovy = type === "orthographic" ? UNUSED : (fov * Math.PI) / 180;
+    this.distance = norm(offset);
     this.yaw = Math.atan2(dot(back, this.axes[0]), dot(back, this.axes[2]));
     this.pitch = Math.asin(Math.max(-1, Math.min(1, dot(back, vertical))));
     this.pivot = [...target];
+  }
+
+  // What the user changes, to be kept and set again.
+  get state() {
+    const { yaw, pitch, distance, height, pivot } = this;
+    return { yaw, pitch, distance, height, pivot };
+  }
+
+  set state(state) {
+    Object.assign(this, state, { pivot: [...state.pivot] });
+  }
+
+  // The height of the picture in scene units, where the pivot is.
+  get extent() {
+    return this.height ?? 2 * this.distance * Math.tan(this.fovy / 2);
   }
 
   // The whole scene in view, seen from the side where the camera is.
@@ -38,12 +55,15 @@ export class Camera {
     this.pivot = scale(add(lower, upper), 0.5);
     const [right, up, back] = this.frame();
     const slope = Math.tan(this.fovy / 2) / ROOM;
-    // Each corner of the bounds lies this far towards the eye, and needs so much more distance to be within the film.
-    const needed = [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => {
+    // How far each corner of the bounds lies towards the eye, and aside: half the film's height that shows it.
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => {
       const at = sub([0, 1, 2].map((k) => ((corner >> k) & 1 ? upper : lower)[k]), this.pivot);
-      return dot(at, back) + Math.max(Math.abs(dot(at, right)) / aspect, Math.abs(dot(at, up))) / slope;
+      return [dot(at, back), Math.max(Math.abs(dot(at, right)) / aspect, Math.abs(dot(at, up)))];
     });
-    this.distance = Math.max(...needed, 1e-3 * this.radius);
+    if (this.height !== null) {
+      this.height = 2 * ROOM * Math.max(...corners.map(([, aside]) => aside), 1e-3 * this.radius);
+      this.distance = 2 * this.radius; // nothing lies behind the eye
+    } else this.distance = Math.max(...corners.map(([near, aside]) => near + aside / slope), 1e-3 * this.radius);
   }
 
   // Right, up and back as unit vectors.
@@ -82,15 +102,24 @@ export class Camera {
   // Move eye and pivot along the film, by shares of the picture's height.
   pan(x, y) {
     const [right, up] = this.frame();
-    const height = 2 * this.distance * Math.tan(this.fovy / 2);
-    this.pivot = add(this.pivot, add(scale(right, x * height), scale(up, y * height)));
+    this.pivot = add(this.pivot, add(scale(right, x * this.extent), scale(up, y * this.extent)));
   }
 
-  // Change the distance to the pivot by a factor.
-  zoom(factor) {
+  // Change the distance to the pivot by a factor, or the size of an orthographic film. What is seen `x` to the right of
+  // the middle and `y` above it, in shares of the picture's height, stays there if it is as far away as the pivot.
+  zoom(factor, x = 0, y = 0) {
     // From grazing the pivot to seeing the scene as a dot.
-    const closest = 1e-3 * this.radius;
-    this.distance = Math.max(closest, Math.min(100 * this.radius, this.distance * factor));
+    const within = (size) => Math.max(1e-3 * this.radius, Math.min(100 * this.radius, size * factor));
+    const before = this.extent;
+    if (this.height !== null) this.height = within(this.height);
+    else this.distance = within(this.distance);
+    const share = before / this.extent - 1;
+    this.pan(x * share, y * share);
+  }
+
+  // Look at a point, in the same direction from as far as before.
+  focus(point) {
+    this.pivot = [...point];
   }
 
   // Walk: right, up and forward in scene units.

@@ -18,7 +18,10 @@ export function address(path, query = {}) {
 
 export async function fetchFrom(path, query) {
   const response = await fetch(address(path, query));
-  if (!response.ok) throw new Error(`${path}: ${response.status} ${await response.text()}`);
+  if (!response.ok) {
+    const { status } = response;
+    throw Object.assign(new Error(`${path}: ${status} ${await response.text()}`), { status });
+  }
   return response;
 }
 
@@ -31,10 +34,9 @@ export function decode(buffer) {
 }
 
 export class Connection {
-  // `received(picture)`, `told(message)` and `changed(open)` are called as things arrive.
+  // Begins with `open`. `received(picture)`, `told(message)` and `changed(open)` are called as things arrive.
   constructor({ received, told, changed }) {
     Object.assign(this, { received, told, changed, attempts: 0 });
-    this.open();
   }
 
   open() {
@@ -60,7 +62,7 @@ export class Connection {
   }
 
   get ready() {
-    return this.socket.readyState === WebSocket.OPEN;
+    return this.socket?.readyState === WebSocket.OPEN;
   }
 
   // Drops the message where there is no connection: only the newest view matters, and it is sent again on return.

@@ -4,6 +4,9 @@
 const TURN = Math.PI;
 // A wheel's notch is 100 to 120 units in most browsers: about an eighth closer.
 const WHEEL = 0.0012;
+// Browsers tell of two fingers that part on a trackpad as a wheel with the control key, of a hundredth for each part of
+// e by which they part.
+const PINCH = 0.01;
 // A press that moves less is a click: hands and touch screens tremble by about this many pixels.
 const STILL = 4;
 // Radians, scene radii and factors of distance a second, while a key is held.
@@ -23,10 +26,16 @@ const HELD = {
 // Before anything is focused, keys mean the stage too.
 export const isForStage = (event, stage) => event.target === stage || event.target === document.body;
 
+// Letters, digits and signs mean it on every control that makes nothing of them; lists search by them.
+const MAKES_NOTHING_OF_THEM = "button, summary, input:is([type=checkbox], [type=radio], [type=range])";
+export const isShortcut = (event) =>
+  event.key.length === 1 && event.key !== " " && event.target.matches(MAKES_NOTHING_OF_THEM);
+
 export class Controls {
-  // `moved()` is called after each movement, `clicked(clientX, clientY)` for a press that did not move.
-  constructor(stage, { camera, moved, clicked }) {
-    Object.assign(this, { stage, camera, moved, clicked, walking: false });
+  // `moved()` is called after each movement, `clicked(clientX, clientY)` for a press that did not move, `focused()` for
+  // two of them. `frame` is the picture's element on the stage.
+  constructor(stage, frame, { camera, moved, clicked, focused }) {
+    Object.assign(this, { stage, frame, camera, moved, clicked, walking: false });
     this.pointers = new Map();
     this.held = new Map();
     this.travelled = 0;
@@ -35,6 +44,7 @@ export class Controls {
     for (const name of ["pointerup", "pointercancel"])
       stage.addEventListener(name, (event) => this.release(event));
     stage.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    stage.addEventListener("dblclick", (event) => event.target.closest("button") ?? focused());
     stage.addEventListener("contextmenu", (event) => event.preventDefault());
     document.addEventListener("keydown", (event) => this.keyDown(event));
     document.addEventListener("keyup", (event) => this.held.delete(event.code));
@@ -78,29 +88,36 @@ export class Controls {
   }
 
   pan(x, y) {
-    const { height } = this.stage.getBoundingClientRect();
+    const { height } = this.frame.getBoundingClientRect();
     this.camera().pan(-x / height, y / height);
+  }
+
+  // Zoom by a factor towards or away from a point of the window.
+  zoomAt(factor, [x, y]) {
+    const { left, top, width, height } = this.frame.getBoundingClientRect();
+    this.camera().zoom(factor, (x - left - width / 2) / height, (top + height / 2 - y) / height);
   }
 
   // One finger moved from `before` to `now` while the other stood still.
   pinch(now, before, still) {
     this.pan((now[0] - before[0]) / 2, (now[1] - before[1]) / 2);
     const spread = (p) => Math.max(Math.hypot(p[0] - still[0], p[1] - still[1]), 1);
-    this.camera().zoom(spread(before) / spread(now));
+    this.zoomAt(spread(before) / spread(now), [(now[0] + still[0]) / 2, (now[1] + still[1]) / 2]);
   }
 
   wheel(event) {
     event.preventDefault();
     const unit = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 33 : 1;
-    const amount = event.deltaY * unit * WHEEL;
+    const amount = event.deltaY * unit * (event.ctrlKey ? PINCH : WHEEL);
     if (this.walking) this.camera().walk(0, 0, -amount * this.camera().radius * 0.5);
-    else this.camera().zoom(Math.exp(amount));
+    else this.zoomAt(Math.exp(amount), [event.clientX, event.clientY]);
     this.moved();
   }
 
   keyDown(event) {
     const held = HELD[event.code] ?? HELD[event.key];
-    if (!held || event.ctrlKey || event.metaKey || event.altKey || !isForStage(event, this.stage)) return;
+    if (!held || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!isForStage(event, this.stage) && !isShortcut(event)) return;
     event.preventDefault();
     if (this.held.has(event.code)) return;
     // By its place on the keyboard, because a shift released earlier changes the character of its keyup.

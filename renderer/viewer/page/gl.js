@@ -1,11 +1,17 @@
 // The WebGL layer: the model and lines over it, or lines alone over a traced picture.
-import { clipMatrix, dot, norm, scale, add, sub } from "./matrix.js";
+import { clipMatrix, dot, norm, scale, add, seenFrom, sub } from "./matrix.js";
 import { DEPTH, Model } from "./model.js";
 import { Boxes } from "./boxes.js";
 import { Lines } from "./lines.js";
 
 // Beyond it a finer grid is not seen, and fragments cost their time.
 const MAX_PIXEL_RATIO = 2;
+
+// How graphics without a graphics processor call themselves.
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+// The most boxes that are drawn at a time. Two cores draw one to three a millisecond, so that a picture takes them less
+// than a second; a graphics processor is bounded by the memory of their lines and panes, 46 MB.
+const BOXES = { software: 1000, hardware: 100000 };
 
 // What the veil darkens towards, as sRGB.
 const NIGHT = [0.03, 0.06, 0.13];
@@ -23,11 +29,23 @@ export class GlLayer {
     this.model = new Model(this.gl);
     this.boxes = new Boxes(this.gl);
     this.lines = new Lines(this.gl);
+    const info = this.gl.getExtension("WEBGL_debug_renderer_info");
+    const name = this.gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : this.gl.RENDERER);
+    this.mostBoxes = SOFTWARE.test(name) ? BOXES.software : BOXES.hardware;
   }
 
-  load(mesh, scene) {
+  // Take another scene, of which nothing is drawn before its mesh is loaded.
+  begin(scene) {
     this.scene = scene;
-    this.model.load(mesh, scene);
+    this.model.clear();
+  }
+
+  load(mesh) {
+    this.model.load(mesh, this.scene);
+  }
+
+  get loaded() {
+    return this.model.loaded;
   }
 
   // `width` and `height` are those of the frame, in CSS pixels.
@@ -53,7 +71,7 @@ export class GlLayer {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (shading === DEPTH && !seen.length) return;
     const clip = clipMatrix(view, this.scene.bounds);
-    const eye = view.m.slice(12, 15);
+    const eye = seenFrom(view, this.scene.bounds);
     this.model.draw(shading, clip, { eye, scene: this.scene, direction, veil: [...dark, veil] });
     this.boxes.draw(panes, clip);
     for (const { name, set, hidden, fades } of seen) this.lines.draw(name, set, clip, this.fade(view, fades), hidden);
@@ -61,6 +79,7 @@ export class GlLayer {
 
   // From where to where lines fade: through the scene, or nowhere near it.
   fade(view, fades) {
+    if (view.height) return [1, 1e6]; // where nothing is smaller for being far, every line has its full strength
     const [lower, upper] = this.scene.bounds;
     const radius = norm(sub(upper, lower)) / 2;
     const distance = dot(sub(view.m.slice(12, 15), scale(add(lower, upper), 0.5)), view.m.slice(8, 11));

@@ -1,6 +1,6 @@
 // Keys on the stage that are commands; those that move the camera are in controls.js.
 
-import { isForStage } from "./controls.js";
+import { isForStage, isShortcut } from "./controls.js";
 
 const MODES = ["gl", "phong", "brute", "octree"];
 
@@ -21,7 +21,7 @@ export function bindKeys(viewer) {
     l: () => click(fields.walk),
     ",": () => level(-1),
     ".": () => level(1),
-    Escape: () => (viewer.rays.close(), viewer.cancel()),
+    Escape: () => (viewer.rays.shown ? viewer.rays.close() : viewer.cancel()),
     Enter: () => {
       const { left, top, width, height } = document.querySelector("#frame").getBoundingClientRect();
       viewer.pickAt(left + width / 2, top + height / 2);
@@ -30,10 +30,23 @@ export function bindKeys(viewer) {
   MODES.forEach((mode, i) => (commands[i + 1] = () => viewer.setMode(mode)));
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const own = isForStage(event, stage) || event.key === "Escape";
+    const own = isForStage(event, stage) || isShortcut(event) || event.key === "Escape";
     const command = commands[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!own || !command) return;
     event.preventDefault();
     command();
   });
+}
+
+// After a click on a control the stage has the keys again; who came by keyboard stays there. Sliders keep the arrow
+// keys, by which they are set finely.
+export function returnKeys(stage) {
+  let byPointer = false;
+  document.addEventListener("pointerdown", () => (byPointer = true), true);
+  document.addEventListener("keydown", () => (byPointer = false), true);
+  const giveBack = (event, controls) => {
+    if (byPointer && event.target.closest(controls)) stage.focus({ preventScroll: true });
+  };
+  document.addEventListener("change", (event) => giveBack(event, "select, input:not([type=range])"));
+  document.addEventListener("click", (event) => giveBack(event, "button, summary"));
 }

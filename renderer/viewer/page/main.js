@@ -4,7 +4,9 @@ import { Connection, FACE_COLORS, fetchFrom } from "./connection.js";
 import { Controls } from "./controls.js";
 import { film } from "./film.js";
 import { GlLayer } from "./gl.js";
-import { bindKeys } from "./keys.js";
+import { Busy } from "./busy.js";
+import { bindKeys, returnKeys } from "./keys.js";
+import { kept, remember, remembered, stays } from "./memory.js";
 import { DEPTH, FACES, LIT } from "./model.js";
 import { Notices } from "./notices.js";
 import { NO_BOXES, fetchBoxes } from "./overlay.js";
@@ -14,10 +16,13 @@ import { Progress } from "./progress.js";
 import { Rays } from "./rays.js";
 import { Readings } from "./readings.js";
 import { savePicture, saveText } from "./save.js";
+import { improves, sameCamera } from "./standing.js";
 
 const TRACED = ["brute", "octree"];
 // A traced picture of another camera is shown this long, then the model of WebGL moves instead: a quarter of a second.
 const STALE = 250;
+// A mesh of more faces, some 70 MB, is fetched only once WebGL is to draw it.
+const MANY_FACES = 1e6;
 // Brute force starts once the camera rests: a picture of seconds is not worth starting in each frame.
 const REST = 150;
 // So long what was drawn last stays while its successor is on its way: drawing the model in between, only to draw again
@@ -33,11 +38,15 @@ const find = (selector) => document.querySelector(selector);
 class Viewer {
   constructor() {
     Object.assign(this, { mode: "octree", seq: 0, sent: new Map(), shown: null, dirty: true, movedAt: 0, heldSince: null });
+    // The id of the scene that the server shows here, the scene that the page has, and the one whose mesh it fetches.
+    Object.assign(this, { announced: null, scene: null, meshOf: null });
+    Object.assign(this, { staleSince: null, model: false, saving: false, focusing: null });
     this.boxes = NO_BOXES;
     this.stage = find("#stage");
     this.picture = new Picture(find("#picture"));
     this.notices = new Notices(find("#notices"));
     this.progress = new Progress(find("#progress"));
+    this.busy = new Busy(find("#busy"));
     this.rays = new Rays(find("#card"), find("#frame"), () => this.request());
     this.readings = new Readings(find("#readings"), find("#hud"));
     this.panel = new Panel((name) => this.changed(name));
@@ -48,51 +57,109 @@ class Viewer {
     }
   }
 
-  async start() {
-    await this.loadScene();
-    this.controls = new Controls(this.stage, {
-      camera: () => this.camera,
-      moved: () => this.moved(),
-      clicked: (x, y) => this.pickAt(x, y),
-    });
-    bindKeys(this);
-    this.bindButtons();
-    new ResizeObserver(() => this.layout()).observe(this.stage);
-    this.layout();
-    this.setMode(this.mode);
+  start() {
+    this.busy.begin("opening", "Opening the scene …");
     this.connection = new Connection({
       received: (picture) => this.received(picture),
       told: (message) => this.told(message),
       changed: (open) => this.connected(open),
     });
+    this.connection.open();
+    addEventListener("pagehide", () => this.scene && remember(kept(this.scene, this.camera)));
+  }
+
+  // What works once there is a scene.
+  begin() {
+    this.controls = new Controls(this.stage, find("#frame"), {
+      camera: () => this.camera,
+      moved: () => this.moved(),
+      clicked: (x, y) => this.pickAt(x, y),
+      focused: () => this.focus(),
+    });
+    bindKeys(this);
+    returnKeys(this.stage);
+    this.bindButtons();
+    new ResizeObserver(() => this.layout()).observe(this.stage);
     document.body.dataset.ready = "true";
   }
 
-  async loadScene() {
-    this.scene = await (await fetchFrom("scene")).json();
-    this.camera = new Camera(this.scene);
-    this.panel.load(this.scene);
-    this.readings.ofScene(this.scene);
-    this.shown = null;
-    this.rays.close();
-    find("#name").textContent = this.scene.name.replace(/\.toml$/, "").replaceAll("_", " ");
-    document.title = `${this.scene.name} · octree-render`;
-    if (this.layer) this.layer.load(await (await fetchFrom("mesh")).arrayBuffer(), this.scene);
-    await this.loadBoxes();
+  // The server shows the scene with that id here; one that the page has not is taken over, all at once.
+  async showScene(id) {
+    this.announced = id;
+    if (this.scene?.id !== id) {
+      const scene = await (await fetchFrom("scene", { id })).json();
+      if (this.announced !== id) return;
+      this.take(scene);
+    }
+    this.busy.end("opening");
     this.dirty = true;
+    this.request();
+  }
+
+  take(scene) {
+    const before = kept(this.scene, this.camera) ?? remembered();
+    this.scene = scene;
+    this.camera = new Camera(scene);
+    if (stays(before, scene)) this.camera.state = before.camera;
+    this.forget();
+    this.panel.load(scene);
+    this.readings.ofScene(scene);
+    find("#name").textContent = scene.name.replace(/\.toml$/, "").replaceAll("_", " ");
+    document.title = `${scene.name} · octree-render`;
+    if (!this.controls) this.begin();
+    this.layout();
+    this.setMode(this.mode);
+    if (TRACED.includes(this.mode)) this.busy.begin("tracing", "Tracing the first picture …");
+    if (scene.faces <= MANY_FACES) this.loadMesh();
+    this.tryBoxes();
+  }
+
+  // Nothing of the scene before is shown any more, nor taken when it comes.
+  forget() {
+    Object.assign(this, { shown: null, boxes: NO_BOXES, staleSince: null, meshOf: null });
+    this.sent.clear();
+    this.rays.close();
+    this.picture.clear();
+    this.layer?.begin(this.scene);
+    this.stopSaving();
+  }
+
+  async loadMesh() {
+    const { scene } = this;
+    if (!this.layer || this.meshOf === scene) return;
+    this.meshOf = scene;
+    this.busy.begin("mesh", "Loading the model for WebGL …");
+    try {
+      const mesh = await (await fetchFrom("mesh", { id: scene.id })).arrayBuffer();
+      if (this.scene !== scene || !this.layer) return;
+      this.layer.load(mesh);
+      this.dirty ||= this.mode === "phong"; // whose colours had no faces before
+      this.request();
+    } catch (error) {
+      if (this.scene === scene && error.status !== 404) this.notices.say(`The model cannot be shown: ${error.message}`);
+    } finally {
+      if (this.scene === scene) this.busy.end("mesh");
+    }
   }
 
   async loadBoxes() {
     const { boxes, level } = this.panel.fields;
+    const { scene } = this;
     this.boxes = NO_BOXES;
     if (boxes.checked && this.layer && !boxes.disabled) {
+      this.loadMesh();
       const wanted = level.value;
-      const fetched = await fetchBoxes(Number(wanted));
-      if (wanted !== level.value || !boxes.checked) return;
+      const fetched = await fetchBoxes(scene.id, Number(wanted), this.layer.mostBoxes);
+      if (wanted !== level.value || !boxes.checked || this.scene !== scene) return;
       this.boxes = fetched;
-      this.panel.showBoxes(fetched.count);
+      this.panel.showBoxes(fetched);
     }
     this.request();
+  }
+
+  tryBoxes() {
+    const { scene } = this;
+    this.loadBoxes().catch((error) => this.scene === scene && error.status !== 404 && this.notices.say(error.message));
   }
 
   withoutGl(reason) {
@@ -122,10 +189,15 @@ class Viewer {
     onClick("#reset-view", () => this.reset());
     onClick("#fit", () => this.fit());
     onClick("#cancel", () => this.cancel());
-    onClick("#save-picture", () => savePicture(this.visibleLayers(), this.scene.name));
+    onClick("#reload", () => this.open(this.scene.name));
+    onClick("#reset-light", () => {
+      this.panel.resetLight();
+      this.changed("light");
+    });
+    onClick("#save-picture", () => this.save());
     onClick("#save-camera", () => {
-      const { m, fovy } = this.view();
-      this.connection.send({ type: "camera", m, fovy, walk: this.controls.walking });
+      const { m, fovy, height } = this.view();
+      this.connection.send({ type: "camera", m, fovy, height, walk: this.controls.walking });
     });
     onClick("#toggle-panel", () => {
       const away = document.body.classList.toggle("wide");
@@ -136,21 +208,32 @@ class Viewer {
   // What a change of a setting asks for.
   changed(name) {
     const { fields } = this.panel;
-    if (name === "file") {
-      this.notices.say(`Opening ${fields.file.value} …`, "opening");
-      this.connection.send({ type: "scene", file: fields.file.value });
-    } else if (name === "boxes" || name === "level") {
+    if (name === "file") this.open(fields.file.value);
+    else if (name === "boxes" || name === "level") {
       if (name === "level") fields.boxes.checked = true;
-      this.loadBoxes().catch((error) => this.notices.say(error.message));
+      this.tryBoxes();
     } else if (name === "walk") this.controls.walking = fields.walk.checked;
     else if (name === "size") this.layout();
-    else this.moved();
+    else {
+      this.moved();
+      const question = this.rays.again(this.panel.settings);
+      if (question) this.connection.send(question);
+    }
+  }
+
+  open(file) {
+    this.busy.begin("opening", `Opening ${file} …`);
+    this.connection.send({ type: "scene", file });
   }
 
   setMode(mode) {
     const input = find(`[name=mode][value=${mode}]`);
     if (input.disabled) return this.notices.say(`${input.parentElement.textContent.slice(1)}: ${input.parentElement.title}`);
     if (this.mode === "brute" && mode !== "brute") this.progress.show(null);
+    if (!TRACED.includes(mode)) {
+      this.stopSaving();
+      this.loadMesh();
+    }
     input.checked = true;
     this.mode = mode;
     this.panel.setMode(mode);
@@ -162,7 +245,6 @@ class Viewer {
 
   reset() {
     this.camera.reset();
-    this.panel.resetLight();
     this.moved();
   }
 
@@ -173,7 +255,8 @@ class Viewer {
 
   moved() {
     const now = performance.now();
-    if (!this.dirty) this.staleSince = now;
+    if (this.current) this.staleSince = null;
+    else this.staleSince ??= now;
     this.dirty = true;
     this.movedAt = now;
     this.request();
@@ -191,7 +274,8 @@ class Viewer {
   }
 
   view() {
-    return { m: this.camera.matrix(), fovy: this.camera.fovy, ...this.size };
+    const { fovy, height } = this.camera;
+    return { m: this.camera.matrix(), fovy, ...(height === null ? {} : { height }), ...this.size };
   }
 
   // Ask for a drawing in the next frame.
@@ -214,7 +298,7 @@ class Viewer {
     const moving = this.controls.advance(seconds);
     this.before = moving ? now : null;
     const waiting = this.mode === "brute" && performance.now() - this.movedAt < REST;
-    if (this.dirty && this.connection?.ready && !waiting) this.sendView();
+    if (this.dirty && this.attended && !waiting) this.sendView();
     // An answer that came since this frame was asked for has drawn it all.
     if (this.held) setTimeout(() => this.heldSince !== null && this.wake(), HOLD);
     else if (this.undrawn) this.draw();
@@ -226,30 +310,37 @@ class Viewer {
     return this.sent.has(this.seq) && this.heldSince !== null && performance.now() - this.heldSince < HOLD;
   }
 
+  // Whether the server shows the scene that the page has.
+  get attended() {
+    return this.connection.ready && this.scene !== null && this.announced === this.scene.id;
+  }
+
   sendView() {
-    const view = { ...this.view(), mode: this.mode, at: performance.now() };
-    const { m, fovy, w, h } = view;
+    const view = { ...this.view(), mode: this.mode, at: performance.now(), settings: this.panel.settings };
+    const { at, ...message } = view;
     this.seq++;
     if (this.mode !== "gl") this.sent.set(this.seq, view); // to which nothing is sent
     this.dirty = false;
-    this.heldSince ??= view.at;
-    this.connection.send({ type: "view", seq: this.seq, mode: this.mode, m, fovy, w, h, settings: this.panel.settings });
+    this.heldSince ??= at;
+    this.connection.send({ type: "view", seq: this.seq, ...message });
     if (this.mode === "brute") this.progress.show(0);
   }
 
   // Whether the traced picture was taken by the current camera.
   get current() {
-    if (this.shown?.mode !== this.mode) return false;
-    const now = this.view();
-    const sameShape = this.shown.w * now.h === this.shown.h * now.w;
-    return sameShape && this.shown.m.every((x, i) => x === now.m[i]);
+    return this.shown !== null && TRACED.includes(this.mode) && sameCamera(this.shown.view, this.view());
   }
 
-  // Whether it may stand for the current camera all the same, because the next is about to come.
+  // Whether it may stand for the current camera all the same, because the next is about to come or nothing else is there.
   get recent() {
-    if (this.shown?.mode !== this.mode) return false;
-    const since = Math.max(this.shown.arrived, this.staleSince ?? 0);
-    return !this.layer || (this.mode === "octree" && performance.now() - since < STALE);
+    if (this.shown === null || !TRACED.includes(this.mode)) return false;
+    if (!this.layer?.loaded) return true;
+    return this.mode === "octree" && this.staleSince !== null && performance.now() - this.staleSince < STALE;
+  }
+
+  // Whether it is the last that comes for the newest view.
+  get finished() {
+    return this.current && this.shown.last && this.shown.seq === this.seq && !this.dirty;
   }
 
   draw() {
@@ -258,10 +349,11 @@ class Viewer {
     const traced = TRACED.includes(this.mode);
     const current = traced && this.current;
     const live = current || (traced && this.recent);
-    this.picture.visible = live || (traced && !this.layer);
+    this.picture.visible = live;
+    this.model = traced && !live && Boolean(this.layer?.loaded);
     this.stage.classList.toggle("waiting", traced && !live);
     if (this.layer) {
-      const view = live ? this.shown : this.view();
+      const view = live ? { ...this.shown.view, w: this.shown.w, h: this.shown.h } : this.view();
       const shading = live ? DEPTH : this.mode === "phong" ? FACES : LIT;
       const veil = this.boxes.count ? VEIL : 0;
       this.layer.draw(view, { shading, veil, direction: this.panel.light, panes: this.boxes.panes, layers: [
@@ -270,15 +362,15 @@ class Viewer {
         { name: "rays", set: this.rays.path, hidden: HIDDEN.rays, fades: false },
       ] });
     }
-    if (this.mode === "gl") this.note({ seq: this.seq, step: 0, last: true }, this.view());
+    if (this.mode === "gl" && this.layer.loaded) this.note({ seq: this.seq, step: 0, last: true }, this.view());
     // A picture of an earlier camera stands for a while only, unless another drawing has replaced it by then.
-    this.standing = live && !current && Boolean(this.layer);
+    this.standing = live && !current && Boolean(this.layer?.loaded);
     if (this.standing) setTimeout(() => this.standing && this.request(), STALE);
   }
 
   // Say on the stage which view is seen now.
-  note({ seq, step, last }, { m, fovy, w, h }) {
-    const known = { mode: this.mode, seq, step, last: Number(last), camera: JSON.stringify({ m, fovy, w, h }) };
+  note({ seq, step, last }, { m, fovy, height, w, h }) {
+    const known = { mode: this.mode, seq, step, last: Number(last), camera: JSON.stringify({ m, fovy, height, w, h }) };
     Object.assign(this.stage.dataset, known);
     if (this.mode === "gl") this.readings.ofGl({ w, h });
   }
@@ -286,60 +378,73 @@ class Viewer {
   async received(picture) {
     const { seq, step, last, kind } = picture;
     const view = this.sent.get(seq);
-    const wanted = view?.mode === this.mode;
-    if (wanted && kind === FACE_COLORS) {
-      this.layer?.model.setFaceColors(picture.bytes);
-      this.draw();
-      this.note(picture, this.view());
-    } else if (wanted) {
-      await this.picture.show(picture);
-      this.shown = { ...view, w: picture.w, h: picture.h, seq, arrived: performance.now() };
-      this.note(picture, this.shown);
-      this.draw();
+    let wanted = view?.mode === this.mode;
+    if (wanted && kind === FACE_COLORS) this.color(picture);
+    else if (wanted) {
+      wanted = improves(picture, view, { shown: this.shown, now: this.view(), model: this.model });
+      if (wanted) await this.stand(picture, view);
     }
     this.connection.send({ type: "ack", seq, step });
     // Nothing older comes after it.
     for (const old of this.sent.keys()) if (old < seq || (old === seq && last)) this.sent.delete(old);
     if (!wanted) return;
     if (this.mode === "brute") this.progress.show(null);
-    this.readings.ofPicture(picture, performance.now() - view.at, this.scene.faces, view.legend);
+    this.readings.ofPicture(picture, performance.now() - view.at, this.scene.faces, view);
+    if (this.saving && this.finished) this.saveNow();
+  }
+
+  color(picture) {
+    if (!this.layer?.loaded) return; // they are asked for again when it is
+    this.layer.model.setFaceColors(picture.bytes);
+    this.draw();
+    this.note(picture, this.view());
+  }
+
+  // Let a traced picture stand on the stage.
+  async stand(picture, view) {
+    const { scene } = this;
+    await this.picture.show(picture);
+    if (this.scene !== scene) return this.picture.clear();
+    const { seq, step, last, w, h } = picture;
+    this.shown = { view, w, h, seq, step, last };
+    this.staleSince = this.current ? null : performance.now();
+    this.busy.end("tracing");
+    this.note(picture, { ...view, w, h });
+    this.draw();
   }
 
   told(message) {
     const acts = {
       // Not after a cancel, which this may have crossed on the way.
       progress: ({ seq, done }) => seq === this.seq && this.progress.shown && this.progress.show(done),
-      pick: (pick) => this.rays.show(pick, this.scene),
+      pick: (pick) => this.picked(pick),
       legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
-      scene: () => this.otherScene(),
+      scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
       camera: ({ name, text }) => saveText(name, text),
       error: ({ message: text }) => {
-        this.notices.clear("opening");
+        this.busy.end("opening");
         this.notices.say(text);
-        this.panel.fields.file.value = this.scene.name; // the one that is still shown
+        if (this.scene) this.panel.fields.file.value = this.scene.name; // the one that is still shown
       },
     };
     acts[message.type]?.(message);
   }
 
-  async otherScene() {
-    this.notices.clear("opening");
-    try {
-      await this.loadScene();
-      this.layout();
-      this.setMode(this.mode);
-    } catch (error) {
-      this.notices.say(`The scene cannot be shown: ${error.message}`);
-    }
+  cannotShow(id, error) {
+    if (this.announced !== id || error.status === 404) return; // another has come or will, or the connection has gone
+    this.busy.end("opening");
+    this.notices.say(`The scene cannot be shown: ${error.message}`);
   }
 
   connected(open) {
     document.body.dataset.connected = String(open);
     if (open) {
       this.notices.clear("lost");
-      this.dirty = true;
-      this.request();
+      // The server may be another one by now, with another scene.
+      this.connection.send({ type: "hello", file: this.scene?.name ?? remembered()?.name ?? "" });
     } else {
+      this.announced = null;
+      this.busy.end("opening");
       this.progress.show(null);
       this.notices.say("No connection to the renderer; trying again.", "lost");
     }
@@ -349,6 +454,8 @@ class Viewer {
     if (!this.progress.shown) return;
     this.connection.send({ type: "cancel" });
     this.dirty = false; // nor is a change wanted that was waiting for the camera to rest
+    this.sent.delete(this.seq);
+    this.stopSaving();
     this.progress.show(null);
     this.notices.say("Brute force cancelled; the next movement starts it again.");
   }
@@ -358,13 +465,50 @@ class Viewer {
     if (question) this.connection.send(question);
   }
 
+  picked(pick) {
+    if (pick.seq !== this.rays.seq) return;
+    this.rays.show(pick, this.scene);
+    if (this.focusing === pick.seq) this.focusOn(pick);
+  }
+
+  // Turn about what was clicked last, once it is known what that is.
+  focus() {
+    if (this.rays.pick?.seq === this.rays.seq) this.focusOn(this.rays.pick);
+    else this.focusing = this.rays.seq;
+  }
+
+  focusOn({ hit, point }) {
+    this.focusing = null;
+    if (!hit) return;
+    this.camera.focus(point);
+    this.moved();
+  }
+
+  // Save what is seen; a traced picture once it is finished, if it will be.
+  save() {
+    const coming = this.dirty || this.sent.has(this.seq);
+    if (!TRACED.includes(this.mode) || this.finished || !coming) return this.saveNow();
+    this.saving = true;
+    this.notices.say("The picture is saved when it is finished.", "saving");
+  }
+
+  saveNow() {
+    this.stopSaving();
+    this.notices.say(`Saved: ${savePicture(this.visibleLayers(), this.scene.name)}`);
+  }
+
+  stopSaving() {
+    this.saving = false;
+    this.notices.clear("saving");
+  }
+
   // The canvases that are seen, lowest first.
   visibleLayers() {
-    const traced = TRACED.includes(this.mode) && (this.current || this.recent || !this.layer);
+    const traced = this.current || this.recent || !this.layer;
     return [...(traced ? [this.picture.canvas] : []), ...(this.layer ? [this.layer.canvas] : [])];
   }
 }
 
 // Reachable from the console, for the curious and for tests.
 const viewer = (window.viewer = new Viewer());
-viewer.start().catch((error) => viewer.notices.say(`The scene cannot be shown: ${error.message}`));
+viewer.start();

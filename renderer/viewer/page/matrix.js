@@ -41,12 +41,38 @@ export function perspective(fovy, aspect, near, far) {
   ];
 }
 
-// World to clip space for a view {m, fovy, w, h}; the clip planes enclose the sphere around `bounds`.
+// Of a film `height` high; what is seen has no perspective.
+export function orthographic(height, aspect, near, far) {
+  return [
+    2 / (height * aspect), 0, 0, 0,
+    0, 2 / height, 0, 0,
+    0, 0, 2 / (near - far), 0,
+    0, 0, (far + near) / (near - far), 1,
+  ];
+}
+
+// Where a view {m, height} sees the scene within `bounds` from: the eye, or far behind it where all rays are parallel.
+// So many times the scene's size and distance away they are, as exactly as float32 can tell.
+const FAR = 1e4;
+export function seenFrom(view, bounds) {
+  const eye = view.m.slice(12, 15);
+  if (!view.height) return eye;
+  const centre = scale(add(bounds[0], bounds[1]), 0.5);
+  const away = norm(sub(bounds[1], bounds[0])) + norm(sub(eye, centre));
+  return add(centre, scale(view.m.slice(8, 11), FAR * away));
+}
+
+// World to clip space for a view {m, fovy, height, w, h}; the clip planes enclose the sphere around `bounds`.
 export function clipMatrix(view, bounds) {
   const centre = scale(add(bounds[0], bounds[1]), 0.5);
   const radius = norm(sub(bounds[1], bounds[0])) / 2;
   const distance = dot(sub(view.m.slice(12, 15), centre), view.m.slice(8, 11));
   const far = Math.max(distance + 1.5 * radius, 1e-3 * radius);
+  if (view.height) {
+    // Rays begin at the eye's plane.
+    const near = Math.max(distance - 1.5 * radius, 0);
+    return multiply(orthographic(view.height, view.w / view.h, near, Math.max(far, near + radius)), inverseRigid(view.m));
+  }
   // 24 bits of depth tell apart what lies a few thousandths of the near plane apart at this ratio.
   const near = Math.max(distance - 1.5 * radius, far / 4000);
   return multiply(perspective(view.fovy, view.w / view.h, near, far), inverseRigid(view.m));

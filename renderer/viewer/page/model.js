@@ -134,7 +134,12 @@ export class Model {
     this.vertices = gl.createVertexArray();
     this.buffers = [POSITION, NORMAL, MATERIAL, COLOR].map(() => gl.createBuffer());
     this.materials = gl.createTexture();
-    this.faces = 0;
+    this.clear();
+  }
+
+  // Draw nothing until `load`.
+  clear() {
+    Object.assign(this, { faces: 0, loaded: false, coloured: false, runs: { opaque: [], glass: [] } });
   }
 
   // Take the triangles of the server's /mesh and the materials of its /scene.
@@ -159,6 +164,7 @@ export class Model {
     gl.vertexAttribPointer(COLOR, 3, gl.UNSIGNED_BYTE, true, 4, 0);
     this.runs = runs(materials, scene.materials.map((m) => m.type === "dielectric"));
     this.setMaterials(scene.materials);
+    this.loaded = true;
   }
 
   fill(location, values, usage) {

@@ -23,25 +23,28 @@ export const levelColor = (level, levels) => {
   return LEVELS[low].map((c, i) => Math.round(c + share * (next[i] - c)));
 };
 
-export const NO_BOXES = { edges: new LineSet(1), panes: new BoxSet(0), count: 0 };
+export const NO_BOXES = { edges: new LineSet(1), panes: new BoxSet(0), count: 0, all: 0 };
 
-// The boxes of a level: {edges, panes, count}.
-export async function fetchBoxes(level) {
-  const buffer = await (await fetchFrom("octree", { level })).arrayBuffer();
-  const [count, levels] = new Uint32Array(buffer, 0, 2);
-  const corners = new Float32Array(buffer, 8, 6 * count);
+// Boxes of a level of the scene with that id, `most` of them at the most, evenly from all of it: {edges, panes, count,
+// all}, of which `all` is the number of boxes that the level has.
+export async function fetchBoxes(id, level, most) {
+  const buffer = await (await fetchFrom("octree", { id, level })).arrayBuffer();
+  const [all, levels] = new Uint32Array(buffer, 0, 2);
+  const corners = new Float32Array(buffer, 8, 6 * all);
+  const count = Math.min(all, most);
   const edges = new LineSet(Math.max(12 * count, 1));
   const panes = new BoxSet(count);
   // Many boxes are drawn finer and fainter, or they would cover the model.
   const crowd = Math.min(Math.max((Math.log10(Math.max(count, 1)) - 1.2) / 2.6, 0), 1);
   const between = (few, many) => few + (many - few) * crowd;
   const color = levelColor(level, levels);
-  for (let i = 0; i < count; i++) {
+  for (let shown = 0; shown < count; shown++) {
+    const i = Math.floor((shown * all) / count);
     const [lower, upper] = [corners.subarray(6 * i, 6 * i + 3), corners.subarray(6 * i + 3, 6 * i + 6)];
     edges.addBox(lower, upper, [...color, between(255, 70)], between(2.2, 0.9));
     panes.add(lower, upper, [...color, between(64, 40)]);
   }
-  return { edges, panes, count };
+  return { edges, panes, count, all };
 }
 
 // As which of KINDS a segment of a path is shown.

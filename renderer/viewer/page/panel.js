@@ -25,7 +25,7 @@ export class Panel {
   load(scene) {
     this.scene = scene;
     const { fields } = this;
-    fields.file.replaceChildren(...scene.files.map((f) => element("option", { value: f, textContent: f })));
+    fields.file.replaceChildren(...scene.files.map((f) => element("option", { value: f, textContent: f.replace(/\.toml$/, "") })));
     fields.file.value = scene.name;
     fields.max_depth.value = Math.min(scene.render.max_depth, fields.max_depth.max);
     this.offerSamples(scene.render.samples);
@@ -34,6 +34,7 @@ export class Panel {
     fields.level.max = Math.max(scene.octree.levels - 1, 0);
     // Some hundred boxes at most: enough to see, few enough to see through.
     fields.level.value = Math.min(3, fields.level.max);
+    document.querySelector("#reload").disabled = !scene.files.length;
     this.offerBoxes(scene.octree.nodes > 0);
     this.resetLight();
     this.showLevels(Math.max(scene.octree.levels, 1));
@@ -92,7 +93,8 @@ export class Panel {
     fields.azimuth_shown.value = `${Math.round(fields.azimuth.value)}°`;
     fields.elevation_shown.value = `${Math.round(fields.elevation.value)}°`;
     const directional = !document.querySelector("#light").disabled;
-    const note = this.lightMoved ? "Moved; Reset brings the scene's own back" : "As the scene has it";
+    document.querySelector("#reset-light").disabled = !this.lightMoved;
+    const note = this.lightMoved ? "Moved" : "As the scene has it";
     document.querySelector("#light-note").textContent = directional ? note : "This scene has no directional light";
   }
 
@@ -106,9 +108,10 @@ export class Panel {
     this.showValues();
   }
 
-  // How many boxes the chosen level has.
-  showBoxes(boxes) {
-    this.fields.level_shown.value = `${this.fields.level.value} · ${count(boxes)} ${boxes === 1 ? "node" : "nodes"}`;
+  // How many boxes the chosen level has, and how many of them are shown.
+  showBoxes({ count: shown, all }) {
+    const some = shown < all ? `${count(shown)} of ` : "";
+    this.fields.level_shown.value = `${this.fields.level.value} · ${some}${count(all)} ${all === 1 ? "node" : "nodes"}`;
   }
 
   showNeeds(needs) {

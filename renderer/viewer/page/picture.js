@@ -24,6 +24,10 @@ export class Picture {
     if (this.canvas.height !== h) this.canvas.height = h;
   }
 
+  clear() {
+    this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
+  }
+
   set visible(value) {
     this.canvas.classList.toggle("away", !value);
   }

@@ -8,7 +8,11 @@ const NONE = new LineSet(1);
 export class Rays {
   // `changed()` is called when other lines are to be drawn.
   constructor(card, frame, changed) {
-    Object.assign(this, { card, frame, changed, seq: 0, path: NONE, nodes: NONE, showNodes: true });
+    Object.assign(this, { card, frame, changed, seq: 0, asked: null, path: NONE, nodes: NONE, showNodes: true });
+  }
+
+  get shown() {
+    return !this.card.hidden;
   }
 
   get visited() {
@@ -21,12 +25,22 @@ export class Rays {
     const x = Math.floor(((clientX - left) / width) * view.w);
     const y = Math.floor(((clientY - top) / height) * view.h);
     if (x < 0 || y < 0 || x >= view.w || y >= view.h) return null;
-    return { type: "pick", seq: ++this.seq, x, y, ...view, settings };
+    return this.ask({ x, y, ...view }, settings);
   }
 
-  // Show the renderer's answer, unless another pixel was picked since.
+  // The question for the same pixel with other settings, or null where none is picked.
+  again(settings) {
+    return this.asked && this.ask(this.asked, settings);
+  }
+
+  ask(asked, settings) {
+    this.asked = asked;
+    return { type: "pick", seq: ++this.seq, ...asked, settings };
+  }
+
+  // Show the renderer's answer.
   show(pick, scene) {
-    if (pick.seq !== this.seq) return;
+    this.pick = pick;
     this.path = pathLines(pick);
     this.nodes = visitedLines(pick);
     const toggle = (shown) => {
@@ -40,6 +54,7 @@ export class Rays {
   close() {
     // What is still on its way is no longer asked for.
     this.seq++;
+    this.asked = null;
     if (this.card.contains(document.activeElement)) this.frame.parentElement.focus();
     this.card.hidden = true;
     this.path = this.nodes = NONE;

@@ -6,6 +6,9 @@ export const count = (n) => n.toLocaleString("en");
 const bytes = (n) => (n < 1e6 ? `${(n / 1e3).toFixed(0)} kB` : `${(n / 1e6).toFixed(1)} MB`);
 const seconds = (s) => (s < 1 ? `${(1e3 * s).toFixed(0)} ms` : `${s.toFixed(2)} s`);
 const milliseconds = (ms) => (ms < 10 ? `${ms.toFixed(1)} ms` : seconds(ms / 1e3));
+// Rays a second, of which `millions` are given: 0.004 of them are 4 thousand.
+const pace = (millions) =>
+  millions < 0.1 ? `${(1e3 * millions).toFixed(millions < 0.01 ? 2 : 1)} k rays/s` : `${millions.toFixed(millions < 10 ? 2 : 1)} M rays/s`;
 const scale = ({ aov, low, high }) =>
   aov === "cost" ? `${count(low)} to ${count(high)} rays` : `${low.toPrecision(4)} to ${high.toPrecision(4)}`;
 
@@ -37,17 +40,19 @@ export class Readings {
     this.read({ picture: `${w} × ${h}`, pass: "–", time: "–", shown: "–", speed: "–", scale: "–" });
   }
 
-  // A picture or colours that arrived: {kind, step, last, w, h, ms, rate}, `late` milliseconds after they were asked for;
+  // A picture or colours that arrived: {kind, step, last, w, h, ms, rate}, `late` milliseconds after `view` was sent; its
   // `legend` has the values at the ends of a scale of colours, where the picture has one.
-  ofPicture({ kind, step, last, w, h, ms, rate }, late, faces, legend) {
+  ofPicture({ kind, step, last, w, h, ms, rate }, late, faces, view) {
+    const { legend } = view;
     const [time, shown] = [milliseconds(ms), `after ${milliseconds(late)}`];
     const ends = legend ? scale(legend) : "–";
     if (kind === FACE_COLORS) {
       this.line.textContent = `own Phong · ${count(faces)} colours in ${time}`;
       return this.read({ picture: `${count(faces)} colours`, pass: "–", time, shown, speed: "–", scale: ends });
     }
-    const speed = `${rate.toFixed(rate < 10 ? 2 : 1)} M rays/s`;
-    this.line.textContent = `${w} × ${h} · ${time} · ${speed}`;
+    const speed = pace(rate);
+    const size = last ? `${w} × ${h}` : `${w} × ${h} of ${view.w} × ${view.h}`;
+    this.line.textContent = `${size} · ${time} · ${speed}`;
     this.read({ picture: `${w} × ${h}`, pass: last ? "final" : `${step + 1}`, time, shown, speed, scale: ends });
   }
 }

@@ -10,10 +10,12 @@ function download(blob, name) {
 
 export const saveText = (name, text) => download(new Blob([text], { type: "text/plain" }), name);
 
-// What is seen as a PNG: `canvases` over each other, at the size of the first.
+// What is seen as a PNG: `canvases` over each other, at the size of the first. Returns the file's name and size, as text.
 export function savePicture(canvases, sceneName) {
   const whole = element("canvas", { width: canvases[0].width, height: canvases[0].height });
   const context = whole.getContext("2d");
   for (const canvas of canvases) context.drawImage(canvas, 0, 0, whole.width, whole.height);
-  whole.toBlob((blob) => download(blob, sceneName.replace(/\.toml$/, ".png")), "image/png");
+  const name = sceneName.replace(/(\.\w+)?$/, ".png");
+  whole.toBlob((blob) => download(blob, name), "image/png");
+  return `${name}, ${whole.width} × ${whole.height}`;
 }

@@ -104,6 +104,12 @@ def _record() -> dict[str, Any]:
             {"rays": 1, "median": {"ours": 4.5, "embree": 2.0}, "ratios": {"embree": 2.5}},
             {"rays": 10, "median": {"ours": 5.0, "embree": 4.0}, "ratios": {"embree": 0.75}},
         ],
+        "studies": [
+            {"mesh": "city", "rays": 80, "seconds": 2.0, "shadow": 20.0, "memory": 5, "array": 100,
+             "peers": {"open3d": {"whole": 4.0}}},
+            {"mesh": "terrain", "rays": 90, "seconds": 3.0, "shadow": 60.0, "memory": 20, "array": 100,
+             "peers": {"open3d": {"whole": 12.0}}},
+        ],
         "frames": {"size": 512, "ratios": {frames.LISTS: 1.5}},
         "processes": {name: {"median": 1.0} for name in (processes.WARM, processes.IMPORT)},
         "first_answers": {"rows": {"first_hit_cpu": {"median": 8.5, "unit": "CPU s"}}},
@@ -156,6 +162,16 @@ def test_builds_refits_and_memory_are_shares_of_the_peers(targets: dict[str, dic
     assert refit["mean"] == pytest.approx(0.25) and refit["aimed"]
     rest = targets["memory at rest, of Embree's (Open3D)"]
     assert (rest["measured"], rest["at_least"], rest["aim"], rest["met"]) == (0.75, 0.7, 0.5, False)
+
+
+def test_studies_take_the_worst_mesh(targets: dict[str, dict[str, Any]]) -> None:
+    name = "145 directions from each point"
+    beside = targets[f"{name}, against open3d"]
+    assert (beside["measured"], beside["where"], beside["met"], beside["aimed"]) == (2.0, "city", True, False)
+    memory = targets[f"{name}, memory, of rays that are written down"]
+    assert (memory["measured"], memory["where"], memory["met"]) == (0.2, "terrain", False)
+    rate = targets[f"{name}, rays a second, of shadow rays of a picture"]
+    assert (rate["measured"], rate["where"], rate["met"]) == (0.5, "terrain", False)
 
 
 def test_single_things_are_judged_by_themselves(targets: dict[str, dict[str, Any]]) -> None:

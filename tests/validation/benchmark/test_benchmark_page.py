@@ -11,7 +11,17 @@ from renderer.mesh.load import save_ply
 from renderer.mesh.mesh import Mesh
 from validation import timing
 from validation.benchmark import __main__ as command
-from validation.benchmark.measures import ablation, calls, drop_in, first_answers, frames, memory, meshes, processes
+from validation.benchmark.measures import (
+    ablation,
+    calls,
+    drop_in,
+    first_answers,
+    frames,
+    memory,
+    meshes,
+    processes,
+    studies,
+)
 from validation.benchmark.page import heat, history, page, record
 from validation.benchmark.parameters import study
 from validation.benchmark.peers import systems
@@ -58,6 +68,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(calls, "_CALLS", 2)
         patch.setattr(command, "QUICK_RAYS", 300)
         patch.setattr(drop_in, "QUICK_RAYS", (1, 40))
+        patch.setattr(studies, "QUICK_SIZE", 400)
         patch.setattr(frames, "measure", _frames)
         patch.setattr(processes, "measure", _processes)
         patch.setattr(first_answers, "measure", _first_answers)
@@ -99,6 +110,7 @@ def test_the_record_says_what_was_measured_and_with_what(folder: Path) -> None:
             assert sum(counts["from"]) == pytest.approx(counts["lines"]) and counts["lines"] > 0
     # The mesh by path is none of the series, so no fit knows of it: a fit needs all three others.
     assert {f["contender"] for f in found["fits"]} >= {OURS, OURS_ONE, "embree", "trimesh", "mitsuba_scalar"}
+    assert [row["mesh"].split(",")[0] for row in found["studies"]] == ["city", "terrain"]
     assert len(found["drop_in"]) == 5 * 2 and all(min(row["ratios"].values()) > 0 for row in found["drop_in"])
     for row in found["builds"]:
         assert {"ours_midpoint", "ours_sah", "embree"} <= set(row["contenders"])
@@ -113,11 +125,18 @@ def test_the_page_is_drawn_from_the_stored_record_alone(folder: Path, capsys: py
     stored["queries"][0]["ratios"]["embree"] = 12.34
     stored["queries"][0]["ratios_one_thread"]["embree"] = 0.9876
     stored["environment"]["processor"] = "A <made-up> processor"
+    stored["studies"][0] |= {"seconds": 2.0, "peers": {"embree": {"whole": 15.5, "bare": 9.0, "differing": 7}}}
+    stored["studies"][1] |= {"peers": {"embree": {"whole": 1.0, "bare": 0.5, "differing": 0}}}
     record.write(stored, folder / "benchmark.json")
     assert command.main(["--page-only", "--output", str(folder)]) == 0
     text = (folder / "benchmark.html").read_text(encoding="utf-8")
     assert (
-        "12.34" in text and ">0.98<" in text and "A &lt;made-up&gt; processor" in text and "pip install nobody" in text
+        "7.75" in text
+        and "4.50" in text
+        and "12.34" in text
+        and ">0.98<" in text
+        and "A &lt;made-up&gt; processor" in text
+        and "pip install nobody" in text
     )
     # Memory is not drawn for meshes as small as these.
     assert text.count("<svg") == 12 + 7 + 1
@@ -216,7 +235,7 @@ def test_other_records_are_refused(folder: Path, tmp_path: Path) -> None:
     stored = record.read(folder / "benchmark.json")
     path = tmp_path / "benchmark.json"
     path.write_text(json.dumps(stored | {"schema": 99}))
-    with pytest.raises(ValueError, match="schema 6, got 99"):
+    with pytest.raises(ValueError, match="schema 7, got 99"):
         record.read(path)
     path.write_text(json.dumps({k: v for k, v in stored.items() if k != "fits"}))
     with pytest.raises(ValueError, match="expected the keys"):

@@ -1,5 +1,6 @@
 """Plots are well-formed SVG that can stand beside each other in one page, and the same text every time."""
 
+import re
 from xml.etree import ElementTree
 
 import pytest
@@ -102,3 +103,14 @@ def test_the_stability_record_gives_a_figure_a_sweep_and_one_of_leaks():
     assert "offset of the mesh" in texts(figures[0]["svg"])
     everything = [name for figure in figures for name in ids(figure["svg"])]
     assert len(everything) == len(set(everything))
+
+
+def test_a_legend_takes_no_more_columns_than_fit():
+    """Long names stood beyond both sides of the figure."""
+    names = [f"{kind} of a street's floor, counted by {way}" for kind in ("share", "angle") for way in ("ones", "tens")]
+    svg = draw([Panel([Series(name, [1.0, 10.0], [0.1, 0.2]) for name in names], "y")], x_label="x", title="Wide")
+    shown = [element for element in ElementTree.fromstring(svg).iter() if element.text in names]
+    places = [[float(n) for n in re.findall(r"-?[\d.]+", element.attrib["transform"])][-2:] for element in shown]
+    width = float(ElementTree.fromstring(svg).attrib["viewBox"].split()[2])
+    # A letter is at least 3 points wide.
+    assert len(places) == 4 and all(0.0 < x < width - 3.0 * len(names[0]) for x, _ in places)

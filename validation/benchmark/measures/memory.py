@@ -56,15 +56,25 @@ def grown(system: System, folder: Path) -> dict[str, int | None]:
     system.loaded(small.vertices, small.faces)
     build = system.load(vertices, faces)
     with system.scope():
-        _trim()
-        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
-        before = _bytes("VmRSS")
+        before = resident()
         peer = build()
         peer.touch()
-    peak = _bytes("VmHWM") - before
+    peak = most_resident() - before
     _trim()
     rest = _bytes("VmRSS") - before
     return {"rest": rest, "peak": peak, "own": peer.octree.stats.bytes if isinstance(peer, ours.Ours) else None}
+
+
+def resident() -> int:
+    """This process's resident bytes now, from which ``most_resident`` counts anew."""
+    _trim()
+    Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
+    return _bytes("VmRSS")
+
+
+def most_resident() -> int:
+    """The most resident bytes of this process since ``resident`` was asked."""
+    return _bytes("VmHWM")
 
 
 def _trim() -> None:

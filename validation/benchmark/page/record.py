@@ -27,6 +27,9 @@ fits[]            family, query, contender, and a, b, residual of ns = a log2 N 
 drop_in[]         call, faces, rays; seconds a ray by contender (all runs), ratios: theirs over the drop-in's
 calls[]           rays; micros a call by contender (all runs), median; ratios by peer: its time over ours with all
                   threads, and over ours_one_thread where it has one
+studies[]         mesh, points, directions, rays (those above horizons), threads, seconds; written, shadow: rays a
+                  second of any_hit; memory, array: bytes that it takes, and that all rays would
+  peers           by name: bare (seconds of its calls), whole, batch, by_direction, differing bits
 builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint; ratios_refit: the build
                   of each peer over our refit
 memory[]          mesh, faces, systems: rest, peak (bytes by which a process grows), own (our own count or null)
@@ -54,10 +57,10 @@ from renderer.process.files import write_atomically
 from validation import environment
 from validation.benchmark.peers.contender import System
 
-SCHEMA = 6
+SCHEMA = 7
 KEYS = (
     "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series",
-    "kinds", "open_edges", "queries", "fits", "drop_in", "calls", "builds", "memory", "frames", "processes",
+    "kinds", "open_edges", "queries", "fits", "drop_in", "calls", "studies", "builds", "memory", "frames", "processes",
     "first_answers", "ablation", "knobs", "limits", "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")

@@ -71,7 +71,7 @@ _QUERIES = (
 def judged(record: Mapping[str, Any]) -> list[dict[str, Any]]:
     """All targets with their values in ``record``."""
     makers: tuple[Callable[[Mapping[str, Any]], Iterator[Target]], ...]
-    makers = (_first_hits, _threads, _queries, _builds, _memory, _calls, _frames, _processes, _first_answers)
+    makers = (_first_hits, _threads, _queries, _builds, _memory, _calls, _studies, _frames, _processes, _first_answers)
     return [target.record() for make in makers for target in make(record)]
 
 
@@ -135,6 +135,20 @@ def _calls(record: Mapping[str, Any]) -> Iterator[Target]:
             yield Target(subject, "times", "above", 1.0, 2.0, measured, where, reason)
     alone = next((row["median"][OURS] for row in record["calls"] if row["rays"] == 1), None)
     yield Target("call of 1 ours", "us", "below", 20.0, 8.0, alone, "first answers", "people do call rays one by one")
+
+
+def _studies(record: Mapping[str, Any]) -> Iterator[Target]:
+    rows = record["studies"]
+    worst, where = _worst([(r["peers"]["open3d"]["whole"] / r["seconds"], r["mesh"]) for r in rows if r["peers"]], min)
+    yield Target("145 directions from each point, against open3d", "times", "above", 1.5, 3.0, worst, where,
+                 "theirs are written down by its user, in the best batches; ours never are")  # fmt: skip
+    name, written = "145 directions from each point", "of rays that are written down"
+    worst, where = _worst([(r["memory"] / r["array"], r["mesh"]) for r in rows], max)
+    yield Target(f"{name}, memory, {written}", "share", "below", 0.1, None, worst, where,
+                 "all rays at once do not fit into memory")  # fmt: skip
+    worst, where = _worst([(r["rays"] / r["seconds"] / r["shadow"], r["mesh"]) for r in rows], min)
+    yield Target(f"{name}, rays a second, of shadow rays of a picture", "share", "above", 0.8, None, worst, where,
+                 "the same search, of rays that go the same way")  # fmt: skip
 
 
 def _frames(record: Mapping[str, Any]) -> Iterator[Target]:

@@ -1,9 +1,11 @@
 """Open3D's ``RaycastingScene`` as a contender: Embree on all threads."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import open3d as o3d
+from numpy.typing import NDArray
 
 from renderer.process.parallel import available_threads
 from validation.benchmark.peers.contender import Faces, Family, Floats, HitLists, Peer, Points, Query, System
@@ -73,6 +75,19 @@ class Open3DPeer(Peer):
     def touch(self) -> None:
         """Trace one ray."""
         self._scene.test_occlusions(self._ray)
+
+
+def occlusion_test(vertices: Floats, faces: Faces, threads: int) -> Callable[[NDArray[np.float32]], NDArray[np.bool_]]:
+    """Open3D's occlusion test of rays (n, 6), origins and directions, on so many threads; its tree is built."""
+    scene = o3d.t.geometry.RaycastingScene(nthreads=threads)
+    scene.add_triangles(_tensor(vertices), o3d.core.Tensor(faces.astype(np.uint32)))
+    scene.test_occlusions(o3d.core.Tensor(np.array([[0, 0, 0, 0, 0, 1]], np.float32)))
+
+    def test(rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+        hit: NDArray[np.bool_] = scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
+        return hit
+
+    return test
 
 
 def systems() -> list[System]:

@@ -1,5 +1,5 @@
-"""The public contract, piece by piece: the docstrings of what ``renderer`` exports, the fields of its scenes, and the
-help of its commands.
+"""The public contract, piece by piece: the docstrings of what ``renderer`` and its studies export, the fields of
+scenes, and the help of the commands.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 import renderer
-from renderer import cli
+from renderer import cli, studies
 from validation.promises.contract.fields import described
 
 # A line that begins the definition of a name: "t_max   the last ..." or "faces : (F, 3) ...".
@@ -40,16 +40,18 @@ def contract() -> list[Piece]:
 
 
 def _documented() -> Iterator[Piece]:
-    yield from pieces(renderer.__name__, inspect.getdoc(renderer) or "")
-    for name in sorted(renderer.__all__):
-        thing = getattr(renderer, name)
-        if callable(thing):
-            yield from pieces(name, inspect.getdoc(thing) or "")
-        if inspect.isclass(thing):
-            for owner, member, value in _members(thing):
-                yield from pieces(f"{owner}.{member}", inspect.getdoc(value) or "")
-            if issubclass(thing, BaseModel):
-                yield from (Piece(where, says) for where, says in described(thing))
+    """The docstrings of each public module and of what it exports; names within a part begin with the part's."""
+    for module, part in ((renderer, ""), (studies, "studies.")):
+        yield from pieces(module.__name__, inspect.getdoc(module) or "")
+        for name in sorted(module.__all__):
+            thing = getattr(module, name)
+            if callable(thing):
+                yield from pieces(part + name, inspect.getdoc(thing) or "")
+            if inspect.isclass(thing):
+                for owner, member, value in _members(thing):
+                    yield from pieces(f"{part}{owner}.{member}", inspect.getdoc(value) or "")
+                if issubclass(thing, BaseModel):
+                    yield from (Piece(where, says) for where, says in described(thing))
 
 
 def _members(kind: type) -> Iterator[tuple[str, str, Any]]:

@@ -1,0 +1,331 @@
+"""Any hits of many parallel rays that start near each other, as those of the points of a study in one direction.
+
+One beam around all of them goes through the tree and lists the leaves that it meets, with their boxes laid out like
+those of nodes. Then sixteen rays at a time go through that list, which lies in the nearest cache, and not through the
+tree. The beam around all holds that around sixteen of them, so the list has every leaf that a ray would visit alone.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import (
+    address,
+    alike,
+    at,
+    float32_pointer,
+    gather8,
+    get,
+    int32_pointer,
+    larger,
+    lowest_bit,
+    pointer,
+    prefetch,
+    put,
+    smaller,
+    splat8,
+    store,
+)
+from renderer.trace.intersect import Shear, round_both
+from renderer.trace.layout import CACHE_LINE, CHILDREN, NODE_WORDS, UNUSED, cache_aligned
+from renderer.trace.leaf import NO_FACE, blocks_of, nearest_in_blocks
+from renderer.trace.packet import Beam, enter_beam, highest_origin, lowest_origin, make_beam, meet_box
+from renderer.trace.ray_lanes import (
+    BLOCK_ROW,
+    CHILD,
+    FACE,
+    FAR_ORIGIN,
+    LIMIT,
+    NEAR_INVERSE,
+    NEAR_ORIGIN,
+    NUMBER,
+    ORIGIN,
+    WIDTH,
+    T,
+    nearest_in_leaf,
+    prepare_eight,
+    shear_of,
+)
+from renderer.trace.rays import ray_at
+from renderer.trace.singly import search_singly, stack_size
+
+# The leaves of a list: 128 kB with the rays. Half as many take as long, twice as many 5 % longer.
+LISTED = 256
+# The beam around n rays gives up after it entered n times as many nodes. In a city and on a terrain with a point for
+# each face it enters 0.3 to 1.4 nodes a ray, where sixteen rays alone enter about 20.
+_MOST_NODES = 2
+_LINE = CACHE_LINE // 4
+
+
+class ParallelMemory(NamedTuple):
+    """The arrays behind a ``Parallel``."""
+
+    nodes: NDArray[np.float32]
+    integers: NDArray[np.int64]
+    rays: int
+
+
+class Parallel(NamedTuple):
+    """Memory of one thread, as pointers: the listed leaves as nodes, and their links; the nodes that wait; and the
+    numbers of the rays that have hit nothing yet; and for each ray a leaf that may hide it, or 0.
+    """
+
+    nodes: Any
+    links: Any
+    waiting: Any
+    live: Any
+    hiders: Any
+
+
+def make_parallel_memory(depth: int, rays: int) -> ParallelMemory:
+    """Memory for up to ``rays`` rays against a tree of ``depth`` levels."""
+    nodes = cache_aligned(LISTED // 8 * NODE_WORDS, np.float32)
+    return ParallelMemory(nodes, cache_aligned(stack_size(depth) + 2 * rays, np.int64), rays)
+
+
+@inlined
+def parallel_pointers(memory):
+    """Pointers into a ``ParallelMemory``."""
+    nodes, integers = address(memory.nodes), pointer(memory.integers)
+    return Parallel(
+        float32_pointer(nodes), int32_pointer(nodes), at(integers, 2 * memory.rays), integers, at(integers, memory.rays)
+    )
+
+
+@inlined
+def _prepare_direction(rays, prepared):
+    """Prepare the first ray sixteen times: all but its origin is that of every ray. Returns its beam."""
+    numbers = at(prepared.integers, NUMBER)
+    for r in range(WIDTH):
+        put(numbers, r, 0)
+    for half in range(0, WIDTH, 8):
+        prepare_eight(rays, prepared, half, numbers)
+    return make_beam(prepared)
+
+
+@inlined
+def _prepare_origins(rays, prepared, sixteen, limits):
+    """Let the prepared rays be sixteen of those that are live, the last one again where there are fewer.
+
+    sixteen  their numbers, which one is the first, and how many are live
+    limits   T and LIMIT of a ray that has hit nothing
+    """
+    floats, doubles, integers = prepared
+    live, first, count = sixteen
+    w = get(integers, BLOCK_ROW + 2 * WIDTH) >> 2
+    for r in range(WIDTH):
+        put(integers, NUMBER + r, get(live, smaller(first + r, count - 1)))
+    for half in range(0, WIDTH, 8):
+        for axis in range(3):
+            o = gather8(rays.origins, at(integers, NUMBER + half), rays.origin_step, axis) * rays.scale
+            far, near = round_both(o)
+            if get(floats, NEAR_INVERSE + axis * WIDTH) < 0.0:
+                near, far = far, near
+            store(floats, NEAR_ORIGIN + axis * WIDTH + half, near)
+            store(floats, FAR_ORIGIN + axis * WIDTH + half, far)
+            store(doubles, ORIGIN + (axis + 2 - w) % 3 * WIDTH + half, o)
+        store(doubles, T + half, alike(limits[0], o))
+        store(floats, LIMIT + half, splat8(limits[1]))
+        store(integers, FACE + half, alike(np.int64(NO_FACE), o))
+
+
+@inlined
+def _beam_between(beam, low, high):
+    """A beam with other origins, from ``low`` to ``high``, in the order w, u, v."""
+    near, far = (high[0], low[0]) if beam.sign > 0.0 else (low[0], high[0])
+    return Beam(
+        beam.near_row, beam.far_row, beam.row_u, beam.row_v, near, far, low[1], high[1], low[2], high[2],
+        beam.least_u, beam.most_u, beam.least_v, beam.most_v, beam.sign, beam.lower,
+    )  # fmt: skip
+
+
+@inlined
+def _bounds(rays, live, count, axis):
+    """The range of the origins of the rays ``live``, float32 and rounded outwards: rounding is monotone."""
+    low = get(rays.origins, get(live, 0) * rays.origin_step + axis)
+    high = low
+    for j in range(1, count):
+        o = get(rays.origins, get(live, j) * rays.origin_step + axis)
+        low, high = smaller(low, o), larger(high, o)
+    return round_both(low * rays.scale)[0], round_both(high * rays.scale)[1]
+
+
+@inlined
+def _beam_around(rays, beam, live, count):
+    """The beam around all rays that are ``live``."""
+    low_w, high_w = _bounds(rays, live, count, beam.near_row >> 4)
+    low_u, high_u = _bounds(rays, live, count, beam.row_u >> 4)
+    low_v, high_v = _bounds(rays, live, count, beam.row_v >> 4)
+    return _beam_between(beam, (low_w, low_u, low_v), (high_w, high_u, high_v))
+
+
+@inlined
+def _beam_of_sixteen(floats, beam):
+    """The beam around the prepared rays."""
+    w, u, v = beam.near_row >> 4, beam.row_u >> 4, beam.row_v >> 4
+    low = lowest_origin(floats, w), lowest_origin(floats, u), lowest_origin(floats, v)
+    return _beam_between(beam, low, (highest_origin(floats, w), highest_origin(floats, u), highest_origin(floats, v)))
+
+
+@inlined
+def _list_leaf(tree, parallel, place, octant, child):
+    """Copy the box whose first word is ``octant`` to the list, with its leaf."""
+    base = (place >> 3) * NODE_WORDS + (place & 7)
+    for row in range(6):
+        put(parallel.nodes, base + 8 * row, get(tree.nodes, octant + 8 * row))
+    put(parallel.links, base + CHILDREN, np.int32(child))
+
+
+@inlined
+def _end_list(parallel, listed):
+    """Fill the last node of the list up with boxes that no beam meets."""
+    place = listed
+    while place & 7 != 0:
+        base = (place >> 3) * NODE_WORDS + (place & 7)
+        for row in range(6):
+            put(parallel.nodes, base + 8 * row, np.float32(-np.inf) if row & 1 else np.float32(np.inf))
+        put(parallel.links, base + CHILDREN, np.int32(UNUSED))
+        place += 1
+
+
+@kernel
+def _list_leaves(tree, beam, limit, parallel, top):
+    """List leaves that a beam meets, until the list is full or no node waits; returns the nodes that wait, the length
+    of the list, and how many nodes were entered.
+    """
+    listed, entered = np.int64(0), np.int64(0)
+    while top > 0 and listed + 8 <= LISTED:
+        top -= 1
+        entered += 1
+        base = get(parallel.waiting, top) * NODE_WORDS
+        _, bits = enter_beam(tree.nodes, base, beam, limit)
+        while bits != 0:
+            octant = base + lowest_bit(bits)
+            bits &= bits - 1
+            child = np.int64(get(tree.links, octant + CHILDREN))
+            if child < 0:
+                _list_leaf(tree, parallel, listed, octant, child)
+                listed += 1
+            else:
+                put(parallel.waiting, top, child)
+                top += 1
+                for line in range(0, NODE_WORDS, _LINE):
+                    prefetch(tree.nodes, child * NODE_WORDS + line)
+    _end_list(parallel, listed)
+    return top, listed, entered
+
+
+@inlined
+def _test_listed_leaf(tree, prepared, meeting, leaf):
+    """Test the rays in ``meeting`` against a leaf, which hides those it hits. Returns the bits of those in doubt."""
+    doubtful = np.int64(0)
+    while meeting != 0:
+        r = lowest_bit(meeting)
+        meeting &= meeting - 1
+        hit, doubts = nearest_in_leaf(tree, prepared, r, leaf)
+        doubtful |= np.int64(doubts != 0) << r
+        if hit:
+            # A limit that no box lies within: the ray meets no further one.
+            put(prepared.floats, LIMIT + r, np.float32(-np.inf))
+            put(prepared.integers, CHILD + r, leaf)
+    return doubtful
+
+
+@kernel
+def _test_list(tree, prepared, parallel, listed, beam):
+    """Test sixteen prepared rays against the leaves of the list; returns the bits of the rays in doubt."""
+    beam, floats, doubtful = _beam_of_sixteen(prepared.floats, beam), prepared.floats, np.int64(0)
+    limit = get(floats, LIMIT)
+    for base in range(0, (listed + 7) // 8 * NODE_WORDS, NODE_WORDS):
+        _, bits = enter_beam(parallel.nodes, base, beam, limit)
+        while bits != 0:
+            octant = base + lowest_bit(bits)
+            bits &= bits - 1
+            meeting = meet_box(parallel.nodes, octant, floats, 0) | (meet_box(parallel.nodes, octant, floats, 8) << 8)
+            if meeting != 0:
+                doubtful |= _test_listed_leaf(tree, prepared, meeting, np.int64(get(parallel.links, octant + CHILDREN)))
+    return doubtful
+
+
+@inlined
+def _keep_live(tree, rays, found, scratch, parallel, state, doubtful):
+    """Note which of sixteen rays are hidden, and keep the numbers of the others; returns how many are kept."""
+    first, count, kept = state
+    integers = scratch.prepared.integers
+    for r in range(smaller(count - first, np.int64(WIDTH))):
+        i = get(integers, NUMBER + r)
+        hidden, sure = get(integers, FACE + r) != NO_FACE, False
+        if hidden:
+            put(parallel.hiders, i, get(integers, CHILD + r))
+        elif (doubtful >> r) & 1 != 0:
+            ray, t_max = ray_at(rays, i)
+            best, _ = search_singly(tree, ray, t_max, scratch.packet_stack)
+            hidden, sure = best[1] != NO_FACE, True
+        put(found.hit, i, hidden)
+        put(parallel.live, kept, i)
+        kept += np.int64(not (hidden or sure))
+    return kept
+
+
+@kernel
+def _test_rays(tree, rays, found, scratch, parallel, counts, beam, limits):
+    """Test all rays that have hit nothing yet against the list, sixteen at a time; returns how many are left."""
+    prepared, kept = scratch.prepared, np.int64(0)
+    count, listed = counts
+    for first in range(0, count, WIDTH):
+        _prepare_origins(rays, prepared, (parallel.live, first, count), limits)
+        doubtful = _test_list(tree, prepared, parallel, listed, beam)
+        kept = _keep_live(tree, rays, found, scratch, parallel, (first, count, kept), doubtful)
+    return kept
+
+
+@kernel
+def _try_hiders(tree, rays, found, prepared, parallel, count):
+    """Test each ray against the leaf that hid one like it; returns how many are not hidden."""
+    shear, t_max, kept = shear_of(prepared, 0), get(prepared.doubles, T), np.int64(0)
+    w = shear.row_z >> 2
+    x, y = (w + 1) % 3, (w + 2) % 3
+    for i in range(count):
+        leaf, face = get(parallel.hiders, i), np.int32(NO_FACE)
+        if leaf < 0:
+            o = at(rays.origins, i * rays.origin_step)
+            own = Shear(
+                shear.row_x, shear.row_y, shear.row_z, get(o, x) * rays.scale, get(o, y) * rays.scale,
+                get(o, w) * rays.scale, shear.shear_x, shear.shear_y, shear.direction_z,
+            )  # fmt: skip
+            first, blocks = blocks_of(leaf)
+            none = t_max, face, 0.0, 0.0, 1.0
+            _, face, _, _, _, _ = nearest_in_blocks(tree, first, blocks, 0.0, own, none)
+        hidden = face != NO_FACE
+        # Asked once more only where it hid the last ray: elsewhere that would cost open rays more than it saves.
+        put(parallel.hiders, i, leaf if hidden else np.int64(0))
+        put(found.hit, i, hidden)
+        put(parallel.live, kept, i)
+        kept += np.int64(not hidden)
+    return kept
+
+
+@kernel
+def trace_parallel(tree, rays, found, count, scratch, parallel):
+    """Whether each of the first ``count`` rays, which all have the direction and the bounds of the first, hits
+    anything.
+
+    ``parallel.hiders`` has a leaf for each ray that is asked first, or 0; afterwards the one that hid it, or 0.
+    Returns whether that is answered: it gives up where the rays are too far apart to share their way.
+    """
+    prepared = scratch.prepared
+    beam = _prepare_direction(rays, prepared)
+    limits = get(prepared.doubles, T), get(prepared.floats, LIMIT)
+    left = _try_hiders(tree, rays, found, prepared, parallel, count)
+    put(parallel.waiting, 0, 0)
+    top, entered = np.int64(1), np.int64(0)
+    while top > 0 and left > 0:
+        if entered > _MOST_NODES * count:
+            return False
+        around = _beam_around(rays, beam, parallel.live, left)
+        top, listed, more = _list_leaves(tree, around, limits[1], parallel, top)
+        entered += more
+        left = _test_rays(tree, rays, found, scratch, parallel, (left, listed), beam, limits)
+    return True

@@ -1,0 +1,27 @@
+// What a tab keeps when its page is loaded again: which scene it shows, and from where.
+
+const KEY = "octree-render";
+
+// Some frames and private windows keep nothing.
+export function remember(kept) {
+  try {
+    sessionStorage.setItem(KEY, JSON.stringify(kept));
+  } catch {
+    // Then the page begins anew.
+  }
+}
+
+export function remembered() {
+  try {
+    return JSON.parse(sessionStorage.getItem(KEY));
+  } catch {
+    return null;
+  }
+}
+
+// The name of a scene, its own camera, and the one that it is seen by; null for no scene.
+export const kept = (scene, camera) => scene && { name: scene.name, own: scene.camera, camera: camera.state };
+
+// Whether the camera of `before` is to stay for `scene`: not where its file has another one now.
+export const stays = (before, scene) =>
+  before?.name === scene.name && JSON.stringify(before.own) === JSON.stringify(scene.camera);

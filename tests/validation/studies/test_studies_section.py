@@ -1,0 +1,115 @@
+"""The section on studies: ours passes, and each kind of wrong answer turns a gate red."""
+
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from renderer import Octree
+from validation.job import Job
+from validation.report import page, studies_figures
+from validation.studies import bits, bodies, forms, holds, section
+from validation.thresholds import Thresholds
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    taken = []
+    job = Job(True, Thresholds(), tmp_path_factory.mktemp("studies"), taken.append)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(section, "_QUICK", (150, 16))
+        record, gates = section.run(job)
+    assert len(taken) == section.steps(job)
+    return record, gates, job.folder
+
+
+def test_all_gates_pass_and_the_record_draws_a_figure(run):
+    record, gates, folder = run
+    assert len(gates) == len(record["forms"]) + 2 + 5 + len(holds.CHECKS) and all(gate.passed for gate in gates)
+    assert all(row["asked"] > 0 for row in (*record["bits"], *record["holds"]))
+    assert (folder / section.PICTURE).stat().st_size > 10_000
+    (figure,) = studies_figures.figures(record)
+    assert "N^-0.7" in figure["svg"] and "as by chance" in figure["svg"]
+    assert page.PARTIALS["studies"] == ("Studies", "studies.html")
+
+
+@pytest.mark.parametrize("name", ["sky_view_factor", "ambient_occlusion", "openness"])
+def test_a_share_that_is_off_breaks_its_bound(monkeypatch, name):
+    own = getattr(forms, name)
+    monkeypatch.setattr(forms, name, lambda *a, **k: np.minimum(own(*a, **k) + 0.02, 1.0))
+    worst = max(forms.check_form(i, False)["share_of_bound"] for i in range(len(forms.forms())))
+    assert worst > 1.0
+
+
+def test_errors_that_do_not_fall_have_no_slope(monkeypatch):
+    own = forms.sky_view_factor
+    monkeypatch.setattr(forms, "sky_view_factor", lambda *a, **k: own(*a, **k) + 1e-3)
+    assert all(row["slope"] > forms.SLOPE for row in forms.check_slope(False)["curves"])
+
+
+@pytest.mark.parametrize("name", ["town", "terrain", "balls", "loose triangles", "slivers"])
+def test_a_wrong_bit_is_counted(monkeypatch, name):
+    own = bits.occlusion
+
+    def one_wrong(*told, **options):
+        found = own(*told, **options)
+        found[7, 0] ^= 0xFF
+        return found
+
+    assert bits.check_bits(name, 40, 64)["wrong"] == 0
+    monkeypatch.setattr(bits, "occlusion", one_wrong)
+    # Of the bits at the horizon's very edge either will do: none is among these.
+    assert bits.check_bits(name, 40, 64)["wrong"] == 8
+
+
+def test_exact_rays_skip_the_face_that_they_leave_and_nothing_else():
+    mesh = bodies.touching()
+    start = np.array([[0.5, 0.5, 2.0]])
+    assert bits.hidden_exactly(mesh, start, np.array([[0.0, 0.0, 1.0]])).tolist() == [False]
+    assert bits.hidden_exactly(mesh, start, np.array([[0.0, 0.0, -1.0]])).tolist() == [True]
+
+
+BROKEN = {
+    "moved to UTM coordinates": (
+        "sky_view_factor", lambda own: lambda o, p, *a, **k: own(o, p, *a, **k) + p[:, 0] * 1e-12),
+    "threads, order and company": (
+        "sky_view_factor", lambda own: lambda *a, **k: own(*a, **k) + 1e-9 * (k.get("threads") == 3)),
+    "light through walls that touch": ("occlusion", lambda own: lambda *a, **k: own(*a, **k) & 0x7F),
+    "shade among faces of a plane": ("ambient_occlusion", lambda own: lambda *a, **k: own(*a, **k) - 2.0**-53),
+    "two sides of a thin plate": ("sky_view_factor", lambda own: lambda *a, **k: 1.0 - own(*a, **k)),
+    "points inside bodies": ("openness", lambda own: lambda *a, **k: own(*a, **k) + 1.0 / 300),
+    "hours of sun in a street": ("sun_hours", lambda own: lambda *a, **k: own(*a, **k) + 0.25),
+    "weights and distances": ("occlusion", lambda own: lambda *a, distance=0, **k: own(*a, **k)),
+    "faces that an eye sees": ("visible_faces", lambda own: lambda *a, **k: ~own(*a, **k)),
+    "clouds and depths": ("depth_map", lambda own: lambda *a, **k: own(*a, **k) * (1 + 2.0**-50)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_what_does_not_hold_is_counted(monkeypatch, name):
+    study, broken = BROKEN[name]
+    assert BROKEN.keys() == holds.CHECKS.keys()
+    monkeypatch.setattr(holds, study, broken(getattr(holds, study)))
+    row = holds.check(name)
+    assert 0 < row["wrong"] <= row["asked"]
+
+
+def test_meshes_stand_apart_and_on_grids_that_move_exactly():
+    for mesh in (bodies.town(), bodies.terrain()):
+        points = holds._within(mesh)
+        assert ((mesh.vertices + holds.UTM) - holds.UTM == mesh.vertices).all()
+        assert ((points + holds.UTM) - holds.UTM == points).all()
+    # No face lies so near to a point that exact rays would begin behind it.
+    for mesh in bodies.bodies().values():
+        place = bits.face_points(mesh)
+        rows = np.random.default_rng(0).choice(len(place.points), 50, replace=False)
+        off = 4.0 * bits._BEGIN * mesh.extent.max()
+        for row in rows:
+            others = Octree(mesh.vertices, np.delete(mesh.faces, place.faces[row], axis=0))
+            assert others.closest_point(place.points[row]).distance > off
+
+
+def test_the_section_is_one_of_the_suites():
+    assert import_module("validation.sections").NAMES[3] == "studies"
+    assert Path(section.__file__).parent.name == "studies"

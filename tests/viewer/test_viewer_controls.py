@@ -1,0 +1,263 @@
+"""What hands do to the viewer's page, on its controls, on its stage and on small screens."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from viewer_page import CHROMIUM, Viewer
+
+pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+
+
+@pytest.mark.parametrize(
+    "control", ["[name=mode][value=phong]", "[name=walk]", "#fit", "#keys summary", "[name=samples]"]
+)
+def test_keys_mean_the_stage_after_a_click_on_a_control(viewer: Viewer, control: str) -> None:
+    """They were lost, and the arrows changed the mode."""
+    if control == "[name=samples]":
+        viewer.page.click(control)
+        viewer.page.keyboard.press("Escape")
+        viewer.page.select_option(control, "4")
+    else:
+        viewer.page.click(control)
+    mode = viewer.page.evaluate("() => viewer.mode")
+    viewer.settled(mode)
+    before = viewer.camera["m"]
+    viewer.page.keyboard.press("ArrowLeft")
+    viewer.wait_until(lambda: viewer.camera["m"] != before)
+    assert viewer.page.evaluate("() => viewer.mode") == mode
+    viewer.page.keyboard.press("1")
+    viewer.settled("gl")
+
+
+def test_letters_mean_the_stage_where_a_slider_is_focused_and_arrows_the_slider(viewer: Viewer) -> None:
+    viewer.page.focus("[name=max_depth]")
+    before = viewer.camera["m"]
+    viewer.page.keyboard.press("ArrowLeft")
+    viewer.page.keyboard.press("ArrowLeft")
+    viewer.settled("octree")
+    assert viewer.page.input_value("[name=max_depth]") == "1" and viewer.camera["m"] == before
+    viewer.page.keyboard.press("w")
+    viewer.wait_until(lambda: viewer.camera["m"] != before)
+    viewer.page.keyboard.press("2")
+    viewer.settled("phong")
+
+
+def test_who_comes_by_keyboard_stays_on_the_control(viewer: Viewer) -> None:
+    viewer.page.focus("[name=shadows]")
+    viewer.page.keyboard.press("Space")
+    assert not viewer.page.is_checked("[name=shadows]")
+    assert viewer.page.evaluate("() => document.activeElement.name") == "shadows"
+
+
+def picked(viewer: Viewer) -> str:
+    """The card of a pixel whose ray goes on, and sends shadow rays."""
+    left, top, width, height = (viewer.page.locator("#frame").bounding_box()[k] for k in ("x", "y", "width", "height"))
+    for x, y in np.ndindex(9, 9):
+        # The card may cover the next pixel.
+        seq = viewer.page.evaluate("() => (viewer.rays.close(), viewer.rays.seq)")
+        viewer.page.mouse.click(left + width * (x + 1) / 10, top + height * (y + 1) / 10)
+        viewer.page.wait_for_function(
+            "(seq) => viewer.rays.seq > seq && viewer.rays.pick?.seq === viewer.rays.seq", arg=seq
+        )
+        card = viewer.page.inner_text("#card")
+        if "shadow" in card and "reflected" in card:
+            return card
+    raise AssertionError("no such pixel")
+
+
+@pytest.mark.parametrize(
+    ("field", "kind"), [("max_depth", "reflected"), ("reflection", "reflected"), ("shadows", "shadow")]
+)
+def test_the_card_follows_the_settings(viewer: Viewer, field: str, kind: str) -> None:
+    """It kept the rays of the settings before."""
+    assert kind in picked(viewer)
+    if field == "max_depth":
+        viewer.page.locator("[name=max_depth]").fill("0")
+    else:
+        viewer.page.click(f"[name={field}]")
+    viewer.page.wait_for_function("(kind) => !document.querySelector('#card').innerText.includes(kind)", arg=kind)
+    assert "1 camera ray" in viewer.page.inner_text("#card")
+    viewer.page.click("#card .close")
+    viewer.page.click("[name=refraction]")
+    viewer.settled("octree")
+    assert viewer.page.is_hidden("#card")
+
+
+def test_escape_closes_the_card_before_it_cancels(viewer: Viewer) -> None:
+    picked(viewer)
+    viewer.page.evaluate("() => { viewer.progress.show(0.5); viewer.stage.focus(); }")
+    viewer.page.keyboard.press("Escape")
+    assert viewer.page.is_hidden("#card") and viewer.page.is_visible("#progress")
+    viewer.page.keyboard.press("Escape")
+    assert viewer.page.is_hidden("#progress")
+
+
+def test_light_and_camera_are_reset_each_by_itself(viewer: Viewer) -> None:
+    start, own = viewer.camera, viewer.pixels("picture")
+    assert viewer.page.is_disabled("#reset-light")
+    viewer.page.locator("[name=azimuth]").fill("-90")
+    viewer.settled("octree")
+    lit = viewer.pixels("picture")
+    viewer.drag(60, 20)
+    viewer.page.click("#reset-view")
+    viewer.settled("octree")
+    assert viewer.camera == start and np.array_equal(viewer.pixels("picture"), lit)
+    viewer.drag(60, 20)
+    viewer.page.wait_for_timeout(50)
+    viewer.settled("octree")
+    moved = viewer.camera
+    viewer.page.click("#reset-light")
+    viewer.settled("octree")
+    assert viewer.camera == moved != start
+    viewer.page.locator("#stage").press("r")
+    viewer.settled("octree")
+    assert np.array_equal(viewer.pixels("picture"), own) and not np.array_equal(own, lit)
+
+
+@pytest.mark.parametrize(("value", "share"), [("0.5", "half as wide and high"), ("0.25", "a quarter as wide and high")])
+def test_a_share_of_the_window_is_what_its_name_says(viewer: Viewer, value: str, share: str) -> None:
+    """Half of each side was called half the pixels."""
+    assert viewer.page.inner_text(f"[name=size] [value='{value}']") == share
+    whole = viewer.camera
+    viewer.page.select_option("[name=size]", value)
+    viewer.settled("octree")
+    for side in ("w", "h"):
+        assert abs(viewer.camera[side] - float(value) * whole[side]) <= 0.5  # whole pixels
+
+
+@pytest.mark.parametrize(
+    ("rate", "said"), [(0.00012, "0.12 k"), (0.0042, "4.20 k"), (0.06, "60.0 k"), (2.5, "2.50 M"), (42, "42.0 M")]
+)
+def test_slow_and_fast_pictures_have_a_speed(viewer: Viewer, rate: float, said: str) -> None:
+    told = viewer.page.evaluate(
+        """(rate) => {
+            viewer.readings.ofPicture({ kind: 1, step: 2, last: true, w: 8, h: 8, ms: 5, rate }, 6, 1, { w: 8, h: 8 });
+            return [viewer.readings.values.speed.textContent, document.querySelector("#hud").textContent];
+        }""",
+        rate,
+    )
+    assert told[0] == f"{said} rays/s" and told[1].endswith(f"{said} rays/s")
+
+
+def test_more_boxes_than_can_be_drawn_are_not_drawn_and_that_is_said(viewer: Viewer) -> None:
+    """48,311 boxes stalled software GL for seconds a picture."""
+    budget = viewer.page.evaluate("() => viewer.layer.mostBoxes")
+    assert budget == 1000  # the tests' GL is software
+    viewer.page.evaluate("() => { viewer.layer.mostBoxes = 5; }")
+    try:
+        viewer.choose("gl")
+        deepest = viewer.page.get_attribute("[name=level]", "max")
+        viewer.page.locator("[name=level]").fill(deepest)
+        viewer.page.wait_for_function("() => viewer.boxes.count > 0")
+        count, edges, panes, everything = viewer.page.evaluate(
+            "() => [viewer.boxes.count, viewer.boxes.edges.count, viewer.boxes.panes.count, viewer.boxes.all]"
+        )
+        assert (count, edges, panes) == (5, 60, 5) and everything > 5
+        shown = viewer.page.evaluate("() => viewer.panel.fields.level_shown.value")
+        assert shown == f"{deepest} · 5 of {everything:,} nodes"
+        # They are of all of the level: of its first and of its last parts.
+        corners = viewer.page.evaluate(
+            """async (level) => {
+                const { fetchBoxes } = await import("./static/overlay.js");
+                const [few, all] = await Promise.all([5, 1e9].map((most) => fetchBoxes(viewer.scene.id, level, most)));
+                return [few, all].map(({ panes }) => [...panes.floats].filter((_, i) => i % 7 < 6));
+            }""",
+            int(deepest),
+        )
+        few, all_of_them = (np.reshape(values, (-1, 6)) for values in corners)
+        assert np.array_equal(few, all_of_them[np.arange(5) * len(all_of_them) // 5])
+    finally:
+        viewer.page.evaluate("(budget) => { viewer.layer.mostBoxes = budget; }", budget)
+
+
+def wheel(viewer: Viewer, x: float, y: float, **options: Any) -> None:
+    viewer.page.evaluate(
+        "([clientX, clientY, options]) => viewer.stage.dispatchEvent("
+        "new WheelEvent('wheel', { clientX, clientY, cancelable: true, ...options }))",
+        [x, y, options],
+    )
+
+
+def test_a_pinch_on_a_trackpad_zooms_as_far_as_the_fingers_part(viewer: Viewer) -> None:
+    """A tenth of it was zoomed: browsers tell of it as a wheel with the control key, in hundredths of a power of e."""
+    before = viewer.page.evaluate("() => viewer.camera.distance")
+    wheel(viewer, *viewer.centre(), deltaY=-100 * math.log(1.5), ctrlKey=True)
+    assert viewer.page.evaluate("() => viewer.camera.distance") == pytest.approx(before / 1.5)
+
+
+def place(viewer: Viewer, point: list[float]) -> tuple[float, float]:
+    """Where a point of the scene is in the window."""
+    x, y, z, _ = np.linalg.inv(np.reshape(viewer.page.evaluate("() => viewer.camera.matrix()"), (4, 4)).T) @ [
+        *point,
+        1.0,
+    ]
+    box, fovy = viewer.page.locator("#frame").bounding_box(), viewer.page.evaluate("() => viewer.camera.fovy")
+    scale = box["height"] / 2 / math.tan(fovy / 2) / -z
+    return box["x"] + box["width"] / 2 + x * scale, box["y"] + box["height"] / 2 - y * scale
+
+
+def test_the_wheel_zooms_towards_the_pointer(viewer: Viewer) -> None:
+    pivot, right, up = viewer.page.evaluate("() => [viewer.camera.pivot, ...viewer.camera.frame().slice(0, 2)]")
+    point = (np.array(pivot) + 0.7 * np.array(right) - 0.4 * np.array(up)).tolist()
+    before = place(viewer, point)
+    wheel(viewer, *before, deltaY=-300)
+    # An event's place is in whole pixels; by e^0.36 - 1 of one the zoom moves the rest.
+    assert place(viewer, point) == pytest.approx(before, abs=0.44)
+    assert math.dist(place(viewer, pivot), before) > 20.0
+
+
+def test_a_double_click_turns_about_what_is_there(viewer: Viewer) -> None:
+    viewer.page.mouse.dblclick(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
+    viewer.page.wait_for_function(
+        "() => viewer.rays.pick && String(viewer.camera.pivot) === String(viewer.rays.pick.point)"
+    )
+    point, distance = viewer.page.evaluate("() => [viewer.rays.pick.point, viewer.camera.distance]")
+    assert place(viewer, point) == pytest.approx(viewer.centre())
+    viewer.settled("octree")
+    assert math.dist(viewer.camera["m"][12:15], point) == pytest.approx(distance)
+
+
+LUMINANCE = """() => {
+    const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+    const of = (element) => {
+        const [r, g, b] = getComputedStyle(element).backgroundColor.match(/[\\d.]+/g).map((c) => linear(c / 255));
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    return [of(document.querySelector("[name=walk]")), of(document.querySelector("#panel"))];
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_a_switch_that_is_off_stands_out(browser: Any, url: str, scheme: str) -> None:
+    page = Viewer(browser, url, color_scheme=scheme)
+    try:
+        page.page.goto(page.url)
+        off, ground = page.page.evaluate(LUMINANCE)
+        # WCAG 2.2, 1.4.11: 3 to 1 for what is needed to understand a control; its knob is white.
+        assert (max(off, ground) + 0.05) / (min(off, ground) + 0.05) >= 3.0
+        assert 1.05 / (off + 0.05) >= 3.0
+    finally:
+        page.context.close()
+
+
+@pytest.mark.parametrize(("width", "height"), [(320, 640), (390, 844)])
+def test_a_phone_shows_the_modes_whole_and_the_cameras_buttons_at_once(
+    browser: Any, url: str, width: int, height: int
+) -> None:
+    page = Viewer(browser, url, viewport={"width": width, "height": height}, has_touch=True, is_mobile=True)
+    try:
+        page.open()
+        assert page.page.evaluate("() => document.documentElement.scrollWidth") == width
+        cut = """() => [...document.querySelectorAll(".modes span")].filter((span) =>
+            span.scrollWidth > span.clientWidth || span.getBoundingClientRect().right > innerWidth).length"""
+        assert page.page.evaluate(cut) == 0
+        for button in ("#reset-view", "#fit", "#save-picture"):
+            box = page.page.locator(button).bounding_box()
+            assert box["y"] + box["height"] <= height, button
+    finally:
+        page.context.close()

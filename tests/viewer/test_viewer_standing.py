@@ -1,0 +1,137 @@
+"""Which picture stands on the stage of the viewer's page, and which is saved: none older or coarser than one before."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image as Pillow
+from viewer_page import CHROMIUM, Viewer
+
+pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+
+# The server sends a next picture once the last is acknowledged: so long as the page does not, it stays at that pass.
+HOLD = """() => {
+    const { connection } = window.viewer, send = connection.send;
+    window.acks = [];
+    connection.send = (message) => message.type === "ack" ? window.acks.push(message) : send.call(connection, message);
+}"""
+GO_ON = """() => {
+    const { connection } = window.viewer;
+    delete connection.send;
+    window.acks.forEach((message) => connection.send(message));
+}"""
+# Notes after each drawing whether the traced picture is seen, and how wide it is; null where WebGL's model is.
+WATCH = """() => {
+    const { viewer } = window, { draw } = viewer;
+    window.drawn = [];
+    viewer.draw = () => {
+        draw.call(viewer);
+        window.drawn.push(viewer.picture.canvas.classList.contains("away") ? null : viewer.picture.canvas.width);
+    };
+}"""
+WATCHED = "() => { delete window.viewer.draw; return window.drawn; }"
+# Longer than a picture of another camera may stand.
+STALE = 600
+
+
+@pytest.fixture
+def odd(browser: Any, url: str) -> Any:
+    """A page whose stage has no shape that smaller pictures share to the pixel."""
+    page = Viewer(browser, url, viewport={"width": 823, "height": 467}).open()
+    yield page
+    page.context.close()
+
+
+def test_the_first_traced_picture_stands_until_a_finer_one_comes(odd: Viewer) -> None:
+    """Its sides are whole pixels, so its shape is not quite the stage's; it was dropped for that, for seconds."""
+    width, height = (odd.camera[k] for k in ("w", "h"))
+    assert 128 * height != round(128 * height / width) * width
+    odd.page.evaluate(HOLD)
+    odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
+    odd.page.wait_for_function("() => window.acks.some(({ seq, step }) => seq === viewer.seq && step === 0)")
+    odd.page.evaluate(WATCH)
+    odd.page.wait_for_timeout(STALE)
+    odd.page.evaluate("() => viewer.draw()")
+    odd.page.evaluate(GO_ON)
+    odd.settled("octree")
+    drawn = odd.page.evaluate(WATCHED)
+    assert drawn[0] == 128 and drawn[-1] == width and None not in drawn and drawn == sorted(drawn)
+
+
+@pytest.mark.parametrize("samples", ["4", "1"])
+def test_a_finished_picture_stands_until_one_of_other_samples_is_finished(odd: Viewer, samples: str) -> None:
+    width = odd.camera["w"]
+    if samples == "1":
+        odd.page.select_option("[name=samples]", "4")
+        odd.settled("octree")
+    odd.page.evaluate(WATCH)
+    odd.page.select_option("[name=samples]", samples)
+    odd.settled("octree")
+    odd.page.evaluate("() => viewer.draw()")
+    assert set(odd.page.evaluate(WATCHED)) == {width}
+
+
+def test_brute_force_begins_with_the_octrees_picture(odd: Viewer) -> None:
+    """It is the same one; WebGL's model stood there for the seconds that brute force took."""
+    odd.page.evaluate(WATCH)
+    odd.choose("brute")
+    assert set(odd.page.evaluate(WATCHED)) == {odd.camera["w"]}
+
+
+def test_of_two_pictures_the_newer_and_finer_one_stands(viewer: Viewer) -> None:
+    seen = viewer.page.evaluate(
+        """async () => {
+            const { improves } = await import("./static/standing.js");
+            const m = [...Array(16).keys()], settings = { samples: 1, shadows: true };
+            const now = { m, fovy: 1, w: 980, h: 747 };
+            const view = { ...now, settings }, other = { ...view, m: [...m].reverse() };
+            const [few, final] = [{ w: 128, last: false }, { w: 980, last: true }];
+            const shown = (picture, of = view) => ({ view: of, ...picture });
+            const asked = [
+                [few, view, null], [few, view, shown(final, other)], [final, view, shown(few)],
+                [final, view, shown({ ...final, w: 1024 })], [{ w: 256 }, view, shown(few)],
+                [few, view, shown(final, { ...view, settings: { ...settings, shadows: false } })],
+                [few, { ...view, w: 490, h: 374 }, shown(final)],
+                [few, view, shown(final)], [few, other, shown(few)],
+                [few, view, shown(final, { ...view, settings: { ...settings, samples: 9 } })],
+                [few, other, shown(few, { ...other, fovy: 1.1 })], [few, other, null],
+            ];
+            const whether = ([picture, of, stands], model) => improves(picture, of, { shown: stands, now, model });
+            return [asked.map((one) => whether(one, false)), whether(asked[0], true), whether(asked.at(-2), true)];
+        }"""
+    )
+    # Of another camera's pictures a newer one stands for an older, but neither for the camera's own nor for the model.
+    assert seen == [[True] * 6 + [False] * 4 + [True] * 2, True, False]
+
+
+def test_a_picture_that_is_not_finished_is_saved_when_it_is(odd: Viewer, tmp_path: Path) -> None:
+    """The coarse one that stood there was written, without a word."""
+    odd.page.evaluate(HOLD)
+    odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
+    odd.page.wait_for_function("() => window.acks.some(({ seq, step }) => seq === viewer.seq && step === 0)")
+    odd.page.click("#save-picture")
+    assert "when it is finished" in odd.page.inner_text("#notices")
+    with odd.page.expect_download() as saved:
+        odd.page.evaluate(GO_ON)
+    odd.settled("octree")
+    saved.value.save_as(tmp_path / "seen.png")
+    seen = odd.pixels("picture")
+    assert np.array_equal(np.asarray(Pillow.open(tmp_path / "seen.png").convert("RGBA")), seen)
+    assert seen.shape[:2] == (odd.camera["h"], odd.camera["w"])
+    said = odd.page.inner_text("#notices")
+    assert f"blocks.png, {seen.shape[1]} × {seen.shape[0]}" in said and "when it is finished" not in said
+
+
+def test_the_line_over_the_picture_says_that_it_is_not_the_last(odd: Viewer) -> None:
+    odd.page.evaluate(HOLD)
+    odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
+    odd.page.wait_for_function("() => window.acks.some(({ seq, step }) => seq === viewer.seq && step === 0)")
+    width, height = (odd.page.evaluate("() => viewer.size")[k] for k in ("w", "h"))
+    odd.page.wait_for_function(f"() => document.querySelector('#hud').textContent.includes('of {width} × {height}')")
+    odd.page.evaluate(GO_ON)
+    odd.settled("octree")
+    assert odd.page.inner_text("#hud").startswith(f"{width} × {height} ·")

@@ -1,0 +1,220 @@
+"""What holds of studies exactly: each check counts the answers that are not as they must be."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, grid, icosphere
+from renderer.octree import Octree
+from renderer.scene.camera import OrthographicCamera
+from renderer.studies import (
+    ambient_occlusion,
+    depth_map,
+    face_points,
+    fibonacci_sphere,
+    occlusion,
+    openness,
+    scan,
+    sky_view_factor,
+    sun_hours,
+    tregenza,
+    visible_faces,
+)
+from validation.oracle.exact import closest_hits
+from validation.studies.bodies import FAR, bodies, street, terrain, touching, town
+
+Floats = NDArray[np.float64]
+Asked = tuple[int, int]
+_SEED = 2045
+# Whole numbers, so that coordinates of whole multiples of 2^-18 are moved exactly: near Munich in UTM, metres.
+UTM = np.array([691_008.0, 5_335_040.0, 519.0])
+
+
+def _within(mesh: Mesh) -> Floats:
+    """A point within each face, whose coordinates are exact where its corners' are whole multiples of 2^-14."""
+    a, b, c = mesh.triangles.transpose(1, 0, 2)
+    points: Floats = a + (b - a) / 4.0 + (c - a) / 4.0
+    return points
+
+
+def _count(same: Any) -> Asked:
+    right = np.asarray(same)
+    return right.size, int((~right).sum())
+
+
+def _bits(octree: Octree, points: Floats, normals: Floats, *, leaving: NDArray[np.int64]) -> Any:
+    return occlusion(octree, points, normals, tregenza().directions, packed=True, leaving=leaving)
+
+
+def moved_to_utm() -> Asked:
+    """Mesh and points moved by the same whole numbers have the same bits."""
+    asked, wrong = 0, 0
+    for mesh in (town(), terrain()):
+        points, normals, faces = _within(mesh), mesh.face_normals(), np.arange(len(mesh.faces))
+        near, far = Octree.from_mesh(mesh), Octree.from_mesh(Mesh(mesh.vertices + UTM, mesh.faces))
+        for study in (sky_view_factor, _bits):
+            here = study(near, points, normals, leaving=faces)
+            there = study(far, points + UTM, normals, leaving=faces)
+            number, bad = _count(here == there)
+            asked, wrong = asked + number, wrong + bad
+    return asked, wrong
+
+
+def threads_order_and_company() -> Asked:
+    """A point's answer is the same for any threads, in any order, alone and among others."""
+    mesh, rng = town(), np.random.default_rng(_SEED)
+    octree, (points, normals, faces) = Octree.from_mesh(mesh), face_points(mesh)
+    whole = sky_view_factor(octree, points, normals, leaving=faces, threads=1)
+    mixed, some = rng.permutation(len(points)), np.sort(rng.choice(len(points), 77, replace=False))
+    found = [
+        sky_view_factor(octree, points, normals, leaving=faces, threads=3) == whole,
+        sky_view_factor(octree, points[mixed], normals[mixed], leaving=faces[mixed]) == whole[mixed],
+        sky_view_factor(octree, points[some], normals[some], leaving=faces[some]) == whole[some],
+        [sky_view_factor(octree, points[i], normals[i], leaving=faces[i]) == whole[i] for i in some[:9]],
+    ]
+    return _count(np.concatenate(found))
+
+
+def no_light_through_touching_walls() -> Asked:
+    """Within houses wall to wall, directions to their seams, corners and all around are hidden."""
+    mesh, octree = touching(), Octree.from_mesh(touching())
+    rng = np.random.default_rng(_SEED)
+    points = rng.integers(1, 2**12, (40, 3)) / 2.0**12 * [2.0, 2.0, 2.0]
+    corners = mesh.triangles
+    aims = np.concatenate([corners.reshape(-1, 3), (corners[:, 0] + corners[:, 1]) / 2.0, corners.mean(axis=1)])
+    asked, wrong = 0, 0
+    for point in points:
+        ways = np.concatenate([aims - point, fibonacci_sphere(200).directions])
+        ways = ways[np.abs(ways).max(axis=1) > 0.0]
+        packed: Any = occlusion(octree, [point], None, ways, packed=True)
+        hidden = np.unpackbits(packed, axis=-1, count=len(ways))
+        asked, wrong = asked + hidden.size, wrong + int((hidden == 0).sum())
+    return asked, wrong
+
+
+def no_shade_among_faces_of_a_plane() -> Asked:
+    """Roofs that touch, and many faces of one plane, level or turned, shade each other nowhere."""
+    mesh = touching()
+    roofs = np.flatnonzero(mesh.face_normals()[:, 2] == 1.0)
+    found = [sky_view_factor(Octree.from_mesh(mesh), _within(mesh)[roofs], [0, 0, 1], leaving=roofs) == 1.0]
+    plate, rng = grid(30, 30, (3.0, 3.0)), np.random.default_rng(_SEED)
+    for _ in range(4):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turned = Mesh(plate.vertices @ turn.T + rng.uniform(-1e3, 1e3, 3), plate.faces)
+        points, normals, faces = face_points(turned)
+        light = ambient_occlusion(Octree.from_mesh(turned), points, normals, leaving=faces, samples=200)
+        found.append(light == 1.0)
+    return _count(np.concatenate(found))
+
+
+def two_sides_of_a_thin_plate() -> Asked:
+    """A plate 1e-9 as thick as it is wide: its upper side sees all of the sky, its lower side none."""
+    mesh = box((0.0, 0.0, 0.0), (1.0, 1.0, 1e-9))
+    points, normals, faces = face_points(mesh)
+    sky = sky_view_factor(Octree.from_mesh(mesh), points, normals, leaving=faces)
+    level = normals[:, 2] != 0.0
+    return _count(sky[level] == (normals[level, 2] > 0.0))
+
+
+def dark_inside_bodies() -> Asked:
+    """Points within closed bodies are hidden from all sides, whatever their normals."""
+    rng = np.random.default_rng(_SEED)
+    ball, points = Octree.from_mesh(icosphere(3)), rng.uniform(-0.5, 0.5, (300, 3))
+    return _count(np.concatenate([
+        openness(ball, points, samples=300) == 0.0, sky_view_factor(ball, points, rng.normal(size=(300, 3))) == 0.0,
+        ambient_occlusion(ball, points, rng.normal(size=(300, 3))) == 0.0,
+        occlusion(ball, points, None, fibonacci_sphere(64).directions) == 1.0,
+    ]))  # fmt: skip
+
+
+def hours_behind_walls() -> Asked:
+    """Hours on a street's floor, counted by the angles to its walls, for suns of different weight."""
+    width, depth = 2.0, 1.0
+    octree = Octree.from_mesh(street(width, depth))
+    angle = np.radians(np.arange(1, 180) + 0.5)
+    suns = np.stack([np.cos(angle), np.zeros(179), np.sin(angle)], axis=1) * np.linspace(0.5, 9.0, 179)[:, None]
+    hours = np.arange(1.0, 180.0) / 4.0
+    x = np.linspace(-0.9, 0.9, 37)
+    found = sun_hours(octree, np.stack([x, x, 0 * x], axis=1), [0, 0, 1], suns, hours, leaving=0 * x.astype(np.int64))
+    low, high = np.arctan(depth / (1.0 - x)), np.pi - np.arctan(depth / (1.0 + x))
+    known = [hours[(angle > a) & (angle < b)].sum() for a, b in zip(low, high, strict=True)]
+    return _count(found == known)
+
+
+def weights_and_distances_of_directions() -> Asked:
+    """A share is the sum of hidden weights over that of all; a distance is in units of the scene, however long the
+    directions are: a wall at x = 2 hides the two directions to it, and not beyond 1.
+    """
+    octree = Octree.from_mesh(box((2.0, -FAR, -FAR), (3.0, FAR, FAR)))
+    ways, weights = np.array([[3, 0, 0], [-1, 0, 0], [0.25, 0, 0], [0, 0, 7]]), [1.0, 2.0, 4.0, 8.0]
+    points = [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0]]
+    found = [
+        occlusion(octree, points, None, ways, weights=weights),
+        occlusion(octree, points, None, ways, weights=weights, distance=1.0),
+        occlusion(octree, points, [0, 0, 1], ways, weights=weights),
+    ]
+    known = [[5 / 15, 5 / 15], [0.0, 5 / 15], [7 / 15, 7 / 15]]
+    return _count(np.array(found) == known)
+
+
+def faces_that_an_eye_sees() -> Asked:
+    """Of a ball, which hides none of its faces but by facing away: those whose plane the eye is above."""
+    mesh = icosphere(4)
+    octree, wrong = Octree.from_mesh(mesh), 0
+    eyes = 3.0 * fibonacci_sphere(12).directions
+    for eye in eyes:
+        corners = mesh.triangles
+        above = np.einsum("ij,ij->i", np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
+                          eye - corners[:, 0])  # fmt: skip
+        seen = visible_faces(octree, eye)
+        wrong += int((seen != (above > 0.0))[np.abs(above) > 1e-12].sum())
+    return len(eyes) * len(mesh.faces), wrong
+
+
+def clouds_and_depths() -> Asked:
+    """Distances of a scan and a depth map are those of exact hits, within 4 ulp of t, and none where none is."""
+    mesh = bodies()["balls"]
+    octree, origin = Octree.from_mesh(mesh), np.array([0.25, -4.0, 0.5])
+    ways = fibonacci_sphere(600).directions * np.linspace(0.25, 8.0, 600)[:, None]
+    cloud = scan(octree, origin, ways)
+    known = closest_hits(mesh.vertices, mesh.faces, np.tile(origin, (len(ways), 1)), ways)
+    expected = np.array([float(hit.t) if hit else np.inf for hit in known]) * np.linalg.norm(ways, axis=1)
+    found = np.full(len(ways), np.inf)
+    found[cloud.rays] = cloud.distances
+    camera = OrthographicCamera(eye=(0.0, 0.0, 9.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), height=4.0)
+    depth = depth_map(octree, camera, 24, 24)
+    x, y = np.meshgrid((np.arange(24) + 0.5) / 6.0 - 2.0, 2.0 - (np.arange(24) + 0.5) / 6.0)
+    starts = np.stack([x.ravel(), y.ravel(), np.full(x.size, 9.0)], axis=1)
+    lines = closest_hits(mesh.vertices, mesh.faces, starts, np.tile([0.0, 0.0, -1.0], (x.size, 1)))
+    deep = np.array([float(hit.t) if hit else np.inf for hit in lines])
+    return _count(np.concatenate([_near(found, expected), _near(depth.ravel(), deep)]))
+
+
+def _near(found: Floats, known: Floats) -> NDArray[np.bool_]:
+    """Equal, both infinite, or within 4 ulp; a scan multiplies t by a length, both rounded."""
+    with np.errstate(invalid="ignore"):
+        close = np.abs(found - known) <= 4.0 * np.spacing(np.where(np.isfinite(known), known, 1.0))
+    return (found == known) | close
+
+
+CHECKS: dict[str, Callable[[], Asked]] = {
+    "moved to UTM coordinates": moved_to_utm,
+    "threads, order and company": threads_order_and_company,
+    "light through walls that touch": no_light_through_touching_walls,
+    "shade among faces of a plane": no_shade_among_faces_of_a_plane,
+    "two sides of a thin plate": two_sides_of_a_thin_plate,
+    "points inside bodies": dark_inside_bodies,
+    "hours of sun in a street": hours_behind_walls,
+    "weights and distances": weights_and_distances_of_directions,
+    "faces that an eye sees": faces_that_an_eye_sees,
+    "clouds and depths": clouds_and_depths,
+}
+
+
+def check(name: str) -> dict[str, Any]:
+    """A row: answers asked, and how many are not as they must be."""
+    asked, wrong = CHECKS[name]()
+    return {"subject": name, "says": " ".join((CHECKS[name].__doc__ or "").split()), "asked": asked, "wrong": wrong}

@@ -1,0 +1,61 @@
+"""The section on studies: sky view factors, hours of sun and occlusion against closed forms, Embree and exact bits."""
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from validation.gates import Gate
+from validation.job import Job, Task
+from validation.studies import bits, bodies, forms, holds, picture
+
+# Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
+# faces are traced together.
+_QUICK, _FULL = (6_000, 64), (6_000, 577)
+JUDGES = ("closed forms", "Embree robust", "exact arithmetic")
+_BITS = "exact: of each bit on which Embree differs, and of a sample of the others, exact arithmetic says who is right"
+_BOUND = "the bound: as if every patch along the boundary were wrong by half of its weight, all to one side"
+_SLOPE = "chance alone has -1/2; an even lattice does better"
+_HOLDS = "exact: it must hold of every answer"
+PICTURE = "studies-town.png"
+
+
+def steps(job: Job) -> int:
+    """Number of calls of ``job.step``: one for each closed form, mesh and check, one for the slope, one to draw."""
+    return len(_tasks(job))
+
+
+def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Ask all questions and draw a picture; returns a record for JSON and the gates."""
+    found = iter(job.each(_tasks(job)))
+    shares = [next(found) for _ in forms.forms()]
+    slopes = next(found)["curves"]
+    bit_rows = [next(found) for _ in bodies.bodies()]
+    held = [next(found) for _ in holds.CHECKS]
+    drawn = next(found)
+    gates = [
+        *(Gate("studies", row["subject"], "error over its bound", row["share_of_bound"], "at most", 1.0, _BOUND)
+          for row in shares),
+        *(Gate("studies", row["subject"], "slope of the error", row["slope"], "at most", forms.SLOPE, _SLOPE)
+          for row in slopes),
+        *(Gate("studies", row["subject"], "wrong bits", float(row["wrong"]), "at most", 0.0, _BITS)
+          for row in bit_rows),
+        *(Gate("studies", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, _HOLDS)
+          for row in held),
+    ]  # fmt: skip
+    record = {"forms": shares, "slopes": slopes, "bits": bit_rows, "holds": held, "picture": drawn,
+              "patches": list(forms.PATCHES),
+              "costs": dict.fromkeys(JUDGES)}  # fmt: skip
+    return record, gates
+
+
+def _tasks(job: Job) -> list[Task]:
+    points, directions = _QUICK if job.quick else _FULL
+    return [
+        *(Task(f"studies: {form.name}", partial(forms.check_form, index, job.quick))
+          for index, (form, _) in enumerate(forms.forms())),
+        Task("studies: error against directions", partial(forms.check_slope, job.quick)),
+        *(Task(f"studies: bits of {name}", partial(bits.check_bits, name, points, directions))
+          for name in bodies.bodies()),
+        *(Task(f"studies: {name}", partial(holds.check, name)) for name in holds.CHECKS),
+        Task("studies: picture", partial(picture.write, Path(job.folder) / PICTURE)),
+    ]  # fmt: skip
