@@ -26,8 +26,8 @@ from renderer import (
 SIZE = int(os.environ.get("GALLERY_SIZE", "400"))
 
 ball = load_mesh("../../scenes/models/sphere.ply")
-figure, plots = plt.subplots(1, 4, figsize=(10, 3), layout="constrained")
-for axes, ior in zip(plots, (1.05, 1.33, 1.5, 2.4), strict=True):
+figure, plots = plt.subplots(2, 2, figsize=(7, 7), layout="constrained")
+for axes, ior in zip(plots.flat, (1.05, 1.33, 1.5, 2.4), strict=True):
     scene = Scene(
         camera=PerspectiveCamera(eye=(0.0, 2.2, 5.0), target=(0.0, 0.9, 0.0), fov=38.0),
         materials={"glass": Dielectric(ior=ior), "light": Phong(diffuse=0.75), "dark": Phong(diffuse=0.1)},

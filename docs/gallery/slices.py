@@ -28,8 +28,8 @@ def along_z(x, y):
     return hits
 
 
-figure, plots = plt.subplots(1, 4, figsize=(11, 3), layout="constrained")
-for axes, height in zip(plots, np.linspace(low[1], high[1], 5)[1:4], strict=False):
+figure, plots = plt.subplots(2, 2, figsize=(8, 7), layout="constrained")
+for axes, height in zip(plots.flat, np.linspace(low[1], high[1], 5)[1:4], strict=False):
     hits = along_z(x, height)
     axes.vlines(hits.points[::2, 0], hits.points[::2, 2], hits.points[1::2, 2], linewidth=200 / SIZE)
     axes.set_title(f"y = {height:.2f}")
@@ -37,6 +37,6 @@ for axes, height in zip(plots, np.linspace(low[1], high[1], 5)[1:4], strict=Fals
 hits = along_z(x, y[:, None])
 thick = np.zeros(SIZE * SIZE)
 np.add.at(thick, hits.ray[::2], hits.t[1::2] - hits.t[::2])
-plots[3].imshow(thick.reshape(SIZE, SIZE), origin="lower", cmap="bone", extent=(x[0], x[-1], y[0], y[-1]))
-plots[3].set_title("lengths added up")
+plots[1, 1].imshow(thick.reshape(SIZE, SIZE), origin="lower", cmap="bone", extent=(x[0], x[-1], y[0], y[-1]))
+plots[1, 1].set_title("lengths added up")
 plt.show()

@@ -1,5 +1,8 @@
-"""The site's parts: gallery scripts run, docstrings become lists, links are checked, public names have a place."""
+"""The site's parts: gallery and notebooks run, docstrings become lists, links are checked, names have a place."""
 
+import gzip
+import json
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -12,6 +15,7 @@ import renderer
 
 ROOT = Path(__file__).parents[2]
 GALLERY = sorted((ROOT / "docs" / "gallery").glob("*.py"))
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 
 
 def module(name):
@@ -53,6 +57,61 @@ def test_a_script_is_short_and_named_by_its_title(script):
     assert set(underline) == {"="} and len(underline) == len(title)
     assert script.stem.split("_")[0] in title.lower()
     assert len([line for line in code.splitlines() if line.strip()]) <= 40
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_cells_of_a_notebook_run_in_turn(notebook, monkeypatch):
+    """Small, and without Jupyter; ``make docs`` runs them whole, in a kernel."""
+    if notebook.stem == "proof":
+        pytest.importorskip("embreex", reason="pip install '.[validate]'")
+    else:
+        pytest.importorskip("starlette", reason="pip install '.[viewer]'")
+    monkeypatch.chdir(notebook.parent)
+    monkeypatch.setenv("GALLERY_SIZE", "48")
+    monkeypatch.setattr(plt, "show", lambda: None)
+    monkeypatch.setattr("webbrowser.open", lambda url: True)
+    plt.switch_backend("agg")
+    names = {}
+    try:
+        for cell in cells(notebook, "code"):
+            exec(compile("".join(cell["source"]), f"{notebook.name}, {cell['id']}", "exec"), names)
+        assert plt.get_fignums()
+    finally:
+        plt.close("all")
+        if "viewing" in names:
+            names["viewing"].close()
+
+
+def cells(notebook, kind):
+    return [cell for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == kind]
+
+
+def test_two_notebooks_without_outputs():
+    """Outputs are made at build, so that they are of today's code."""
+    assert [path.stem for path in NOTEBOOKS] == ["first_look", "proof"]
+    for notebook in NOTEBOOKS:
+        assert not any(cell["outputs"] or cell["execution_count"] for cell in cells(notebook, "code"))
+
+
+def test_links_of_notebooks_lead_somewhere():
+    for notebook in NOTEBOOKS:
+        text = "".join("".join(cell["source"]) for cell in cells(notebook, "markdown"))
+        for link in re.findall(r"\]\(([^)#]+)", text):
+            assert (notebook.parent / link).is_file(), link
+
+
+def test_tiles_have_the_readmes_figures():
+    html = module("figures")["tiles"]((ROOT / "README.md").read_text(encoding="utf-8"))
+    assert html.count("<p>") == 5 and "<b>0</b> wrong hits in " in html and "106 of 106" in html
+    made = module("figures")["tiles"]("| a < b | 7 | c | `make x` |\n| d | 8 | | `make y` |\n| no figure | 9 | |")
+    assert made.splitlines()[1:3] == ["<p><b>7</b> a &lt; b<small>c</small></p>", "<p><b>8</b> d</p>"]
+    assert len(made.splitlines()) == 4
+
+
+def test_samples_are_pages():
+    for name, title in (("report", "Octree ray tracer: validation"), ("benchmark", "Octree ray tracer: benchmark")):
+        text = gzip.decompress((ROOT / "docs" / "samples" / f"{name}.html.gz").read_bytes()).decode()
+        assert f"<h1>{title}</h1>" in text and not re.search(r'(?:src|href)="(?!data:|#)', text)
 
 
 def test_twelve_examples():
