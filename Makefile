@@ -57,7 +57,7 @@ lint: $(STAMP)
 	if [ -n "$$foreign" ]; then echo "lint: only Python here, but found:" $$foreign >&2; exit 1; fi
 
 clean:
-	rm -rf .venv build dist docs/examples *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf .venv build dist docs/examples sg_execution_times.rst *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
 	find renderer validation tests scenes -name __pycache__ -prune -exec rm -rf {} +
 	find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name baseline.json ! -name 'mutants*.json' -exec rm -rf {} +
 

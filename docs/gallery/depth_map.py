@@ -20,7 +20,7 @@ with tempfile.TemporaryDirectory() as folder:  # an STL of your own takes the pl
     trimesh.load("../../scenes/models/teapot.ply").export(f"{folder}/teapot.stl")
     octree = Octree.from_mesh(load_mesh(f"{folder}/teapot.stl"))
 
-camera = PerspectiveCamera(eye=(2.0, 3.5, 6.0), target=(0.1, 0.8, 0.0), fov=14.0)
+camera = PerspectiveCamera(eye=(2.0, 3.5, 6.0), target=(0.1, 0.7, 0.0), fov=16.0)
 depth = depth_map(octree, camera, SIZE, SIZE * 3 // 4)  # inf where there is nothing
 
 plt.imshow(depth, cmap="viridis_r")

@@ -31,7 +31,7 @@ def along_z(x, y):
 figure, plots = plt.subplots(2, 2, figsize=(8, 7), layout="constrained")
 for axes, height in zip(plots.flat, np.linspace(low[1], high[1], 5)[1:4], strict=False):
     hits = along_z(x, height)
-    axes.vlines(hits.points[::2, 0], hits.points[::2, 2], hits.points[1::2, 2], linewidth=200 / SIZE)
+    axes.vlines(hits.points[::2, 0], hits.points[::2, 2], hits.points[1::2, 2], linewidth=500 / SIZE)
     axes.set_title(f"y = {height:.2f}")
     axes.set_aspect("equal")
 hits = along_z(x, y[:, None])

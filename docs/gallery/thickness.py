@@ -17,7 +17,7 @@ SIZE = int(os.environ.get("GALLERY_SIZE", "400"))
 
 octree = Octree.from_mesh(load_mesh("../../scenes/models/teapot.ply"))
 center = octree.mesh.vertices.mean(axis=0)
-camera = OrthographicCamera(eye=(center[0], center[1], 9.0), target=tuple(center), height=2.0)
+camera = OrthographicCamera(eye=(center[0], center[1], 9.0), target=tuple(center), height=2.4)
 hits = octree.closest_hit(*primary_rays(camera, SIZE, SIZE))
 inward = octree.all_hits(hits.points[hits.hit], -hits.normals[hits.hit], leaving=hits.face[hits.hit], max_hits=1)
 thickness = np.full(hits.hit.shape, np.nan)

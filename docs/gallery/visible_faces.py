@@ -25,7 +25,7 @@ colors = np.where(seen[:, None], to_rgb("tab:green"), to_rgb("tab:red"))
 
 figure, plots = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 for axes, place, title in ((plots[0], eye, "from the eye"), (plots[1], (7.0, 3.0, -1.0), "from the side")):
-    origins, directions = primary_rays(PerspectiveCamera(eye=place, target=target, fov=16.0), SIZE, SIZE)
+    origins, directions = primary_rays(PerspectiveCamera(eye=place, target=target, fov=19.0), SIZE, SIZE)
     hits = octree.closest_hit(origins, directions)
     slope = np.abs((hits.normals * directions).sum(axis=-1, keepdims=True))
     picture = np.where(hits.hit[:, None], colors[hits.face] * (0.3 + 0.7 * slope), 1.0)
