@@ -62,6 +62,8 @@ RUN_ELSEWHERE = {
     "pre-commit install": "writes into .git",
     "octree-render view": "tests/viewer_page.py",
     "octree-render compile": "tests/front/test_startup.py",
+    "octree-render study sky city.ply -o sky.npy --cluster tcp://": "tests/cluster/test_commands.py, at an address",
+    "octree-render render scenes/three_models.toml -o out.png --resolution 8192x8192": "tests/cluster/test_commands.py",
     "octree-validate --scene my.toml": ".ci/bounds.py",
     "python -m validation --scene": ".ci/bounds.py",
     "python -m validation [": "a line of usage, tests/validation/test_validation_main.py",
