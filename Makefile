@@ -1,4 +1,4 @@
-# make validate | test | lint | bench | clean. The first one used sets up .venv; later ones find it there.
+# make validate | test | lint | bench | docs | clean. The first one used sets up .venv; later ones find it there.
 
 PYTHON ?= python3
 BIN    := .venv/bin
@@ -14,7 +14,7 @@ TRIMESH ?=
 FOREIGN := c cc cpp cxx c++ cu h hh hpp hxx pyx pxd pxi rs
 
 .DEFAULT_GOAL := help
-.PHONY: help validate test machines lint bench conformance clean
+.PHONY: help validate test machines lint bench conformance docs clean
 
 help:
 	@echo "make validate   prove hits and pictures against the references; writes reports/index.html"
@@ -25,6 +25,7 @@ help:
 	@echo "make bench      measure speed beside other systems; writes reports/benchmark.html"
 	@echo "                QUICK=1 for the short run, ARGS='--mesh FILE' or '--huge' for more"
 	@echo "make conformance TRIMESH=DIR   run trimesh's own tests, from a checkout of its repository, with the drop-in"
+	@echo "make docs       build the site, gallery included, and check its links; writes build/site/index.html"
 	@echo "make clean      remove everything that make made, .venv included"
 
 validate: $(STAMP)
@@ -42,6 +43,11 @@ bench: $(STAMP)
 conformance: $(STAMP)
 	$(BIN)/python -m validation.conformance "$(TRIMESH)"
 
+# A warning is an error. Sources are read from here, so that pages outside docs/ and links to them are the site's too.
+docs: $(STAMP)
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir build/doctrees . build/site
+	$(BIN)/python docs/links.py build/site
+
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -51,7 +57,7 @@ lint: $(STAMP)
 	if [ -n "$$foreign" ]; then echo "lint: only Python here, but found:" $$foreign >&2; exit 1; fi
 
 clean:
-	rm -rf .venv build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf .venv build dist docs/examples sg_execution_times.rst *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
 	find renderer validation tests scenes -name __pycache__ -prune -exec rm -rf {} +
 	find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name baseline.json ! -name 'mutants*.json' -exec rm -rf {} +
 
@@ -61,7 +67,7 @@ $(STAMP): pyproject.toml requirements.lock
 	|| { echo "make: Python 3.11 or newer is needed, but $(PYTHON) is $$($(PYTHON) -V 2>&1); set PYTHON=..." >&2; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null \
 	|| { echo "make: $(PYTHON) has no venv module; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
-	@echo "make: installing what requirements.lock lists into .venv (1.3 GB; a few minutes the first time)"
+	@echo "make: installing what requirements.lock lists into .venv (1.4 GB; a few minutes the first time)"
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .

@@ -11,7 +11,7 @@ from renderer.cluster.workers import SentMesh, answer_part
 from renderer.octree import Octree
 from renderer.process.terminal import progress_bar
 from renderer.runs.parts import Parts, digest_of
-from renderer.runs.study import PART, Points, Study
+from renderer.runs.study import PART, Points, Study, parts_of
 
 
 def run_on(
@@ -31,10 +31,11 @@ def run_on(
     loses its parts under way, which others compute. The bits are those of a run on this machine alone. Raises
     ``OSError`` where the scheduler is gone, or without a worker for 10 seconds; the same call then goes on.
     """
-    mesh, parts = octree.mesh, Parts(folder, study.plan(octree.mesh, points, size))
+    mesh = octree.mesh
+    parts = parts_of(octree, study, points, folder, size)
     missing = parts.missing()
     sent = SentMesh(digest_of(mesh.vertices, mesh.faces), mesh.vertices, mesh.faces, split)
-    tasks = (Task(part, sent, (study, points.part(*parts.plan.span(part)))) for part in missing)
+    tasks = (Task(part, sent, (study, points.part(parts.rows(part)))) for part in missing)
     with (
         progress_bar(len(points), "point", progress) as update,
         closing(results(client, answer_part, tasks)) as answers,

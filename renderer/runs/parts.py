@@ -2,8 +2,10 @@
 
 A folder beside the result has ``manifest.json``, which says what is computed of what, and a file for each part that is
 done: its rows as they are in memory, and behind them their SHA-256. Each file is written beside and renamed, so a part
-is whole or absent; one that a disk has spoilt counts as absent. The result is made of all parts, in order, and the
+is whole or absent; one that a disk has spoilt counts as absent. The result is made of all parts, and the
 folder removed.
+
+A part's rows need not follow each other in the result: an order says which row each place of the parts is.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -24,6 +26,8 @@ from renderer.process.files import write_atomically
 
 _MANIFEST = "manifest.json"
 _DIGEST_BYTES = 32
+# Of a result that is written at once, where its rows are not in the order of the parts.
+_MOST_BYTES = 1 << 26
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class Plan:
         return max(1, -(-self.rows // self.size))
 
     def span(self, part: int) -> tuple[int, int]:
-        """The rows of a part: begin and end."""
+        """The places of a part: begin and end."""
         return part * self.size, min(self.rows, (part + 1) * self.size)
 
     def shape(self, rows: int) -> tuple[int, ...]:
@@ -60,12 +64,15 @@ class Plan:
 class Parts:
     """The folder of a run under way."""
 
-    def __init__(self, folder: Path, plan: Plan) -> None:
+    def __init__(self, folder: Path, plan: Plan, order: NDArray[np.int64] | None = None) -> None:
         """Begin it, or go on where an earlier run of the same plan was killed.
+
+        order  (rows,) the row of the result at each place of the parts, each row once; None: as they are. The plan's
+               ``made_of`` must tell two orders apart
 
         Raises ``ValueError`` where the folder is of another plan, and says what differs.
         """
-        self.folder, self.plan = folder, plan
+        self.folder, self.plan, self.order = folder, plan, order
         wanted = json.loads(json.dumps(asdict(plan)))
         path = folder / _MANIFEST
         if not path.exists():
@@ -84,6 +91,11 @@ class Parts:
         """The parts that are still to be computed."""
         return [part for part in range(self.plan.parts) if self._read(part) is None]
 
+    def rows(self, part: int) -> slice | NDArray[np.int64]:
+        """The rows of the result that a part has."""
+        here = slice(*self.plan.span(part))
+        return here if self.order is None else self.order[here]
+
     def write(self, part: int, values: NDArray[Any]) -> None:
         """Keep a part; of the shape and type of the plan."""
         begin, end = self.plan.span(part)
@@ -98,19 +110,19 @@ class Parts:
         return np.frombuffer(self._whole(part), self.plan.dtype).reshape(self.plan.shape(end - begin))
 
     def join(self, path: Path) -> None:
-        """Write the result as ``.npy``, part by part. Raises ``OSError`` where one is absent."""
+        """Write the result as ``.npy``, some of it at a time. Raises ``OSError`` where a part is absent."""
         write_atomically(path, self._join)
 
     def joined(self) -> NDArray[Any]:
         """The result in memory."""
-        parts = [self._whole(part) for part in range(self.plan.parts)]
-        values = np.frombuffer(b"".join(parts), self.plan.dtype)
-        return values.reshape(self.plan.shape(self.plan.rows)).copy()
+        values = np.empty(self.plan.shape(self.plan.rows), self.plan.dtype)
+        for part in range(self.plan.parts):
+            values[self.rows(part)] = self.read(part)
+        return values
 
     def count(self, value: float) -> int:
         """How many values of all parts are this one."""
-        parts = (np.frombuffer(self._whole(part), self.plan.dtype) for part in range(self.plan.parts))
-        return sum(int(np.count_nonzero(values == value)) for values in parts)
+        return sum(int(np.count_nonzero(self.read(part) == value)) for part in range(self.plan.parts))
 
     def remove(self) -> None:
         """Remove the folder."""
@@ -121,8 +133,22 @@ class Parts:
         header = {"descr": np.dtype(self.plan.dtype).str, "fortran_order": False,
                   "shape": self.plan.shape(self.plan.rows)}  # fmt: skip
         np.lib.format.write_array_header_1_0(file, header)
-        for part in range(self.plan.parts):
-            file.write(self._whole(part))
+        blocks = map(self.read, range(self.plan.parts)) if self.order is None else self._reordered(self.order)
+        for values in blocks:
+            file.write(values.tobytes())
+
+    def _reordered(self, order: NDArray[np.int64]) -> Iterator[NDArray[Any]]:
+        """The result's rows, as many at a time as are little memory; parts are read again for each."""
+        row = max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
+        most = max(1, _MOST_BYTES // row)
+        for first in range(0, self.plan.rows, most):
+            values = np.empty(self.plan.shape(min(most, self.plan.rows - first)), self.plan.dtype)
+            for part in range(self.plan.parts):
+                rows = order[slice(*self.plan.span(part))] - first
+                here = (rows >= 0) & (rows < len(values))
+                if here.any():
+                    values[rows[here]] = self.read(part)[here]
+            yield values
 
     def _whole(self, part: int) -> bytes:
         content = self._read(part)

@@ -14,15 +14,19 @@ from numpy.typing import NDArray
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from renderer.points.curve import order_along_curve
 from renderer.process.files import check_writable
 from renderer.process.terminal import progress_bar
 from renderer.runs.parts import Parts, Plan, digest_of
 from renderer.studies.ambient import ambient_occlusion
+from renderer.studies.share import check_asked
 from renderer.studies.sky import sky_view_factor, sun_hours
 
 Floats = NDArray[np.float64]
 # Points of a part: with 145 directions some seconds of work on one thread, which is what a kill loses at most.
 PART = 1 << 15
+# Points that are put in order together: 32 bytes each while it is done, and a second of sorting.
+_TOGETHER = 1 << 22
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +40,16 @@ class Points:
     def __len__(self) -> int:
         return len(self.points)
 
-    def part(self, begin: int, end: int) -> Points:
+    def part(self, rows: slice | NDArray[np.int64]) -> Points:
         """Those of some rows."""
-        return Points(self.points[begin:end], self.normals[begin:end], self.leaving[begin:end])
+        return Points(self.points[rows], self.normals[rows], self.leaving[rows])
+
+    def order(self) -> NDArray[np.int64]:
+        """The rows (n,) in which those that follow each other lie together, along a curve that fills space."""
+        rows = np.empty(len(self), np.int64)
+        for first in range(0, len(self), _TOGETHER):
+            rows[first : first + _TOGETHER] = first + order_along_curve(self.points[first : first + _TOGETHER])[0]
+        return rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +72,14 @@ class Study:
             octree, points.points, points.normals, leaving=points.leaving, threads=threads, **self.options
         )
 
-    def plan(self, mesh: Mesh, points: Points, size: int = PART) -> Plan:
-        """The study in parts of ``size`` points, with all that its bits depend on."""
+    def plan(self, mesh: Mesh, points: Points, order: NDArray[np.int64], size: int = PART) -> Plan:
+        """The study in parts of ``size`` points in an order, with all that the bits of each part depend on."""
         options = {
             name: digest_of(value) if isinstance(value, np.ndarray) else value for name, value in self.options.items()
         }
         made_of = {
             "kind": self.kind, "options": options, "mesh": digest_of(mesh.vertices, mesh.faces),
-            "points": digest_of(points.points, points.normals, points.leaving),
+            "points": digest_of(points.points, points.normals, points.leaving), "order": digest_of(order),
             "version": sys.modules["renderer"].__version__,
         }  # fmt: skip
         return Plan(len(points), size, 0, "<f8", made_of)
@@ -82,20 +93,33 @@ def folder_of(output: Path) -> Path:
     return output.with_name(f"{output.name}.parts")
 
 
+def parts_of(octree: Octree, study: Study, points: Points, folder: Path, size: int | None = None) -> Parts:
+    """The parts of a study in a folder, new ones or those that a killed run left: points that lie together are one.
+
+    Raises ``ValueError`` for points, normals or faces that no study takes, naming argument and row, and for the folder
+    of another study.
+    """
+    # Here, as an error of a part would name its own row.
+    check_asked(octree, points.points, points.normals, points.leaving, None, False)
+    order = points.order()
+    plan = study.plan(octree.mesh, points, order, *(() if size is None else (size,)))
+    return Parts(folder, plan, order)
+
+
 def run(octree: Octree, study: Study, points: Points, folder: Path, *, progress: bool = False) -> Parts:
     """Compute the parts that ``folder`` lacks, one after the other; a run that is killed can be begun again.
 
     Returns all parts, whose bits do not depend on how often the run was killed, nor on threads.
     """
     check_writable(folder.with_name(f"{folder.name}.try"))
-    parts = Parts(folder, study.plan(octree.mesh, points))
+    parts = parts_of(octree, study, points, folder)
     missing = parts.missing()
     with progress_bar(len(points), "point", progress) as update:
         if update is not None:
             update(len(points) - sum(end - begin for begin, end in map(parts.plan.span, missing)))
         for part in missing:
-            begin, end = parts.plan.span(part)
-            parts.write(part, study.answer(octree, points.part(begin, end)))
+            some = points.part(parts.rows(part))
+            parts.write(part, study.answer(octree, some))
             if update is not None:
-                update(end - begin)
+                update(len(some))
     return parts

@@ -16,6 +16,7 @@ from renderer.points.curve import order_along_curve
 from renderer.process.parallel import checked_threads, for_chunks
 from renderer.process.terminal import progress_bar
 from renderer.queries import Queries
+from renderer.studies.density import are_dense
 from renderer.studies.sweep import TILE, Answers, Places, Sky, make_sweep_memory, sweep
 from renderer.trace.batch import check_faces
 
@@ -23,9 +24,6 @@ Floats = NDArray[np.float64]
 
 # Points that are put in order together: 16 bytes each for it, and a second of sorting.
 _BLOCK = 1 << 22
-# Rays are traced together where a point has at most so many faces of the mesh: measured with 1, which gains 12 to 26 %,
-# and with 30 and more, which loses 3 to 58 %.
-_DENSE = 2
 # The points of a chunk, at most and at least, where there are enough for all threads.
 _MOST, _LEAST = 64 * TILE, 16
 
@@ -133,10 +131,11 @@ def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
     arrays = mesh.vertices, mesh.faces
     with progress_bar(count, "point", asked.progress) as update:
         for first in range(0, count, _BLOCK):
-            order, steps = order_along_curve(asked.places.points[first : first + _BLOCK])
+            block = asked.places.points[first : first + _BLOCK]
+            order, steps = order_along_curve(block)
             order = first + order
             # Else the way that a tile's rays share costs more than it saves: up to 58 % with a point for 30 faces.
-            steps = steps if _DENSE * count >= len(mesh.faces) else steps[:0]
+            steps = steps if are_dense(block, mesh) else steps[:0]
 
             def look(begin: int, end: int, way: tuple[NDArray[np.int64], ...] = (order, steps)) -> Iterator[None]:
                 rows, jumps = (part[begin:end] for part in way)

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -36,6 +37,14 @@ def test_a_quiet_command_says_nothing_of_its_cluster(tmp_path: Path, capsys: pyt
     study = ["study", "sky", str(tmp_path / "city.ply"), "-o", str(tmp_path / "a.npy")]
     assert main([*study, "--cluster", "local", "--threads", "1", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_study_at_an_address_has_the_bytes_of_this_machine(client: Any, tmp_path: Path) -> None:
+    save_ply(named("city_300"), tmp_path / "city.ply")
+    study = ["study", "sky", str(tmp_path / "city.ply"), "--quiet", "-o"]
+    assert main([*study, str(tmp_path / "here.npy")]) == 0
+    assert main([*study, str(tmp_path / "there.npy"), "--cluster", client.scheduler.address]) == 0
+    assert (tmp_path / "here.npy").read_bytes() == (tmp_path / "there.npy").read_bytes()
 
 
 @pytest.mark.parametrize(

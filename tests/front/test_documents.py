@@ -2,8 +2,12 @@
 
 import argparse
 import ast
+import os
 import re
 import shlex
+import subprocess
+import sys
+import textwrap
 import tomllib
 from functools import cache
 from importlib.util import find_spec
@@ -11,11 +15,13 @@ from pathlib import Path
 
 import pytest
 
-from renderer.cli import make_parser
+from renderer.cli import main, make_parser
+from renderer.mesh.load import save_ply
+from renderer.mesh.shapes import box
 from validation.__main__ import make_parser as validation_parser
 from validation.benchmark.__main__ import make_parser as benchmark_parser
 from validation.stability.section import CASES
-from validation.thresholds import HitLimits
+from validation.thresholds import HitLimits, load_thresholds
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
@@ -24,6 +30,7 @@ PAGES = [README, *DOCS, ROOT / "reports" / "README.md", *sorted(ROOT.glob("[CS]*
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
 # A line of a block to type, without its comment, and commands within a sentence or a table.
 TYPED = re.compile(r"^    (\S.*?)(?:\s+#.*)?$", re.MULTILINE)
+COMMAND = re.compile(r"(?:make|pip|python3?|pre-commit|octree-\w+|rm) ")
 SAID = re.compile(r"`([^`\n]+)`")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 NAMED = re.compile(
@@ -39,6 +46,38 @@ PARSERS = {
     "python -m validation.benchmark": benchmark_parser,
 }
 MOST_LINES = 110
+# Packages that pages show and requirements.lock leaves out; their Python is run where they are installed.
+ABSENT = {"open3d", "pyvista"}
+# Commands of pages that are not run here, by how they begin: where they are, or why nothing runs them.
+RUN_ELSEWHERE = {
+    "make lint": ".ci/run",
+    "make test": ".ci/run",
+    "make docs": ".ci/run",
+    "make validate QUICK=1": ".ci/run",
+    "make validate": "as with QUICK=1, for longer",
+    "make bench": "tests/validation/benchmark/test_benchmark_page.py",
+    "make machines": "tests/machines.py",
+    "python3 -m venv": ".ci/installed.py",
+    "pip install": ".ci/installed.py",
+    "pre-commit install": "writes into .git",
+    "octree-render view": "tests/viewer_page.py",
+    "octree-render compile": "tests/front/test_startup.py",
+    "octree-render study sky city.ply -o sky.npy --cluster tcp://": "tests/cluster/test_commands.py, at an address",
+    "octree-render render scenes/three_models.toml -o out.png --resolution 8192x8192": "tests/cluster/test_commands.py",
+    "octree-validate --scene my.toml": ".ci/bounds.py",
+    "python -m validation --scene": ".ci/bounds.py",
+    "python -m validation [": "a line of usage, tests/validation/test_validation_main.py",
+    "python -m validation --defects [": "a line of usage",
+    "python -m validation --mutants": "a line of usage",
+    "python -m validation --write-baseline [": "a line of usage",
+    "python -m validation.benchmark.": "tests/validation/benchmark/test_benchmark_page.py",
+    "python -m build": "tests/front/test_release.py",
+    "rm -r renderer/compiled": "removes what the line before it wrote",
+    "python -m wheel tags": "renames what the line before it wrote",
+    "python tests/fuzz --inputs 100000": "tests/front/test_fuzz.py",
+    "python scenes/make_quarter.py": "tests/scene/test_quarter.py",
+    "python script.py": "stands for a user's script",
+}
 
 
 def shown(value):
@@ -73,6 +112,8 @@ def test_python_in_a_page_runs_as_it_stands(page, block, tmp_path, monkeypatch):
     """In a checkout, of which nothing is changed: pictures go elsewhere."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenes").symlink_to(ROOT / "scenes")
+    for package in ABSENT & set(re.findall(r"^import (\w+)", block, re.MULTILINE)):
+        pytest.importorskip(package, reason="not in requirements.lock")
     names: dict[str, object] = {}
     exec(compile(block, str(page), "exec"), names)
     if page == README and "closest_hit" in block:
@@ -89,6 +130,65 @@ def test_the_readme_has_python_to_run():
 def test_commands_in_a_page_are_ones_that_there_are(page, line):
     options = make_parser().parse_args(shlex.split(line)[1:])
     assert not hasattr(options, "scene") or (ROOT / options.scene).is_file()
+
+
+def runnable():
+    """(page, command) of all commands of blocks that are run here."""
+    pairs = dict.fromkeys((page, line) for page in PAGES for line in typed(page) if COMMAND.match(line))
+    return [(page, line) for page, line in pairs if not line.startswith(tuple(RUN_ELSEWHERE))]
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """A folder with what the pages' commands name: parts of a checkout, and a user's own files."""
+    for name in ("scenes", "renderer", "validation", "tests"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    for name in ("city.ply", "scan.ply"):
+        save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / name)
+    (tmp_path / "suns.txt").write_text("1 0 1\n-1 0 1\n")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("page", "line"), runnable(), ids=shown)
+def test_a_command_of_a_page_runs(page, line, checkout):
+    before = set(checkout.iterdir())
+    program, *arguments = shlex.split(line)
+    if program == "octree-render":
+        assert make_parser().prog == program and main(arguments) == 0
+    else:
+        assert program == "python"
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        command = [sys.executable, *arguments]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stderr
+    written = {word for word in arguments if word.endswith((".png", ".npy")) or word in ("hours.ply", "shaded.ply")}
+    assert written <= {path.name for path in set(checkout.iterdir()) - before}
+
+
+def test_what_is_run_elsewhere_is_told_where():
+    """Each entry is the start of a command that some page has, and names a file that is there."""
+    lines = [line for page in PAGES for line in [*typed(page), *said(page)]]
+    for start, where in RUN_ELSEWHERE.items():
+        assert any(line.startswith(start) for line in lines), start
+        for path in re.findall(r"[\w.]+(?:/[\w.]+)+", where):
+            assert (ROOT / path).is_file(), path
+
+
+def test_thresholds_in_a_page_are_ones_that_there_are(tmp_path):
+    text = (ROOT / "reports" / "README.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^    (\[pictures\.own\]\n(?:    .*\n|\n)+)", text, re.MULTILINE)
+    (tmp_path / "thresholds.toml").write_text(textwrap.dedent("    " + block))
+    thresholds = load_thresholds(tmp_path / "thresholds.toml")
+    assert (thresholds.pictures.own.ssim, thresholds.hits.near_edge) == (0.997, 2)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=shown)
+def test_every_block_is_of_a_kind_that_is_run(page):
+    """Python is run above; what Sphinx and BibTeX read is neither's; nothing hides from the tests as text."""
+    kinds = re.findall(r"^```(.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    kinds = {kind.split()[0] for kind in kinds}
+    assert kinds <= {"python", "bibtex", *(("{include}", "{raw}", "{toctree}") if page.name == "index.md" else ())}
 
 
 @pytest.mark.parametrize(("page", "line"), commands("octree-", "python -m validation"), ids=shown)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from renderer.runs import parts as module
 from renderer.runs.parts import Parts, Plan, digest_of
 
 PLAN = Plan(rows=10, size=4, width=0, dtype="<f8", made_of={"kind": "sky", "options": {"patches": 145}})
@@ -84,3 +85,24 @@ def test_digests_tell_shapes_types_and_bytes_apart() -> None:
     arrays = [np.zeros(4), np.zeros((2, 2)), np.zeros(8, np.float32), np.array([0.0, 0.0, 0.0, -0.0])]
     assert len({digest_of(a) for a in arrays} | {digest_of(arrays[0], arrays[0])}) == 5
     assert digest_of(np.arange(6).reshape(2, 3).T) == digest_of(np.ascontiguousarray(np.arange(6).reshape(2, 3).T))
+
+
+@pytest.mark.parametrize("width", [0, 3])
+@pytest.mark.parametrize("most", [1, 30, 1 << 20])
+def test_rows_go_where_an_order_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int, most: int) -> None:
+    """Whatever bytes are written at once: less than a row, some rows, all."""
+    monkeypatch.setattr(module, "_MOST_BYTES", most)
+    plan = Plan(rows=10, size=4, width=width, dtype="<f8", made_of={})
+    order = np.random.default_rng(1).permutation(10)
+    values = np.arange(10.0 * max(1, width)).reshape(plan.shape(10))
+    parts = Parts(tmp_path / "parts", plan, order)
+    for part in range(3):
+        assert (parts.rows(part) == order[4 * part : 4 * part + 4]).all()
+        parts.write(part, values[parts.rows(part)])
+    assert (parts.joined() == values).all() and parts.count(values.max()) == 1
+    parts.join(tmp_path / "r.npy")
+    assert np.load(tmp_path / "r.npy").tobytes() == values.tobytes()
+    (tmp_path / "parts" / "00000002.part").unlink()
+    with pytest.raises(OSError, match=r"00000002\.part: expected a part of the run"):
+        parts.join(tmp_path / "none.npy")
+    assert not (tmp_path / "none.npy").exists()

@@ -1,0 +1,15 @@
+"""The README's table of figures as tiles for the start page, so that a figure stands in one place alone."""
+
+import re
+from html import escape
+
+
+def tiles(readme: str) -> str:
+    """HTML of the table's rows: what is ours, large, what it is, and what others have."""
+    rows = re.findall(r"^\| (.+?) \| (.+?) \| (.*?) ?\| `make .*$", readme, re.MULTILINE)
+    return "\n".join(['<div class="figures">', *(_tile(*row) for row in rows), "</div>"])
+
+
+def _tile(figure: str, ours: str, others: str) -> str:
+    more = f"<small>{escape(others)}</small>" if others else ""
+    return f"<p><b>{escape(ours)}</b> {escape(figure)}{more}</p>"

@@ -1,0 +1,38 @@
+"""
+Shadow on terrain
+=================
+
+A day's course of the sun over hills: hours of sun of each triangle, without an epsilon, though all lie on the surface.
+"""
+
+import os
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from renderer import Octree
+from renderer.mesh.heightfield import heightfield_mesh
+from renderer.studies import face_points, sun_hours
+
+SIZE = int(os.environ.get("GALLERY_SIZE", "400"))
+
+rng = np.random.default_rng(7)
+y, x = np.mgrid[0 : SIZE // 2, 0 : SIZE // 2] / (SIZE // 2)
+heights = np.zeros_like(x)
+for wave in range(1, 9):
+    a, b = rng.normal(0.0, wave, 2)
+    heights += 0.1 / wave**1.6 * np.sin(2 * np.pi * (a * x + b * y) + rng.uniform(0.0, 6.3))
+octree = Octree.from_mesh(heightfield_mesh(heights, spacing=2.0 / SIZE))
+
+hours = np.linspace(-5.0, 5.0, 41)  # from noon
+angle = hours / 12.0 * np.pi
+suns = np.stack([-np.sin(angle), -0.6 * np.cos(angle), 0.5 * np.cos(angle) - 0.1], axis=-1)  # a low sun in the south
+points, normals, faces = face_points(octree.mesh)
+lit = sun_hours(octree, points, normals, suns, weights=np.full(41, 10.0 / 41.0), leaving=faces)
+
+plt.figure(figsize=(6, 5))
+plt.tripcolor(*octree.mesh.vertices[:, :2].T, octree.mesh.faces, facecolors=lit, cmap="inferno")
+plt.colorbar(label="hours of sun")
+plt.axis("equal")
+plt.title(f"{len(faces):,} triangles, {len(suns)} positions of the sun")
+plt.show()

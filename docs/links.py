@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+"""Check a built site without a network: every link within it leads to a page, a file and an anchor that are there.
+
+python docs/links.py build/site
+"""
+
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+
+class Page(HTMLParser):
+    """The links and anchors of a page."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            if name in ("id", "name") and value:
+                self.anchors.add(value)
+            elif name in ("href", "src") and value and tag != "base":
+                self.links.append(value)
+
+
+def main(site: Path) -> int:
+    pages = {path.resolve(): Page(path) for path in sorted(site.rglob("*.html"))}
+    broken, outside, count = [], set(), 0
+    for path, page in pages.items():
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                outside.add(link)
+                continue
+            count += 1
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            there = target.is_file() or (target / "index.html").is_file()
+            anchored = not parts.fragment or target not in pages or unquote(parts.fragment) in pages[target].anchors
+            if not (there and anchored):
+                broken.append(f"{path.relative_to(site.resolve())}: {link}")
+    print(
+        f"{len(pages)} pages, {count} links within the site, {len(broken)} broken; {len(outside)} others, not asked for"
+    )
+    print(*broken, sep="\n")
+    return 1 if broken or not count else 0
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    sys.exit(main(Path(sys.argv[1])))

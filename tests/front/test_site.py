@@ -1,0 +1,195 @@
+"""The site's parts: gallery and notebooks run, docstrings become lists, links are checked, names have a place."""
+
+import doctest
+import gzip
+import json
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import renderer
+
+ROOT = Path(__file__).parents[2]
+GALLERY = sorted((ROOT / "docs" / "gallery").glob("*.py"))
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+
+
+def module(name):
+    return runpy.run_path(str(ROOT / "docs" / f"{name}.py"))
+
+
+@pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)
+def test_a_script_of_the_gallery_draws_a_picture(script, monkeypatch):
+    """In its folder, as Sphinx runs it, with small pictures; each has something to see."""
+    if script.stem == "error_map":
+        pytest.importorskip("mitsuba", reason="pip install '.[validate]'")
+    monkeypatch.chdir(script.parent)
+    monkeypatch.setenv("GALLERY_SIZE", "48")
+    monkeypatch.setattr(plt, "show", lambda: None)
+    plt.switch_backend("agg")
+    plt.close("all")
+    try:
+        runpy.run_path(str(script))
+        (figure,) = map(plt.figure, plt.get_fignums())
+        figure.canvas.draw()
+        pixels = np.asarray(figure.canvas.buffer_rgba())
+    finally:
+        plt.close("all")
+    assert (pixels[..., :3] != 255).any(axis=-1).mean() > 0.02
+
+
+def test_a_script_without_mitsuba_says_that_it_is_skipped(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mitsuba", None)
+    monkeypatch.chdir(ROOT / "docs" / "gallery")
+    plt.close("all")
+    runpy.run_path("error_map.py")
+    assert capsys.readouterr().out.startswith("skipped: ") and not plt.get_fignums()
+
+
+@pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)
+def test_a_script_is_short_and_named_by_its_title(script):
+    _, head, code = script.read_text(encoding="utf-8").split('"""', 2)
+    title, underline = head.strip().splitlines()[:2]
+    assert set(underline) == {"="} and len(underline) == len(title)
+    assert script.stem.split("_")[0] in title.lower()
+    assert len([line for line in code.splitlines() if line.strip()]) <= 40
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_cells_of_a_notebook_run_in_turn(notebook, monkeypatch):
+    """Small, and without Jupyter; ``make docs`` runs them whole, in a kernel."""
+    if notebook.stem == "proof":
+        pytest.importorskip("embreex", reason="pip install '.[validate]'")
+    else:
+        pytest.importorskip("starlette", reason="pip install '.[viewer]'")
+    monkeypatch.chdir(notebook.parent)
+    monkeypatch.setenv("GALLERY_SIZE", "48")
+    monkeypatch.setattr(plt, "show", lambda: None)
+    monkeypatch.setattr("webbrowser.open", lambda url: True)
+    plt.switch_backend("agg")
+    names = {}
+    try:
+        for cell in cells(notebook, "code"):
+            exec(compile("".join(cell["source"]), f"{notebook.name}, {cell['id']}", "exec"), names)
+        assert plt.get_fignums()
+    finally:
+        plt.close("all")
+        if "viewing" in names:
+            names["viewing"].close()
+
+
+def cells(notebook, kind):
+    return [cell for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == kind]
+
+
+def test_two_notebooks_without_outputs():
+    """Outputs are made at build, so that they are of today's code."""
+    assert [path.stem for path in NOTEBOOKS] == ["first_look", "proof"]
+    for notebook in NOTEBOOKS:
+        assert not any(cell["outputs"] or cell["execution_count"] for cell in cells(notebook, "code"))
+
+
+def test_links_of_notebooks_lead_somewhere():
+    for notebook in NOTEBOOKS:
+        text = "".join("".join(cell["source"]) for cell in cells(notebook, "markdown"))
+        for link in re.findall(r"\]\(([^)#]+)", text):
+            assert (notebook.parent / link).is_file(), link
+
+
+def test_tiles_have_the_readmes_figures():
+    html = module("figures")["tiles"]((ROOT / "README.md").read_text(encoding="utf-8"))
+    assert html.count("<p>") == 5 and "<b>0</b> wrong hits in " in html and "106 of 106" in html
+    made = module("figures")["tiles"]("| a < b | 7 | c | `make x` |\n| d | 8 | | `make y` |\n| no figure | 9 | |")
+    assert made.splitlines()[1:3] == ["<p><b>7</b> a &lt; b<small>c</small></p>", "<p><b>8</b> d</p>"]
+    assert len(made.splitlines()) == 4
+
+
+def test_samples_are_pages():
+    for name, title in (("report", "Octree ray tracer: validation"), ("benchmark", "Octree ray tracer: benchmark")):
+        text = gzip.decompress((ROOT / "docs" / "samples" / f"{name}.html.gz").read_bytes()).decode()
+        assert f"<h1>{title}</h1>" in text and not re.search(r'(?:src|href)="(?!data:|#)', text)
+
+
+def test_twelve_examples():
+    assert len(GALLERY) == 12
+
+
+DOCSTRING = """The first line, with ``x_`` and |d|.
+
+a, b  (n, 3), two of them,
+      and more
+t : a bound
+
+Then text.
+
+>>> a  | b
+1  2
+""".splitlines()
+RST = [
+    "The first line, with ``x_`` and \\|d\\|.",
+    "",
+    "",
+    "a, b",
+    "    (n, 3), two of them,",
+    "    and more",
+    "",
+    "t",
+    "    a bound",
+    "",
+    "",
+    "Then text.",
+    "",
+    ">>> a  | b",
+    "1  2",
+]
+
+
+def test_tables_of_docstrings_become_lists_of_definitions():
+    lines = list(DOCSTRING)
+    module("docstrings")["as_rst"](lines)
+    assert lines == RST
+
+
+def test_links_that_lead_nowhere_are_found(tmp_path, capsys):
+    main = module("links")["main"]
+    (tmp_path / "a.html").write_text(
+        '<p id="here"><a href="b.html#there">b</a> <a href="#here">a</a> <img src="c.svg">'
+    )
+    (tmp_path / "b.html").write_text('<p id="there"><a href="https://elsewhere.example">x</a>')
+    (tmp_path / "c.svg").touch()
+    assert main(tmp_path) == 0
+    for broken in ("d.html", "b.html#nowhere", "#nowhere", "folder/"):
+        (tmp_path / "b.html").write_text(f'<p id="there"><a href="{broken}">x</a>')
+        assert main(tmp_path) == 1 and f"b.html: {broken}" in capsys.readouterr().out
+
+
+def test_every_public_name_is_in_the_reference():
+    text = (ROOT / "docs" / "api" / "renderer.rst").read_text(encoding="utf-8")
+    absent = [name for name in renderer.__all__ if f":: renderer.{name}\n" not in text]
+    assert absent == ["__version__"]
+
+
+@pytest.mark.parametrize("name", sorted(set(renderer.__all__) - {"__version__"}))
+def test_examples_in_the_reference_work(name, tmp_path, monkeypatch):
+    """Those of a public name and its members, as the page of the API shows them."""
+    monkeypatch.chdir(ROOT)
+    thing = getattr(renderer, name)
+    runner = doctest.DocTestRunner()
+    for example in doctest.DocTestFinder().find(thing, name, globs=dict(vars(sys.modules[thing.__module__]))):
+        runner.run(example)
+    assert not runner.failures
+
+
+def test_drawings_are_svg_without_what_lies_elsewhere():
+    """Nothing fetched, and as wide as they say, so that pages of a code host show them."""
+    drawings = sorted((ROOT / "docs" / "drawings").glob("*.svg"))
+    assert len(drawings) == 3
+    for path in drawings:
+        text = path.read_text(encoding="utf-8")
+        assert text.startswith('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ') and "aria-label" in text
+        assert "href" not in text and text.count("http") == 1

@@ -1,0 +1,1 @@
+"""What more workers than two would do: arithmetic and a simulation, both from what ``measures.cluster`` measured."""
