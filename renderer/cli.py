@@ -84,6 +84,7 @@ class _Notices(logging.Handler):
 
 
 _SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb): camera, light and floor are then chosen to fit"
+_CHANGE = "camera, lights or keys of render in place of the file's, such as 'render.shadows = false'; may be given again"
 _WRITE_SCENE = "of a mesh file: write the scene chosen for it, to be changed at will"
 
 
@@ -115,6 +116,7 @@ def make_parser() -> argparse.ArgumentParser:
     render.add_argument("--samples", type=int, metavar="N", help="samples a pixel: 1, 4, 9, ...")
     render.add_argument("--min-weight", type=float, metavar="W", help="end rays that weigh less")
     render.add_argument("--max-rays", type=int, metavar="N", help="rays of a sample of a pixel after which it is cut")
+    render.add_argument("--change", action="append", default=[], metavar="TOML", help=_CHANGE)
     render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto")
     render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help="how the octree is cut")
     render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
@@ -169,10 +171,16 @@ def _render(options: argparse.Namespace) -> None:
     from renderer.picture.image import PLANES, CutWarning, check_picture_path
     from renderer.picture.render import render
     from renderer.precompile import compile_in_two
+    from renderer.scene.change import changed
     from renderer.scene.scene import load_scene
 
     check_picture_path(options.output)
     scene = load_scene(options.scene)
+    for text in options.change:
+        try:
+            scene = changed(scene, text)
+        except ValueError as error:
+            raise ValueError(f"--change: {error}") from None
     _check_output_is_no_input(options, scene)
     _scene_to_write(options)
     asked: dict[str, Any] = {

@@ -24,6 +24,7 @@ from renderer.viewer.payload import Payload, boxes_payload, description, mesh_pa
 from renderer.viewer.security import ResponseHeaders, SameOrigin, TokenRequired, allowed_hosts
 from renderer.viewer.session import Connection, Session
 from renderer.viewer.shown import ShownScene, open_file
+from renderer.viewer.watch import follow
 
 PAGE = Path(__file__).parent / "page"
 # Each connection may keep all processors busy; beyond this many, pictures would come too slowly for all.
@@ -153,7 +154,9 @@ def make_app(shown: ShownScene, host: str, port: int, token: str | None, ancesto
 
     @asynccontextmanager
     async def lifespan(_app: Starlette) -> AsyncIterator[None]:
+        following = asyncio.create_task(follow(viewer.sessions))
         yield
+        following.cancel()
         await viewer.stop()
 
     return Starlette(

@@ -1,7 +1,7 @@
 """The messages between page and server on the WebSocket: the page's are checked, the server's packed."""
 
 import struct
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator, model_validator
 
@@ -9,19 +9,20 @@ from renderer.limits import FARTHEST
 from renderer.scene.camera import sample_offsets
 from renderer.scene.fields import FiniteVector
 
-# The longest side of a picture: four megabytes per picture, as much as a browser draws without a hitch.
-MAX_SIDE = 1024
+# The longest side of a picture and the most pixels, those of a screen called 4K, 3840 x 2160, and some more.
+MAX_SIDE, MAX_PIXELS = 4096, 1 << 23
 # A page's largest message is a pick of under 1 kB; this leaves room for numbers of any length.
 MAX_MESSAGE_BYTES = 16384
-# An 8 x 8 grid per pixel: with 1024 x 1024 pixels, 67 million camera rays, the most that are worth the wait.
+# An 8 x 8 grid per pixel: of a million pixels, 67 million camera rays, the most that are worth the wait.
 MAX_SAMPLES = 64
 # Below a thousandth of a radian neighbouring rays differ by less than a page's float32 matrices resolve; above 3.1
 # almost all of the picture is its rim.
 MIN_FOVY, MAX_FOVY = 0.001, 3.1
 
 RGBA, JPEG, FACE_COLORS = 1, 2, 3
-# kind, seq, step, last, w, h as uint32, then milliseconds and million rays per second as float32, little-endian.
-HEADER = struct.Struct("<6I2f")
+# kind, seq, step, last, w, h, first row and rows of the whole as uint32, then milliseconds and million rays per second
+# as float32, little-endian.
+HEADER = struct.Struct("<8I2f")
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 _Sequence = Annotated[int, Field(ge=0, lt=2**32)]
@@ -37,6 +38,17 @@ MODES: tuple[Mode, ...] = ("gl", "phong", "brute", "octree")
 
 class _Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class _Sized(_Message):
+    w: _Side
+    h: _Side
+
+    @model_validator(mode="after")
+    def _not_too_large(self) -> Self:
+        if self.w * self.h > MAX_PIXELS:
+            raise ValueError(f"expected at most {MAX_PIXELS} pixels, got {self.w} x {self.h}")
+        return self
 
 
 class ViewSettings(_Message):
@@ -67,7 +79,7 @@ class ViewSettings(_Message):
         return value
 
 
-class CameraMessage(_Message):
+class CameraMessage(_Sized):
     """A view to show: ``m`` camera to world as in ``viewpoint``, ``fovy`` in radians, ``w`` x ``h`` pixels.
 
     A ``height``, in scene units, makes the camera an orthographic one.
@@ -79,8 +91,6 @@ class CameraMessage(_Message):
     m: _Matrix
     fovy: _Fovy
     height: _Height = None
-    w: _Side
-    h: _Side
     settings: ViewSettings = ViewSettings()
 
 
@@ -98,7 +108,7 @@ class Cancel(_Message):
     type: Literal["cancel"]
 
 
-class Pick(_Message):
+class Pick(_Sized):
     """A click on pixel (``x``, ``y``), counted from the top left, that asks for its ray and all that this spawns."""
 
     type: Literal["pick"]
@@ -108,8 +118,6 @@ class Pick(_Message):
     m: _Matrix
     fovy: _Fovy
     height: _Height = None
-    w: _Side
-    h: _Side
     settings: ViewSettings = ViewSettings()
 
     @model_validator(mode="after")
@@ -137,16 +145,30 @@ class OpenScene(_Message):
 
 
 class SaveCamera(_Message):
-    """Write this camera as a scene file's table. While walking there is nothing that it turns about."""
+    """Write this camera as a scene file's table, and with ``settings`` the tables of these. While walking there is
+    nothing that it turns about.
+    """
 
     type: Literal["camera"]
     m: _Matrix
     fovy: _Fovy
     height: _Height = None
     walk: bool = False
+    settings: ViewSettings | None = None
 
 
-Message = CameraMessage | Ack | Cancel | Pick | Hello | OpenScene | SaveCamera
+class AskCommand(_Sized):
+    """Say by which command line the picture of this view is rendered."""
+
+    type: Literal["command"]
+    mode: Mode
+    m: _Matrix
+    fovy: _Fovy
+    height: _Height = None
+    settings: ViewSettings = ViewSettings()
+
+
+Message = CameraMessage | Ack | Cancel | Pick | Hello | OpenScene | SaveCamera | AskCommand
 _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
@@ -161,11 +183,19 @@ def parse(text: str) -> Message:
         raise ValueError(f"{where}: {fault['msg']}, got {repr(fault['input'])[:40]}") from None
 
 
-def packed(
-    kind: int, view: CameraMessage, step: int, last: bool, size: tuple[int, int], pace: tuple[float, float]
-) -> bytes:
-    """The header of a picture or of face colours; ``size`` is (w, h), ``pace`` ms and million rays per second.
+class Rows(NamedTuple):
+    """The rows of a picture that a message holds: its ``first`` and how many, of as many as the ``whole`` has."""
 
-    32 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 bytes per face.
+    first: int
+    count: int
+    whole: int
+
+
+def packed(
+    kind: int, view: CameraMessage, step: int, last: bool, width: int, rows: Rows, pace: tuple[float, float]
+) -> bytes:
+    """The header of a picture, of a band of one, or of face colours; ``pace`` is ms and million rays per second.
+
+    40 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 bytes per face.
     """
-    return HEADER.pack(kind, view.seq, step, last, *size, *pace)
+    return HEADER.pack(kind, view.seq, step, last, width, rows.count, rows.first, rows.whole, *pace)

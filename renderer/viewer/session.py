@@ -12,14 +12,23 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
-import numpy as np
-
 from renderer.picture.prepare import tiles
+from renderer.viewer.commands import command_of, saved
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
-from renderer.viewer.protocol import Ack, CameraMessage, Cancel, Hello, OpenScene, Pick, SaveCamera, parse
+from renderer.viewer.protocol import (
+    Ack,
+    AskCommand,
+    CameraMessage,
+    Cancel,
+    Hello,
+    OpenScene,
+    Pick,
+    SaveCamera,
+    parse,
+)
 from renderer.viewer.shown import ShownScene
-from renderer.viewer.viewpoint import camera_of, camera_toml
+from renderer.viewer.viewpoint import camera_of
 
 # Seconds between messages of progress: ten per second look smooth and cost nothing.
 _PROGRESS = 0.1
@@ -113,7 +122,9 @@ class Session:
             elif isinstance(message, Pick):
                 self.picks.put(message)
             elif isinstance(message, SaveCamera):
-                await self._tell(type="camera", name="camera.toml", text=self._camera(message))
+                await self._tell(type="camera", name="camera.toml", text=saved(self.shown, message))
+            elif isinstance(message, AskCommand):
+                await self._tell(type="command", text=command_of(self.shown, message))
             elif isinstance(message, Hello | OpenScene):
                 self.scenes.put(message)
         except ValueError as error:
@@ -129,6 +140,10 @@ class Session:
     async def complain(self, error: Exception) -> None:
         """Send the page an error's message, on one line."""
         await self._tell(type="error", message=" ".join(str(error).split()) or type(error).__name__)
+
+    def reload(self) -> None:
+        """Show the scene as its files have it now."""
+        self.scenes.put(Hello(type="hello", file=self.shown.path.name if self.shown.path else "", server=self.host.id))
 
     async def show_scene(self, shown: ShownScene) -> None:
         """Show ``shown`` from now on, and say which that is. Views of the one before are dropped."""
@@ -225,16 +240,6 @@ class Session:
                 await self.complain(error)
                 if isinstance(wanted, Hello):  # a page that begins has no scene to go on with
                     await self.show_scene(self.shown)
-
-    def _camera(self, message: SaveCamera) -> str:
-        """The camera as TOML. Its target is the point of its axis nearest the scene's middle, if that lies ahead."""
-        camera = camera_of(message.m, message.fovy, height=message.height)
-        if not message.walk:
-            middle = np.mean(self.shown.prepared.mesh.bounds, axis=0)
-            ahead = float((middle - camera.eye) @ camera.frame()[2])
-            if ahead > 0.0:
-                camera = camera_of(message.m, message.fovy, ahead, message.height)
-        return camera_toml(camera)
 
     async def _tell(self, **message: Any) -> None:
         await self.connection.text(json.dumps(message, allow_nan=False))

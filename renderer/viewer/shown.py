@@ -20,8 +20,8 @@ from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer.protocol import ViewSettings
 
-# The most bytes of a file that may be a saved camera alone, of which the viewer writes some 300.
-_CAMERA_BYTES = 4096
+# The most bytes of a file that may be a saved camera alone: the viewer writes some 300, and 150 for each light.
+_CAMERA_BYTES = 16384
 
 
 class _Mark(NamedTuple):
@@ -57,7 +57,7 @@ class ShownScene:
     @property
     def files(self) -> list[str]:
         """The scene files that may be opened: this one and those beside it, but for pipes, names that are no text and
-        files of a camera alone, as the viewer saves them.
+        files of a camera without a scene, as the viewer saves them.
         """
         if self.path is None:
             return []
@@ -68,7 +68,11 @@ class ShownScene:
     @property
     def edited(self) -> bool:
         """Whether a file that it was loaded from has changed since."""
-        return _marks(self.marks) != self.marks
+        return self.marks_now() != self.marks
+
+    def marks_now(self) -> dict[Path, _Mark | None]:
+        """The marks of the files that it was loaded from, as they are now."""
+        return _marks(self.marks)
 
     def beside(self, file: str) -> Path:
         """The path of one of ``files``. Raises ``ValueError`` for any other."""
@@ -98,9 +102,12 @@ def _mark(path: Path) -> _Mark | None:
 
 
 def _is_camera(path: Path) -> bool:
-    """Whether a file holds the table of a camera and nothing else."""
+    """Whether a file holds what the viewer saves and nothing else: a scene has materials."""
     try:
-        return path.stat().st_size <= _CAMERA_BYTES and tomllib.loads(path.read_text("utf-8-sig")).keys() == {"camera"}
+        if path.stat().st_size > _CAMERA_BYTES:
+            return False
+        tables = tomllib.loads(path.read_text("utf-8-sig")).keys()
+        return "camera" in tables and tables <= {"camera", "render", "lights"}
     except (OSError, ValueError, RecursionError):
         return False  # opening it says what is wrong
 

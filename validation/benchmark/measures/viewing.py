@@ -56,7 +56,7 @@ def measure(file: Path, mode: str, views: int) -> dict[str, list[float]]:
                 while not last:
                     message = socket.recv()
                     assert isinstance(message, bytes), message
-                    _, seq, step, last, width, height, _, _ = HEADER.unpack_from(message)
+                    _, seq, step, last, width, height, *_ = HEADER.unpack_from(message)
                     if number >= _UNSEEN:
                         what = "colours" if mode == "phong" else f"{width} x {height}"
                         seconds[what].append(time.perf_counter() - began)

@@ -1,0 +1,41 @@
+"""Changes of a scene by a few lines of TOML, as the command line takes them."""
+
+import tomllib
+from typing import Any
+
+from pydantic import ValidationError
+
+from renderer.errors import expect
+from renderer.scene.fields import Fields, first_fault
+from renderer.scene.scene import AnyCamera, AnyLight, Scene, checked_settings
+
+
+class _Changes(Fields):
+    camera: AnyCamera | None = None
+    lights: tuple[AnyLight, ...] | None = None
+    render: dict[str, Any] = {}
+
+
+def changed(scene: Scene, text: str) -> Scene:
+    """``scene`` with what ``text`` has of a scene file in its place: camera, lights, and single keys of ``render``.
+
+    Raises ``ValueError`` with one line that names the key.
+
+    >>> scene = Scene(camera={"eye": (0, 0, 1), "target": (0, 0, 0)}, materials={})
+    >>> changed(scene, "render.samples = 4").render.samples
+    4
+    """
+    try:
+        table = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # not only TOML's: too many digits
+        raise ValueError(f"expected TOML, got a syntax error: {error}") from None
+    known = list(_Changes.model_fields)
+    for key in table:
+        expect(key in known, "change", f"keys among {known}", repr(key))
+    try:
+        changes = _Changes.model_validate(table)
+    except ValidationError as error:
+        raise ValueError(first_fault(error, Scene._union_member)) from None
+    found = {"camera": changes.camera, "lights": changes.lights}
+    given: dict[str, Any] = {key: value for key, value in found.items() if value is not None}
+    return scene.altered(**given, render=checked_settings(scene.render, changes.render))
