@@ -20,6 +20,11 @@ def connected(address: str | None = None, *, workers: int | None = None) -> Iter
 
     Raises ``ImportError`` where the extra is not installed, ``ValueError`` for workers of a cluster that runs
     already, and ``OSError`` where no scheduler answers.
+
+    >>> from renderer.cluster import connected
+    >>> with connected(workers=1) as client:
+    ...     len(client.scheduler_info()["workers"])
+    1
     """
     try:
         from distributed import Client, LocalCluster
