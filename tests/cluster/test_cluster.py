@@ -141,9 +141,9 @@ def test_a_local_cluster_has_a_worker_of_one_thread_for_each_processor() -> None
 
 @pytest.mark.parametrize("address", ["nonsense", "", "x://y:1", "tcp://127.0.0.1", 3])
 def test_what_is_no_address_is_told_at_once(address: Any) -> None:
-    with pytest.raises(ValueError, match=r"address: expected a scheduler's, such as 'tcp://host:8786', got "):
-        with connected(address):
-            pass
+    said = "address: expected a scheduler's, such as 'tcp://host:8786', got "
+    with pytest.raises(ValueError, match=said), connected(address):
+        pass
 
 
 def test_without_the_extra_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
