@@ -18,8 +18,13 @@ def connected(address: str | None = None, *, workers: int | None = None) -> Iter
     """A ``distributed.Client`` of the scheduler at ``address`` ("tcp://host:8786"), or of a local cluster, which ends
     with the block: ``workers`` processes of one thread each, by default one for each processor.
 
-    Raises ``ImportError`` where the extra is not installed, ``ValueError`` for workers of a cluster that runs
-    already, and ``OSError`` where no scheduler answers.
+    Raises ``ImportError`` where the extra is not installed, ``ValueError`` for what is no address and for workers of a
+    cluster that runs already, and ``OSError`` where no scheduler answers.
+
+    >>> from renderer.cluster import connected
+    >>> with connected(workers=1) as client:
+    ...     len(client.scheduler_info()["workers"])
+    1
     """
     try:
         from distributed import Client, LocalCluster
@@ -27,7 +32,7 @@ def connected(address: str | None = None, *, workers: int | None = None) -> Iter
         raise ImportError(f"a cluster needs the package distributed; {extra_hint('cluster')}") from error
     if address is not None:
         expect(workers is None, "workers", "None, as the cluster has its own", repr(workers))
-        with Client(address, timeout=SECONDS) as client:
+        with Client(_checked_address(address), timeout=SECONDS) as client:
             yield client
         return
     count = checked_threads(workers)
@@ -42,3 +47,17 @@ def connected(address: str | None = None, *, workers: int | None = None) -> Iter
         Client(cluster) as client,
     ):
         yield client
+
+
+def _checked_address(address: object) -> str:
+    """An address as Dask reads it. Raises ``ValueError`` for what is none, which Dask would first wait for."""
+    from distributed.comm import get_address_host, parse_address, unparse_address
+
+    expected = "a scheduler's, such as 'tcp://host:8786'"
+    expect(isinstance(address, str), "address", expected, type(address).__name__)
+    try:
+        whole: str = unparse_address(*parse_address(address))
+        get_address_host(whole)
+    except ValueError as error:
+        raise ValueError(f"address: expected {expected}, got {address!r}: {error}") from None
+    return whole

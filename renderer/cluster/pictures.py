@@ -43,6 +43,16 @@ def render_on(
     worker that dies loses its parts under way, which others render: the bits are those of ``render``. Raises
     ``ValueError`` naming the argument, or where the folder is of another picture, and ``OSError`` where the scheduler
     is gone, or without a worker for 10 seconds; the same call then goes on.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> from renderer import Mesh, PerspectiveCamera, Phong, SceneObject
+    >>> from renderer.cluster import connected, render_on
+    >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
+    >>> camera = PerspectiveCamera(eye=(0.3, 0.3, 2), target=(0.3, 0.3, 0))
+    >>> scene = Scene(camera=camera, materials={"grey": Phong()}, objects=[triangle], ambient=1)
+    >>> with connected(workers=1) as client, TemporaryDirectory() as folder:
+    ...     render_on(client, scene, folder, resolution=(3, 3)).image().face[1].tolist()
+    [-1, 0, -1]
     """
     sent, picture = _Sender(options).picture(scene, camera)
     run = PictureRun(as_path("folder", folder), picture, band)

@@ -25,6 +25,14 @@ def closest_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float =
     Nothing is computed before the result is asked for; ``hits["t"]`` is lazy too. The bits are those of
     ``octree.closest_hit``. Raises ``ValueError`` for other shapes; a ray that is out of range raises when its chunk
     is computed.
+
+    >>> import dask.array as da
+    >>> from renderer import Octree
+    >>> from renderer.cluster import closest_hit
+    >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> origins, directions = da.from_array([[0.25, 0.25, 2.0], [9, 9, 2]]), da.from_array([[0.0, 0, -1], [0, 0, -1]])
+    >>> closest_hit(floor, origins, directions)["t"].compute()
+    array([ 2., inf])
     """
 
     def trace(mesh: SentMesh, o: NDArray[Any], d: NDArray[Any]) -> NDArray[Any]:
@@ -38,7 +46,7 @@ def closest_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float =
 
 
 def any_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf) -> Any:
-    """Whether each ray hits anything, a dask array (n,) of bool; see ``closest_hit``."""
+    """Whether each ray hits anything, a dask array (n,) of bool: arguments, bits and errors as of ``closest_hit``."""
 
     def trace(mesh: SentMesh, o: NDArray[Any], d: NDArray[Any]) -> NDArray[Any]:
         return mesh.octree().any_hit(o, d, t_min=t_min, t_max=t_max)

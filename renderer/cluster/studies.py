@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from contextlib import closing
+from numbers import Integral
 from pathlib import Path
 from typing import Any, Literal
 
 from renderer.cluster.tasks import Task, results
 from renderer.cluster.workers import SentMesh, answer_part
+from renderer.errors import expect
 from renderer.octree import Octree
+from renderer.picture.render import check_tree
+from renderer.process.files import as_path
 from renderer.process.terminal import progress_bar
 from renderer.runs.parts import Parts, digest_of
 from renderer.runs.study import PART, Points, Study, parts_of
@@ -19,7 +23,7 @@ def run_on(
     octree: Octree,
     study: Study,
     points: Points,
-    folder: Path,
+    folder: str | Path,
     *,
     size: int = PART,
     split: Literal["midpoint", "sah"] = "midpoint",
@@ -27,10 +31,30 @@ def run_on(
 ) -> Parts:
     """``renderer.runs.study.run`` on the workers of ``client``, a ``distributed.Client``.
 
+    points  where, as ``renderer.runs.chosen`` makes them
+    folder  for the parts, a new one or that of a run that was killed; the caller removes it
+    size    points of a part at least. It changes no bit
+    split   the tree that workers build, as ``Octree.from_mesh`` takes it. It changes no bit
+
+    Returns the parts, whose ``joined()`` is the answer, float64 (n,), one for each point in their order.
+
     Parts are written here, whole, as they come; those that a killed run left are not computed again. A worker that dies
     loses its parts under way, which others compute. The bits are those of a run on this machine alone. Raises
+    ``ValueError`` naming the argument, with the row of a bad point, or where the folder is of another study, and
     ``OSError`` where the scheduler is gone, or without a worker for 10 seconds; the same call then goes on.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from renderer import Octree
+    >>> from renderer.cluster import connected, run_on
+    >>> from renderer.runs.chosen import on_faces
+    >>> from renderer.runs.study import Study
+    >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> with connected(workers=1) as client, TemporaryDirectory() as folder:
+    ...     run_on(client, floor, Study("sky", {}), on_faces(floor).points, Path(folder) / "parts").joined().tolist()
+    [1.0]
     """
+    folder = _checked(octree, study, points, folder, size, split)
     mesh = octree.mesh
     parts = parts_of(octree, study, points, folder, size)
     missing = parts.missing()
@@ -48,3 +72,14 @@ def run_on(
                 begin, end = parts.plan.span(part)
                 update(end - begin)
     return parts
+
+
+def _checked(octree: object, study: object, points: object, folder: object, size: object, split: object) -> Path:
+    """The folder as a path. Raises ``ValueError`` for what a study on a cluster does not take."""
+    expect(isinstance(octree, Octree), "octree", "an Octree", type(octree).__name__)
+    expect(isinstance(study, Study), "study", "a Study", type(study).__name__)
+    expect(isinstance(points, Points), "points", "Points", type(points).__name__)
+    good = isinstance(size, Integral) and not isinstance(size, bool) and int(size) >= 1
+    expect(good, "size", "an integer >= 1", repr(size))
+    check_tree("octree", split)
+    return as_path("folder", folder)

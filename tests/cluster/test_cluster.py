@@ -1,7 +1,9 @@
 """Studies and rays on a cluster have the bits of those on this machine, whatever workers die."""
 
+import doctest
 import os
 import signal
+import sys
 import threading
 import time
 from importlib import import_module
@@ -13,8 +15,9 @@ import numpy as np
 import pytest
 from watched import Watched
 
-from renderer import Mesh, Octree
+from renderer import Mesh, Octree, cluster
 from renderer.cluster import any_hit, closest_hit, connected, run_on
+from renderer.process.parallel import checked_threads
 from renderer.runs.chosen import on_faces
 from renderer.runs.study import Study, run
 from validation.benchmark.measures.meshes import named
@@ -32,8 +35,10 @@ def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Oct
     expected = study.answer(octree, points)
     here = run(octree, study, points, tmp_path / "here").joined()
     assert here.tobytes() == expected.tobytes()
-    there = run_on(client, octree, study, points, tmp_path / "there", size=SIZE)
+    there = run_on(client, octree, study, points, str(tmp_path / "there"), size=SIZE)
     assert there.plan.parts > 10 and there.joined().tobytes() == expected.tobytes()
+    other = run_on(client, octree, study, points, tmp_path / "other", size=SIZE * 4, split="sah")
+    assert 1 < other.plan.parts < there.plan.parts and other.joined().tobytes() == expected.tobytes()
 
 
 def test_a_worker_that_is_killed_changes_no_bit(octree: Octree, tmp_path: Path) -> None:
@@ -126,3 +131,46 @@ def test_no_scheduler_and_wrong_arguments_are_told(monkeypatch: pytest.MonkeyPat
         pass
     with pytest.raises(OSError, match=r"127\.0\.0\.1"), connected("tcp://127.0.0.1:9"):
         pass
+
+
+def test_a_local_cluster_has_a_worker_of_one_thread_for_each_processor() -> None:
+    with connected() as client:
+        assert list(client.ncores().values()) == [1] * checked_threads(None)
+    assert client.status == "closed"
+
+
+@pytest.mark.parametrize("address", ["nonsense", "", "x://y:1", "tcp://127.0.0.1", 3])
+def test_what_is_no_address_is_told_at_once(address: Any) -> None:
+    said = "address: expected a scheduler's, such as 'tcp://host:8786', got "
+    with pytest.raises(ValueError, match=said), connected(address):
+        pass
+
+
+def test_without_the_extra_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ImportError, match=r"a cluster needs the package distributed; .*\[cluster\]"), connected():
+        pass
+
+
+@pytest.mark.parametrize(
+    "bad, said",
+    [({"client": None}, "client: expected a distributed.Client, got NoneType"), ({"size": 0}, "size: expected an int"),
+     ({"split": "x"}, "split: expected one of"), ({"study": "sky"}, "study: expected a Study, got str"),
+     ({"points": np.zeros((1, 3))}, "points: expected Points, got ndarray"),
+     ({"folder": 3}, "folder: expected a string"), ({"octree": 1}, "octree: expected an Octree")],
+)  # fmt: skip
+def test_bad_arguments_of_a_study_are_named(
+    client: Any, octree: Octree, tmp_path: Path, bad: dict[str, Any], said: str
+) -> None:
+    good = {"client": client, "octree": octree, "study": Study("sky", {}), "points": on_faces(octree).points}
+    with pytest.raises(ValueError, match=said):
+        run_on(**(good | {"folder": tmp_path / "parts"} | bad))
+
+
+def test_the_examples_of_the_docstrings_hold() -> None:
+    runner = doctest.DocTestRunner()
+    for name in cluster.__all__:
+        thing = getattr(cluster, name)
+        for example in doctest.DocTestFinder().find(thing, name, globs=dict(vars(sys.modules[thing.__module__]))):
+            runner.run(example)
+    assert runner.tries > 15 and runner.failures == 0

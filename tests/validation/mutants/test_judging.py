@@ -297,7 +297,8 @@ def test_a_workshop_breaks_one_file_and_mends_it(tmp_path: Path, monkeypatch: py
     # A limit of its own ends it where nobody is left to do so.
     monkeypatch.setattr(workshop, "_LARGEST", 1 << 22)
     printing = shop.run(["-c", "import os\nwhile True: os.write(1, b'x' * (1 << 20))"], 600.0)
-    assert printing.code == 1 and len(printing.output) == 1 << 20
+    # 120 is Python's own where the words of its error find no room either.
+    assert printing.code in (1, 120) and len(printing.output) == 1 << 20
     limited = "import resource as r\nwhile r.getrlimit(r.RLIMIT_CPU)[0] == r.RLIM_INFINITY: pass"
     assert shop.run(["-c", limited], 60.0).code == 0
 

@@ -1,5 +1,5 @@
-"""The public contract, piece by piece: the docstrings of what ``renderer`` and its studies export, the fields of
-scenes, and the help of the commands.
+"""The public contract, piece by piece: the docstrings of what ``renderer``, its studies and its cluster export, the
+fields of scenes, and the help of the commands.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 import renderer
-from renderer import cli, studies
+from renderer import cli, cluster, studies
 from validation.promises.contract.fields import described
 
 # A line that begins the definition of a name: "t_max   the last ..." or "faces : (F, 3) ...".
@@ -41,7 +41,7 @@ def contract() -> list[Piece]:
 
 def _documented() -> Iterator[Piece]:
     """The docstrings of each public module and of what it exports; names within a part begin with the part's."""
-    for module, part in ((renderer, ""), (studies, "studies.")):
+    for module, part in ((renderer, ""), (studies, "studies."), (cluster, "cluster.")):
         yield from pieces(module.__name__, inspect.getdoc(module) or "")
         for name in sorted(module.__all__):
             thing = getattr(module, name)
@@ -150,6 +150,8 @@ def _after_output(example: doctest.Example) -> str:
     """
     lines = example.want.splitlines()
     last = ast.parse(example.source).body[-1]
+    while isinstance(last, ast.With):  # its last statement shows its value, as one that stands alone does
+        last = last.body[-1]
     if not isinstance(last, ast.Expr):
         return example.want
     if isinstance(last.value, ast.Call) and ast.unparse(last.value.func) == "print":
