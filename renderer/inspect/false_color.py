@@ -61,8 +61,9 @@ def limits_of(image: Image, aov: str) -> Limits:
 
     (0, 0) for other AOVs and where there is nothing.
     """
-    drawn: dict[str, NDArray[Any]] = {"depth": image.depth[image.face >= 0], "cost": image.rays}
-    values = drawn.get(aov, np.empty(0))
+    if aov not in ("depth", "cost"):  # whose picture may lack these planes
+        return (0.0, 0.0)
+    values = image.rays if aov == "cost" else image.depth[image.face >= 0]
     return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
 
 

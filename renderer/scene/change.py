@@ -3,7 +3,7 @@
 import tomllib
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from renderer.errors import expect
 from renderer.scene.fields import Fields, first_fault
@@ -13,7 +13,7 @@ from renderer.scene.scene import AnyCamera, AnyLight, Scene, checked_settings
 class _Changes(Fields):
     camera: AnyCamera | None = None
     lights: tuple[AnyLight, ...] | None = None
-    render: dict[str, Any] = {}
+    render: dict[str, Any] = Field({})
 
 
 def changed(scene: Scene, text: str) -> Scene:

@@ -55,7 +55,7 @@ def passes_of(view: CameraMessage) -> list[Pass]:
         return []
     longest = max(view.w, view.h)
     coarse = [side for side in COARSE if side < longest] if view.mode == "octree" else []
-    if coarse and 2 * _MIDDLE <= longest:
+    if coarse and longest >= 2 * _MIDDLE:
         coarse.append(_MIDDLE)
     # The first pass is shown even if a newer view comes meanwhile, so it must not be one of many samples.
     if view.mode == "octree" and view.settings.samples > 1 and not coarse:
@@ -113,7 +113,9 @@ def picture(
 ) -> Image:
     """The same picture that ``render`` gives for the view's camera and settings, or the band of it that is wanted."""
     prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)
-    settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, wanted.last or wanted.band is not None)
+    settings = render_settings(
+        shown.scene, view.settings, wanted.size, wanted.samples, wanted.last or wanted.band is not None
+    )
     camera = camera_of(view.m, view.fovy, height=view.height)
     planes = ("rays", *_PLANES[view.settings.aov])
     return prepared.picture(camera, settings, BOUNDED, shown.threads, finished, planes, wanted.band)

@@ -184,10 +184,10 @@ def parse(text: str) -> Message:
 
 
 class Rows(NamedTuple):
-    """The rows of a picture that a message holds: its ``first`` and how many, of as many as the ``whole`` has."""
+    """The rows of a picture that a message holds: the ``first``, their ``number``, and that of the ``whole``."""
 
     first: int
-    count: int
+    number: int
     whole: int
 
 
@@ -198,4 +198,4 @@ def packed(
 
     40 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 bytes per face.
     """
-    return HEADER.pack(kind, view.seq, step, last, width, rows.count, rows.first, rows.whole, *pace)
+    return HEADER.pack(kind, view.seq, step, last, width, rows.number, rows.first, rows.whole, *pace)

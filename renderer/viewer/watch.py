@@ -19,8 +19,8 @@ class Watch:
     """What is known of the files of scenes on show."""
 
     def __init__(self) -> None:
-        self._seen: dict[ShownScene, Marks] = {}
-        self._taken: dict[ShownScene, Marks] = {}
+        self._seen: Mapping[ShownScene, Marks] = {}
+        self._taken: Mapping[ShownScene, Marks] = {}
 
     def edited(self, scenes: Iterable[ShownScene]) -> set[ShownScene]:
         """Those of ``scenes`` whose files have changed, and rested since the last call. Each change is told once, also

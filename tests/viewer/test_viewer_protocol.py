@@ -14,15 +14,18 @@ from renderer.viewer.protocol import (
     JPEG,
     MAX_FOVY,
     MAX_MESSAGE_BYTES,
+    MAX_PIXELS,
     MAX_SIDE,
     MIN_FOVY,
     MODES,
     Ack,
+    AskCommand,
     CameraMessage,
     Cancel,
     Hello,
     OpenScene,
     Pick,
+    Rows,
     SaveCamera,
     ViewSettings,
     packed,
@@ -44,6 +47,7 @@ SIZE = {"w": 320, "h": 240}
 VIEW = {"type": "view", "seq": 7, "mode": "octree", "m": M, "fovy": 0.7, "height": 2.5, **SIZE, "settings": SETTINGS}
 PICK = {"type": "pick", "seq": 8, "x": 319, "y": 239, "m": M, "fovy": 0.7, "height": 2, **SIZE, "settings": SETTINGS}
 CAMERA = {"type": "camera", "m": M, "fovy": 0.7, "height": 1e-3}
+COMMAND = {"type": "command", "mode": "brute", "m": M, "fovy": 0.7, "height": 1e-3, **SIZE, "settings": SETTINGS}
 # The keys of a message that may be left out.
 OPTIONAL = {"settings", "walk", "height"}
 # A message that may name no file.
@@ -60,6 +64,8 @@ def said(message: Any) -> str:
         (VIEW, CameraMessage),
         (PICK, Pick),
         (CAMERA | {"walk": True}, SaveCamera),
+        (CAMERA | {"settings": SETTINGS}, SaveCamera),
+        (COMMAND, AskCommand),
         (HELLO, Hello),
         ({"type": "ack", "seq": 7, "step": 2}, Ack),
         ({"type": "cancel"}, Cancel),
@@ -69,7 +75,7 @@ def said(message: Any) -> str:
 def test_a_message_is_what_it_says(message: dict[str, Any], kind: type) -> None:
     read = parse(said(message))
     assert type(read) is kind
-    assert json.loads(read.model_dump_json()) == message
+    assert json.loads(read.model_dump_json(exclude_unset=True)) == message
     for key in message.keys() - OPTIONAL - ({"file", "server"} if message is HELLO else set()):
         with pytest.raises(ValueError, match=f"{key}|discriminator 'type'"):
             parse(said({name: value for name, value in message.items() if name != key}))
@@ -108,8 +114,8 @@ BAD = [
     ("mode", ["", "GL", "ray", 1, None, ["gl"]], "mode"),
     ("fovy", [0, -0.7, 0.0009, 3.11, 1e999, math.nan, "0.7", None], "fovy"),
     ("height", [0, -0.0, -1, FARTHEST * 2, 1e999, math.nan, "2", True], "height"),
-    ("w", [0, -1, 1025, 10**30, 320.5, "320", True, None], "w"),
-    ("h", [0, -1, 1025, 10**30, 320.5, "240", True, None], "h"),
+    ("w", [0, -1, 4097, 10**30, 320.5, "320", True, None], "w"),
+    ("h", [0, -1, 4097, 10**30, 320.5, "240", True, None], "h"),
     ("m", [M[:15], [*M, 0.0], [], None, "1" * 16, {str(i): 1 for i in range(16)}], "m"),
     ("m", [[*M[:5], bad, *M[6:]] for bad in (math.nan, math.inf, -math.inf, "0", None, [], True)], r"m\.5"),
 ]
@@ -117,7 +123,7 @@ BAD = [
 
 @pytest.mark.parametrize(
     ("message", "key", "values", "where"),
-    [(said, *bad) for said in (VIEW, PICK, CAMERA) for bad in BAD if bad[0] in said],
+    [(said, *bad) for said in (VIEW, PICK, CAMERA, COMMAND) for bad in BAD if bad[0] in said],
 )
 def test_a_bad_value_is_refused_by_its_key(message: dict[str, Any], key: str, values: list[Any], where: str) -> None:
     for value in values:
@@ -203,12 +209,20 @@ def test_whatever_comes_is_a_message_or_a_value_error(text: str) -> None:
         read = parse(text)
     except ValueError:
         return
-    assert isinstance(read, CameraMessage | Pick | Ack | Cancel | Hello | OpenScene | SaveCamera)
+    assert isinstance(read, CameraMessage | Pick | Ack | Cancel | Hello | OpenScene | SaveCamera | AskCommand)
 
 
-def test_the_header_is_32_bytes_little_endian() -> None:
+@pytest.mark.parametrize("message", [VIEW, PICK, COMMAND])
+def test_a_picture_has_at_most_so_many_pixels(message: dict[str, Any]) -> None:
+    assert parse(said(message | {"w": MAX_SIDE, "h": MAX_PIXELS // MAX_SIDE}))
+    with pytest.raises(ValueError, match=rf"{message['type']}: .*at most {MAX_PIXELS} pixels, got 4096 x 2049"):
+        parse(said(message | {"w": MAX_SIDE, "h": MAX_PIXELS // MAX_SIDE + 1}))
+
+
+def test_the_header_is_40_bytes_little_endian() -> None:
     view = CameraMessage(type="view", seq=2**32 - 1, mode="octree", m=M, fovy=0.7, w=320, h=240)
-    header = packed(JPEG, view, 2, True, (128, 96), (1.5, 0.25))
-    assert header == bytes.fromhex("02000000 ffffffff 02000000 01000000 80000000 60000000 0000c03f 0000803e")
-    assert struct.unpack("<6I2f", header)[3] == 1
-    assert struct.unpack("<6I2f", packed(JPEG, view, 0, False, (1, 1), (0.0, 0.0)))[2:4] == (0, 0)
+    header = packed(JPEG, view, 2, True, 128, Rows(32, 64, 96), (1.5, 0.25))
+    words = "02000000 ffffffff 02000000 01000000 80000000 40000000 20000000 60000000"
+    assert header == bytes.fromhex(f"{words} 0000c03f 0000803e")
+    whole = packed(JPEG, view, 0, False, 1, Rows(0, 1, 1), (0.0, 0.0))
+    assert struct.unpack("<8I2f", whole)[2:4] == (0, 0)

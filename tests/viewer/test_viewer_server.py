@@ -16,7 +16,6 @@ import urllib.request
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -29,7 +28,7 @@ from viewer_page import MODELS, SCENE
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
-from websockets.sync.client import connect
+from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camera, fetched, looking, rendered
 
 import renderer
 from renderer import load_scene, render
@@ -40,125 +39,12 @@ from renderer.inspect.tree_boxes import boxes_at, visited
 from renderer.mesh.shapes import icosphere
 from renderer.picture.image import srgb
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
-from renderer.scene.scene import Scene
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer import app, session
 from renderer.viewer.passes import Answer
 from renderer.viewer.session import SupersededError
 from renderer.viewer.shown import ShownScene, open_file
 from renderer.viewer.viewpoint import camera_of, camera_toml
-
-# Seconds for an answer that should come at once: what a machine with other work may take.
-PATIENCE = 120.0
-# 16,272 faces: by brute force 256 x 256 pixels take seconds, and a tile of them a tenth of one.
-HEAVY = f"""{SCENE}
-[[objects]]
-mesh = "{MODELS / "teapot.ply"}"
-material = "red"
-translate = [0.0, 0.0, -1.0]
-"""
-# What reflects and lets light through by constants, which a file can set to nothing.
-PLAIN = SCENE.replace('type = "dielectric"', "diffuse = 0.2\ntransmittance = 0.6\nior = 1.3")
-SIZE = {"w": 200, "h": 150}
-LONG = {"mode": "brute", "w": 256, "h": 256}
-
-
-@dataclass
-class Got:
-    """A binary message: its header, and its payload."""
-
-    kind: int
-    seq: int
-    step: int
-    last: int
-    w: int
-    h: int
-    ms: float
-    rate: float
-    payload: bytes
-
-    @property
-    def rgb(self) -> NDArray[np.uint8]:
-        """The picture of a message of kind 1."""
-        rgba = np.frombuffer(self.payload, np.uint8).reshape(self.h, self.w, 4)
-        assert self.kind == 1 and (rgba[..., 3] == 255).all()
-        return rgba[..., :3]
-
-
-class Client:
-    """A page, as far as the server can tell."""
-
-    def __init__(self, url: str) -> None:
-        origin = url.rstrip("/")
-        self.connection = connect(f"{origin.replace('http', 'ws')}/ws", origin=origin, max_size=None)
-        self.seq = 0
-
-    def __enter__(self) -> "Client":
-        self.socket = self.connection.__enter__()
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self.connection.__exit__(*error)
-
-    def send(self, **message: Any) -> None:
-        self.socket.send(json.dumps(message))
-
-    def view(self, eye: tuple[float, float, float] = (0.5, 2.6, 5.5), **changes: Any) -> int:
-        self.seq += 1
-        self.send(**{"type": "view", "seq": self.seq, "mode": "octree", **looking(eye), **SIZE, **changes})
-        return self.seq
-
-    def next(self, timeout: float = PATIENCE) -> Got | dict[str, Any]:
-        message = self.socket.recv(timeout)
-        if isinstance(message, str):
-            return json.loads(message)
-        return Got(*struct.unpack("<6I2f", message[:32]), message[32:])
-
-    def acknowledge(self, got: Got) -> None:
-        self.send(type="ack", seq=got.seq, step=got.step)
-
-    def told(self, kind: str) -> dict[str, Any]:
-        """The next text message, which is of that type; pictures before it are acknowledged."""
-        while isinstance(message := self.next(), Got):
-            self.acknowledge(message)
-        assert message["type"] == kind, message
-        return message
-
-    def passes(self, seq: int) -> list[Got]:
-        """All pictures up to the last of view ``seq``, acknowledged."""
-        pictures = []
-        while not (pictures and pictures[-1].seq == seq and pictures[-1].last):
-            message = self.next()
-            if isinstance(message, Got):
-                pictures.append(message)
-                self.acknowledge(message)
-            else:
-                assert message["type"] in ("progress", "legend"), message
-        return pictures
-
-    def final(self, **changes: Any) -> Got:
-        return self.passes(self.view(**changes))[-1]
-
-
-def camera(eye: tuple[float, float, float]) -> PerspectiveCamera:
-    return PerspectiveCamera(eye=eye, target=(0.0, 0.5, 0.0), fov=38.0)
-
-
-def looking(eye: tuple[float, float, float]) -> dict[str, Any]:
-    right, up, forward = camera(eye).frame()
-    return {"m": [*right, 0.0, *up, 0.0, *-forward, 0.0, *eye, 1.0], "fovy": math.radians(38.0)}
-
-
-def rendered(scene: Scene, eye: tuple[float, float, float] = (0.5, 2.6, 5.5), **options: Any) -> Any:
-    """What ``render`` gives for the camera that ``Client.view`` sends."""
-    view = looking(eye)
-    seen = scene.model_copy(update={"camera": camera_of(view["m"], view["fovy"])})
-    return render(seen, **{"resolution": (200, 150), "max_depth": 6, **options})
-
-
-def fetched(url: str, path: str) -> bytes:
-    with urllib.request.urlopen(url + path, timeout=PATIENCE) as answer:
-        return answer.read()
 
 
 @pytest.fixture(scope="module")

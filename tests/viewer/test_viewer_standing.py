@@ -90,6 +90,7 @@ def test_of_two_pictures_the_newer_and_finer_one_stands(viewer: Viewer) -> None:
             const now = { m, fovy: 1, w: 980, h: 747 };
             const view = { ...now, settings }, other = { ...view, m: [...m].reverse() };
             const [few, final] = [{ w: 128, last: false }, { w: 980, last: true }];
+            const band = { w: 980, h: 747, rows: 32, last: false };
             const shown = (picture, of = view) => ({ view: of, ...picture });
             const asked = [
                 [few, view, null], [few, view, shown(final, other)], [final, view, shown(few)],
@@ -99,13 +100,17 @@ def test_of_two_pictures_the_newer_and_finer_one_stands(viewer: Viewer) -> None:
                 [few, view, shown(final)], [few, other, shown(few)],
                 [few, view, shown(final, { ...view, settings: { ...settings, samples: 9 } })],
                 [few, other, shown(few, { ...other, fovy: 1.1 })], [few, other, null],
+                [band, view, shown(few)],
+                [band, view, shown(final, { ...view, settings: { ...settings, samples: 9 } })],
+                [band, other, shown(few)], [band, view, null],
             ];
             const whether = ([picture, of, stands], model) => improves(picture, of, { shown: stands, now, model });
-            return [asked.map((one) => whether(one, false)), whether(asked[0], true), whether(asked.at(-2), true)];
+            return [asked.map((one) => whether(one, false)), whether(asked[0], true), whether(asked[10], true)];
         }"""
     )
-    # Of another camera's pictures a newer one stands for an older, but neither for the camera's own nor for the model.
-    assert seen == [[True] * 6 + [False] * 4 + [True] * 2, True, False]
+    # A band takes the place of a part of a picture by the same camera. Of another camera's pictures a newer one stands
+    # for an older, but neither for the camera's own nor for the model.
+    assert seen == [[True] * 6 + [False] * 4 + [True] * 4 + [False] * 2, True, False]
 
 
 def test_a_picture_that_is_not_finished_is_saved_when_it_is(odd: Viewer, tmp_path: Path) -> None:

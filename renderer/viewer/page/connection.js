@@ -3,7 +3,7 @@
 export const PICTURE_RGBA = 1;
 export const PICTURE_JPEG = 2;
 export const FACE_COLORS = 3;
-const HEADER = 32;
+const HEADER = 40;
 // Seconds between attempts: at once after a hiccup, then slow enough not to be a load.
 const PATIENCE = [0.3, 1, 2, 5];
 
@@ -25,12 +25,13 @@ export async function fetchFrom(path, query) {
   return response;
 }
 
-// A picture or face colours: {kind, seq, step, last, w, h, ms, rate, bytes}; rate in million rays a second.
+// A picture, a band of one or face colours: {kind, seq, step, last, w, h, first, rows, ms, rate, bytes}. The picture is
+// w x h; bytes holds `rows` of it from the `first`. The rate is in million rays a second.
 export function decode(buffer) {
-  const words = new Uint32Array(buffer, 0, 6);
-  const [ms, rate] = new Float32Array(buffer, 24, 2);
-  const [kind, seq, step, last, w, h] = words;
-  return { kind, seq, step, last: last === 1, w, h, ms, rate, bytes: new Uint8ClampedArray(buffer, HEADER) };
+  const [kind, seq, step, last, w, rows, first, h] = new Uint32Array(buffer, 0, 8);
+  const [ms, rate] = new Float32Array(buffer, 32, 2);
+  const bytes = new Uint8ClampedArray(buffer, HEADER);
+  return { kind, seq, step, last: last === 1, w, h, first, rows, ms, rate, bytes };
 }
 
 export class Connection {

@@ -15,7 +15,7 @@ import { Picture } from "./picture.js";
 import { Progress } from "./progress.js";
 import { Rays } from "./rays.js";
 import { Readings } from "./readings.js";
-import { savePicture, saveText } from "./save.js";
+import { copyText, savePicture, saveText } from "./save.js";
 import { improves, sameCamera } from "./standing.js";
 
 const TRACED = ["brute", "octree"];
@@ -200,8 +200,10 @@ class Viewer {
     onClick("#save-picture", () => this.save());
     onClick("#save-camera", () => {
       const { m, fovy, height } = this.view();
-      this.connection.send({ type: "camera", m, fovy, height, walk: this.controls.walking });
+      const { settings } = this.panel;
+      this.connection.send({ type: "camera", m, fovy, height, walk: this.controls.walking, settings });
     });
+    onClick("#copy-command", () => this.connection.send({ type: "command", mode: this.mode, ...this.view(), settings: this.panel.settings }));
     onClick("#toggle-panel", () => {
       const away = document.body.classList.toggle("wide");
       find("#toggle-panel").setAttribute("aria-expanded", String(!away));
@@ -269,7 +271,7 @@ class Viewer {
   // Fit frame and layers into the stage, by the chosen resolution.
   layout() {
     const room = [Math.max(this.stage.clientWidth, 1), Math.max(this.stage.clientHeight, 1)];
-    const { css, size } = film(room, this.panel.fields.size.value, this.scene.render.resolution);
+    const { css, size } = film(room, this.panel.fields.size.value, this.scene.render.resolution, devicePixelRatio);
     this.size = size;
     const { style } = find("#frame");
     [style.width, style.height] = css.map((side) => `${side}px`);
@@ -425,6 +427,7 @@ class Viewer {
       legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
       scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
       camera: ({ name, text }) => saveText(name, text),
+      command: ({ text }) => copyText(text).then((copied) => this.notices.say(copied ? `Copied: ${text}` : text)),
       error: ({ message: text }) => {
         for (const name of ["opening", "tracing"]) this.busy.end(name);
         this.notices.say(text);

@@ -7,21 +7,28 @@ export class Picture {
     this.context = canvas.getContext("2d");
   }
 
-  // Show a decoded picture; resolves when it stands on the canvas.
-  async show({ kind, w, h, bytes }) {
-    if (kind === PICTURE_JPEG) {
-      const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
-      this.resize(w, h);
-      this.context.drawImage(bitmap, 0, 0);
-    } else {
-      this.resize(w, h);
-      this.context.putImageData(new ImageData(bytes, w, h), 0, 0);
-    }
+  // Show a decoded picture, or a band of one over what stands there; resolves when it stands on the canvas.
+  async show({ kind, w, h, first, rows, bytes }) {
+    const jpeg = kind === PICTURE_JPEG && (await createImageBitmap(new Blob([bytes], { type: "image/jpeg" })));
+    if (rows === h) this.resize(w, h);
+    else this.stretch(w, h);
+    if (jpeg) this.context.drawImage(jpeg, 0, first);
+    else this.context.putImageData(new ImageData(bytes, w, rows), 0, first);
   }
 
   resize(w, h) {
     if (this.canvas.width !== w) this.canvas.width = w;
     if (this.canvas.height !== h) this.canvas.height = h;
+  }
+
+  // The same picture in w x h pixels.
+  stretch(w, h) {
+    const { canvas } = this;
+    if (canvas.width === w && canvas.height === h) return;
+    const before = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+    before.getContext("2d").drawImage(canvas, 0, 0);
+    this.resize(w, h);
+    this.context.drawImage(before, 0, 0, w, h);
   }
 
   clear() {

@@ -19,3 +19,13 @@ export function savePicture(canvases, sceneName) {
   whole.toBlob((blob) => download(blob, name), "image/png");
   return `${name}, ${whole.width} × ${whole.height}`;
 }
+
+// Whether `text` is on the clipboard now, which a browser may refuse.
+export async function copyText(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    return false;
+  }
+}

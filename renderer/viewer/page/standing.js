@@ -11,9 +11,11 @@ export const sameCamera = (a, b) =>
 const sameButFiner = (a, b) =>
   sameCamera(a, b) && JSON.stringify({ ...a.settings, samples: 0 }) === JSON.stringify({ ...b.settings, samples: 0 });
 
-// Whether a picture {w, last} that came for `view` is to take the place of `shown`, {view, w} or null. `now` is the view
-// of the camera as it is, and `model` whether WebGL's model stands in for the picture.
-export function improves({ w, last }, view, { shown, now, model }) {
+// Whether a picture {w, h, rows, last} that came for `view` is to take the place of `shown`, {view, w} or null. `now` is
+// the view of the camera as it is, and `model` whether WebGL's model stands in for the picture. A band of rows is as fine
+// as the last picture, but takes the place of a part only.
+export function improves({ w, h, rows, last }, view, { shown, now, model }) {
+  if (rows < h) return shown !== null && sameCamera(shown.view, view);
   const current = shown !== null && sameCamera(shown.view, now);
   if (!sameCamera(view, now)) return !current && !model;
   return last || !current || !sameButFiner(shown.view, view) || w > shown.w;

@@ -1,0 +1,102 @@
+"""A view as text: what is saved of it, and the command line that renders its picture."""
+
+import shlex
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from viewer_page import SCENE
+
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+from PIL import Image as Pillow
+from viewer_client import SIZE, Client, looking
+
+import renderer
+from renderer import load_scene
+from renderer.cli import main
+
+EYE = (0.3, 2.0, 4.0)
+ORTHOGRAPHIC = {"height": 3.0}
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("with space") / "blocks.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def url(scene: Path) -> Iterator[str]:
+    with renderer.view(scene, browser=False) as viewing:
+        yield viewing.url
+
+
+@pytest.fixture
+def client(url: str) -> Iterator[Client]:
+    with Client(url) as client:
+        yield client
+
+
+@pytest.mark.parametrize(
+    ("changes", "settings"),
+    [
+        ({}, {}),
+        ({}, {"samples": 4, "max_depth": 1, "shadows": False}),
+        ({}, {"light": [1.0, -1.0, 0.5]}),
+        (ORTHOGRAPHIC, {}),
+        ({"mode": "brute", "w": 40, "h": 30}, {"samples": 4}),
+    ],
+)
+def test_the_command_renders_the_picture_that_is_seen(
+    client: Client, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any], settings: Any
+) -> None:
+    seen = client.passes(client.view(eye=EYE, settings=settings, **changes))
+    mode = changes.get("mode", "octree")
+    client.send(**{"type": "command", "mode": mode, **looking(EYE), **SIZE, **changes, "settings": settings})
+    program, *words = shlex.split(client.told("command")["text"])
+    assert program == "octree-render" and str(scene) in words
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "--quiet"]) == 0
+    picture = np.asarray(Pillow.open(tmp_path / "blocks.png"))[..., :3]
+    assert np.array_equal(picture, seen[-1].rgb)
+
+
+@pytest.mark.parametrize("settings", [{"aov": "depth"}, {"reflection": False}, {"refraction": False}])
+def test_where_no_command_renders_it_that_is_said(client: Client, settings: dict[str, Any]) -> None:
+    client.send(**{"type": "command", "mode": "octree", **looking(EYE), **SIZE, "settings": settings})
+    assert client.told("error")["message"].startswith("command: expected ")
+
+
+def test_a_scene_made_in_python_has_no_command(scene: Path) -> None:
+    with renderer.view(load_scene(scene), browser=False) as viewing, Client(viewing.url) as client:
+        client.send(**{"type": "command", "mode": "octree", **looking(EYE), **SIZE})
+        assert "a scene that was made in Python" in client.told("error")["message"]
+
+
+def test_what_is_saved_with_the_camera_makes_the_same_picture(client: Client, scene: Path, tmp_path: Path) -> None:
+    """Samples, bounces and lights were lost."""
+    settings = {"samples": 4, "max_depth": 2, "shadows": False, "light": [1.0, -1.0, 0.5]}
+    client.send(type="camera", **looking(EYE), walk=True, settings=settings)
+    saved = client.told("camera")["text"]
+    kept = SCENE[SCENE.index("[materials.red]") : SCENE.index("[[lights]]")] + SCENE[SCENE.index("[[objects]]") :]
+    head = "ambient = 0.1\nbackground = [0.45, 0.62, 0.82]\n"
+    (tmp_path / "a.toml").write_text(head + saved + kept)
+    loaded = load_scene(tmp_path / "a.toml")
+    assert (loaded.render.samples, loaded.render.max_depth, loaded.render.shadows) == (4, 2, False)
+    assert [light.direction for light in loaded.lights] == [(1.0, -1.0, 0.5)]
+    again = renderer.render(loaded, resolution=(200, 150))
+    assert np.array_equal(renderer.srgb(again.radiance), client.final(eye=EYE, settings=settings).rgb)
+
+
+def test_what_is_saved_is_not_offered_as_a_scene(client: Client, url: str, scene: Path) -> None:
+    client.send(type="camera", **looking(EYE), settings={"samples": 4})
+    saved = scene.parent / "camera.toml"
+    saved.write_text(client.told("camera")["text"])
+    with urllib.request.urlopen(f"{url}scene") as answer:
+        assert b'"files":["blocks.toml"]' in answer.read().replace(b" ", b"")
+    saved.unlink()
