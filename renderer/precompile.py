@@ -171,6 +171,7 @@ def touch_viewing(prepared: PreparedScene) -> None:
     face_colors(prepared.arrays, eye)
     ray_path(prepared, eye, forward, 1)
     visited(prepared.octree, eye, forward)
+    prepared.octree.count_steps(eye, forward)
 
 
 def compile_in_two() -> None:

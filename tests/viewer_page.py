@@ -92,13 +92,22 @@ def _printed_url(server: "subprocess.Popen[bytes]") -> str:
     raise AssertionError(f"the server printed no address: {printed}")
 
 
+# Before the page's own scripts: pictures at rest stay as they are, so that a test sees the one it waited for.
+STAYS = """document.addEventListener("readystatechange", () => {
+    const refine = document.querySelector("[name=refine]");
+    if (refine) for (const option of refine.options) option.defaultSelected = option.selected = option.value === "1";
+}, { once: true });"""
+
+
 class Viewer:
-    """One page in the browser, and what it says about itself."""
+    """One page in the browser, and what it says about itself. With ``refine`` its pictures grow at rest."""
 
     faults: ClassVar[list[str]] = []  # of all pages
 
-    def __init__(self, browser: Any, url: str, **options: Any) -> None:
+    def __init__(self, browser: Any, url: str, refine: bool = False, **options: Any) -> None:
         self.context = browser.new_context(**{"viewport": {"width": 800, "height": 420}, **options})
+        if not refine:
+            self.context.add_init_script(STAYS)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
         self.page.on("console", lambda m: self.faults.append(m.text) if m.type in ("error", "warning") else None)
@@ -157,7 +166,7 @@ class Viewer:
         return self.page.evaluate("() => ({ ...document.querySelector('#stage').dataset })")
 
     def choose(self, mode: str) -> None:
-        self.page.locator("#stage").press({"gl": "1", "phong": "2", "brute": "3", "octree": "4"}[mode])
+        self.page.locator("#stage").press({"gl": "1", "phong": "2", "brute": "3", "octree": "4", "proof": "5"}[mode])
         self.settled(mode)
 
     @property

@@ -67,6 +67,13 @@ def limits_of(image: Image, aov: str) -> Limits:
     return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
 
 
+def scale_colors(aov: str) -> NDArray[np.uint8]:
+    """The colours (n, 3) of a scale from its least value to its greatest, at even steps, for a legend."""
+    if aov == "depth":
+        return np.repeat(np.array([[_NEAR], [_FAR]], np.uint8), 3, axis=1)
+    return VIRIDIS.copy()
+
+
 def shades_of(values: NDArray[Any], low: float, high: float) -> NDArray[np.uint8]:
     """The colours (..., 3) of values on a scale, as those of a cost."""
     return _viridis(_STEPS)[_steps(values, low, high)]

@@ -1,20 +1,33 @@
-"""The pictures that answer one view: small ones at once, the full one when it is done."""
+"""The pictures that answer one view: small ones at once, the full one when it is done, finer ones while it rests."""
 
 import io
+import struct
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.inspect.face_phong import face_colors
-from renderer.inspect.false_color import Limits, false_color, limits_of
-from renderer.picture.image import Image
-from renderer.picture.prepare import TILE
+from renderer.inspect.false_color import Limits, false_color, limits_of, scale_colors, shades_of
+from renderer.inspect.ray_cost import camera_steps
+from renderer.picture.image import Image, srgb
+from renderer.picture.prepare import TILE, tiles
 from renderer.trace.spawn import BOUNDED
-from renderer.viewer.protocol import FACE_COLORS, JPEG, RGBA, CameraMessage, Rows, packed
+from renderer.viewer.compare import Comparison, compared, heat_map
+from renderer.viewer.protocol import (
+    FACE_COLORS,
+    JPEG,
+    PROOF,
+    RGBA,
+    CameraMessage,
+    Mode,
+    Rows,
+    packed,
+)
 from renderer.viewer.shown import ShownScene, render_settings, varied
 from renderer.viewer.viewpoint import camera_of, seen_from
 
@@ -24,18 +37,26 @@ COARSE = (128, 256)
 _MIDDLE = 1024
 # The pixels of a message, four megabytes: as many as a browser draws without a hitch. Larger pictures come in bands.
 BAND_PIXELS = 1 << 20
+# The longest side of a picture that is compared with another renderer's, which may take milliseconds a ray.
+_LONGEST_REFERENCE = 256
+# The samples per pixel by which the picture of a camera at rest grows, each four times those before.
+REFINED = (4, 16, 64)
 # The planes that an AOV is drawn from, beside radiance, and the counted rays that give the pace.
 _PLANES = {"color": (), "cost": (), "depth": ("depth", "face"), "normal": ("normal", "face"), "face": ("face",)}
+_STEPS = ("nodes", "triangles")
 # AOVs on a scale that goes from the least value of the whole picture to the greatest.
-_SCALED = ("depth", "cost")
+_SCALED = ("depth", "cost", *_STEPS)
 # On Pillow's scale; above it files grow faster than the quality that can be seen.
 _JPEG_QUALITY = 90
+# Of Pillow's nine: on this machine the page is as fast with larger files.
+_PNG_EFFORT = 1
 
 
 @dataclass(frozen=True)
 class Pass:
-    """One answer to a view: its number from 0, whether it is the last, the picture's size (w, h) and samples per pixel;
-    and the rows that are a part of the full picture, first and end, or None for all of one.
+    """One answer to a view: its number from 0, whether the picture is whole and as fine as asked for by it, the
+    picture's size (w, h) and samples per pixel; the rows that are a part of the full picture, first and end, or None
+    for all of one; and whether it only refines a picture that was whole before.
     """
 
     step: int
@@ -43,82 +64,181 @@ class Pass:
     size: tuple[int, int]
     samples: int
     band: tuple[int, int] | None = None
+    refines: bool = False
+
+    @property
+    def work(self) -> int:
+        """The camera rays that it takes."""
+        first, end = self.band or (0, self.size[1])
+        return self.size[0] * (end - first) * self.samples
 
 
-def passes_of(view: CameraMessage) -> list[Pass]:
+def passes_of(view: CameraMessage, threads: int = 1) -> list[Pass]:
     """The passes that answer ``view``: none for "gl", face colours for "phong", one picture or growing ones.
 
-    Brute force takes one sample per pixel: with many it would take minutes. Octree pictures of more than BAND_PIXELS
-    end in bands from top to bottom, where the colours of a pixel do not depend on all others.
+    Brute force takes one sample per pixel: with many it would take minutes; its picture comes in bands of a few tiles
+    for each of ``threads``. Octree pictures of more than BAND_PIXELS end in bands too, where the colours of a pixel do
+    not depend on all others.
     """
     if view.mode == "gl":
         return []
-    longest = max(view.w, view.h)
-    coarse = [side for side in COARSE if side < longest] if view.mode == "octree" else []
-    if coarse and longest >= 2 * _MIDDLE:
+    if view.mode == "phong":
+        return [Pass(0, True, (view.w, view.h), 1)]
+    octree, (width, height) = view.mode == "octree", _full_size(view)
+    samples = view.settings.samples if octree else 1
+    coarse = _coarse_sizes(width, height, samples, octree)
+    found = [Pass(step, False, size, 1) for step, size in enumerate(coarse)]
+    bands = _bands(view, threads)
+    for number in (samples, *_refined(view)):
+        found += [
+            Pass(len(found) + i, band is bands[-1], (width, height), number, band, number > samples)
+            for i, band in enumerate(bands)
+        ]
+    return found
+
+
+def _full_size(view: CameraMessage) -> tuple[int, int]:
+    """The size of the last picture: that of the view, but for proofs, whose floats are kept."""
+    if view.mode != "proof":
+        return view.w, view.h
+    most, longest = min(1.0, (BAND_PIXELS / (view.w * view.h)) ** 0.5), max(view.w, view.h)
+    if view.settings.pair not in ("brute", "samples"):
+        most = min(most, _LONGEST_REFERENCE / longest)
+    return max(1, int(view.w * most)), max(1, int(view.h * most))
+
+
+def _coarse_sizes(width: int, height: int, samples: int, octree: bool) -> list[tuple[int, int]]:
+    longest = max(width, height)
+    coarse = [side for side in COARSE if side < longest]
+    if coarse and octree and longest >= 2 * _MIDDLE:
         coarse.append(_MIDDLE)
     # The first pass is shown even if a newer view comes meanwhile, so it must not be one of many samples.
-    if view.mode == "octree" and view.settings.samples > 1 and not coarse:
+    if samples > 1 and not coarse:
         coarse = [longest]
-    sizes = [(_scaled(view.w, side, longest), _scaled(view.h, side, longest)) for side in coarse]
-    first = [Pass(step, False, size, 1) for step, size in enumerate(sizes)]
-    samples = view.settings.samples if view.mode == "octree" else 1
-    bands = _bands(view) if view.mode == "octree" and view.settings.aov not in _SCALED else [None]
-    full = enumerate(bands, len(sizes))
-    return [*first, *(Pass(step, band is bands[-1], (view.w, view.h), samples, band) for step, band in full)]
+    return [(_scaled(width, side, longest), _scaled(height, side, longest)) for side in coarse]
 
 
-def _bands(view: CameraMessage) -> list[tuple[int, int] | None]:
-    """Rows of the full picture, first and end of each band; None for all where it is no large one."""
-    if view.w * view.h <= BAND_PIXELS:
+def _refined(view: CameraMessage) -> list[int]:
+    """The samples per pixel to which the view's picture grows at rest."""
+    settings = view.settings
+    if view.mode != "octree" or settings.aov != "color":
+        return []
+    return [samples for samples in REFINED if settings.samples < samples <= settings.refine]
+
+
+def _bands(view: CameraMessage, threads: int) -> list[tuple[int, int] | None]:
+    """Rows of the full picture, first and end of each band; None for all where it comes whole."""
+    if view.mode == "proof" or view.settings.aov in _SCALED:
         return [None]
+    across = -(-view.w // TILE)
     rows = max(TILE, BAND_PIXELS // view.w // TILE * TILE)
+    if view.mode == "brute":
+        rows = min(rows, TILE * -(-2 * threads // across))
+    if view.h <= rows or (view.mode == "octree" and view.w * view.h <= BAND_PIXELS):
+        return [None]
     return [(first, min(first + rows, view.h)) for first in range(0, view.h, rows)]
 
 
 class Answer(NamedTuple):
-    """A message for the page, and the values at the ends of its scale of colours if it has one."""
+    """A message for the page, what is told before it, the colours if they are a picture's, and a proof's pictures."""
 
     message: bytes
-    limits: Limits | None
+    told: dict[str, Any] | None = None
+    colors: NDArray[np.uint8] | None = None
+    comparison: Comparison | None = None
 
 
-def answer(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[int], None]) -> Answer:
-    """The answer of one pass. ``finished(tiles)`` is called after each tile; what it raises ends the pass.
+class _Payload(NamedTuple):
+    kind: int
+    payload: bytes
+    rays: float = 0.0  # a second
+    told: dict[str, Any] | None = None
+    colors: NDArray[np.uint8] | None = None
+    comparison: Comparison | None = None
+
+
+def answer(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]) -> Answer:
+    """The answer of one pass. ``finished(share)`` is called with shares of it as they are done; what it raises ends it.
 
     The milliseconds that it gives are from the start of the pass to its payload, the rays per second those of tracing
     alone.
     """
-    began, limits, (width, height) = time.perf_counter(), None, wanted.size
+    began, (width, height) = time.perf_counter(), wanted.size
     first, end = wanted.band or (0, height)
-    if view.mode == "phong":
-        prepared = varied(shown.prepared, view.settings)
-        eye = seen_from(camera_of(view.m, view.fovy, height=view.height), prepared.mesh.bounds)
-        payload = face_colors(prepared.arrays, eye, shown.threads).tobytes()
-        kind, pace = FACE_COLORS, 0.0
+    made = _PAYLOADS.get(view.mode, _traced)(shown, view, wanted, finished)
+    pace = (time.perf_counter() - began) * 1e3, made.rays / 1e6
+    header = packed(made.kind, view, wanted.step, wanted.last, width, Rows(first, end - first, height), pace)
+    told = made.told and made.told | {"seq": view.seq, "step": wanted.step, "w": width, "h": height}
+    return Answer(header + made.payload, told, made.colors, made.comparison)
+
+
+def _colored(shown: ShownScene, view: CameraMessage, *_: object) -> _Payload:
+    """Face colours."""
+    prepared = varied(shown.prepared, view.settings)
+    eye = seen_from(camera_of(view.m, view.fovy, height=view.height), prepared.mesh.bounds)
+    return _Payload(FACE_COLORS, face_colors(prepared.arrays, eye, shown.threads).tobytes())
+
+
+def _traced(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]) -> _Payload:
+    """A picture, or a band of one."""
+    aov = view.settings.aov
+    if aov in _STEPS:
+        rgb, limits, rays = _steps(shown, view, wanted, finished)
     else:
         image = picture(shown, view, wanted, finished)
-        aov = view.settings.aov
-        limits = limits_of(image, aov) if aov in _SCALED else None
-        rgb = false_color(image, aov, limits)
-        kind, payload = (JPEG, _jpeg(rgb)) if view.settings.pixels == "jpeg" else (RGBA, _rgba(rgb))
-        pace = float(image.rays.sum()) / image.render_seconds / 1e6
-    ms = (time.perf_counter() - began) * 1e3
-    rows = Rows(first, end - first, height)
-    return Answer(packed(kind, view, wanted.step, wanted.last, width, rows, (ms, pace)) + payload, limits)
+        limits, rays = limits_of(image, aov), float(image.rays.sum()) / image.render_seconds
+        rgb = false_color(image, aov, limits if aov in _SCALED else None)
+    kind, payload = (JPEG, _jpeg(rgb)) if view.settings.pixels == "jpeg" else (RGBA, _rgba(rgb))
+    return _Payload(kind, payload, rays, _legend(aov, limits) if aov in _SCALED else None, rgb)
+
+
+def _proven(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]) -> _Payload:
+    """Both pictures of a comparison, and their heat map."""
+    comparison = compared(shown, view, wanted.size, finished)
+    heat, limits = heat_map(comparison)
+    files = [_png(rgb) for rgb in (*map(srgb, comparison.pictures), heat)]
+    told = _legend("difference", limits) | comparison.described() | {"type": "proof"}
+    payload = b"".join(chain(*((struct.pack("<I", len(file)), file) for file in files)))
+    return _Payload(PROOF, payload, told=told, comparison=comparison)
+
+
+_PAYLOADS: dict[Mode, Callable[[ShownScene, CameraMessage, Pass, Callable[[float], object]], _Payload]] = {
+    "phong": _colored,
+    "proof": _proven,
+}
+
+
+def _legend(aov: str, limits: Limits) -> dict[str, Any]:
+    """What is told of a scale of colours: its ends, and the colours at even steps between them."""
+    return {"type": "legend", "aov": aov, "low": limits[0], "high": limits[1], "colors": scale_colors(aov).tolist()}
+
+
+def _steps(
+    shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]
+) -> tuple[NDArray[np.uint8], Limits, float]:
+    """What the camera rays test, as colours, the ends of their scale, and rays per second."""
+    began = time.perf_counter()
+    prepared = shown.brute if view.mode == "brute" else shown.prepared
+    camera = camera_of(view.m, view.fovy, height=view.height)
+    counts = getattr(camera_steps(prepared, camera, wanted.size, finished), view.settings.aov)
+    low, high = float(counts.min()), float(counts.max())
+    return shades_of(counts, low, high), (low, high), counts.size / (time.perf_counter() - began)
 
 
 def picture(
-    shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[int], None] | None = None
+    shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object] = lambda share: None
 ) -> Image:
     """The same picture that ``render`` gives for the view's camera and settings, or the band of it that is wanted."""
     prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)
-    settings = render_settings(
-        shown.scene, view.settings, wanted.size, wanted.samples, wanted.last or wanted.band is not None
-    )
+    full = wanted.last or wanted.band is not None
+    settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, full)
     camera = camera_of(view.m, view.fovy, height=view.height)
     planes = ("rays", *_PLANES[view.settings.aov])
-    return prepared.picture(camera, settings, BOUNDED, shown.threads, finished, planes, wanted.band)
+    first, end = wanted.band or (0, wanted.size[1])
+    number = tiles((wanted.size[0], end - first))
+    return prepared.picture(
+        camera, settings, BOUNDED, shown.threads, lambda done: finished(done / number), planes, wanted.band
+    )
 
 
 def _scaled(side: int, longest: int, of: int) -> int:
@@ -136,4 +256,12 @@ def _jpeg(rgb: NDArray[np.uint8]) -> bytes:
 
     buffer = io.BytesIO()
     Pillow.fromarray(rgb).save(buffer, "jpeg", quality=_JPEG_QUALITY)
+    return buffer.getvalue()
+
+
+def _png(rgb: NDArray[np.uint8]) -> bytes:
+    from PIL import Image as Pillow
+
+    buffer = io.BytesIO()
+    Pillow.fromarray(rgb).save(buffer, "png", compress_level=_PNG_EFFORT)
     return buffer.getvalue()

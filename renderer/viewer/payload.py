@@ -18,6 +18,7 @@ from renderer.scene.needs import examine
 from renderer.shade.records import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
 from renderer.viewer.protocol import MODES
+from renderer.viewer.references import references
 from renderer.viewer.shown import ShownScene
 
 MAGIC = 0x4853454D
@@ -54,6 +55,7 @@ def description(shown: ShownScene) -> dict[str, Any]:
         },
         "threads": shown.threads,
         "modes": MODES,
+        "references": list(references()),
     }
 
 

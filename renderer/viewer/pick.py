@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from renderer.inspect.ray_path import Segment, Vector, ray_path
-from renderer.inspect.tree_boxes import visited
+from renderer.inspect.tree_boxes import Visit, visited
 from renderer.picture.prepare import PreparedScene
 from renderer.shade.records import MATERIAL_COLUMNS
 from renderer.shade.surface import surface_of
 from renderer.trace.hits import Hits
+from renderer.viewer.compare import Comparison
 from renderer.viewer.protocol import Pick
 from renderer.viewer.shown import ShownScene, varied
 from renderer.viewer.viewpoint import camera_of
@@ -19,8 +20,10 @@ from renderer.viewer.viewpoint import camera_of
 _MAX_BOXES = 512
 
 
-def picked(shown: ShownScene, pick: Pick) -> dict[str, Any]:
-    """The message for ``pick``: the ray through the pixel's centre; null for values that a miss does not have."""
+def picked(shown: ShownScene, pick: Pick, comparison: Comparison | None = None) -> dict[str, Any]:
+    """The message for ``pick``: the ray through the pixel's centre; null for values that a miss does not have. With a
+    ``comparison`` also the values that the pixel has in it.
+    """
     prepared = varied(shown.prepared, pick.settings)
     rows = camera_of(pick.m, pick.fovy, height=pick.height).rows(pick.w, pick.h)
     origin, direction = (
@@ -29,21 +32,38 @@ def picked(shown: ShownScene, pick: Pick) -> dict[str, Any]:
     direction = direction / np.linalg.norm(direction)
     x, y, z = direction.tolist()
     hits = prepared.octree.closest_hit(origin[None], direction[None])
-    path = ray_path(
-        prepared,
-        origin,
-        direction,
-        pick.settings.max_depth,
-        min_weight=shown.scene.render.min_weight,
-        shadows=pick.settings.shadows,
-    )
+
+    def followed(over: PreparedScene) -> tuple[Segment, ...]:
+        """The path of the ray; over another tree its hits are found in another way."""
+        least, settings = shown.scene.render.min_weight, pick.settings
+        return ray_path(over, origin, direction, settings.max_depth, min_weight=least, shadows=settings.shadows)
+
+    path = followed(prepared)
     nodes = visited(prepared.octree, origin, direction)
     boxes = [
         {"level": level, "lower": lower.tolist(), "upper": upper.tolist(), "leaf": leaf}
         for level, lower, upper, leaf in nodes[:_MAX_BOXES]
     ]
     met = _met(shown, prepared, (x, y, z), hits)
-    return {"type": "pick", "seq": pick.seq, **met, "path": _told(path), "nodes": boxes, "visited": len(nodes)}
+    steps = prepared.octree.count_steps(origin[None], direction[None])
+    told = {"type": "pick", "seq": pick.seq, **met, "path": _told(path), "nodes": boxes, "visited": len(nodes)}
+    told |= {"levels": _by_level(nodes), "tested": {"nodes": int(steps.nodes[0]), "triangles": int(steps.triangles[0])}}
+    if comparison is None:
+        return told
+    again = followed(varied(shown.brute, pick.settings)) if comparison.by_brute_force else None
+    return told | {"proof": _values(comparison, pick) | {"same_rays": None if again is None else again == path}}
+
+
+def _by_level(nodes: Sequence[Visit]) -> list[int]:
+    """The number of visited nodes of each level, from the root's."""
+    return np.bincount([node.level for node in nodes]).tolist() if nodes else []
+
+
+def _values(comparison: Comparison, pick: Pick) -> dict[str, Any]:
+    """The values of the comparison's pixel under that of the view."""
+    height, width = comparison.identical.shape
+    x, y = pick.x * width // pick.w, pick.y * height // pick.h
+    return {"at": [x, y], "of": [width, height], "values": comparison.values_at(x, y)}
 
 
 def _met(shown: ShownScene, prepared: PreparedScene, direction: Vector, hits: Hits) -> dict[str, Any]:
@@ -63,4 +83,5 @@ def _met(shown: ShownScene, prepared: PreparedScene, direction: Vector, hits: Hi
 
 
 def _told(path: Sequence[Segment]) -> list[dict[str, Any]]:
-    return [{"kind": s.kind, "depth": s.depth, "start": s.start, "end": s.end, "hit": s.hit} for s in path]
+    keys = ("kind", "depth", "parent", "start", "end", "hit", "face", "weight", "radiance")
+    return [{key: getattr(segment, key) for key in keys} for segment in path]

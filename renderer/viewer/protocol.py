@@ -19,7 +19,7 @@ MAX_SAMPLES = 64
 # almost all of the picture is its rim.
 MIN_FOVY, MAX_FOVY = 0.001, 3.1
 
-RGBA, JPEG, FACE_COLORS = 1, 2, 3
+RGBA, JPEG, FACE_COLORS, PROOF = 1, 2, 3, 4
 # kind, seq, step, last, w, h, first row and rows of the whole as uint32, then milliseconds and million rays per second
 # as float32, little-endian.
 HEADER = struct.Struct("<8I2f")
@@ -32,8 +32,10 @@ _Fovy = Annotated[float, Field(ge=MIN_FOVY, le=MAX_FOVY)]
 _Height = Annotated[float, Field(gt=0.0, le=FARTHEST)] | None
 _FileName = Annotated[str, Field(max_length=255)]  # the longest file name
 
-Mode = Literal["gl", "phong", "brute", "octree"]
-MODES: tuple[Mode, ...] = ("gl", "phong", "brute", "octree")
+Mode = Literal["gl", "phong", "brute", "octree", "proof"]
+MODES: tuple[Mode, ...] = ("gl", "phong", "brute", "octree", "proof")
+# Modes whose pictures may take minutes.
+SLOW: tuple[Mode, ...] = ("brute", "proof")
 
 
 class _Message(BaseModel):
@@ -53,7 +55,9 @@ class _Sized(_Message):
 
 class ViewSettings(_Message):
     """The settings of the panel. ``light`` is the direction in which the first directional light travels, null for the
-    scene's own; ``aov`` the value that a pixel shows; ``pixels`` the format in which pictures are sent.
+    scene's own; ``aov`` the value that a pixel shows; ``pixels`` the format in which pictures are sent; ``pair`` what a
+    proof compares: the octree and "brute" force, few and many "samples", or the octree and the reference of that name;
+    ``refine`` the samples per pixel up to which the picture of a camera at rest grows.
     """
 
     max_depth: Annotated[int, Field(ge=0, le=64)] = 6
@@ -61,11 +65,13 @@ class ViewSettings(_Message):
     shadows: bool = True
     reflection: bool = True
     refraction: bool = True
-    aov: Literal["color", "depth", "normal", "face", "cost"] = "color"
+    refine: Annotated[int, Field(ge=1, le=MAX_SAMPLES)] = 1
+    aov: Literal["color", "depth", "normal", "face", "cost", "nodes", "triangles"] = "color"
     light: FiniteVector | None = None
     pixels: Literal["rgba", "jpeg"] = "rgba"
+    pair: Annotated[str, Field(min_length=1, max_length=40)] = "brute"
 
-    @field_validator("samples")
+    @field_validator("samples", "refine")
     @classmethod
     def _square(cls, value: int) -> int:
         sample_offsets(value)
@@ -109,7 +115,9 @@ class Cancel(_Message):
 
 
 class Pick(_Sized):
-    """A click on pixel (``x``, ``y``), counted from the top left, that asks for its ray and all that this spawns."""
+    """A click on pixel (``x``, ``y``), counted from the top left, that asks for its ray and all that this spawns; and
+    for the pixel's values in the proof of view ``proof``.
+    """
 
     type: Literal["pick"]
     seq: _Sequence
@@ -118,6 +126,7 @@ class Pick(_Sized):
     m: _Matrix
     fovy: _Fovy
     height: _Height = None
+    proof: _Sequence | None = None
     settings: ViewSettings = ViewSettings()
 
     @model_validator(mode="after")
@@ -196,6 +205,7 @@ def packed(
 ) -> bytes:
     """The header of a picture, of a band of one, or of face colours; ``pace`` is ms and million rays per second.
 
-    40 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, or 3 bytes per face.
+    40 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, 3 bytes per face; or
+    for a proof three PNG files, each after its size as a uint32: the picture one way, the other way, and the heat map.
     """
     return HEADER.pack(kind, view.seq, step, last, width, rows.number, rows.first, rows.whole, *pace)

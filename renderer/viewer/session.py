@@ -12,11 +12,13 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
-from renderer.picture.prepare import tiles
 from renderer.viewer.commands import command_of, saved
+from renderer.viewer.compare import Comparison
+from renderer.viewer.growth import Growth
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
 from renderer.viewer.protocol import (
+    SLOW,
     Ack,
     AskCommand,
     CameraMessage,
@@ -103,6 +105,7 @@ class Session:
     def __post_init__(self) -> None:
         self.shown = self.host.shown
         self._awaited: tuple[int, int] | None = None
+        self._proof: tuple[int, Comparison] | None = None
         self._acknowledged = asyncio.Event()
         self._acknowledged.set()
         self._leaving: set[asyncio.Future[Any]] = set()
@@ -147,7 +150,7 @@ class Session:
 
     async def show_scene(self, shown: ShownScene) -> None:
         """Show ``shown`` from now on, and say which that is. Views of the one before are dropped."""
-        self.shown = shown
+        self.shown, self._proof = shown, None
         self.views.put(None)
         await self._tell(type="scene", id=shown.id)
 
@@ -157,37 +160,52 @@ class Session:
             await self._acknowledged.wait()
             view = await self.views.take()
             try:
-                for wanted in passes_of(view):
-                    await self._show(view, wanted)
+                await self._show_view(view)
             except SupersededError:
                 pass
             except Exception as error:  # where the connection itself has failed, complaining raises that again
                 await self.complain(error)
 
-    async def _show(self, view: CameraMessage, wanted: Pass) -> None:
-        """Compute and send one pass. The first of a view is always shown, however fast views come, or a slow machine
-        would show none while the camera moves. That of brute force is not, because it takes seconds.
+    async def _show_view(self, view: CameraMessage) -> None:
+        """Compute and send all passes of a view."""
+        passes, growth = passes_of(view, self.shown.threads), Growth()
+        refined = passes and passes[-1].refines
+        whole, done = sum(wanted.work for wanted in passes if not wanted.refines), 0
+        for wanted in passes:
+            made = await self._show(view, wanted, (done / whole, wanted.work / whole))
+            done += wanted.work
+            if told := growth.add(wanted, made.colors) if refined and made.colors is not None else None:
+                await self._tell(**told, seq=view.seq)
+
+    async def _show(self, view: CameraMessage, wanted: Pass, span: tuple[float, float]) -> Answer:
+        """Compute and send one pass, which is that ``span`` of the view's work: its begin and its share.
+
+        The first of a view is always shown, however fast views come, or a slow machine would show none while the camera
+        moves. That of a slow mode is not, because it takes seconds.
         """
-        stubborn = wanted.step == 0 and view.mode != "brute"
-        if view.mode == "brute" and self._leaving:
+        stubborn = wanted.step == 0 and view.mode not in SLOW
+        if view.mode in SLOW and self._leaving:
             # One such picture at a time: the tiles under way of the last one end first.
             await self._unless_newer(asyncio.wait(self._leaving))
-        message, limits = await self._computed(view, wanted, stubborn)
+        made = await self._computed(view, wanted, stubborn, span)
         if not stubborn:
             await self._unless_newer(self._acknowledged.wait())
         self._awaited = view.seq, wanted.step
         self._acknowledged.clear()
-        if limits is not None:
-            await self._tell(type="legend", seq=view.seq, aov=view.settings.aov, low=limits[0], high=limits[1])
-        await self.connection.binary(message)
+        if made.comparison is not None:
+            self._proof = view.seq, made.comparison
+        if made.told is not None:
+            await self._tell(**made.told)
+        await self.connection.binary(made.message)
+        return made
 
-    async def _computed(self, view: CameraMessage, wanted: Pass, stubborn: bool) -> Answer:
+    async def _computed(self, view: CameraMessage, wanted: Pass, stubborn: bool, span: tuple[float, float]) -> Answer:
         """The pass's answer. A newer view does not wait for the tiles under way, which end soon; no others begin."""
-        shown, left, done = self.shown, threading.Event(), 0
+        shown, left, done = self.shown, threading.Event(), 0.0
 
-        def finished(tiles: int) -> None:
+        def finished(share: float) -> None:
             nonlocal done
-            done += tiles
+            done += share
             if left.is_set():
                 raise SupersededError
 
@@ -197,8 +215,8 @@ class Session:
         try:
             while not stubborn and not running.done():
                 await self._unless_newer(asyncio.wait({running}, timeout=_PROGRESS))
-                if view.mode == "brute" and not running.done():
-                    await self._tell(type="progress", seq=view.seq, done=done / tiles(wanted.size))
+                if view.mode in SLOW and not running.done():
+                    await self._tell(type="progress", seq=view.seq, done=min(span[0] + span[1] * done, 1.0))
             return await asyncio.shield(running)
         finally:
             left.set()
@@ -223,10 +241,16 @@ class Session:
         while True:
             pick = await self.picks.take()
             try:
-                running = asyncio.get_running_loop().run_in_executor(self.threads, picked, self.shown, pick)
+                running = asyncio.get_running_loop().run_in_executor(
+                    self.threads, picked, self.shown, pick, self._proof_of(pick)
+                )
                 await self._tell(**await running)
             except Exception as error:  # as above
                 await self.complain(error)
+
+    def _proof_of(self, pick: Pick) -> Comparison | None:
+        """The comparison that the click is on."""
+        return self._proof[1] if self._proof is not None and self._proof[0] == pick.proof else None
 
     async def _open_scenes(self) -> None:
         while True:

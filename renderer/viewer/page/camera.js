@@ -122,6 +122,17 @@ export class Camera {
     this.pivot = [...point];
   }
 
+  // Look at the middle of a way from its side, so far off that all of it is in view.
+  seeAside(start, end) {
+    const way = sub(end, start);
+    this.pivot = add(start, scale(way, 0.5));
+    this.yaw = Math.atan2(dot(way, this.axes[0]), dot(way, this.axes[2])) + Math.PI / 2;
+    this.pitch = 0.15;
+    const wanted = 1.2 * norm(way);
+    if (this.height !== null) this.height = wanted;
+    else this.distance = wanted / (2 * Math.tan(this.fovy / 2));
+  }
+
   // Walk: right, up and forward in scene units.
   walk(x, y, z) {
     const [right, , back] = this.frame();

@@ -1,22 +1,13 @@
 // The card of a picked pixel: where its ray went and what it met.
+import { element, swatch } from "./element.js";
 import { KINDS, shownKind } from "./overlay.js";
+import { rayTree } from "./raytree.js";
+import { count } from "./readings.js";
 
 const NAMES = { camera: "camera ray", reflected: "reflected", refracted: "refracted", shadow: "shadow, lit", blocked: "shadow, blocked" };
 
-export function element(tag, properties = {}, ...children) {
-  const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
-  return made;
-}
-
 const vector = (v) => v.map((x) => x.toFixed(3)).join("  ");
 const rgb = (color) => `rgb(${color.map((x) => Math.round(255 * Math.min(x, 1) ** (1 / 2.2))).join(" ")})`;
-
-function swatch(color) {
-  const dot = element("i", { className: "swatch" });
-  dot.style.background = color;
-  return dot;
-}
 
 function rows(pick, scene) {
   if (!pick.hit) return [["hit", "nothing: the background"]];
@@ -38,8 +29,35 @@ function legend(path) {
     element("li", {}, swatch(`rgb(${KINDS[kind].join(" ")})`), `${count} ${NAMES[kind]}`));
 }
 
-// Fill and show `card`; `close()` is called by its button and `toggle(shown)` by the switch of the visited nodes.
-export function showCard(card, pick, { scene, close, toggle, shown }) {
+// The pixel's values by both ways of a proof, and how they differ.
+function values({ at, of, values: [one, other], same_rays: same }) {
+  const cells = (numbers) => numbers.map((x) => element("td", {}, x.toPrecision(6)));
+  const line = ({ name, radiance, rays }) =>
+    element("tr", { title: rays === null ? "" : `${count(rays)} rays` }, element("th", { scope: "row" }, name), ...cells(radiance));
+  const identical = one.radiance.every((x, i) => x === other.radiance[i]);
+  const apart = one.radiance.map((x, i) => Math.abs(x - other.radiance[i]));
+  const table = element("table", { className: "values" }, line(one), line(other), line({ name: "apart", radiance: apart, rays: null }));
+  const counts = [one, other].map(({ rays }) => (rays === null ? "?" : count(rays))).join(" and ");
+  const rays = same === null ? `${counts} rays` : `${same ? "the same" : "not the same"} ${counts} rays`;
+  const where = `pixel ${at.join(", ")} of ${of.join(" × ")}`;
+  const said = identical ? `Identical to the bit, ${rays}; ${where}` : `Different, ${rays}; ${where}`;
+  return [element("h2", { textContent: "Proof" }), table, element("p", { className: "note", textContent: said })];
+}
+
+// The nodes that the camera ray visited, as bars from the root's level down.
+function byLevel(levels) {
+  const most = Math.max(...levels, 1);
+  const bars = levels.map((number, level) => {
+    const bar = element("i", { title: `level ${level}: ${number}` });
+    bar.style.height = `${(100 * number) / most}%`;
+    return bar;
+  });
+  return element("div", { className: "by-level", role: "img", ariaLabel: `Nodes visited, by level: ${levels.join(", ")}` }, ...bars);
+}
+
+// Fill and show `card`; `close()` is called by its button, `toggle(shown)` by the switch of the visited nodes,
+// `chosen(index)` for the ray that is pointed at, and `aside()` to see it from the side.
+export function showCard(card, pick, { scene, close, toggle, chosen, aside, shown }) {
   const list = element("dl");
   for (const [name, ...value] of rows(pick, scene)) list.append(element("dt", { textContent: name }), element("dd", {}, ...value));
   const closing = element("button", { type: "button", className: "close", ariaLabel: "Close", textContent: "×" });
@@ -48,7 +66,12 @@ export function showCard(card, pick, { scene, close, toggle, shown }) {
   nodes.setAttribute("role", "switch");
   nodes.addEventListener("change", () => toggle(nodes.checked));
   const visited = element("label", { className: "switch" }, element("span", {}, `${pick.visited} nodes visited`), nodes);
+  const tested = element("p", { className: "note", textContent: `${count(pick.tested.triangles)} triangles tested by the camera ray` });
+  const side = element("button", { type: "button", textContent: "View from the side" });
+  side.addEventListener("click", aside);
   const title = element("h2", { textContent: pick.hit ? "Ray" : "Ray into the open" });
-  card.replaceChildren(closing, title, list, element("ul", { className: "legend" }, ...legend(pick.path)), visited);
+  const proof = pick.proof ? values(pick.proof) : [];
+  card.replaceChildren(closing, ...proof, title, list, element("ul", { className: "legend" }, ...legend(pick.path)),
+    ...rayTree(pick.path, chosen), visited, ...(pick.levels.length ? [byLevel(pick.levels)] : []), tested, side);
   card.hidden = false;
 }

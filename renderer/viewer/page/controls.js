@@ -16,6 +16,9 @@ const ZOOM_RATE = 2;
 // What a tap shorter than a frame does: as much as holding the key so long, in seconds.
 const TAP = 0.04;
 
+// What stands on the stage and is no part of the picture.
+const OWN = "button, .proof, .slider";
+
 const HELD = {
   ArrowLeft: [0, -1, 0], ArrowRight: [0, 1, 0], ArrowUp: [0, 0, 1], ArrowDown: [0, 0, -1],
   KeyA: [1, -1, 0, 0], KeyD: [1, 1, 0, 0], KeyQ: [1, 0, -1, 0], KeyE: [1, 0, 1, 0],
@@ -44,7 +47,7 @@ export class Controls {
     for (const name of ["pointerup", "pointercancel"])
       stage.addEventListener(name, (event) => this.release(event));
     stage.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    stage.addEventListener("dblclick", (event) => event.target.closest("button") ?? focused());
+    stage.addEventListener("dblclick", (event) => event.target.closest(OWN) ?? focused());
     stage.addEventListener("contextmenu", (event) => event.preventDefault());
     document.addEventListener("keydown", (event) => this.keyDown(event));
     document.addEventListener("keyup", (event) => this.held.delete(event.code));
@@ -52,7 +55,7 @@ export class Controls {
   }
 
   press(event) {
-    if (event.target.closest("button")) return;
+    if (event.target.closest(OWN)) return;
     this.stage.focus({ preventScroll: true });
     this.stage.setPointerCapture(event.pointerId);
     if (!this.pointers.size) this.travelled = 0;

@@ -2,7 +2,7 @@
 
 import { isForStage, isShortcut } from "./controls.js";
 
-const MODES = ["gl", "phong", "brute", "octree"];
+const MODES = ["gl", "phong", "brute", "octree", "proof"];
 
 export function bindKeys(viewer) {
   const { stage, panel } = viewer;
@@ -19,6 +19,7 @@ export function bindKeys(viewer) {
     f: () => viewer.fit(),
     b: () => click(fields.boxes),
     l: () => click(fields.walk),
+    x: () => viewer.mode === "proof" && viewer.proof.toggle(),
     ",": () => level(-1),
     ".": () => level(1),
     Escape: () => (viewer.rays.shown ? viewer.rays.close() : viewer.cancel()),

@@ -1,24 +1,28 @@
 // The page: one camera, four modes, and the newest view on its way to the renderer.
 import { Camera } from "./camera.js";
-import { Connection, FACE_COLORS, fetchFrom } from "./connection.js";
+import { Connection, FACE_COLORS, PROOF, fetchFrom } from "./connection.js";
 import { Controls } from "./controls.js";
 import { film } from "./film.js";
 import { GlLayer } from "./gl.js";
 import { Busy } from "./busy.js";
 import { bindKeys, returnKeys } from "./keys.js";
 import { kept, remember, remembered, stays } from "./memory.js";
+import { Legend } from "./legend.js";
 import { DEPTH, FACES, LIT } from "./model.js";
 import { Notices } from "./notices.js";
 import { NO_BOXES, fetchBoxes } from "./overlay.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
 import { Progress } from "./progress.js";
+import { Proof } from "./proof.js";
 import { Rays } from "./rays.js";
 import { Readings } from "./readings.js";
 import { copyText, savePicture, saveText } from "./save.js";
 import { improves, sameCamera } from "./standing.js";
 
-const TRACED = ["brute", "octree"];
+const TRACED = ["brute", "octree", "proof"];
+// Whose pictures take seconds, and are begun when the camera rests.
+const SLOW = ["brute", "proof"];
 // A traced picture of another camera is shown this long, then the model of WebGL moves instead: a quarter of a second.
 const STALE = 250;
 // A mesh of more faces, some 70 MB, is fetched only once WebGL is to draw it.
@@ -43,11 +47,15 @@ class Viewer {
     Object.assign(this, { staleSince: null, model: false, saving: false, focusing: null });
     this.boxes = NO_BOXES;
     this.stage = find("#stage");
-    this.picture = new Picture(find("#picture"));
+    this.proof = new Proof({
+      bar: find("#proof"), divider: find("#divider"), frame: find("#frame"), changed: () => this.picture?.paint(), asked: () => this.moved(),
+    });
+    this.picture = new Picture(find("#picture"), this.proof);
+    this.legend = new Legend(find("#legend"));
     this.notices = new Notices(find("#notices"));
     this.progress = new Progress(find("#progress"));
     this.busy = new Busy(find("#busy"));
-    this.rays = new Rays(find("#card"), find("#frame"), () => this.request());
+    this.rays = new Rays(find("#card"), find("#frame"), () => this.request(), (pick) => this.seeAside(pick));
     this.readings = new Readings(find("#readings"), find("#hud"));
     this.panel = new Panel((name) => this.changed(name));
     try {
@@ -103,6 +111,7 @@ class Viewer {
     if (stays(before, scene)) this.camera.state = before.camera;
     this.forget();
     this.panel.load(scene);
+    this.proof.offer(scene.references);
     this.readings.ofScene(scene);
     find("#name").textContent = scene.name.replace(/\.toml$/, "").replaceAll("_", " ");
     document.title = `${scene.name} · octree-render`;
@@ -120,6 +129,8 @@ class Viewer {
     this.sent.clear();
     this.rays.close();
     this.picture.clear();
+    this.proof.forget();
+    this.legend.show(null);
     this.layer?.begin(this.scene);
     this.stopSaving();
     for (const name of ["mesh", "tracing"]) this.busy.end(name);
@@ -234,7 +245,9 @@ class Viewer {
   setMode(mode) {
     const input = find(`[name=mode][value=${mode}]`);
     if (input.disabled) return this.notices.say(`${input.parentElement.textContent.slice(1)}: ${input.parentElement.title}`);
-    if (this.mode === "brute" && mode !== "brute") this.progress.show(null);
+    if (SLOW.includes(this.mode) && mode !== this.mode) this.progress.show(null);
+    find("#proof").hidden = mode !== "proof";
+    if (mode !== "proof") this.proof.forget();
     if (!TRACED.includes(mode)) {
       this.stopSaving();
       this.busy.end("tracing");
@@ -303,7 +316,7 @@ class Viewer {
     const seconds = Math.min((now - (this.before ?? now)) / 1000, 0.1);
     const moving = this.controls.advance(seconds);
     this.before = moving ? now : null;
-    const waiting = this.mode === "brute" && performance.now() - this.movedAt < REST;
+    const waiting = SLOW.includes(this.mode) && performance.now() - this.movedAt < REST;
     if (this.dirty && this.attended && !waiting) this.sendView();
     // An answer that came since this frame was asked for has drawn it all.
     if (this.held) setTimeout(() => this.heldSince !== null && this.wake(), HOLD);
@@ -329,7 +342,7 @@ class Viewer {
     this.dirty = false;
     this.heldSince ??= at;
     this.connection.send({ type: "view", seq: this.seq, ...message });
-    if (this.mode === "brute") this.progress.show(0);
+    if (SLOW.includes(this.mode)) this.progress.show(0);
   }
 
   // Whether the traced picture was taken by the current camera.
@@ -394,7 +407,7 @@ class Viewer {
     // Nothing older comes after it.
     for (const old of this.sent.keys()) if (old < seq || (old === seq && last)) this.sent.delete(old);
     if (!wanted) return;
-    if (this.mode === "brute") this.progress.show(null);
+    if (SLOW.includes(this.mode) && picture.last) this.progress.show(null);
     this.readings.ofPicture(picture, performance.now() - view.at, this.scene.faces, view);
     if (this.saving && this.finished) this.saveNow();
   }
@@ -415,6 +428,8 @@ class Viewer {
     this.shown = { view, w, h, seq, step, last };
     this.staleSince = this.current ? null : performance.now();
     this.busy.end("tracing");
+    this.legend.show(view.legend ?? null);
+    if (picture.kind === PROOF) this.proof.tell(view.legend);
     this.note(picture, { ...view, w, h });
     this.draw();
   }
@@ -425,6 +440,8 @@ class Viewer {
       progress: ({ seq, done }) => seq === this.seq && this.progress.shown && this.progress.show(done),
       pick: (pick) => this.picked(pick),
       legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
+      proof: (proof) => this.sent.has(proof.seq) && (this.sent.get(proof.seq).legend = proof),
+      refined: (told) => told.seq === this.seq && this.readings.refined(told),
       scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
       camera: ({ name, text }) => saveText(name, text),
       command: ({ text }) => copyText(text).then((copied) => this.notices.say(copied ? `Copied: ${text}` : text)),
@@ -466,11 +483,12 @@ class Viewer {
     this.stopSaving();
     this.busy.end("tracing");
     this.progress.show(null);
-    this.notices.say("Brute force cancelled; the next movement starts it again.");
+    this.notices.say("Cancelled; the next movement starts it again.");
   }
 
   pickAt(clientX, clientY) {
-    const question = this.rays.question(this.view(), this.panel.settings, clientX, clientY);
+    const proof = this.mode === "proof" && this.current && this.shown.view.mode === "proof" ? { proof: this.shown.seq } : {};
+    const question = this.rays.question({ ...this.view(), ...proof }, this.panel.settings, clientX, clientY);
     if (question) this.connection.send(question);
   }
 
@@ -478,6 +496,12 @@ class Viewer {
     if (pick.seq !== this.rays.seq) return;
     this.rays.show(pick, this.scene);
     if (this.focusing === pick.seq) this.focusOn(pick);
+  }
+
+  // See the first ray of a pick from its side.
+  seeAside({ path: [{ start, end }] }) {
+    this.camera.seeAside(start, end);
+    this.moved();
   }
 
   // Turn about what was clicked last, once it is known what that is.

@@ -1,5 +1,5 @@
 // Short messages over the stage, such as what the server says is wrong.
-import { element } from "./card.js";
+import { element } from "./element.js";
 
 // Milliseconds: long enough to read two lines.
 const SHOWN = 8000;

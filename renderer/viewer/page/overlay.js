@@ -50,15 +50,17 @@ export async function fetchBoxes(id, level, most) {
 // As which of KINDS a segment of a path is shown.
 export const shownKind = ({ kind, hit }) => (kind === "shadow" && hit ? "blocked" : kind);
 
-// The rays of a picked pixel and the point that each of them met.
-export function pathLines(pick) {
+// The rays of a picked pixel and the point that each of them met. Where one is `chosen` by its index, the others fade.
+export function pathLines(pick, chosen = -1) {
   const set = new LineSet();
-  for (const segment of pick.path) {
+  pick.path.forEach((segment, i) => {
     const shadow = segment.kind === "shadow";
-    const color = [...KINDS[shownKind(segment)], shadow ? 215 : 255];
-    set.add(segment.start, segment.end, color, shadow ? 2 : 3, shadow && segment.hit ? 9 : 0);
+    const faded = chosen >= 0 && i !== chosen;
+    const color = [...KINDS[shownKind(segment)], faded ? 70 : shadow && i !== chosen ? 215 : 255];
+    const width = (shadow ? 2 : 3) * (i === chosen ? 1.8 : 1);
+    set.add(segment.start, segment.end, color, width, shadow && segment.hit ? 9 : 0);
     if (segment.hit) set.add(segment.end, segment.end, color, shadow ? 6 : 9);
-  }
+  });
   return set;
 }
 

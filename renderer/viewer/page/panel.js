@@ -1,5 +1,5 @@
 // The panel: its form holds the settings, the rest shows what the scene is and how fast its pictures come.
-import { element } from "./card.js";
+import { element } from "./element.js";
 import { levelColor } from "./overlay.js";
 import { count } from "./readings.js";
 
@@ -77,12 +77,12 @@ export class Panel {
 
   // The settings of a view as the server reads them.
   get settings() {
-    const { max_depth, samples, shadows, reflection, refraction, aov } = this.fields;
+    const { max_depth, samples, shadows, reflection, refraction, aov, refine } = this.fields;
     // Raw pixels cost nothing on this machine; through a network a tenth of them is worth the loss.
     const local = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
     return { max_depth: Number(max_depth.value), samples: Number(samples.value), shadows: shadows.checked,
       reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, light: this.light,
-      pixels: local ? "rgba" : "jpeg" };
+      refine: Number(refine.value), pair: document.querySelector("[name=pair]").value, pixels: local ? "rgba" : "jpeg" };
   }
 
   showValues() {
@@ -124,9 +124,10 @@ export class Panel {
 
   // What does not apply to the mode is disabled, and says so.
   setMode(mode) {
-    const traced = mode === "octree" || mode === "brute";
+    const traced = mode === "octree" || mode === "brute" || mode === "proof";
     document.querySelector("#traced").disabled = !traced;
-    this.fields.samples.disabled = mode === "brute"; // it always takes one
+    this.fields.samples.disabled = this.fields.refine.disabled = mode !== "octree"; // others have their own numbers
+    this.fields.aov.disabled = mode === "proof"; // which compares colours
     document.querySelector("#traced-note").hidden = traced;
   }
 }

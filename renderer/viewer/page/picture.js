@@ -1,19 +1,32 @@
 // The traced picture: a 2D canvas that shows each pass as it arrives, stretched to the frame.
-import { PICTURE_JPEG } from "./connection.js";
+import { PICTURE_JPEG, PROOF } from "./connection.js";
+import { readProof } from "./proof.js";
 
 export class Picture {
-  constructor(canvas) {
-    this.canvas = canvas;
+  // `proof` draws pictures that are two.
+  constructor(canvas, proof) {
+    Object.assign(this, { canvas, proof, parts: null });
     this.context = canvas.getContext("2d");
   }
 
   // Show a decoded picture, or a band of one over what stands there; resolves when it stands on the canvas.
   async show({ kind, w, h, first, rows, bytes }) {
+    if (kind === PROOF) {
+      this.parts = await readProof(bytes);
+      this.resize(w, h);
+      return this.paint();
+    }
+    this.parts = null;
     const jpeg = kind === PICTURE_JPEG && (await createImageBitmap(new Blob([bytes], { type: "image/jpeg" })));
     if (rows === h) this.resize(w, h);
     else this.stretch(w, h);
     if (jpeg) this.context.drawImage(jpeg, 0, first);
     else this.context.putImageData(new ImageData(bytes, w, rows), 0, first);
+  }
+
+  // Draw the two pictures of a proof, if that is what stands here, as they are wanted now.
+  paint() {
+    if (this.parts) this.proof.paint(this.context, this.parts);
   }
 
   resize(w, h) {
@@ -32,6 +45,7 @@ export class Picture {
   }
 
   clear() {
+    this.parts = null;
     this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
   }
 

@@ -6,9 +6,9 @@ import { pathLines, visitedLines } from "./overlay.js";
 const NONE = new LineSet(1);
 
 export class Rays {
-  // `changed()` is called when other lines are to be drawn.
-  constructor(card, frame, changed) {
-    Object.assign(this, { card, frame, changed, seq: 0, asked: null, path: NONE, nodes: NONE, showNodes: true });
+  // `changed()` is called when other lines are to be drawn, and `aside(pick)` to see a ray from the side.
+  constructor(card, frame, changed, aside) {
+    Object.assign(this, { card, frame, changed, aside, seq: 0, asked: null, path: NONE, nodes: NONE, showNodes: true });
   }
 
   get shown() {
@@ -47,7 +47,12 @@ export class Rays {
       this.showNodes = shown;
       this.changed();
     };
-    showCard(this.card, pick, { scene, close: () => this.close(), toggle, shown: this.showNodes });
+    const chosen = (index) => {
+      this.path = pathLines(pick, index);
+      this.changed();
+    };
+    const aside = () => this.aside(pick);
+    showCard(this.card, pick, { scene, close: () => this.close(), toggle, chosen, aside, shown: this.showNodes });
     this.changed();
   }
 

@@ -1,6 +1,6 @@
 // The list of numbers in the panel, and the short line over the picture.
-import { element } from "./card.js";
-import { FACE_COLORS } from "./connection.js";
+import { element } from "./element.js";
+import { FACE_COLORS, PROOF } from "./connection.js";
 
 export const count = (n) => n.toLocaleString("en");
 const bytes = (n) => (n < 1e6 ? `${(n / 1e3).toFixed(0)} kB` : `${(n / 1e6).toFixed(1)} MB`);
@@ -10,7 +10,7 @@ const milliseconds = (ms) => (ms < 10 ? `${ms.toFixed(1)} ms` : seconds(ms / 1e3
 const pace = (millions) =>
   millions < 0.1 ? `${(1e3 * millions).toFixed(millions < 0.01 ? 2 : 1)} k rays/s` : `${millions.toFixed(millions < 10 ? 2 : 1)} M rays/s`;
 const scale = ({ aov, low, high }) =>
-  aov === "cost" ? `${count(low)} to ${count(high)} rays` : `${low.toPrecision(4)} to ${high.toPrecision(4)}`;
+  ["cost", "nodes", "triangles"].includes(aov) ? `${count(low)} to ${count(high)} ${aov === "cost" ? "rays" : aov}` : `${low.toPrecision(4)} to ${high.toPrecision(4)}`;
 
 export class Readings {
   constructor(list, line) {
@@ -40,6 +40,13 @@ export class Readings {
     this.read({ picture: `${w} × ${h}`, pass: "–", time: "–", shown: "–", speed: "–", scale: "–" });
   }
 
+  // A picture at rest that has grown finer: its samples a pixel, and what is left of its error in 255ths, as estimated.
+  refined({ samples, error }) {
+    const told = `${samples} samples a pixel, within about ${error.toFixed(error < 1 ? 2 : 1)} of 255`;
+    this.line.textContent = told;
+    this.read({ refined: told });
+  }
+
   // A picture or colours that arrived: {kind, step, last, w, h, ms, rate}, `late` milliseconds after `view` was sent; its
   // `legend` has the values at the ends of a scale of colours, where the picture has one.
   ofPicture({ kind, step, last, w, h, ms, rate }, late, faces, view) {
@@ -50,9 +57,9 @@ export class Readings {
       this.line.textContent = `own Phong · ${count(faces)} colours in ${time}`;
       return this.read({ picture: `${count(faces)} colours`, pass: "–", time, shown, speed: "–", scale: ends });
     }
-    const speed = pace(rate);
+    const speed = kind === PROOF ? "–" : pace(rate);
     const size = last ? `${w} × ${h}` : `${w} × ${h} of ${view.w} × ${view.h}`;
-    this.line.textContent = `${size} · ${time} · ${speed}`;
+    this.line.textContent = kind === PROOF ? `${size} twice · ${time}` : `${size} · ${time} · ${speed}`;
     this.read({ picture: `${w} × ${h}`, pass: last ? "final" : `${step + 1}`, time, shown, speed, scale: ends });
   }
 }

@@ -1,5 +1,5 @@
 // Files that the page offers for download.
-import { element } from "./card.js";
+import { element } from "./element.js";
 
 function download(blob, name) {
   const url = URL.createObjectURL(blob);

@@ -7,9 +7,11 @@ const sameShape = (a, b) => Math.abs(a.w * b.h - a.h * b.w) <= Math.max(a.w, a.h
 export const sameCamera = (a, b) =>
   a.fovy === b.fovy && a.height === b.height && sameShape(a, b) && a.m.every((x, i) => x === b.m[i]);
 
-// Whether they differ at most in how finely they are traced. Brute force gives the octree's picture.
+const FINENESS = { samples: 0, refine: 0 };
+
+// Whether they differ at most in how finely they are traced. Brute force gives the octree's picture; a proof has two.
 const sameButFiner = (a, b) =>
-  sameCamera(a, b) && JSON.stringify({ ...a.settings, samples: 0 }) === JSON.stringify({ ...b.settings, samples: 0 });
+  sameCamera(a, b) && (a.mode === "proof") === (b.mode === "proof") && JSON.stringify({ ...a.settings, ...FINENESS }) === JSON.stringify({ ...b.settings, ...FINENESS });
 
 // Whether a picture {w, h, rows, last} that came for `view` is to take the place of `shown`, {view, w} or null. `now` is
 // the view of the camera as it is, and `model` whether WebGL's model stands in for the picture. A band of rows is as fine

@@ -1,0 +1,14 @@
+// Elements of the page, made of their properties and what is in them.
+
+export function element(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+// A dot in a colour of CSS.
+export function swatch(color) {
+  const dot = element("i", { className: "swatch" });
+  dot.style.background = color;
+  return dot;
+}
