@@ -106,6 +106,7 @@ class Session:
         self.shown = self.host.shown
         self._awaited: tuple[int, int] | None = None
         self._proof: tuple[int, Comparison] | None = None
+        self._told_at = 0.0
         self._acknowledged = asyncio.Event()
         self._acknowledged.set()
         self._leaving: set[asyncio.Future[Any]] = set()
@@ -215,11 +216,17 @@ class Session:
         try:
             while not stubborn and not running.done():
                 await self._unless_newer(asyncio.wait({running}, timeout=_PROGRESS))
-                if view.mode in SLOW and not running.done():
-                    await self._tell(type="progress", seq=view.seq, done=min(span[0] + span[1] * done, 1.0))
+                await self._tell_progress(view, span[0] + span[1] * done)
             return await asyncio.shield(running)
         finally:
             left.set()
+
+    async def _tell_progress(self, view: CameraMessage, done: float) -> None:
+        """Tell how much of a slow view is done, unless that was told a moment ago."""
+        now = asyncio.get_running_loop().time()
+        if view.mode in SLOW and now - self._told_at >= _PROGRESS:
+            self._told_at = now
+            await self._tell(type="progress", seq=view.seq, done=min(done, 1.0))
 
     def _left(self, ended: asyncio.Future[Answer]) -> None:
         self._leaving.discard(ended)

@@ -42,14 +42,27 @@ SETTINGS = {
     "aov": "depth",
     "light": [0, -1.5, 0.25],
     "pixels": "jpeg",
+    "pair": "samples",
+    "refine": 16,
 }
 SIZE = {"w": 320, "h": 240}
 VIEW = {"type": "view", "seq": 7, "mode": "octree", "m": M, "fovy": 0.7, "height": 2.5, **SIZE, "settings": SETTINGS}
-PICK = {"type": "pick", "seq": 8, "x": 319, "y": 239, "m": M, "fovy": 0.7, "height": 2, **SIZE, "settings": SETTINGS}
+PICK = {
+    "type": "pick",
+    "seq": 8,
+    "x": 319,
+    "y": 239,
+    "m": M,
+    "fovy": 0.7,
+    "height": 2,
+    **SIZE,
+    "settings": SETTINGS,
+    "proof": 3,
+}
 CAMERA = {"type": "camera", "m": M, "fovy": 0.7, "height": 1e-3}
 COMMAND = {"type": "command", "mode": "brute", "m": M, "fovy": 0.7, "height": 1e-3, **SIZE, "settings": SETTINGS}
 # The keys of a message that may be left out.
-OPTIONAL = {"settings", "walk", "height"}
+OPTIONAL = {"settings", "walk", "height", "proof"}
 # A message that may name no file.
 HELLO = {"type": "hello", "file": "a b.toml", "server": "0123456789abcdef"}
 
@@ -136,6 +149,8 @@ def test_a_bad_value_is_refused_by_its_key(message: dict[str, Any], key: str, va
     [
         ("max_depth", [-1, 65, 1.5, "3", None]),
         ("samples", [0, -4, 2, 3, 65, 100, 10**9, 4.5, None]),
+        ("refine", [0, -4, 2, 3, 65, 100, 10**9, 4.5, None]),
+        ("pair", ["", "a" * 41, 1, None]),
         ("shadows", [0, 1, "true", None]),
         ("reflection", [0, 1, "true", None]),
         ("refraction", [0, 1, "true", None]),

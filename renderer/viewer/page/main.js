@@ -276,6 +276,7 @@ class Viewer {
     const now = performance.now();
     if (this.current) this.staleSince = null;
     else this.staleSince ??= now;
+    if (this.proof.told && !(this.current && this.shown.view.settings.pair === this.panel.settings.pair)) this.proof.forget();
     this.dirty = true;
     this.movedAt = now;
     this.request();
@@ -396,7 +397,8 @@ class Viewer {
 
   async received(picture) {
     const { seq, step, last, kind } = picture;
-    const view = this.sent.get(seq);
+    // The picture of a camera at rest grows finer after its last.
+    const view = this.sent.get(seq) ?? (this.shown?.seq === seq ? this.shown.view : undefined);
     let wanted = view?.mode === this.mode;
     if (wanted && kind === FACE_COLORS) this.color(picture);
     else if (wanted) {

@@ -1,0 +1,181 @@
+"""What a ray costs: heat maps of nodes and triangles, and the whole tree of rays of a clicked pixel."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from viewer_page import CHROMIUM, SCENE, Viewer
+
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+from viewer_client import SIZE, Client, Got, looking, rendered
+
+import renderer
+from renderer import load_scene
+from renderer.inspect.false_color import shades_of
+from renderer.inspect.ray_cost import camera_steps
+from renderer.picture.prepare import PreparedScene
+from renderer.scene.camera import primary_rays
+from renderer.viewer.shown import open_file
+from renderer.viewer.viewpoint import camera_of
+
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+EYE = (0.5, 2.6, 5.5)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("cost") / "blocks.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def url(scene: Path) -> Iterator[str]:
+    with renderer.view(scene, browser=False) as viewing:
+        yield viewing.url
+
+
+@pytest.fixture
+def client(url: str) -> Iterator[Client]:
+    with Client(url) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def prepared(scene: Path) -> PreparedScene:
+    return open_file(scene).prepared
+
+
+@pytest.mark.parametrize("aov", ["nodes", "triangles"])
+def test_the_heat_map_is_that_of_the_counted_steps(client: Client, prepared: PreparedScene, aov: str) -> None:
+    client.view(w=100, h=75, settings={"aov": aov})
+    view = looking(EYE)
+    origins, directions = primary_rays(camera_of(view["m"], view["fovy"]), 100, 75)
+    counts = getattr(prepared.octree.count_steps(origins, directions), aov).reshape(75, 100)
+    told, got = client.next(), client.next()
+    assert isinstance(told, dict) and isinstance(got, Got)
+    assert (told["type"], told["aov"], told["low"], told["high"]) == ("legend", aov, counts.min(), counts.max())
+    assert told["colors"][0] == [68, 1, 84] and told["colors"][-1] == [253, 231, 37]  # viridis
+    # Rays through rounded directions may enter another box at its very edge.
+    assert (got.rgb == shades_of(counts, counts.min(), counts.max())).all(axis=2).mean() > 0.999
+    assert len(np.unique(counts)) > 3
+
+
+def test_brute_force_tests_all_triangles_and_no_node(client: Client, prepared: PreparedScene) -> None:
+    for aov, number in (("nodes", 0), ("triangles", len(prepared.mesh.faces))):
+        client.view(mode="brute", w=40, h=30, settings={"aov": aov})
+        told = client.told("legend")
+        assert told["low"] == told["high"] == number
+        client.next()
+        client.send(type="ack", seq=client.seq, step=0)
+
+
+def test_steps_are_counted_in_parts_that_are_the_whole(
+    prepared: PreparedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from renderer.inspect import ray_cost
+
+    camera, shares = prepared.scene.camera, list[float]()
+    whole = camera_steps(prepared, camera, (64, 48))
+    monkeypatch.setattr(ray_cost, "_RAYS", 300)
+    parts = camera_steps(prepared, camera, (64, 48), shares.append)
+    assert whole.nodes.shape == (48, 64) and len(shares) == 12 and sum(shares) == pytest.approx(1.0, abs=1e-12)
+    assert np.array_equal(parts.nodes, whole.nodes) and np.array_equal(parts.triangles, whole.triangles)
+
+
+@pytest.mark.parametrize(("x", "y"), [(140, 100), (3, 3)])
+def test_a_click_tells_the_whole_tree_of_rays(client: Client, scene: Path, x: int, y: int) -> None:
+    client.send(**{"type": "pick", "seq": 7, "x": x, "y": y, **looking(EYE), **SIZE})
+    got = client.told("pick")
+    image = rendered(load_scene(scene))
+    path = got["path"]
+    # Rounding apart, what the rays bring adds up to the pixel; the picture's sum is of float32.
+    assert np.allclose(sum(np.array(ray["radiance"]) for ray in path), image.radiance[y, x], rtol=0.0, atol=1e-6)
+    for i, ray in enumerate(path):
+        parent = path[ray["parent"]] if i else {"depth": -1}
+        assert ray["parent"] < i and ray["depth"] == parent["depth"] + (ray["kind"] != "shadow")
+        assert (ray["face"] >= 0) == ray["hit"]
+    assert path[0]["weight"] == [1.0, 1.0, 1.0] and path[0]["face"] == image.face[y, x]
+    assert sum(got["levels"]) == got["visited"]
+    assert [got["tested"]["nodes"] >= 0, got["tested"]["triangles"] >= 0] == [True, True]
+
+
+# On the page
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, url: str) -> Iterator[Viewer]:
+    page = Viewer(browser, url, viewport={"width": 900, "height": 640}).open()
+    yield page
+    page.context.close()
+
+
+@needs_browser
+@pytest.mark.parametrize("aov", ["depth", "cost", "nodes", "triangles"])
+def test_a_legend_shows_the_scale_of_colours(page: Viewer, aov: str) -> None:
+    assert page.page.is_hidden("#legend")
+    page.page.select_option("[name=aov]", aov)
+    page.settled("octree")
+    low, high = page.page.evaluate(
+        "() => [...viewer.sent.values()].length, [viewer.shown.view.legend.low, viewer.shown.view.legend.high]"
+    )
+    ends = page.page.locator("#legend .ends span").all_inner_texts()
+    assert float(ends[0].replace(",", "")) == pytest.approx(low, rel=1e-3)
+    assert float(ends[-1].replace(",", "")) == pytest.approx(high, rel=1e-3)
+    assert "gradient" in page.page.evaluate(
+        "() => getComputedStyle(document.querySelector('#legend .scale')).backgroundImage"
+    )
+    page.page.select_option("[name=aov]", "color")
+    page.settled("octree")
+    assert page.page.is_hidden("#legend")
+
+
+@needs_browser
+def test_the_card_lists_all_rays_and_what_is_pointed_at_stands_out(page: Viewer) -> None:
+    x, y = page.centre()
+    page.page.mouse.click(x + 90, y + 60)
+    page.page.wait_for_selector("#card:not([hidden]) .rays")
+    rays = page.page.evaluate("() => viewer.rays.pick.path.map(({ kind, depth }) => [kind, depth])")
+    rows = page.page.locator("#card .rays button")
+    assert rows.count() == len(rays) > 2
+    for (kind, _), text in zip(rays, rows.all_inner_texts(), strict=True):
+        assert kind in text and "%" in text
+    plain = page.pixels("gl")
+    rows.nth(1).hover()
+    page.page.wait_for_timeout(100)
+    assert not np.array_equal(page.pixels("gl"), plain)
+    for _ in range(3):
+        page.page.get_by_label("Next ray").click()
+        chosen = page.page.locator("#card .rays [aria-current]")
+        assert chosen.count() == 1
+    assert page.page.inner_text("#card .steps").split()[1] in ("3", "4")
+    assert page.page.locator("#card .by-level i").count() == len(page.page.evaluate("() => viewer.rays.pick.levels"))
+    page.page.locator("#stage").press("Escape")
+
+
+@needs_browser
+def test_a_ray_is_seen_from_its_side(page: Viewer) -> None:
+    x, y = page.centre()
+    page.page.mouse.click(x, y)
+    page.page.wait_for_selector("#card:not([hidden])")
+    page.page.click("text=View from the side")
+    page.settled("octree")
+    ray, m, w, h, fovy = page.page.evaluate(
+        """() => { const { m, w, h, fovy } = viewer.view(), { start, end } = viewer.rays.pick.path[0];
+                   return [[start, end], m, w, h, fovy]; }"""
+    )
+    columns = np.array(m).reshape(4, 4)
+    (start, end), (right, up, back, eye) = np.array(ray), columns[:, :3]
+    way = (end - start) / np.linalg.norm(end - start)
+    assert abs(way @ back) < 0.3  # across the view, but for the tilt
+    for point in (start, end):
+        seen = point - eye
+        depth = -(seen @ back)
+        half = np.tan(fovy / 2) * depth
+        assert depth > 0 and abs(seen @ right) < half * w / h and abs(seen @ up) < half
+    page.page.locator("#stage").press("Escape")
+    page.page.evaluate("() => viewer.reset()")
+    page.settled("octree")
