@@ -98,9 +98,7 @@ def answer(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Calla
         kind, pace = FACE_COLORS, 0.0
     else:
         image = picture(shown, view, wanted, finished)
-        aov = view.settings.aov
-        limits = limits_of(image, aov) if aov in _SCALED else None
-        rgb = false_color(image, aov, limits)
+        rgb, limits = colored(image, view.settings.aov)
         kind, payload = (JPEG, _jpeg(rgb)) if view.settings.pixels == "jpeg" else (RGBA, _rgba(rgb))
         pace = float(image.rays.sum()) / image.render_seconds / 1e6
     ms = (time.perf_counter() - began) * 1e3
@@ -119,6 +117,12 @@ def picture(
     camera = camera_of(view.m, view.fovy, height=view.height)
     planes = ("rays", *_PLANES[view.settings.aov])
     return prepared.picture(camera, settings, BOUNDED, shown.threads, finished, planes, wanted.band)
+
+
+def colored(image: Image, aov: str) -> tuple[NDArray[np.uint8], Limits | None]:
+    """The colours of a picture's AOV, (h, w, 3), and the ends of their scale if it has one."""
+    limits = limits_of(image, aov) if aov in _SCALED else None
+    return false_color(image, aov, limits), limits
 
 
 def _scaled(side: int, longest: int, of: int) -> int:

@@ -14,6 +14,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from renderer.picture.prepare import tiles
 from renderer.viewer.commands import command_of, saved
+from renderer.viewer.export import Exporter
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
 from renderer.viewer.protocol import (
@@ -25,6 +26,9 @@ from renderer.viewer.protocol import (
     OpenScene,
     Pick,
     SaveCamera,
+    Still,
+    Stop,
+    Turntable,
     parse,
 )
 from renderer.viewer.shown import ShownScene
@@ -67,10 +71,11 @@ class Newest(Generic[T]):
 
 
 class SceneHost(Protocol):
-    """The holder of the scenes that connections show."""
+    """The holder of the scenes that connections show; ``files`` computes the files that pages ask for."""
 
     id: str
     shown: ShownScene
+    files: Executor
 
     async def open(self, file: str, fresh: bool) -> ShownScene:
         """The scene of one of the files offered, or for "" the server's own; loaded anew where it was edited since it
@@ -102,6 +107,7 @@ class Session:
 
     def __post_init__(self) -> None:
         self.shown = self.host.shown
+        self.exporter = Exporter(self._tell, self.connection.binary, self.host.files)
         self._awaited: tuple[int, int] | None = None
         self._acknowledged = asyncio.Event()
         self._acknowledged.set()
@@ -125,17 +131,22 @@ class Session:
                 await self._tell(type="camera", name="camera.toml", text=saved(self.shown, message))
             elif isinstance(message, AskCommand):
                 await self._tell(type="command", text=command_of(self.shown, message))
+            elif isinstance(message, Still | Turntable):
+                self.exporter.begin(self.shown, message)
+            elif isinstance(message, Stop):
+                self.exporter.stop()
             elif isinstance(message, Hello | OpenScene):
                 self.scenes.put(message)
         except ValueError as error:
             await self.complain(error)
 
     async def run(self) -> None:
-        """Show views, answer clicks and open scenes until cancelled."""
+        """Show views, answer clicks, open scenes and make files until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._show_views())
             tasks.create_task(self._answer_picks())
             tasks.create_task(self._open_scenes())
+            tasks.create_task(self.exporter.run(self.complain))
 
     async def complain(self, error: Exception) -> None:
         """Send the page an error's message, on one line."""
