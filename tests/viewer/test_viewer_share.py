@@ -251,8 +251,16 @@ def test_of_the_model_alone_its_drawing_is_the_picture(viewer: Viewer, browser: 
 
 
 def test_a_picture_under_way_is_waited_for(viewer: Viewer, browser: Any, tmp_path: Path) -> None:
-    viewer.drag(50, 10)
-    path = saved(viewer, tmp_path / "moved.html")
+    with viewer.page.expect_download() as download:
+        viewer.page.evaluate(
+            """() => {
+                window.viewer.camera.orbit(0.3, 0.1);
+                window.viewer.moved();
+                document.querySelector("#share-file").click();
+            }"""
+        )
+    path = tmp_path / "moved.html"
+    download.value.save_as(path)
     viewer.settled("octree")
     found = re.search(r'id="picture" src="data:image/png;base64,([^"]+)"', path.read_text("utf-8"))
     assert found is not None
@@ -273,6 +281,7 @@ def test_names_are_text_whatever_they_hold(browser: Any, tmp_path: Path) -> None
     page = Saved(browser, tmp_path / "saved.html").open()
     try:
         assert page.page.title() == f"{FILE} · octree-render"
+        assert page.page.text_content("#name") == "<b>\"&'" and page.page.locator("header b").count() == 0
         names = page.page.evaluate("() => window.standalone.known.scene.materials.map((m) => m.name)")
         assert MATERIAL in names and page.page.locator("[onerror]").count() == 0
         assert page.asked == []
