@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
@@ -46,6 +46,8 @@ class Viewer:
         self._scenes = WeakValueDictionary({shown.id: shown})
         self.sessions: set[Session] = set()
         self._threads = ThreadPoolExecutor(_THREADS_A_SESSION * MAX_CONNECTIONS, "viewer")
+        # One file is computed at a time, for whichever page: each takes some 100 MB and all processors.
+        self.files: Executor = ThreadPoolExecutor(1, "viewer-files")
         self._one_opens = asyncio.Lock()
 
     async def open(self, file: str, fresh: bool) -> ShownScene:
@@ -104,7 +106,8 @@ class Viewer:
 
     async def stop(self) -> None:
         """Begin nothing more."""
-        self._threads.shutdown(wait=False, cancel_futures=True)
+        for threads in (self._threads, self.files):
+            threads.shutdown(wait=False, cancel_futures=True)
 
 
 def _opened(own: ShownScene, known: list[ShownScene], file: str, fresh: bool) -> ShownScene:

@@ -181,15 +181,22 @@ def _colored(shown: ShownScene, view: CameraMessage, *_: object) -> _Payload:
 
 def _traced(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]) -> _Payload:
     """A picture, or a band of one."""
-    aov = view.settings.aov
-    if aov in _STEPS:
-        rgb, limits, rays = _steps(shown, view, wanted, finished)
-    else:
-        image = picture(shown, view, wanted, finished)
-        limits, rays = limits_of(image, aov), float(image.rays.sum()) / image.render_seconds
-        rgb = false_color(image, aov, limits if aov in _SCALED else None)
+    aov, (rgb, limits, rays) = view.settings.aov, colored(shown, view, wanted, finished)
     kind, payload = (JPEG, _jpeg(rgb)) if view.settings.pixels == "jpeg" else (RGBA, _rgba(rgb))
     return _Payload(kind, payload, rays, _legend(aov, limits) if aov in _SCALED else None, rgb)
+
+
+def colored(
+    shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]
+) -> tuple[NDArray[np.uint8], Limits, float]:
+    """The colours of a picture or a band, (h, w, 3), the ends of their scale if it has one, and rays per second."""
+    aov = view.settings.aov
+    if aov in _STEPS:
+        return _steps(shown, view, wanted, finished)
+    image = picture(shown, view, wanted, finished)
+    limits = limits_of(image, aov)
+    rgb = false_color(image, aov, limits if aov in _SCALED else None)
+    return rgb, limits, float(image.rays.sum()) / image.render_seconds
 
 
 def _proven(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]) -> _Payload:

@@ -19,7 +19,11 @@ MAX_SAMPLES = 64
 # almost all of the picture is its rim.
 MIN_FOVY, MAX_FOVY = 0.001, 3.1
 
-RGBA, JPEG, FACE_COLORS, PROOF = 1, 2, 3, 4
+# A turn in steps of a degree; and the pixels of all its frames together, those of 36 of 1280 x 720 and some more: while
+# they are encoded they are 100 MB.
+MAX_FRAMES, MAX_FRAME_PIXELS = 360, 1 << 25
+
+RGBA, JPEG, FACE_COLORS, PROOF, FILE = 1, 2, 3, 4, 5
 # kind, seq, step, last, w, h, first row and rows of the whole as uint32, then milliseconds and million rays per second
 # as float32, little-endian.
 HEADER = struct.Struct("<8I2f")
@@ -40,6 +44,12 @@ SLOW: tuple[Mode, ...] = ("brute", "proof")
 
 class _Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+def _not_zero(direction: FiniteVector) -> FiniteVector:
+    if not any(direction):
+        raise ValueError("expected a direction of non-zero length")
+    return direction
 
 
 class _Sized(_Message):
@@ -79,10 +89,8 @@ class ViewSettings(_Message):
 
     @field_validator("light")
     @classmethod
-    def _not_zero(cls, value: FiniteVector | None) -> FiniteVector | None:
-        if value is not None and not any(value):
-            raise ValueError("expected a direction of non-zero length")
-        return value
+    def _shines_somewhere(cls, value: FiniteVector | None) -> FiniteVector | None:
+        return None if value is None else _not_zero(value)
 
 
 class CameraMessage(_Sized):
@@ -177,7 +185,53 @@ class AskCommand(_Sized):
     settings: ViewSettings = ViewSettings()
 
 
-Message = CameraMessage | Ack | Cancel | Pick | Hello | OpenScene | SaveCamera | AskCommand
+class Still(_Sized):
+    """Make a PNG file of this view, traced by the octree, beside the view that is shown."""
+
+    type: Literal["still"]
+    seq: _Sequence
+    m: _Matrix
+    fovy: _Fovy
+    height: _Height = None
+    settings: ViewSettings = ViewSettings()
+
+
+class Turntable(_Sized):
+    """Make an animated file of ``frames`` views, the camera turned once about the line through ``pivot`` along
+    ``axis``.
+    """
+
+    type: Literal["turntable"]
+    seq: _Sequence
+    m: _Matrix
+    fovy: _Fovy
+    height: _Height = None
+    settings: ViewSettings = ViewSettings()
+    pivot: FiniteVector
+    axis: FiniteVector
+    frames: Annotated[int, Field(ge=2, le=MAX_FRAMES)] = 36
+    format: Literal["webp", "gif"] = "webp"
+
+    @field_validator("axis")
+    @classmethod
+    def _has_a_direction(cls, value: FiniteVector) -> FiniteVector:
+        return _not_zero(value)
+
+    @model_validator(mode="after")
+    def _not_too_long(self) -> Self:
+        if self.frames * self.w * self.h > MAX_FRAME_PIXELS:
+            of = f"{self.frames} frames of {self.w} x {self.h}"
+            raise ValueError(f"expected at most {MAX_FRAME_PIXELS} pixels in all frames, got {of}")
+        return self
+
+
+class Stop(_Message):
+    """Stop making the file under way."""
+
+    type: Literal["stop"]
+
+
+Message = CameraMessage | Ack | Cancel | Pick | Hello | OpenScene | SaveCamera | AskCommand | Still | Turntable | Stop
 _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
@@ -193,7 +247,9 @@ def parse(text: str) -> Message:
 
 
 class Rows(NamedTuple):
-    """The rows of a picture that a message holds: the ``first``, their ``number``, and that of the ``whole``."""
+    """The rows of a picture that a message holds, or the bytes of a file: the ``first``, their ``number``, and that of
+    the ``whole``.
+    """
 
     first: int
     number: int
@@ -201,11 +257,19 @@ class Rows(NamedTuple):
 
 
 def packed(
-    kind: int, view: CameraMessage, step: int, last: bool, width: int, rows: Rows, pace: tuple[float, float]
+    kind: int,
+    view: CameraMessage | Still | Turntable,
+    step: int,
+    last: bool,
+    width: int,
+    rows: Rows,
+    pace: tuple[float, float],
 ) -> bytes:
-    """The header of a picture, of a band of one, or of face colours; ``pace`` is ms and million rays per second.
+    """The header of a picture, of a band of one, of face colours or of a piece of a file; ``pace`` is ms and million
+    rays per second.
 
-    40 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, 3 bytes per face; or
-    for a proof three PNG files, each after its size as a uint32: the picture one way, the other way, and the heat map.
+    40 bytes, which the payload follows: 4 w h bytes row by row from the top for RGBA, a JPEG file, 3 bytes per face, or
+    the bytes of the file; for a proof three PNG files, each after its size as a uint32: the picture one way, the other
+    way, and the heat map.
     """
     return HEADER.pack(kind, view.seq, step, last, width, rows.number, rows.first, rows.whole, *pace)

@@ -15,6 +15,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from renderer.viewer.commands import command_of, saved
 from renderer.viewer.compare import Comparison
 from renderer.viewer.growth import Growth
+from renderer.viewer.export import Exporter
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
 from renderer.viewer.protocol import (
@@ -27,6 +28,9 @@ from renderer.viewer.protocol import (
     OpenScene,
     Pick,
     SaveCamera,
+    Still,
+    Stop,
+    Turntable,
     parse,
 )
 from renderer.viewer.shown import ShownScene
@@ -69,10 +73,11 @@ class Newest(Generic[T]):
 
 
 class SceneHost(Protocol):
-    """The holder of the scenes that connections show."""
+    """The holder of the scenes that connections show; ``files`` computes the files that pages ask for."""
 
     id: str
     shown: ShownScene
+    files: Executor
 
     async def open(self, file: str, fresh: bool) -> ShownScene:
         """The scene of one of the files offered, or for "" the server's own; loaded anew where it was edited since it
@@ -104,6 +109,7 @@ class Session:
 
     def __post_init__(self) -> None:
         self.shown = self.host.shown
+        self.exporter = Exporter(self._tell, self.connection.binary, self.host.files)
         self._awaited: tuple[int, int] | None = None
         self._proof: tuple[int, Comparison] | None = None
         self._told_at = 0.0
@@ -129,17 +135,22 @@ class Session:
                 await self._tell(type="camera", name="camera.toml", text=saved(self.shown, message))
             elif isinstance(message, AskCommand):
                 await self._tell(type="command", text=command_of(self.shown, message))
+            elif isinstance(message, Still | Turntable):
+                self.exporter.begin(self.shown, message)
+            elif isinstance(message, Stop):
+                self.exporter.stop()
             elif isinstance(message, Hello | OpenScene):
                 self.scenes.put(message)
         except ValueError as error:
             await self.complain(error)
 
     async def run(self) -> None:
-        """Show views, answer clicks and open scenes until cancelled."""
+        """Show views, answer clicks, open scenes and make files until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._show_views())
             tasks.create_task(self._answer_picks())
             tasks.create_task(self._open_scenes())
+            tasks.create_task(self.exporter.run(self.complain))
 
     async def complain(self, error: Exception) -> None:
         """Send the page an error's message, on one line."""

@@ -11,8 +11,11 @@ from hypothesis import strategies as st
 
 from renderer.limits import FARTHEST
 from renderer.viewer.protocol import (
+    FILE,
     JPEG,
     MAX_FOVY,
+    MAX_FRAME_PIXELS,
+    MAX_FRAMES,
     MAX_MESSAGE_BYTES,
     MAX_PIXELS,
     MAX_SIDE,
@@ -27,6 +30,9 @@ from renderer.viewer.protocol import (
     Pick,
     Rows,
     SaveCamera,
+    Still,
+    Stop,
+    Turntable,
     ViewSettings,
     packed,
     parse,
@@ -61,8 +67,11 @@ PICK = {
 }
 CAMERA = {"type": "camera", "m": M, "fovy": 0.7, "height": 1e-3}
 COMMAND = {"type": "command", "mode": "brute", "m": M, "fovy": 0.7, "height": 1e-3, **SIZE, "settings": SETTINGS}
+STILL = {"type": "still", "seq": 9, "m": M, "fovy": 0.7, "height": 1e-3, **SIZE, "settings": SETTINGS}
+TURN = {"pivot": [0, 0.5, -1], "axis": [0, 1, 0], "frames": 24, "format": "gif"}
+TURNTABLE = STILL | {"type": "turntable"} | TURN
 # The keys of a message that may be left out.
-OPTIONAL = {"settings", "walk", "height", "proof"}
+OPTIONAL = {"settings", "walk", "height", "proof", "frames", "format"}
 # A message that may name no file.
 HELLO = {"type": "hello", "file": "a b.toml", "server": "0123456789abcdef"}
 
@@ -83,6 +92,9 @@ def said(message: Any) -> str:
         ({"type": "ack", "seq": 7, "step": 2}, Ack),
         ({"type": "cancel"}, Cancel),
         ({"type": "scene", "file": "a b.toml"}, OpenScene),
+        (STILL, Still),
+        (TURNTABLE, Turntable),
+        ({"type": "stop"}, Stop),
     ],
 )
 def test_a_message_is_what_it_says(message: dict[str, Any], kind: type) -> None:
@@ -136,7 +148,7 @@ BAD = [
 
 @pytest.mark.parametrize(
     ("message", "key", "values", "where"),
-    [(said, *bad) for said in (VIEW, PICK, CAMERA, COMMAND) for bad in BAD if bad[0] in said],
+    [(said, *bad) for said in (VIEW, PICK, CAMERA, COMMAND, STILL, TURNTABLE) for bad in BAD if bad[0] in said],
 )
 def test_a_bad_value_is_refused_by_its_key(message: dict[str, Any], key: str, values: list[Any], where: str) -> None:
     for value in values:
@@ -164,7 +176,7 @@ def test_a_bad_value_is_refused_by_its_key(message: dict[str, Any], key: str, va
     ],
 )
 def test_bad_settings_are_refused_by_their_key(key: str, values: list[Any]) -> None:
-    for message in (VIEW, PICK):
+    for message in (VIEW, PICK, STILL, TURNTABLE):
         for value in values:
             with pytest.raises(ValueError, match=rf"^{message['type']}\.settings\.{key}(\.\d)?: .*, got "):
                 parse(said(message | {"settings": SETTINGS | {key: value}}))
@@ -209,25 +221,57 @@ def test_garbage_is_refused_in_few_words(text: str) -> None:
     assert len(str(refused.value)) < 300
 
 
+KEYS = [*VIEW, *PICK, *TURNTABLE, *SETTINGS]
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
-    lambda inner: st.lists(inner) | st.dictionaries(st.sampled_from([*VIEW, *PICK, *SETTINGS]) | st.text(), inner),
+    lambda inner: st.lists(inner) | st.dictionaries(st.sampled_from(KEYS) | st.text(), inner),
     max_leaves=20,
 )
 
 
 @given(
-    st.text() | JSON.map(said) | st.dictionaries(st.sampled_from([*PICK, "mode"]), JSON).map(lambda d: said(VIEW | d))
+    st.text()
+    | JSON.map(said)
+    | st.dictionaries(st.sampled_from([*PICK, "mode"]), JSON).map(lambda d: said(VIEW | d))
+    | st.dictionaries(st.sampled_from([*TURNTABLE]), JSON).map(lambda d: said(TURNTABLE | d))
 )
 def test_whatever_comes_is_a_message_or_a_value_error(text: str) -> None:
     try:
         read = parse(text)
     except ValueError:
         return
-    assert isinstance(read, CameraMessage | Pick | Ack | Cancel | Hello | OpenScene | SaveCamera | AskCommand)
+    known = CameraMessage | Pick | Ack | Cancel | Hello | OpenScene | SaveCamera | AskCommand | Still | Turntable | Stop
+    assert isinstance(read, known)
 
 
-@pytest.mark.parametrize("message", [VIEW, PICK, COMMAND])
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("frames", [0, 1, -36, MAX_FRAMES + 1, 36.5, "36", None]),
+        ("format", ["png", "WEBP", "", None, 1]),
+        ("pivot", [[0, 0], [0, 0, 0, 0], [0, 0, math.nan], [1e999, 0, 0], ["0", 0, 0], None]),
+        ("axis", [[0, 0, 0], [-0.0, 0, 0], [0, 1], [0, 1, math.nan], [0, 1e999, 0], None]),
+    ],
+)
+def test_a_turntable_turns_a_few_times_about_a_line(key: str, values: list[Any]) -> None:
+    for value in values:
+        with pytest.raises(ValueError, match=rf"^turntable\.{key}(\.\d)?: .*, got "):
+            parse(said(TURNTABLE | {key: value}))
+
+
+def test_a_turntable_has_at_most_so_many_pixels() -> None:
+    size = {"w": 1024, "h": 1024}
+    most = MAX_FRAME_PIXELS // 1024**2
+    assert parse(said(TURNTABLE | size | {"frames": most}))
+    with pytest.raises(
+        ValueError, match=rf"turntable: .*{MAX_FRAME_PIXELS} pixels in all frames, got {most + 1} frames"
+    ):
+        parse(said(TURNTABLE | size | {"frames": most + 1}))
+    left_out = parse(said({key: value for key, value in TURNTABLE.items() if key not in ("frames", "format")}))
+    assert isinstance(left_out, Turntable) and (left_out.frames, left_out.format) == (36, "webp")
+
+
+@pytest.mark.parametrize("message", [VIEW, PICK, COMMAND, STILL])
 def test_a_picture_has_at_most_so_many_pixels(message: dict[str, Any]) -> None:
     assert parse(said(message | {"w": MAX_SIDE, "h": MAX_PIXELS // MAX_SIDE}))
     with pytest.raises(ValueError, match=rf"{message['type']}: .*at most {MAX_PIXELS} pixels, got 4096 x 2049"):
@@ -239,5 +283,9 @@ def test_the_header_is_40_bytes_little_endian() -> None:
     header = packed(JPEG, view, 2, True, 128, Rows(32, 64, 96), (1.5, 0.25))
     words = "02000000 ffffffff 02000000 01000000 80000000 40000000 20000000 60000000"
     assert header == bytes.fromhex(f"{words} 0000c03f 0000803e")
+    piece = Still(type="still", seq=3, m=M, fovy=0.7, w=320, h=240)
+    header = packed(FILE, piece, 1, True, 320, Rows(2**20, 5, 2**20 + 5), (0.0, 0.0))
+    words = "04000000 03000000 01000000 01000000 40010000 05000000 00001000 05001000"
+    assert header == bytes.fromhex(f"{words} 00000000 00000000")
     whole = packed(JPEG, view, 0, False, 1, Rows(0, 1, 1), (0.0, 0.0))
     assert struct.unpack("<8I2f", whole)[2:4] == (0, 0)

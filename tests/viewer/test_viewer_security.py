@@ -21,6 +21,7 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 import renderer
+from renderer.viewer import export
 from renderer.viewer.app import MAX_CONNECTIONS
 from renderer.viewer.protocol import MAX_MESSAGE_BYTES
 from renderer.viewer.server import ViewerServer
@@ -288,6 +289,71 @@ def test_a_client_that_floods_reads_nothing_and_leaves_disturbs_nobody(port: int
         # A reset in place of a proper end.
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     assert told(port, "x")["type"] == "error"
+
+
+# A view of the scene from its side, and a file of it that takes seconds.
+FILE_OF_VIEW = {"seq": 1, "m": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0.5, 5, 1], "fovy": 0.7, "w": 2048, "h": 2048}
+LONG_STILL = FILE_OF_VIEW | {"type": "still", "settings": {"samples": 64}}
+TURN = FILE_OF_VIEW | {"type": "turntable", "pivot": [0, 0, 0], "axis": [0, 1, 0]}
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        (LONG_STILL | {"w": 4096, "h": 4096}, "still: .*at most 8388608 pixels, got 4096 x 4096"),
+        (LONG_STILL | {"w": 5000}, "still.w: .*, got 5000"),
+        (LONG_STILL | {"settings": {"samples": 100}}, "still.settings.samples: .*, got 100"),
+        (TURN, "turntable: .*at most 33554432 pixels in all frames, got 36 frames of 2048 x 2048"),
+        (TURN | {"w": 8, "h": 8, "frames": 10**9}, "turntable.frames: .*, got 1000000000"),
+        (LONG_STILL | {"file": "/etc/passwd"}, "still.file: Extra inputs are not permitted"),
+        (LONG_STILL | {"m": [0] * 16}, "m: expected a last row of 0, 0, 0, 1"),
+        (LONG_STILL | {"m": [0] * 15 + [1]}, "Camera: expected target != eye"),
+    ],
+)
+def test_a_file_larger_than_allowed_is_refused_before_anything_is_computed(
+    port: int, asked: dict[str, Any], says: str
+) -> None:
+    with connected(port) as client:
+        client.send(json.dumps(asked))
+        message = json.loads(client.recv(30))
+        assert message["type"] == "error" and re.search(says, message["message"]), message
+        client.send("x")
+        assert json.loads(client.recv(30))["type"] == "error"
+
+
+def test_a_second_file_is_refused_while_one_is_made(port: int) -> None:
+    with connected(port) as client:
+        client.send(json.dumps(LONG_STILL))
+        while json.loads(client.recv(30))["type"] != "export":
+            pass
+        for asked in (LONG_STILL, TURN | {"w": 8, "h": 8}):
+            client.send(json.dumps(asked | {"seq": 2}))
+            while (message := json.loads(client.recv(30)))["type"] == "export":
+                assert message["seq"] == 1
+            assert (
+                message["message"] == f"{asked['type']}: expected one file at a time, got another one while one is made"
+            )
+
+
+def test_a_client_that_leaves_ends_its_file(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    make, made = export.still, []
+
+    def watched(shown: ShownScene, asked: Any, finished: Any) -> bytes:
+        file = make(shown, asked, finished)
+        made.append((asked.w, asked.h))
+        return file
+
+    monkeypatch.setattr(export, "still", watched)
+    for _ in range(MAX_CONNECTIONS):
+        with connected(port) as client:
+            client.send(json.dumps(LONG_STILL))
+            client.recv(30)
+    with connected(port) as client:
+        client.send(json.dumps(LONG_STILL | {"w": 8, "h": 8}))
+        while isinstance(message := client.recv(30), str):
+            assert json.loads(message)["type"] == "export"
+        assert message[40:48] == b"\x89PNG\r\n\x1a\n"
+    assert made == [(8, 8)]
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,13 @@ export class BoxSet {
     this.colors.set(color, this.count * STRIDE + 24);
     this.count++;
   }
+
+  // The boxes' corners, lower and upper: six numbers each.
+  get corners() {
+    const corners = new Float32Array(6 * this.count);
+    for (let i = 0; i < this.count; i++) corners.set(this.floats.subarray((i * STRIDE) / 4, (i * STRIDE) / 4 + 6), 6 * i);
+    return corners;
+  }
 }
 
 export class Boxes {

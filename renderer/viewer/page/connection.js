@@ -4,6 +4,7 @@ export const PICTURE_RGBA = 1;
 export const PICTURE_JPEG = 2;
 export const FACE_COLORS = 3;
 export const PROOF = 4;
+export const FILE = 5;
 const HEADER = 40;
 // Seconds between attempts: at once after a hiccup, then slow enough not to be a load.
 const PATIENCE = [0.3, 1, 2, 5];
@@ -26,8 +27,9 @@ export async function fetchFrom(path, query) {
   return response;
 }
 
-// A picture, a band of one, face colours or a proof: {kind, seq, step, last, w, h, first, rows, ms, rate, bytes}. The picture is
-// w x h; bytes holds `rows` of it from the `first`. The rate is in million rays a second.
+// A picture, a band of one, face colours or a proof: {kind, seq, step, last, w, h, first, rows, ms, rate, bytes}. The
+// picture is w x h; bytes holds `rows` of it from the `first`. The rate is in million rays a second. Of a piece of a
+// file, first, rows and h count bytes.
 export function decode(buffer) {
   const [kind, seq, step, last, w, rows, first, h] = new Uint32Array(buffer, 0, 8);
   const [ms, rate] = new Float32Array(buffer, 32, 2);

@@ -16,7 +16,8 @@ export function film(stage, chosen, own, density = 1) {
   return { css: [Math.round(size.w * shown), Math.round(size.h * shown)], size };
 }
 
-function allowed([width, height]) {
+// The size nearest the one asked for that the server allows, of the same shape.
+export function allowed([width, height]) {
   const share = Math.min(1, LARGEST / Math.max(width, height), Math.sqrt(MOST / (width * height)));
   // Rounded down where it is reduced, so that it is allowed.
   const round = share < 1 ? Math.floor : Math.round;

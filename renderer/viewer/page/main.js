@@ -6,11 +6,13 @@ import { film } from "./film.js";
 import { GlLayer } from "./gl.js";
 import { Busy } from "./busy.js";
 import { bindKeys, returnKeys } from "./keys.js";
+import { drawing } from "./layers.js";
 import { kept, remember, remembered, stays } from "./memory.js";
 import { Legend } from "./legend.js";
 import { DEPTH, FACES, LIT } from "./model.js";
 import { Notices } from "./notices.js";
-import { NO_BOXES, fetchBoxes } from "./overlay.js";
+import { fetchBoxes } from "./nodes.js";
+import { NO_BOXES } from "./overlay.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
 import { Progress } from "./progress.js";
@@ -18,6 +20,7 @@ import { Proof } from "./proof.js";
 import { Rays } from "./rays.js";
 import { Readings } from "./readings.js";
 import { copyText, savePicture, saveText } from "./save.js";
+import { Sharing } from "./sharing.js";
 import { improves, sameCamera } from "./standing.js";
 
 const TRACED = ["brute", "octree", "proof"];
@@ -32,10 +35,6 @@ const REST = 150;
 // So long what was drawn last stays while its successor is on its way: drawing the model in between, only to draw again
 // at once, would take where there is no graphics processor longer than all the rest.
 const HOLD = 50;
-// Hidden parts of lines shine through the model by these shares.
-const HIDDEN = { boxes: 0.1, visited: 0.3, rays: 0.65 };
-// Under boxes the model is darkened by this share, so that they glow.
-const VEIL = 0.66;
 
 const find = (selector) => document.querySelector(selector);
 
@@ -58,6 +57,7 @@ class Viewer {
     this.rays = new Rays(find("#card"), find("#frame"), () => this.request(), (pick) => this.seeAside(pick));
     this.readings = new Readings(find("#readings"), find("#hud"));
     this.panel = new Panel((name) => this.changed(name));
+    this.sharing = new Sharing(this, find("#share"));
     try {
       this.layer = new GlLayer(find("#gl"), () => this.lostGl());
     } catch (error) {
@@ -68,7 +68,7 @@ class Viewer {
   start() {
     this.busy.begin("opening", "Opening the scene …");
     this.connection = new Connection({
-      received: (picture) => this.received(picture),
+      received: (picture) => this.sharing.received(picture) || this.received(picture),
       told: (message) => this.told(message),
       changed: (open) => this.connected(open),
     });
@@ -363,6 +363,11 @@ class Viewer {
     return this.current && this.shown.last && this.shown.seq === this.seq && !this.dirty;
   }
 
+  // How the model is drawn where no traced picture is seen.
+  get shading() {
+    return this.mode === "phong" ? FACES : LIT;
+  }
+
   draw() {
     this.heldSince = null;
     this.undrawn = false;
@@ -374,13 +379,8 @@ class Viewer {
     this.stage.classList.toggle("waiting", traced && !live);
     if (this.layer) {
       const view = live ? { ...this.shown.view, w: this.shown.w, h: this.shown.h } : this.view();
-      const shading = live ? DEPTH : this.mode === "phong" ? FACES : LIT;
-      const veil = this.boxes.count ? VEIL : 0;
-      this.layer.draw(view, { shading, veil, direction: this.panel.light, panes: this.boxes.panes, layers: [
-        { name: "boxes", set: this.boxes.edges, hidden: HIDDEN.boxes, fades: true },
-        { name: "visited", set: this.rays.visited, hidden: HIDDEN.visited, fades: true },
-        { name: "rays", set: this.rays.path, hidden: HIDDEN.rays, fades: false },
-      ] });
+      const shading = live ? DEPTH : this.shading;
+      this.layer.draw(view, drawing(shading, this.panel.light, this.boxes, this.rays));
     }
     if (this.mode === "gl" && this.layer?.loaded) this.note({ seq: this.seq, step: 0, last: true }, this.view());
     // A picture of an earlier camera stands for a while only, unless another drawing has replaced it by then.
@@ -447,6 +447,7 @@ class Viewer {
       scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
       camera: ({ name, text }) => saveText(name, text),
       command: ({ text }) => copyText(text).then((copied) => this.notices.say(copied ? `Copied: ${text}` : text)),
+      export: (told) => this.sharing.told(told),
       error: ({ message: text }) => {
         for (const name of ["opening", "tracing"]) this.busy.end(name);
         this.notices.say(text);
@@ -471,6 +472,7 @@ class Viewer {
       this.connection.send({ type: "hello", file, server });
     } else {
       this.announced = null;
+      this.sharing.lost();
       this.busy.end("opening");
       this.progress.show(null);
       this.notices.say("No connection to the renderer; trying again.", "lost");
@@ -519,10 +521,14 @@ class Viewer {
     this.moved();
   }
 
+  // Whether the traced picture of the newest view is still to come, or more of it.
+  get coming() {
+    return TRACED.includes(this.mode) && !this.finished && (this.dirty || this.sent.has(this.seq));
+  }
+
   // Save what is seen; a traced picture once it is finished, if it will be.
   save() {
-    const coming = this.dirty || this.sent.has(this.seq);
-    if (!TRACED.includes(this.mode) || this.finished || !coming) return this.saveNow();
+    if (!this.coming) return this.saveNow();
     this.saving = true;
     this.notices.say("The picture is saved when it is finished.", "saving");
   }

@@ -1,6 +1,5 @@
 // What is drawn over the model: the boxes of one level of the octree, and the way of a picked ray.
 import { BoxSet } from "./boxes.js";
-import { fetchFrom } from "./connection.js";
 import { LineSet } from "./lines.js";
 
 // From the root to the leaves: violet over blue and green to yellow (viridis, lightened so that lines read on any
@@ -24,14 +23,13 @@ export const levelColor = (level, levels) => {
 };
 
 export const NO_BOXES = { edges: new LineSet(1), panes: new BoxSet(0), count: 0, all: 0 };
+export const NO_RAYS = { path: new LineSet(1), visited: new LineSet(1) };
 
-// Boxes of a level of the scene with that id, `most` of them at the most, evenly from all of it: {edges, panes, count,
-// all}, of which `all` is the number of boxes that the level has.
-export async function fetchBoxes(id, level, most) {
-  const buffer = await (await fetchFrom("octree", { id, level })).arrayBuffer();
-  const [all, levels] = new Uint32Array(buffer, 0, 2);
-  const corners = new Float32Array(buffer, 8, 6 * all);
-  const count = Math.min(all, most);
+// Boxes with those corners, six numbers each, on one of `levels` levels, `most` of them at the most and evenly from all
+// of them: {edges, panes, count, all, level, levels}, of which `all` is the number of boxes that the level has.
+export function levelBoxes(corners, { level, levels, all }, most) {
+  const given = corners.length / 6;
+  const count = Math.min(given, most);
   const edges = new LineSet(Math.max(12 * count, 1));
   const panes = new BoxSet(count);
   // Many boxes are drawn finer and fainter, or they would cover the model.
@@ -39,12 +37,12 @@ export async function fetchBoxes(id, level, most) {
   const between = (few, many) => few + (many - few) * crowd;
   const color = levelColor(level, levels);
   for (let shown = 0; shown < count; shown++) {
-    const i = Math.floor((shown * all) / count);
+    const i = Math.floor((shown * given) / count);
     const [lower, upper] = [corners.subarray(6 * i, 6 * i + 3), corners.subarray(6 * i + 3, 6 * i + 6)];
     edges.addBox(lower, upper, [...color, between(255, 70)], between(2.2, 0.9));
     panes.add(lower, upper, [...color, between(64, 40)]);
   }
-  return { edges, panes, count, all };
+  return { edges, panes, count, all, level, levels };
 }
 
 // As which of KINDS a segment of a path is shown.

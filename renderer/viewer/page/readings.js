@@ -3,7 +3,7 @@ import { element } from "./element.js";
 import { FACE_COLORS, PROOF } from "./connection.js";
 
 export const count = (n) => n.toLocaleString("en");
-const bytes = (n) => (n < 1e6 ? `${(n / 1e3).toFixed(0)} kB` : `${(n / 1e6).toFixed(1)} MB`);
+export const bytes = (n) => (n < 1e6 ? `${(n / 1e3).toFixed(0)} kB` : `${(n / 1e6).toFixed(1)} MB`);
 const seconds = (s) => (s < 1 ? `${(1e3 * s).toFixed(0)} ms` : `${s.toFixed(2)} s`);
 const milliseconds = (ms) => (ms < 10 ? `${ms.toFixed(1)} ms` : seconds(ms / 1e3));
 // Rays a second, of which `millions` are given: 0.004 of them are 4 thousand.

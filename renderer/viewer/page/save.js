@@ -1,7 +1,7 @@
 // Files that the page offers for download.
 import { element } from "./element.js";
 
-function download(blob, name) {
+export function download(blob, name) {
   const url = URL.createObjectURL(blob);
   element("a", { href: url, download: name }).click();
   // The browser has opened it by then.

@@ -1,0 +1,400 @@
+"""Files that the server makes for a page: pictures of any size and turntables, with progress and an end at any time."""
+
+import io
+import json
+import math
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image as Pillow
+from viewer_page import CHROMIUM, SCENE, Viewer
+
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+from viewer_client import HEAVY, Client, Got, looking, rendered
+
+import renderer
+from renderer import load_scene, render
+from renderer.inspect.false_color import false_color
+from renderer.picture.image import srgb
+from renderer.scene.camera import OrthographicCamera
+from renderer.viewer import export, passes
+from renderer.viewer.protocol import FILE, Still, parse
+from renderer.viewer.shown import ShownScene, open_file
+from renderer.viewer.viewpoint import camera_of
+
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+EYE = (0.5, 2.6, 5.5)
+TURN: dict[str, Any] = {"pivot": [0.0, 0.5, 0.0], "axis": [0.0, 1.0, 0.0], "frames": 6}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scenes")
+    for name, text in {"blocks": SCENE, "heavy": HEAVY}.items():
+        (folder / f"{name}.toml").write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shown(folder: Path) -> ShownScene:
+    return open_file(folder / "blocks.toml")
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[str]:
+    with renderer.view(folder / "blocks.toml", browser=False) as viewing:
+        yield viewing.url
+
+
+@pytest.fixture
+def client(server: str, folder: Path) -> Iterator[Any]:
+    with Client(server) as client:
+        client.scene = load_scene(folder / "blocks.toml")
+        yield client
+
+
+def still(seq: int = 1, w: int = 200, h: int = 150, **changes: Any) -> dict[str, Any]:
+    return {"type": "still", "seq": seq, **looking(EYE), "w": w, "h": h, **changes}
+
+
+def turntable(seq: int = 1, w: int = 64, h: int = 48, **changes: Any) -> dict[str, Any]:
+    return still(seq, w, h) | {"type": "turntable", **TURN, **changes}
+
+
+def read(asked: dict[str, Any]) -> Any:
+    """The message as the server has it."""
+    return parse(json.dumps(asked))
+
+
+def pieces(client: Client, seq: int = 1) -> tuple[list[float], list[Got]]:
+    """The shares that were told of file ``seq``, and its pieces."""
+    shares, got = [], []
+    while not (got and got[-1].last):
+        message = client.next()
+        if isinstance(message, Got):
+            assert message.kind == FILE and message.seq == seq
+            got.append(message)
+        else:
+            assert message["type"] == "export" and message["seq"] == seq, message
+            shares.append(message["done"])
+    return shares, got
+
+
+def received(client: Client, asked: dict[str, Any]) -> bytes:
+    client.send(**asked)
+    return b"".join(piece.payload for piece in pieces(client, asked["seq"])[1])
+
+
+def decoded(file: bytes) -> Any:
+    return np.asarray(Pillow.open(io.BytesIO(file)).convert("RGB"))
+
+
+def frames(file: bytes) -> list[Any]:
+    opened = Pillow.open(io.BytesIO(file))
+    seen: list[Any] = []
+    for i in range(opened.n_frames):
+        opened.seek(i)
+        seen.append(np.asarray(opened.convert("RGB")))
+    return seen
+
+
+# Stills
+
+
+@pytest.mark.parametrize("settings", [{}, {"samples": 4, "max_depth": 2}, {"shadows": False}])
+@pytest.mark.parametrize("bands", [False, True])
+def test_a_still_is_the_file_that_the_renderer_saves(
+    client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any], bands: bool
+) -> None:
+    if bands:
+        monkeypatch.setattr(passes, "BAND_PIXELS", 10_000)
+    rendered(client.scene, **settings).save(tmp_path / "expected.png")
+    file = received(client, still(settings=settings))
+    assert file == (tmp_path / "expected.png").read_bytes()
+
+
+@pytest.mark.parametrize("aov", ["depth", "normal", "face", "cost"])
+def test_a_still_of_other_values_has_their_colours(client: Any, aov: str) -> None:
+    file = received(client, still(settings={"aov": aov}))
+    depth = 0 if aov != "cost" else 6
+    expected = false_color(rendered(client.scene, max_depth=depth, shadows=aov == "cost"), aov)
+    assert np.array_equal(decoded(file), expected)
+
+
+def test_an_orthographic_still_is_the_renderers(client: Any) -> None:
+    seen = camera_of(looking(EYE)["m"], 1.0, height=3.5)
+    assert isinstance(seen, OrthographicCamera)
+    expected = render(client.scene, camera=seen, resolution=(200, 150), max_depth=6).srgb
+    assert np.array_equal(decoded(received(client, still(height=3.5))), expected)
+
+
+def test_a_view_is_answered_while_a_still_is_made(client: Any) -> None:
+    client.send(**still(w=2048, h=2048, settings={"samples": 64}))
+    assert client.told("export")["done"] == 0.0
+    seq = client.view(w=64, h=48)
+    while not (isinstance(message := client.next(), Got) and message.seq == seq and message.last):
+        if isinstance(message, Got):
+            assert message.kind != FILE  # which takes seconds
+            client.acknowledge(message)
+    expected = srgb(rendered(client.scene, resolution=(64, 48)).radiance)
+    assert np.array_equal(message.rgb, expected)
+    client.send(type="stop")
+
+
+def test_the_share_that_is_done_rises(client: Any) -> None:
+    client.send(**still(w=1024, h=1024, settings={"samples": 4}))
+    shares, _ = pieces(client)
+    assert shares[0] == 0.0 and shares == sorted(shares) and shares[-1] <= 1.0
+    assert len(set(shares)) > 2
+
+
+def test_all_of_the_work_is_counted(shown: ShownScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(passes, "BAND_PIXELS", 10_000)
+    for asked in (read(still()), read(turntable())):
+        done: list[int] = []
+        make = export.still if isinstance(asked, Still) else export.turntable
+        make(shown, asked, done.append)
+        assert sum(done) == pytest.approx(export.work(asked)) and sum(done) > 0
+
+
+def test_a_large_file_comes_in_pieces(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = received(client, still())
+    monkeypatch.setattr(export, "_PIECE", 300)
+    client.send(**still(seq=2))
+    _, got = pieces(client, 2)
+    assert len(got) == -(-len(whole) // 300) > 5
+    assert [piece.step for piece in got] == list(range(len(got)))
+    assert [piece.first for piece in got] == [300 * i for i in range(len(got))]
+    assert all(piece.rows == len(piece.payload) and piece.h == len(whole) for piece in got)
+    assert b"".join(piece.payload for piece in got) == whole
+
+
+# Turntables
+
+
+def test_the_frames_of_a_turntable_are_the_renderers(client: Any) -> None:
+    file = received(client, turntable())
+    seen = frames(file)
+    view = looking(EYE)
+    for step, frame in enumerate(seen):
+        angle = 2.0 * math.pi * step / 6
+        m = export.turned(view["m"], np.array(TURN["pivot"]), np.array(TURN["axis"]), angle)
+        camera = camera_of(m, view["fovy"])
+        expected = render(client.scene, camera=camera, resolution=(64, 48), max_depth=6).srgb
+        assert np.array_equal(frame, expected), step
+        # The eye goes round the vertical through the middle of the scene.
+        radius, start = math.hypot(EYE[0], EYE[2]), math.atan2(EYE[0], EYE[2])
+        expected_eye = radius * math.sin(start + angle), EYE[1], radius * math.cos(start + angle)
+        assert np.allclose(camera.eye, expected_eye, rtol=0, atol=1e-14)
+    assert len(seen) == 6
+    opened = Pillow.open(io.BytesIO(file))
+    assert opened.format == "WEBP" and opened.info["loop"] == 0
+
+
+def test_a_gif_has_the_frames_in_256_colours_each(client: Any) -> None:
+    exact = frames(received(client, turntable()))
+    file = received(client, turntable(seq=2, format="gif"))
+    opened = Pillow.open(io.BytesIO(file))
+    assert opened.format == "GIF" and opened.n_frames == 6 and opened.info["loop"] == 0
+    assert opened.info["duration"] == 670  # 4 s a turn, in hundredths
+    for one, other in zip(frames(file), exact, strict=True):
+        # 256 of the few hundred colours of a frame: neighbouring ones stand for each other.
+        assert np.abs(one.astype(int) - other).mean() < 1.0
+        assert len(np.unique(one.reshape(-1, 3), axis=0)) <= 256
+
+
+@pytest.mark.parametrize("asked", [read(still()), read(turntable()), read(turntable(format="gif"))])
+def test_the_file_is_the_same_for_any_number_of_threads(shown: ShownScene, asked: Any) -> None:
+    make = export.still if isinstance(asked, Still) else export.turntable
+    files = {make(replace(shown, threads=threads), asked, lambda _: None) for threads in (1, 2, 5)}
+    assert len(files) == 1
+
+
+NUMBERS = st.floats(-10, 10)
+VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS)
+
+
+@given(eye=VECTORS, pivot=VECTORS, axis=VECTORS.filter(lambda v: math.hypot(*v) > 1e-3), angle=st.floats(-7, 7))
+def test_a_turn_is_a_rotation(eye: Any, pivot: Any, axis: Any, angle: float) -> None:
+    view = looking(EYE)["m"][:12]
+    k = np.array(axis) / math.hypot(*axis)
+    m = np.reshape(export.turned([*view, *eye, 1.0], np.array(pivot), k, angle), (4, 4))
+    assert m[:, 3].tolist() == [0.0, 0.0, 0.0, 1.0]
+    # As a matrix: I + sin K + (1 - cos) K K, with K v = k x v.
+    cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+    rotation = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    # Rounding of some ten operations on numbers of up to 40.
+    assert np.allclose(m[:3, :3], np.reshape(view, (3, 4))[:, :3] @ rotation.T, rtol=0, atol=1e-13)
+    assert np.allclose(m[3, :3], rotation @ (np.array(eye) - pivot) + pivot, rtol=0, atol=1e-13)
+
+
+def test_no_turn_changes_no_bit() -> None:
+    m = [*looking(EYE)["m"][:12], 0.1, 0.7, 1e17, 1.0]
+    assert export.turned(m, np.array([0.3, 0.9, -1.0]), np.array([0.0, 1.0, 0.0]), 0.0) == m
+
+
+def test_a_pivot_at_the_end_of_float64_is_an_error_of_the_file(client: Any) -> None:
+    client.send(**turntable(pivot=[1e308, -1e308, 1e308]))
+    while (message := client.next())["type"] == "export":
+        pass
+    assert message["type"] == "error"
+    assert decoded(received(client, still(seq=2, w=8, h=8))).shape == (8, 8, 3)
+
+
+# Their end
+
+
+@pytest.fixture
+def given_up(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
+    """Set once the work on a file has ended before its time."""
+    ended = threading.Event()
+
+    def watch(name: str) -> None:
+        make = getattr(export, name)
+
+        def watched(*given: Any) -> bytes:
+            try:
+                return make(*given)
+            except export.StoppedError:
+                ended.set()
+                raise
+
+        monkeypatch.setattr(export, name, watched)
+
+    watch("still")
+    watch("turntable")
+    return ended
+
+
+LONG = [still(w=2048, h=2048, settings={"samples": 64}), turntable(w=512, h=512, frames=120)]
+
+
+@pytest.mark.parametrize("asked", LONG)
+def test_a_stopped_file_ends_its_work_and_another_can_be_asked_for(
+    client: Any, given_up: threading.Event, asked: dict[str, Any]
+) -> None:
+    client.send(**asked)
+    client.told("export")
+    client.send(type="stop")
+    while (share := client.told("export")["done"]) is not None:
+        assert share < 1.0
+    assert given_up.wait(30)
+    assert decoded(received(client, still(seq=2, w=16, h=9))).shape == (9, 16, 3)
+
+
+@pytest.mark.parametrize("asked", LONG)
+def test_a_page_that_leaves_ends_the_work_on_its_file(
+    server: str, given_up: threading.Event, asked: dict[str, Any]
+) -> None:
+    with Client(server) as leaving:
+        leaving.send(**asked)
+        leaving.told("export")
+    assert given_up.wait(30)
+
+
+def test_nothing_is_stopped_where_nothing_is_made(client: Any) -> None:
+    client.send(type="stop")
+    assert decoded(received(client, still(w=16, h=9))).shape == (9, 16, 3)
+
+
+def test_of_several_pages_one_file_is_computed_at_a_time(server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    make, running, most = export.still, threading.Semaphore(1), []
+
+    def watched(*given: Any) -> bytes:
+        most.append(running.acquire(blocking=False))
+        try:
+            return make(*given)
+        finally:
+            running.release()
+
+    monkeypatch.setattr(export, "still", watched)
+    with ExitStack() as opened:
+        clients = [opened.enter_context(Client(server)) for _ in range(4)]
+        for client in clients:
+            client.send(**still(w=256, h=256))
+        files = {b"".join(piece.payload for piece in pieces(client)[1]) for client in clients}
+    assert most == [True] * 4 and len(files) == 1
+
+
+def test_a_file_of_a_scene_is_made_though_another_is_opened(client: Any) -> None:
+    expected = received(client, still(w=512, h=512))
+    client.send(**still(seq=2, w=512, h=512))
+    client.send(type="scene", file="heavy.toml")
+    got: list[Got] = []
+    while not (got and got[-1].last):
+        if isinstance(message := client.next(), Got):
+            got.append(message)
+        else:
+            assert message["type"] in ("export", "scene"), message
+    assert b"".join(piece.payload for piece in got) == expected
+
+
+# The page
+
+
+def shared(viewer: Viewer) -> None:
+    viewer.page.evaluate("() => (document.querySelector('#share').open = true)")
+
+
+@needs_browser
+def test_the_page_saves_a_still(viewer: Viewer, scenes: Path, tmp_path: Path) -> None:
+    shared(viewer)
+    before = viewer.pixels("picture")
+    viewer.page.select_option("#still-size", "1920x1080")
+    with viewer.page.expect_download() as download:
+        viewer.page.click("#export-still")
+        viewer.page.wait_for_selector("#exporting:not([hidden])")
+        assert viewer.page.is_disabled("#export-still") and viewer.page.is_disabled("#export-turntable")
+    assert download.value.suggested_filename == "blocks-1920x1080.png"
+    download.value.save_as(tmp_path / "still.png")
+    seen = camera_of(viewer.camera["m"], viewer.camera["fovy"])
+    expected = render(load_scene(scenes / "blocks.toml"), camera=seen, resolution=(1920, 1080)).srgb
+    assert np.array_equal(decoded((tmp_path / "still.png").read_bytes()), expected)
+    viewer.page.wait_for_selector("#exporting", state="hidden")
+    assert viewer.page.is_enabled("#export-still")
+    assert np.array_equal(viewer.pixels("picture"), before)  # the view stays
+
+
+@needs_browser
+def test_the_page_saves_a_still_of_the_views_own_shape(viewer: Viewer, tmp_path: Path) -> None:
+    shared(viewer)
+    viewer.page.select_option("#still-size", "2")
+    with viewer.page.expect_download() as download:
+        viewer.page.click("#export-still")
+    download.value.save_as(tmp_path / "still.png")
+    h, w = viewer.pixels("picture").shape[:2]
+    assert decoded((tmp_path / "still.png").read_bytes()).shape == (2 * h, 2 * w, 3)
+
+
+@needs_browser
+def test_the_page_saves_a_turntable(viewer: Viewer, tmp_path: Path) -> None:
+    shared(viewer)
+    for field, value in (("height", "240"), ("frames", "24"), ("format", "gif")):
+        viewer.page.select_option(f"#turntable-{field}", value)
+    with viewer.page.expect_download() as download:
+        viewer.page.click("#export-turntable")
+    assert download.value.suggested_filename == "blocks-turntable.gif"
+    download.value.save_as(tmp_path / "turn.gif")
+    seen = frames((tmp_path / "turn.gif").read_bytes())
+    size = viewer.page.evaluate("() => window.viewer.size")
+    assert len(seen) == 24 and seen[0].shape == (240, round(240 * size["w"] / size["h"]), 3)
+
+
+@needs_browser
+def test_the_page_can_cancel_a_file(viewer: Viewer) -> None:
+    shared(viewer)
+    viewer.page.select_option("[name=samples]", "16")
+    viewer.page.click("#export-still")
+    viewer.page.wait_for_selector("#exporting:not([hidden])")
+    viewer.page.click("#stop-export")
+    viewer.page.wait_for_selector("#exporting", state="hidden")
+    assert viewer.page.is_enabled("#export-still") and "3840" not in viewer.page.inner_text("#notices")
