@@ -38,6 +38,12 @@ class Stats:
     nothing: the number of nodes that it enters plus the number of blocks that it tests, each counted as its box's share
     of the root's area. It compares trees of one mesh, such as before and after a refit: the time per ray grows about as
     it does.
+
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> stats = Octree.from_mesh(box()).stats
+    >>> stats.faces, stats.references, stats.depth
+    (12, 12, 1)
     """
 
     faces: int
@@ -51,7 +57,13 @@ class Stats:
 
     @property
     def fill(self) -> float:
-        """The share of the blocks' places that hold a face; 1 where there is no block."""
+        """The share of the blocks' places that hold a face; 1 where there is no block.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> Octree.from_mesh(box()).stats.fill
+        0.6
+        """
         return self.references / (self.blocks * BLOCK_FACES) if self.blocks else 1.0
 
 
@@ -69,6 +81,7 @@ class _Accelerator(Queries):
         A query that runs meanwhile sees the mesh before or after, never a mixture; ``Hits`` keep the mesh that they
         hit. Raises ``MeshError``, and changes nothing, where ``vertices`` cannot replace those of the mesh.
 
+        >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> octree.refit([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
         >>> octree.closest_hit([[0.25, 0.25, 2.0]], [[0, 0, -1]]).t
@@ -86,7 +99,14 @@ class _Accelerator(Queries):
 
     @property
     def stats(self) -> Stats:
-        """Counts and bytes of the built arrays, those of the mesh left out."""
+        """Counts and bytes of the built arrays, those of the mesh left out.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> stats = Octree.from_mesh(box(), leaf_size=2).stats
+        >>> stats.nodes, stats.leaves, stats.blocks
+        (1, 6, 6)
+        """
         mesh, tree = self._built
         children, used = _octants(tree)
         return Stats(
@@ -115,6 +135,7 @@ class Octree(_Accelerator):
                (None without this option) tells what was dropped, and ``repairs.kept_faces[hits.face[hits.hit]]``
                gives the rows of the given ``faces``
 
+    >>> from renderer import Octree
     >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> octree.closest_hit([[0.25, 0.25, 2.0]], [[0, 0, -1]]).t
     array([2.])
@@ -145,7 +166,14 @@ class Octree(_Accelerator):
         max_depth: int = 32,
         threads: int | None = None,
     ) -> "Octree":
-        """Build over a mesh that is already checked; options as in the class."""
+        """Build over a mesh that is already checked; options as in the class.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import icosphere
+        >>> octree = Octree.from_mesh(icosphere(3), split="sah", threads=1)
+        >>> octree.closest_hit([[0, 0, 3]], [0, 0, -1]).t.round(2)
+        array([2.])
+        """
         mesh = _checked_mesh(mesh)
         octree = cls.__new__(cls)
         octree._build(mesh, split, leaf_size, max_depth, threads)
@@ -158,6 +186,7 @@ class Octree(_Accelerator):
         not. Raises ``OSError`` where it cannot be written, and ``ValueError`` for what is no path.
 
         >>> import tempfile
+        >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     octree.save(f"{folder}/triangle.octree")
@@ -184,6 +213,7 @@ class Octree(_Accelerator):
         names the path: not there, not a file, no octree, of another version, truncated, damaged.
 
         >>> import tempfile
+        >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> with tempfile.NamedTemporaryFile() as file:
         ...     octree.save(file.name)
@@ -213,6 +243,13 @@ class BruteForce(_Accelerator):
     """Every ray against every face, through the octree's own triangle test: the octree's baseline.
 
     ``threads`` and ``repair`` as for ``Octree``.
+
+    >>> from renderer import BruteForce, Octree
+    >>> from renderer.mesh.shapes import icosphere
+    >>> mesh, rays = icosphere(3), ([[0.1, 0.2, 3], [2, 2, 2]], [0, 0, -1])
+    >>> brute, octree = BruteForce(mesh.vertices, mesh.faces), Octree(mesh.vertices, mesh.faces)
+    >>> bool((brute.closest_hit(*rays).t == octree.closest_hit(*rays).t).all())
+    True
     """
 
     def __init__(
@@ -224,7 +261,13 @@ class BruteForce(_Accelerator):
 
     @classmethod
     def from_mesh(cls, mesh: Mesh, *, threads: int | None = None) -> "BruteForce":
-        """The same over a mesh that is already checked."""
+        """The same over a mesh that is already checked.
+
+        >>> from renderer import BruteForce
+        >>> from renderer.mesh.shapes import box
+        >>> BruteForce.from_mesh(box(), threads=1).any_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
+        array([ True, False])
+        """
         mesh = _checked_mesh(mesh)
         brute = cls.__new__(cls)
         _Accelerator.__init__(brute, mesh, _all_blocks(mesh, checked_threads(threads)), threads)

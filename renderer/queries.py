@@ -39,6 +39,15 @@ class Queries:
 
     @property
     def mesh(self) -> Mesh:
+        """The mesh that was built over, and after a ``refit`` the moved one.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree.from_mesh(box())
+        >>> hit = octree.closest_hit([0.5, 0.25, 3], [0, 0, -1])
+        >>> octree.mesh.faces[hit.face]
+        array([4, 5, 7], dtype=int32)
+        """
         return self._built[0]
 
     @property

@@ -45,7 +45,7 @@ def render_on(
     is gone, or without a worker for 10 seconds; the same call then goes on.
 
     >>> from tempfile import TemporaryDirectory
-    >>> from renderer import Mesh, PerspectiveCamera, Phong, SceneObject
+    >>> from renderer import Mesh, PerspectiveCamera, Phong, Scene, SceneObject
     >>> from renderer.cluster import connected, render_on
     >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
     >>> camera = PerspectiveCamera(eye=(0.3, 0.3, 2), target=(0.3, 0.3, 0))
@@ -89,6 +89,17 @@ def frames_on(
              renders no frame again whose file is what it wrote. It is removed when all are done
 
     Frames are worked on together, so that no worker waits for the last part of one. Errors are those of ``render_on``.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from renderer import load_scene
+    >>> from renderer.cluster import connected, frames_on
+    >>> scene = load_scene("scenes/stairs.toml")
+    >>> scenes = [scene, scene.altered(lights=())]
+    >>> with connected(workers=1) as client, TemporaryDirectory() as folder:
+    ...     frames_on(client, scenes, [f"{folder}/1.png", f"{folder}/2.png"], f"{folder}/parts", resolution=(8, 8))
+    ...     sorted(path.name for path in Path(folder).iterdir())
+    ['1.png', '2.png']
     """
     frames = _Frames(as_path("folder", folder), outputs, band, options)
     with (

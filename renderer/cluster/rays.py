@@ -46,7 +46,16 @@ def closest_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float =
 
 
 def any_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf) -> Any:
-    """Whether each ray hits anything, a dask array (n,) of bool: arguments, bits and errors as of ``closest_hit``."""
+    """Whether each ray hits anything, a dask array (n,) of bool: arguments, bits and errors as of ``closest_hit``.
+
+    >>> import dask.array as da
+    >>> from renderer import Octree
+    >>> from renderer.cluster import any_hit
+    >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> origins, directions = da.from_array([[0.25, 0.25, 2.0], [9, 9, 2]]), da.from_array([[0.0, 0, -1], [0, 0, -1]])
+    >>> any_hit(floor, origins, directions).compute()
+    array([ True, False])
+    """
 
     def trace(mesh: SentMesh, o: NDArray[Any], d: NDArray[Any]) -> NDArray[Any]:
         return mesh.octree().any_hit(o, d, t_min=t_min, t_max=t_max)

@@ -22,6 +22,7 @@ def heightfield_mesh(grid: ArrayLike, spacing: ArrayLike = 1.0, origin: ArrayLik
     Vertex ``row * columns + column`` is the grid's; cells are cut from their least to their greatest x and y. Raises
     ``ValueError`` naming the argument and, for an infinite height, its place, and for more vertices than a mesh holds.
 
+    >>> from renderer.mesh.heightfield import heightfield_mesh
     >>> mesh = heightfield_mesh([[0, 0, 0], [0, 1, 0]], spacing=2.0, origin=(100, 200, 0))
     >>> mesh.vertices[4].tolist(), len(mesh.faces)
     ([102.0, 202.0, 1.0], 4)

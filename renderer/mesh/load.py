@@ -38,6 +38,11 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
     Raises ``MeshError`` that names the file and the fault: not there, not a file, unknown suffix, malformed
     or truncated, no faces, a face index out of range, a face of fewer than three vertices, values that are
     not finite. With ``repair`` it is raised where no good face is left, and for faults that no repair mends.
+
+    >>> from renderer import load_mesh
+    >>> mesh = load_mesh("scenes/models/torus_knot.ply")
+    >>> mesh.name, mesh.faces.shape, mesh.is_closed()
+    ('torus_knot', (40000, 3), True)
     """
     try:
         path = as_path("path", path)

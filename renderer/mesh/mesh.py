@@ -23,7 +23,19 @@ MAX_VERTICES = 2**31 - 1
 
 
 class RepairWarning(UserWarning):
-    """A mesh file was loaded without its bad parts; names the file and counts them."""
+    r"""A mesh file was loaded without its bad parts; names the file and counts them.
+
+    >>> import warnings
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from renderer import load_mesh
+    >>> with TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     _ = Path(folder, "bad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nf 1 2 3\nf 1 2 4\n")
+    ...     faces = load_mesh(f"{folder}/bad.obj", repair=True).faces
+    >>> faces.tolist(), [warning.category.__name__ for warning in caught]
+    ([[0, 1, 2]], ['RepairWarning'])
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +48,7 @@ class Repairs:
     bad_normals : rows of the given normals that are not finite at a vertex that is, (n,) int64; the mean of the faces
         around the vertex replaces them.
 
+    >>> from renderer import Mesh
     >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 9], [0, 1, 2]])
     >>> print(repairs)
     dropped 1 of 2 faces; 0 vertices are not finite
@@ -74,6 +87,7 @@ class Mesh:
 
     Raises ``MeshError`` that names the array, the value that was expected, the one given and its row.
 
+    >>> from renderer import Mesh
     >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 2, 0]], [[0, 1, 2]])
     >>> mesh.face_normals().tolist()
     [[0.0, 0.0, 1.0]]
@@ -123,6 +137,13 @@ class Mesh:
         """A mesh over ``arrays`` themselves, which have its names, types and shapes: they are not copied.
 
         Values are checked as by the constructor. Nobody may write to their memory from then on.
+
+        >>> import numpy as np
+        >>> from renderer import Mesh
+        >>> arrays = {"vertices": np.eye(3), "faces": np.array([[0, 1, 2]], np.int32)}
+        >>> mesh = Mesh.viewing(arrays, "triangle")
+        >>> np.shares_memory(mesh.vertices, arrays["vertices"]), mesh.vertices.flags.writeable
+        (True, False)
         """
         mesh = object.__new__(cls)
         for attribute in ("vertices", "faces", *(attribute for attribute, _, _ in _VERTEX_ATTRIBUTES)):
@@ -175,30 +196,58 @@ class Mesh:
 
     @lazy
     def bounds(self) -> tuple[Float64Array, Float64Array]:
-        """Least and greatest corner, each (3,) float64; (inf, -inf) when there are no vertices."""
+        """Least and greatest corner, each (3,) float64; (inf, -inf) when there are no vertices.
+
+        >>> from renderer.mesh.shapes import box
+        >>> lower, upper = box((0, 0, 0), (1, 2, 3)).bounds
+        >>> lower, upper
+        (array([0., 0., 0.]), array([1., 2., 3.]))
+        """
         if len(self.vertices) == 0:
             return _read_only(np.full(3, np.inf)), _read_only(np.full(3, -np.inf))
         return _read_only(self.vertices.min(axis=0)), _read_only(self.vertices.max(axis=0))
 
     @property
     def extent(self) -> Float64Array:
-        """Size along each axis, (3,) float64; 0 when there are no vertices."""
+        """Size along each axis, (3,) float64; 0 when there are no vertices.
+
+        >>> from renderer.mesh.shapes import box
+        >>> box((1, 1, 1), (2, 3, 4)).extent
+        array([1., 2., 3.])
+        """
         lower, upper = self.bounds
         return np.maximum(upper - lower, 0.0)
 
     @property
     def triangles(self) -> Float64Array:
-        """Corner positions, (F, 3 corners, 3) float64, a new array."""
+        """Corner positions, (F, 3 corners, 3) float64, a new array.
+
+        >>> from renderer import Mesh
+        >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> mesh.triangles.tolist()
+        [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]
+        """
         return self.vertices[self.faces]
 
     @lazy
     def is_float32(self) -> bool:
-        """Whether float32 holds every vertex exactly."""
+        """Whether float32 holds every vertex exactly.
+
+        >>> from renderer.mesh.shapes import box
+        >>> box((0, 0, 0), (0.5, 1, 1)).is_float32, box((0, 0, 0), (0.1, 1, 1)).is_float32
+        (True, False)
+        """
         with np.errstate(over="ignore", under="ignore"):
             return bool((self.vertices.astype(np.float32) == self.vertices).all())
 
     def face_normals(self) -> Float64Array:
-        """Unit geometric normals, (F, 3) float64; zero for a face without area."""
+        """Unit geometric normals, (F, 3) float64; zero for a face without area.
+
+        >>> from renderer import Mesh
+        >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> mesh.face_normals()
+        array([[0., 0., 1.]])
+        """
         return face_normals(self.triangles)
 
     def vertex_normals(self) -> Float64Array:
@@ -206,6 +255,10 @@ class Mesh:
 
         Unlike area weights, angles do not depend on how a flat region is cut into triangles (Thürmer and
         Wüthrich 1998). A vertex that no face with area uses gets zero.
+
+        >>> from renderer.mesh.shapes import box
+        >>> box((-1, -1, -1), (1, 1, 1)).vertex_normals()[7].round(3)
+        array([0.577, 0.577, 0.577])
         """
         x, y, z = (np.ascontiguousarray(self.vertices[:, axis])[self.faces.T] for axis in range(3))
         corners = [(x[k], y[k], z[k]) for k in range(3)]
@@ -226,6 +279,10 @@ class Mesh:
 
         False for a mesh without faces and where a face names a vertex twice. Vertices are told apart by
         index, not by position.
+
+        >>> from renderer.mesh.shapes import box, grid
+        >>> box().is_closed(), grid().is_closed()
+        (True, False)
         """
         start, end = self.faces.ravel().astype(np.int64), np.roll(self.faces, -1, axis=1).ravel()
         if len(start) == 0 or (start == end).any():
@@ -237,12 +294,27 @@ class Mesh:
 
     @lazy
     def open_edges(self) -> NDArray[np.int64]:
-        """(k, 2) vertices of the edges that are not passed as often in one direction as in the other, by position."""
+        """(k, 2) vertices of the edges that are not passed as often in one direction as in the other, by position.
+
+        >>> from renderer import Mesh
+        >>> from renderer.mesh.shapes import box
+        >>> lidless = Mesh(box().vertices, box().faces[:-2])
+        >>> lidless.open_edges.tolist(), box().open_edges.tolist()
+        ([[4, 6], [7, 5], [5, 4], [6, 7]], [])
+        """
         return open_edges(self.vertices, self.faces, oriented=True)
 
     @lazy
     def odd_edges(self) -> NDArray[np.int64]:
-        """(k, 2) vertices of the edges that an odd number of faces has, by position."""
+        """(k, 2) vertices of the edges that an odd number of faces has, by position.
+
+        >>> from renderer import Mesh
+        >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> mesh.odd_edges.tolist()
+        [[0, 1], [1, 2], [2, 0]]
+        >>> Mesh(mesh.vertices, [[0, 1, 2], [0, 1, 2]]).odd_edges.tolist()
+        []
+        """
         return open_edges(self.vertices, self.faces, oriented=False)
 
     def transformed(self, matrix: object) -> Mesh:
@@ -252,6 +324,11 @@ class Mesh:
 
         Normals go by the inverse transpose and come back with unit length. A map that mirrors also turns
         each face round, so that outside stays outside.
+
+        >>> from renderer.mesh.shapes import box
+        >>> moved = box().transformed([[2, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+        >>> [corner.tolist() for corner in moved.bounds]
+        [[5.0, 0.0, 0.0], [7.0, 1.0, 1.0]]
         """
         expected = "matrix: expected a finite affine (4, 4) with last row 0 0 0 1"
         try:
@@ -285,6 +362,12 @@ class Mesh:
 
         Normals, colours and texture coordinates stay only where all the meshes have them. Raises ``MeshError``
         where ``meshes`` holds anything else.
+
+        >>> from renderer import Mesh
+        >>> from renderer.mesh.shapes import box
+        >>> two = Mesh.concatenate([box(), box((3, 0, 0), (4, 1, 1))])
+        >>> len(two.vertices), len(two.faces), two.extent.tolist()
+        (16, 24, [4.0, 1.0, 1.0])
         """
         try:
             parts = list(meshes)
@@ -322,6 +405,8 @@ class Mesh:
         ``MeshError`` as there: shapes, dtypes, colours and texture coordinates that are not finite at a vertex that is.
         Input without faults gives the same mesh as the class does.
 
+        >>> import numpy as np
+        >>> from renderer import Mesh
         >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, np.nan, 0]], [[0, 1, 3], [0, 1, 2]])
         >>> mesh.faces.tolist(), mesh.vertices[3].tolist(), repairs.bad_vertices.tolist()
         ([[0, 1, 2]], [0.0, 0.0, 0.0], [3])

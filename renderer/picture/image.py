@@ -25,6 +25,10 @@ def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
     """Linear radiance, clipped to [0, 1], as 8-bit sRGB (IEC 61966-2-1).
 
     Raises ``ValueError`` where it is no array of real numbers.
+
+    >>> from renderer import srgb
+    >>> srgb([0.0, 0.2, 0.5, 1.0, 7.0])
+    array([  0, 124, 188, 255, 255], dtype=uint8)
     """
     x = real_argument("linear", linear)
     if x.dtype != np.float32:
@@ -70,7 +74,20 @@ def _table() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
 
 
 class CutWarning(UserWarning):
-    """A picture has pixels that miss rays because of ``max_rays``; the message says how many."""
+    """A picture has pixels that miss rays because of ``max_rays``; the message says how many.
+
+    >>> import warnings
+    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, render
+    >>> from renderer.mesh.shapes import icosphere
+    >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
+    >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+    >>> scene = Scene(camera=eye, materials={"grey": Phong(reflectance=0.5, transmittance=0.5)}, objects=[ball])
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     image = render(scene, resolution=(3, 3), max_rays=1)
+    >>> image.cut, [warning.category.__name__ for warning in caught]
+    (1, ['CutWarning'])
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +103,15 @@ class Image:
     Of those that ``render`` was not asked to keep, h and w are 0.
     cut       the number of pixels that miss rays because of ``max_rays``, 0 in most pictures
     build_seconds, render_seconds  the time that it took, without compiling; the first is the prepared scene's
+
+    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, render
+    >>> from renderer.mesh.shapes import icosphere
+    >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
+    >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+    >>> scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball], ambient=1, background=(0.2, 0.4, 1))
+    >>> image = render(scene, resolution=(3, 3))
+    >>> image.depth[1], image.rays[1]
+    (array([inf,  4., inf]), array([1, 1, 1], dtype=int32))
     """
 
     radiance: NDArray[np.float32]
@@ -98,7 +124,14 @@ class Image:
     cut: int = 0
 
     def cut_message(self, max_rays: int) -> str:
-        """The message of ``CutWarning``."""
+        """The message of ``CutWarning``.
+
+        >>> from renderer import PerspectiveCamera, Scene, render
+        >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+        >>> sky = render(Scene(camera=eye, materials={}, background=(0.2, 0.4, 1)), resolution=(2, 2))
+        >>> sky.cut_message(max_rays=8)[:24]
+        '0 of 4 pixels miss rays:'
+        """
         return (
             f"{self.cut:,} of {self.radiance.size // 3:,} pixels miss rays: they took max_rays = {max_rays:,} a "
             "sample. More max_rays trace all; a min_weight, such as 0.001, ends those that hardly show"
@@ -109,6 +142,16 @@ class Image:
 
         An EXR file also has the depth as Z and the normal as normal.X, normal.Y and normal.Z, float32. It needs the
         package OpenEXR.
+
+        >>> from tempfile import TemporaryDirectory
+        >>> import numpy as np
+        >>> from renderer import PerspectiveCamera, Scene, render
+        >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+        >>> sky = render(Scene(camera=eye, materials={}, background=(0.2, 0.4, 1)), resolution=(2, 2))
+        >>> with TemporaryDirectory() as folder:
+        ...     sky.save(f"{folder}/sky.npy")
+        ...     np.load(f"{folder}/sky.npy")[0, 0]
+        array([0.2, 0.4, 1. ], dtype=float32)
         """
         suffix = as_path("path", path).suffix.lower()
         check_picture_path(path)
@@ -134,7 +177,14 @@ class Image:
 
     @property
     def srgb(self) -> NDArray[np.uint8]:
-        """The picture as (h, w, 3) uint8 sRGB, as a PNG file holds it."""
+        """The picture as (h, w, 3) uint8 sRGB, as a PNG file holds it.
+
+        >>> from renderer import PerspectiveCamera, Scene, render
+        >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+        >>> sky = render(Scene(camera=eye, materials={}, background=(0.2, 0.4, 1)), resolution=(2, 2))
+        >>> sky.srgb[0, 0]
+        array([124, 170, 255], dtype=uint8)
+        """
         codes = np.empty(self.radiance.shape, np.uint8)
         for begin in range(0, len(codes), _ROWS):
             codes[begin : begin + _ROWS] = srgb(self.radiance[begin : begin + _ROWS])

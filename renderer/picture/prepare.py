@@ -38,6 +38,14 @@ class PreparedScene:
     octree         the tree over ``mesh``, or its ``BruteForce``
     needs          the features that are ready: at least those of ``needs_of(scene)``
     build_seconds  the time that it took, without compiling
+
+    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, prepare
+    >>> from renderer.mesh.shapes import icosphere
+    >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
+    >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+    >>> ready = prepare(Scene(camera=eye, materials={"grey": Phong()}, objects=[ball]))
+    >>> len(ready.mesh.faces), ready.octree.stats.faces, ready.needs.octree
+    (1280, 1280, True)
     """
 
     scene: Scene

@@ -51,7 +51,7 @@ def render(
     The same bits for any number of threads. Raises ``ValueError`` naming the argument. Warns with ``CutWarning``
     of pixels that ``max_rays`` cut. Ctrl-C stops it at once.
 
-    >>> from renderer import Mesh, PerspectiveCamera, Phong, SceneObject
+    >>> from renderer import Mesh, PerspectiveCamera, Phong, Scene, SceneObject, render
     >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
     >>> camera = PerspectiveCamera(eye=(0.3, 0.3, 2), target=(0.3, 0.3, 0))
     >>> scene = Scene(camera=camera, materials={"grey": Phong()}, objects=[triangle], ambient=1)
@@ -87,7 +87,7 @@ def prepare(
     Arguments as of ``render``. The result renders at any ``max_depth``. Its pictures have the same bits as those of the
     scene itself. Raises ``ValueError`` naming the argument.
 
-    >>> from renderer import Mesh, PerspectiveCamera, Phong, SceneObject
+    >>> from renderer import Mesh, PerspectiveCamera, Phong, Scene, SceneObject, prepare, render
     >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
     >>> camera = PerspectiveCamera(eye=(0.3, 0.3, 2), target=(0.3, 0.3, 0))
     >>> ready = prepare(Scene(camera=camera, materials={"grey": Phong()}, objects=[triangle]))

@@ -54,20 +54,40 @@ class _Camera(Fields):
         return eye
 
     def frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Unit vectors (right, up, forward) in world space, each (3,) float64."""
+        """Unit vectors (right, up, forward) in world space, each (3,) float64.
+
+        >>> from renderer import PerspectiveCamera
+        >>> right, up, forward = PerspectiveCamera(eye=(5, 0, 0), target=(0, 0, 0)).frame()
+        >>> right, up, forward
+        (array([ 0.,  0., -1.]), array([0., 1., 0.]), array([-1.,  0.,  0.]))
+        """
         forward = unit(np.subtract(self.target, self.eye))
         right = unit(np.cross(forward, unit(self.up)))
         return right, np.cross(right, forward), forward
 
 
 class PerspectiveCamera(_Camera):
-    """A pinhole camera; ``fov`` is the vertical field of view in degrees."""
+    """A pinhole camera; ``fov`` is the vertical field of view in degrees.
+
+    >>> from renderer import Octree, PerspectiveCamera
+    >>> from renderer.mesh.shapes import box
+    >>> from renderer.studies import depth_map
+    >>> camera = PerspectiveCamera(eye=(0.5, 0.25, 3), target=(0.5, 0.25, 0), fov=60)
+    >>> depth_map(Octree.from_mesh(box()), camera, 3, 1)
+    array([[inf,  2., inf]])
+    """
 
     type: Literal["perspective"] = "perspective"
     fov: Annotated[float, Field(gt=0.0, lt=180.0, strict=True)] = 45.0
 
     def rows(self, width: int, height: int) -> NDArray[np.float64]:
-        """The affine map of the module's docstring, (6, 3) float64."""
+        """The affine map of the module's docstring, (6, 3) float64.
+
+        >>> from renderer import PerspectiveCamera
+        >>> rows = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0), fov=90).rows(4, 4)
+        >>> (rows[0] + 2 * rows[1] + 2 * rows[2]).tolist(), (rows[3] + 2 * rows[4] + 2 * rows[5]).round(12).tolist()
+        ([0.0, 0.0, 5.0], [0.0, 0.0, -1.0])
+        """
         right, up, forward = self.frame()
         pixel = 2.0 * math.tan(math.radians(self.fov) / 2.0) / height
         zero = np.zeros(3)
@@ -76,13 +96,27 @@ class PerspectiveCamera(_Camera):
 
 
 class OrthographicCamera(_Camera):
-    """Parallel rays; ``height`` is the height of the film in scene units, up to ``limits.FARTHEST``."""
+    """Parallel rays; ``height`` is the height of the film in scene units, up to ``limits.FARTHEST``.
+
+    >>> from renderer import Octree, OrthographicCamera
+    >>> from renderer.mesh.shapes import box
+    >>> from renderer.studies import depth_map
+    >>> camera = OrthographicCamera(eye=(0.5, 0.25, 3), target=(0.5, 0.25, 0), height=0.9)
+    >>> depth_map(Octree.from_mesh(box()), camera, 3, 1)
+    array([[inf,  2., inf]])
+    """
 
     type: Literal["orthographic"] = "orthographic"
     height: Annotated[float, Field(gt=0.0, le=FARTHEST, strict=True)]
 
     def rows(self, width: int, height: int) -> NDArray[np.float64]:
-        """The affine map of the module's docstring, (6, 3) float64."""
+        """The affine map of the module's docstring, (6, 3) float64.
+
+        >>> from renderer import OrthographicCamera
+        >>> rows = OrthographicCamera(eye=(0, 0, 5), target=(0, 0, 0), height=4).rows(4, 4)
+        >>> rows[0] + 1 * rows[1] + 2 * rows[2], rows[3]
+        (array([-1.,  0.,  5.]), array([ 0.,  0., -1.]))
+        """
         right, up, forward = self.frame()
         pixel = self.height / height
         zero = np.zeros(3)

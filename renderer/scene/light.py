@@ -12,7 +12,17 @@ from renderer.shade.records import DIRECTIONAL, POINT
 
 
 class DirectionalLight(Fields):
-    """Parallel light that travels along ``direction``; ``irradiance`` falls on a surface that faces it."""
+    """Parallel light that travels along ``direction``; ``irradiance`` falls on a surface that faces it.
+
+    >>> from renderer import DirectionalLight, OrthographicCamera, Phong, Scene, SceneObject, render
+    >>> from renderer.mesh.shapes import grid
+    >>> floor = SceneObject(mesh=grid(), material="white")
+    >>> above = OrthographicCamera(eye=(0, 1, 0), target=(0, 0, 0), up=(0, 0, 1), height=1)
+    >>> light = DirectionalLight(direction=(0, -1, 0), irradiance=3)
+    >>> scene = Scene(camera=above, materials={"white": Phong(diffuse=1)}, objects=[floor], lights=[light])
+    >>> render(scene, resolution=(1, 1)).radiance[0, 0]
+    array([3., 3., 3.], dtype=float32)
+    """
 
     type: Literal["directional"] = "directional"
     direction: FiniteVector
@@ -32,7 +42,17 @@ class DirectionalLight(Fields):
 
 
 class PointLight(Fields):
-    """A point that shines evenly; the light arriving at distance r is ``intensity`` / r^2."""
+    """A point that shines evenly; the light arriving at distance r is ``intensity`` / r^2.
+
+    >>> from renderer import OrthographicCamera, Phong, PointLight, Scene, SceneObject, render
+    >>> from renderer.mesh.shapes import grid
+    >>> floor = SceneObject(mesh=grid(), material="white")
+    >>> above = OrthographicCamera(eye=(0, 1, 0), target=(0, 0, 0), up=(0, 0, 1), height=1)
+    >>> light = PointLight(position=(0, 2, 0), intensity=3)
+    >>> scene = Scene(camera=above, materials={"white": Phong(diffuse=1)}, objects=[floor], lights=[light])
+    >>> render(scene, resolution=(1, 1)).radiance[0, 0]
+    array([0.75, 0.75, 0.75], dtype=float32)
+    """
 
     type: Literal["point"] = "point"
     position: FiniteVector

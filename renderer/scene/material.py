@@ -18,6 +18,11 @@ class Phong(Fields):
     """Ambient, diffuse and specular light with a constant reflected and transmitted part.
 
     ``ambient`` (k_a) is ``diffuse`` unless given. Under total internal reflection there is no transmitted part.
+
+    >>> from renderer import Phong
+    >>> red = Phong(diffuse=(0.7, 0.1, 0.1), specular=0.2, shininess=50)
+    >>> red.specular, red.reflectance
+    ((0.2, 0.2, 0.2), (0.0, 0.0, 0.0))
     """
 
     type: Literal["phong"] = "phong"
@@ -31,12 +36,22 @@ class Phong(Fields):
 
     @property
     def passes_light(self) -> bool:
-        """Whether rays go through the surface into the object."""
+        """Whether rays go through the surface into the object.
+
+        >>> from renderer import Phong
+        >>> Phong().passes_light, Phong(transmittance=0.5).passes_light
+        (False, True)
+        """
         return any(self.transmittance)
 
     @property
     def receives_light(self) -> bool:
-        """Whether direct light changes the look of the surface."""
+        """Whether direct light changes the look of the surface.
+
+        >>> from renderer import Phong
+        >>> Phong().receives_light, Phong(diffuse=0, ambient=1).receives_light
+        (True, False)
+        """
         return any(self.diffuse) or any(self.specular)
 
     @property
@@ -52,14 +67,24 @@ class Phong(Fields):
 
 
 class Mirror(Fields):
-    """A perfect mirror: ``reflectance`` times the reflected light, nothing else."""
+    """A perfect mirror: ``reflectance`` times the reflected light, nothing else.
+
+    >>> from renderer import Mirror
+    >>> Mirror(reflectance=0.9).reflectance
+    (0.9, 0.9, 0.9)
+    """
 
     type: Literal["mirror"] = "mirror"
     reflectance: Color = _WHITE
 
     @property
     def passes_light(self) -> bool:
-        """Never: the object behind a mirror is not seen."""
+        """Never: the object behind a mirror is not seen.
+
+        >>> from renderer import Mirror
+        >>> Mirror().passes_light
+        False
+        """
         return False
 
     def row(self) -> NDArray[np.float64]:
@@ -68,7 +93,13 @@ class Mirror(Fields):
 
 
 class Dielectric(Fields):
-    """Clear glass of index ``ior``: Fresnel's share reflected, the rest refracted, tinted by the two colours."""
+    """Clear glass of index ``ior``: Fresnel's share reflected, the rest refracted, tinted by the two colours.
+
+    >>> from renderer import Dielectric
+    >>> green = Dielectric(ior=1.33, transmittance=(0.8, 1, 0.8))
+    >>> green.ior, green.reflectance
+    (1.33, (1.0, 1.0, 1.0))
+    """
 
     type: Literal["dielectric"] = "dielectric"
     ior: _Ior = 1.5
@@ -77,7 +108,12 @@ class Dielectric(Fields):
 
     @property
     def passes_light(self) -> bool:
-        """Whether rays go through the surface into the object."""
+        """Whether rays go through the surface into the object.
+
+        >>> from renderer import Dielectric
+        >>> Dielectric().passes_light, Dielectric(transmittance=0).passes_light
+        (True, False)
+        """
         return any(self.transmittance)
 
     def row(self) -> NDArray[np.float64]:

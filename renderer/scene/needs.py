@@ -32,6 +32,15 @@ class Needs:
     lights            the number of lights: those that shine on something
     float64_vertices  vertices that float32 does not hold exactly
     octree            a tree; without it every ray is tested against every face
+
+    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, needs_of
+    >>> from renderer.mesh.shapes import icosphere
+    >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
+    >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+    >>> scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball])
+    >>> needs = needs_of(scene)
+    >>> needs.octree, needs.smooth_normals, needs.reflection
+    (True, True, False)
     """
 
     reflection: bool
@@ -82,7 +91,7 @@ def needs_of(scene: Scene, max_depth: int | None = None) -> Needs:
 
     Raises ``ValueError`` naming the argument.
 
-    >>> from renderer.scene.camera import PerspectiveCamera
+    >>> from renderer import PerspectiveCamera, Scene, needs_of
     >>> empty = Scene(camera=PerspectiveCamera(eye=(0, 0, 1), target=(0, 0, 0)), materials={})
     >>> needs_of(empty).shadows
     False

@@ -68,6 +68,10 @@ class RenderSettings(Fields):
     mirrors that halve their light, or glass in glass, may double the rays with each bounce. The default is more than
     full branching makes in ten bounces under three lights. Without ``shadows`` nothing hides a light from the surfaces
     that face it, and no shadow ray is traced.
+
+    >>> from renderer import RenderSettings
+    >>> RenderSettings(resolution=(640, 360), samples=4).max_depth
+    6
     """
 
     resolution: tuple[_Pixels, _Pixels] = (512, 512)
@@ -99,7 +103,16 @@ def checked_settings(defaults: RenderSettings, given: dict[str, Any]) -> RenderS
 
 
 class SceneObject(Fields):
-    """A mesh in the world: scaled, then turned about x, y and z (degrees, in this order), then moved."""
+    """A mesh in the world: scaled, then turned about x, y and z (degrees, in this order), then moved.
+
+    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject
+    >>> from renderer.mesh.shapes import box
+    >>> crate = SceneObject(mesh=box(), material="wood", scale=2, translate=(0, 1, 0))
+    >>> eye = PerspectiveCamera(eye=(0, 2, 9), target=(0, 1, 0))
+    >>> scene = Scene(camera=eye, materials={"wood": Phong()}, objects=[crate])
+    >>> [corner.tolist() for corner in scene.instances[0].mesh.bounds]
+    [[0.0, 1.0, 0.0], [2.0, 3.0, 2.0]]
+    """
 
     mesh: Annotated[Path | Mesh, BeforeValidator(_path_or_mesh)]
     material: str
@@ -109,7 +122,16 @@ class SceneObject(Fields):
     translate: FiniteVector = (0.0, 0.0, 0.0)
 
     def matrix(self) -> NDArray[np.float64]:
-        """Object to world, (4, 4) float64."""
+        """Object to world, (4, 4) float64.
+
+        >>> from renderer import SceneObject
+        >>> from renderer.mesh.shapes import box
+        >>> SceneObject(mesh=box(), material="wood", rotate=(0, 90, 0), translate=(0, 1, 0)).matrix().round(12) + 0.0
+        array([[ 0.,  0.,  1.,  0.],
+               [ 0.,  1.,  0.,  1.],
+               [-1.,  0.,  0.,  0.],
+               [ 0.,  0.,  0.,  1.]])
+        """
         result = np.eye(4)
         linear = np.diag(self.scale)
         for axis, degrees in enumerate(self.rotate):
@@ -120,7 +142,15 @@ class SceneObject(Fields):
 
 
 class Floor(Fields):
-    """The plane y = 0 cut to the rectangle from ``min`` to ``max`` (x, z), tiled with its materials in turn."""
+    """The plane y = 0 cut to the rectangle from ``min`` to ``max`` (x, z), tiled with its materials in turn.
+
+    >>> from renderer import Floor, PerspectiveCamera, Phong, Scene
+    >>> floor = Floor(min=(-4, -4), max=(4, 4), materials=["light", "dark"], squares=(8, 8))
+    >>> eye = PerspectiveCamera(eye=(0, 2, 9), target=(0, 0, 0))
+    >>> scene = Scene(camera=eye, materials={"light": Phong(), "dark": Phong(diffuse=0.2)}, floor=floor)
+    >>> [(part.material, len(part.mesh.faces)) for part in scene.instances]
+    [('light', 64), ('dark', 64)]
+    """
 
     min: tuple[_Finite, _Finite]
     max: tuple[_Finite, _Finite]
@@ -149,7 +179,16 @@ class Instance:
 
 
 class Scene(Fields):
-    """Everything that a picture needs. Read one with ``load_scene`` or build it from keyword arguments."""
+    """Everything that a picture needs. Read one with ``load_scene`` or build it from keyword arguments.
+
+    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, render
+    >>> from renderer.mesh.shapes import icosphere
+    >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
+    >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+    >>> scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball], ambient=1, background=(0.2, 0.4, 1))
+    >>> render(scene, resolution=(3, 3)).srgb[1].tolist()
+    [[124, 170, 255], [231, 231, 231], [124, 170, 255]]
+    """
 
     camera: AnyCamera
     materials: dict[str, AnyMaterial]
@@ -175,7 +214,16 @@ class Scene(Fields):
 
     @lazy
     def instances(self) -> tuple[Instance, ...]:
-        """The world-space meshes: the objects in their order, then the floor's (one for each material)."""
+        """The world-space meshes: the objects in their order, then the floor's (one for each material).
+
+        >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject
+        >>> from renderer.mesh.shapes import icosphere
+        >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
+        >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+        >>> scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball])
+        >>> [(part.material, part.smooth, part.mesh.name) for part in scene.instances]
+        [('grey', True, 'icosphere')]
+        """
         placed = [
             Instance(_place(_loaded(o.mesh), o.matrix()), o.material, o.normals == "smooth") for o in self.objects
         ]
@@ -187,6 +235,12 @@ class Scene(Fields):
         """A copy with other values of fields, by name, that shares the meshes: none is loaded or placed again.
 
         So a change of ``objects`` or ``floor`` has no effect. Values are not checked as those of a scene file are.
+
+        >>> from renderer import load_scene
+        >>> scene = load_scene("scenes/stairs.toml")
+        >>> dark = scene.altered(lights=())
+        >>> len(scene.lights), len(dark.lights), dark.instances is scene.instances
+        (2, 0, True)
         """
         _ = self.instances  # cached, so that the copy has it too
         return self.model_copy(update=changes)
@@ -196,6 +250,11 @@ def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file, and load its meshes; of a mesh file, the scene that ``showcase`` puts around it.
 
     Raises ``SceneError``.
+
+    >>> from renderer import load_scene
+    >>> scene = load_scene("scenes/stairs.toml")
+    >>> scene.camera.type, sorted(scene.materials), len(scene.objects)
+    ('orthographic', ['ground', 'stone'], 1)
     """
     try:
         path = as_path("path", path)

@@ -28,6 +28,14 @@ class Pattern(NamedTuple):
 
     directions  (k, 3) float64, unit vectors
     weights     (k,) float64, >= 0: solid angles in steradians; those of ``cosine_hemisphere`` times the cosine
+
+    >>> import numpy as np
+    >>> from renderer import Octree
+    >>> from renderer.studies import Pattern, sky_view_factor
+    >>> roof = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> sky = Pattern(directions=np.array([[0, 0, 1.0], [0.6, 0, 0.8]]), weights=np.array([4.0, 5.0]))
+    >>> sky_view_factor(roof, [[0.25, 0.25, -1]], patches=sky)
+    array([0.5])
     """
 
     directions: Floats
@@ -42,7 +50,8 @@ def tregenza() -> Pattern:
 
     Source: Tregenza, Subdivision of the sky hemisphere for luminance measurements, 1987.
 
-    >>> from renderer.studies.directions import tregenza
+    >>> import numpy as np
+    >>> from renderer.studies import tregenza
     >>> tregenza().directions.shape, round(float(tregenza().weights.sum() / np.pi), 12)
     ((145, 3), 2.0)
     """
@@ -57,7 +66,7 @@ def reinhart(subdivision: int = 2) -> Pattern:
 
     Source: Bourgeois, Reinhart, Ward, A standard daylight coefficient model for dynamic daylighting simulations, 2008.
 
-    >>> from renderer.studies.directions import reinhart
+    >>> from renderer.studies import reinhart
     >>> [len(reinhart(m).weights) for m in (1, 2, 4)]
     [145, 577, 2305]
     """
@@ -80,7 +89,7 @@ def fibonacci_hemisphere(count: int) -> Pattern:
 
     Source: Swinbank, Purser, Fibonacci grids: a novel approach to global modelling, 2006.
 
-    >>> from renderer.studies.directions import fibonacci_hemisphere
+    >>> from renderer.studies import fibonacci_hemisphere
     >>> fibonacci_hemisphere(2).directions[:, 2]
     array([0.25, 0.75])
     """
@@ -94,7 +103,7 @@ def fibonacci_sphere(count: int) -> Pattern:
 
     Source: Swinbank, Purser, Fibonacci grids: a novel approach to global modelling, 2006.
 
-    >>> from renderer.studies.directions import fibonacci_sphere
+    >>> from renderer.studies import fibonacci_sphere
     >>> fibonacci_sphere(4).directions[:, 2]
     array([-0.75, -0.25,  0.25,  0.75])
     """
@@ -111,7 +120,7 @@ def cosine_hemisphere(count: int) -> Pattern:
 
     Source: Vogel, A better way to construct the sunflower head, 1979, for the disc.
 
-    >>> from renderer.studies.directions import cosine_hemisphere
+    >>> from renderer.studies import cosine_hemisphere
     >>> (cosine_hemisphere(2).directions[:, 2] ** 2).round(12)
     array([0.25, 0.75])
     """

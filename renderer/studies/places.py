@@ -17,6 +17,13 @@ class FacePoints(NamedTuple):
     points, normals  (n, 3) float64; normals are unit vectors to the outer side, from which corners run
                      counter-clockwise
     faces            (n,) int64
+
+    >>> from renderer.mesh.shapes import grid
+    >>> from renderer.studies import face_points
+    >>> places = face_points(grid(size=(3, 3)))
+    >>> places.points, places.faces
+    (array([[ 0.5,  0. ,  0.5],
+           [-0.5,  0. , -0.5]]), array([0, 1]))
     """
 
     points: NDArray[np.float64]

@@ -41,6 +41,13 @@ class Scan(NamedTuple):
     distances  (m,) float64 from the scanner, in scene units
     faces      (m,) int64
     rays       (m,) int64, the rows of their directions
+
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> from renderer.studies import scan
+    >>> cloud = scan(Octree.from_mesh(box((-1, -1, -1), (1, 1, 1))), [0, 0, 0], 1000)
+    >>> len(cloud.points), bool((abs(cloud.points).max(axis=1).round(9) == 1).all())
+    (1000, True)
     """
 
     points: Floats

@@ -18,6 +18,12 @@ class Hits:
     u, v  (...) float64, P = (1 - u - v) p0 + u p1 + v p2; nan on a miss
 
     t_error  (...) float64, how far rounding may have moved t, nan on a miss; None unless it was asked for
+
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+    >>> hits.t, hits.face, hits.u
+    (array([ 2., inf]), array([10, -1]), array([0.25,  nan]))
     """
 
     t: NDArray[np.float64]
@@ -28,7 +34,14 @@ class Hits:
     t_error: NDArray[np.float64] | None = None
 
     def shaped(self, shape: tuple[int, ...]) -> "Hits":
-        """The same hits in other dimensions."""
+        """The same hits in other dimensions.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.shaped((2, 1)).t.tolist()
+        [[2.0], [inf]]
+        """
         if self.t.shape == shape:
             return self
         t, u, v = (values.reshape(shape) for values in (self.t, self.u, self.v))
@@ -37,12 +50,27 @@ class Hits:
 
     @property
     def hit(self) -> NDArray[np.bool_]:
-        """Whether each ray hit a face, (...) bool."""
+        """Whether each ray hit a face, (...) bool.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.hit
+        array([ True, False])
+        """
         return self.face >= 0
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Hit points from the barycentrics, (..., 3) float64; nan on a miss."""
+        """Hit points from the barycentrics, (..., 3) float64; nan on a miss.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.points
+        array([[0.5 , 0.25, 1.  ],
+               [ nan,  nan,  nan]])
+        """
         points = np.full((*self.face.shape, 3), np.nan)
         hit = self.hit
         points[hit] = points_on(self._mesh, self.face[hit], self.u[hit], self.v[hit])
@@ -50,7 +78,15 @@ class Hits:
 
     @property
     def normals(self) -> NDArray[np.float64]:
-        """Unit geometric normals by the faces' winding, (..., 3) float64; nan on a miss."""
+        """Unit geometric normals by the faces' winding, (..., 3) float64; nan on a miss.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.normals
+        array([[ 0.,  0.,  1.],
+               [nan, nan, nan]])
+        """
         normals = np.full((*self.face.shape, 3), np.nan)
         hit = self.hit
         normals[hit] = _normals(self._mesh, self.face[hit])
@@ -68,6 +104,13 @@ class AllHits:
     face     (m,) int64
     u, v     (m,) float64, P = (1 - u - v) p0 + u p1 + v p2
     t_error  (m,) float64, how far rounding may have moved t; None unless it was asked for
+
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+    >>> begin, end = hits.offsets[:2]
+    >>> hits.t[begin:end], hits.face[begin:end]
+    (array([2., 3.]), array([10,  9]))
     """
 
     offsets: NDArray[np.int64]
@@ -81,22 +124,52 @@ class AllHits:
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """The number of hits of each ray, in the dimensions of the rays, (...) int64."""
+        """The number of hits of each ray, in the dimensions of the rays, (...) int64.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.counts
+        array([2, 0])
+        """
         return np.diff(self.offsets).reshape(self._shape)
 
     @property
     def ray(self) -> NDArray[np.int64]:
-        """The ray of each hit, (m,) int64: its row, where rays of several dimensions are counted in C order."""
+        """The ray of each hit, (m,) int64: its row, where rays of several dimensions are counted in C order.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.ray
+        array([0, 0])
+        """
         return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Hit points from the barycentrics, (m, 3) float64."""
+        """Hit points from the barycentrics, (m, 3) float64.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.points
+        array([[0.5 , 0.25, 1.  ],
+               [0.5 , 0.25, 0.  ]])
+        """
         return points_on(self._mesh, self.face, self.u, self.v)
 
     @property
     def normals(self) -> NDArray[np.float64]:
-        """Unit geometric normals by the faces' winding, (m, 3) float64."""
+        """Unit geometric normals by the faces' winding, (m, 3) float64.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.normals
+        array([[ 0.,  0.,  1.],
+               [ 0.,  0., -1.]])
+        """
         return _normals(self._mesh, self.face)
 
 

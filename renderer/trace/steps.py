@@ -28,6 +28,12 @@ class Steps:
 
     nodes      (...) int64, the nodes entered, whose eight boxes are tested at once
     triangles  (...) int64, the triangles tested
+
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> steps = Octree.from_mesh(box()).count_steps([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+    >>> steps.nodes, steps.triangles
+    (array([1, 1]), array([4, 0]))
     """
 
     nodes: NDArray[np.int64]

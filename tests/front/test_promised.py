@@ -243,6 +243,15 @@ def test_u_and_v_of_nearest_points_weigh_the_second_and_third_corner() -> None:
     assert found.u.tolist() == [0.25, 0.75] and found.v.tolist() == [0.25, 0.0]
 
 
+def test_the_mesh_of_a_tree_is_the_one_built_over_and_then_the_moved_one() -> None:
+    mesh = icosphere(1)
+    for built in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+        assert built.mesh is mesh
+        built.refit(mesh.vertices * 2.0)
+        assert np.array_equal(built.mesh.vertices, mesh.vertices * 2.0)
+        assert np.array_equal(built.mesh.faces, mesh.faces)
+
+
 def test_a_refit_keeps_what_belongs_to_vertices() -> None:
     mesh = icosphere(1)
     full = Mesh(mesh.vertices, mesh.faces, mesh.vertices, np.abs(mesh.vertices), mesh.vertices[:, :2])

@@ -1,6 +1,5 @@
 """The site's parts: gallery and notebooks run, docstrings become lists, links are checked, names have a place."""
 
-import doctest
 import gzip
 import json
 import re
@@ -172,17 +171,6 @@ def test_every_public_name_is_in_the_reference():
     text = (ROOT / "docs" / "api" / "renderer.rst").read_text(encoding="utf-8")
     absent = [name for name in renderer.__all__ if f":: renderer.{name}\n" not in text]
     assert absent == ["__version__"]
-
-
-@pytest.mark.parametrize("name", sorted(set(renderer.__all__) - {"__version__"}))
-def test_examples_in_the_reference_work(name, tmp_path, monkeypatch):
-    """Those of a public name and its members, as the page of the API shows them."""
-    monkeypatch.chdir(ROOT)
-    thing = getattr(renderer, name)
-    runner = doctest.DocTestRunner()
-    for example in doctest.DocTestFinder().find(thing, name, globs=dict(vars(sys.modules[thing.__module__]))):
-        runner.run(example)
-    assert not runner.failures
 
 
 def test_drawings_are_svg_without_what_lies_elsewhere():

@@ -138,6 +138,7 @@ def test_texts_are_cut_into_sentences_and_definitions() -> None:
     [
         "1 + 1\n2", "[1,\n... 2]\n[1,\n 2]", "print('So it is.')\nSo it is.", "a = 1",
         "import numpy", "a.save()", "with a:\n...     a.b\n3", "'# A comment.'\n'# A comment.'",
+        "f(0)\nTraceback (most recent call last):\n    ...\nValueError: expected 1, got 0",
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("between", ["", "\n"])

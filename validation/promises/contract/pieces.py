@@ -148,6 +148,8 @@ def _after_output(example: doctest.Example) -> str:
     Doctest takes all lines down to an empty one for output, so a sentence could hide there. Here the output of
     ``print`` is one line, and any other is an expression of Python, which a sentence is not.
     """
+    if example.exc_msg is not None:  # of this package's errors, a line
+        return "\n".join(example.exc_msg.splitlines()[1:])
     lines = example.want.splitlines()
     last = ast.parse(example.source).body[-1]
     while isinstance(last, ast.With):  # its last statement shows its value, as one that stands alone does
