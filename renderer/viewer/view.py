@@ -22,6 +22,12 @@ def view(
 
     The result has ``url`` and ``close()``; the server ends with it or with the process. Raises ``ValueError`` naming
     the argument, and ``ModuleNotFoundError`` where the extra ``viewer`` is not installed.
+
+    >>> from renderer import view
+    >>> viewing = view("scenes/stairs.toml", browser=False)
+    >>> viewing.url.startswith("http://127.0.0.1:")
+    True
+    >>> viewing.close()
     """
     expect(isinstance(scene, Scene | str | Path), "scene", "a Scene or a path", type(scene).__name__)
     try:

@@ -18,7 +18,6 @@ ROOT = Path(__file__).parents[2]
 # Names without an example, each for its reason.
 WITHOUT = {
     "__version__": "a string",
-    "view": "serves a page until it is closed; the notebook of the documentation shows it",
     "Queries.tree": "arrays for the kernels",
     "PreparedScene.picture": "render calls it with arguments that it has checked; users call render",
     "Phong.kind": "a number for the kernels",
