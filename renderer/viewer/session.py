@@ -14,8 +14,8 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from renderer.viewer.commands import command_of, saved
 from renderer.viewer.compare import Comparison
-from renderer.viewer.growth import Growth
 from renderer.viewer.export import Exporter
+from renderer.viewer.growth import Growth
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
 from renderer.viewer.protocol import (

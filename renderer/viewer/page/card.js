@@ -56,7 +56,7 @@ function byLevel(levels) {
 }
 
 // Fill and show `card`; `close()` is called by its button, `toggle(shown)` by the switch of the visited nodes,
-// `chosen(index)` for the ray that is pointed at, and `aside()` to see it from the side.
+// `chosen(index)` for the ray that is pointed at, and `aside()`, where there is one, to see it from the side.
 export function showCard(card, pick, { scene, close, toggle, chosen, aside, shown }) {
   const list = element("dl");
   for (const [name, ...value] of rows(pick, scene)) list.append(element("dt", { textContent: name }), element("dd", {}, ...value));
@@ -68,10 +68,10 @@ export function showCard(card, pick, { scene, close, toggle, chosen, aside, show
   const visited = element("label", { className: "switch" }, element("span", {}, `${pick.visited} nodes visited`), nodes);
   const tested = element("p", { className: "note", textContent: `${count(pick.tested.triangles)} triangles tested by the camera ray` });
   const side = element("button", { type: "button", textContent: "View from the side" });
-  side.addEventListener("click", aside);
+  side.addEventListener("click", () => aside());
   const title = element("h2", { textContent: pick.hit ? "Ray" : "Ray into the open" });
   const proof = pick.proof ? values(pick.proof) : [];
   card.replaceChildren(closing, ...proof, title, list, element("ul", { className: "legend" }, ...legend(pick.path)),
-    ...rayTree(pick.path, chosen), visited, ...(pick.levels.length ? [byLevel(pick.levels)] : []), tested, side);
+    ...rayTree(pick.path, chosen), visited, ...(pick.levels.length ? [byLevel(pick.levels)] : []), tested, ...(aside ? [side] : []));
   card.hidden = false;
 }

@@ -1,6 +1,6 @@
 // One HTML file that shows what the page shows, without a server: the picture, the model, boxes and rays.
 import { encoded, dataUrl } from "./base64.js";
-import { element } from "./card.js";
+import { element } from "./element.js";
 import { fetchFrom } from "./connection.js";
 import { drawing } from "./layers.js";
 import { NO_BOXES, NO_RAYS } from "./overlay.js";

@@ -1,5 +1,5 @@
 // The panel's section of files to hand on: all in one, which the page makes by itself, and pictures by the server.
-import { element } from "./card.js";
+import { element } from "./element.js";
 import { Exports } from "./exports.js";
 import { allowed } from "./film.js";
 import { Progress } from "./progress.js";

@@ -158,6 +158,10 @@ class Standalone {
           this.showNodes = shown;
           this.request();
         },
+        chosen: (index) => {
+          this.rays = { ...this.rays, path: pathLines(this.known.pick, index) };
+          this.request();
+        },
         shown: this.showNodes,
       });
   }
