@@ -163,7 +163,7 @@ def test_more_boxes_than_can_be_drawn_are_not_drawn_and_that_is_said(viewer: Vie
         # They are of all of the level: of its first and of its last parts.
         corners = viewer.page.evaluate(
             """async (level) => {
-                const { fetchBoxes } = await import("./static/overlay.js");
+                const { fetchBoxes } = await import("./static/nodes.js");
                 const [few, all] = await Promise.all([5, 1e9].map((most) => fetchBoxes(viewer.scene.id, level, most)));
                 return [few, all].map(({ panes }) => [...panes.floats].filter((_, i) => i % 7 < 6));
             }""",

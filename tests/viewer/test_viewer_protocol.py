@@ -285,7 +285,7 @@ def test_the_header_is_40_bytes_little_endian() -> None:
     assert header == bytes.fromhex(f"{words} 0000c03f 0000803e")
     piece = Still(type="still", seq=3, m=M, fovy=0.7, w=320, h=240)
     header = packed(FILE, piece, 1, True, 320, Rows(2**20, 5, 2**20 + 5), (0.0, 0.0))
-    words = "04000000 03000000 01000000 01000000 40010000 05000000 00001000 05001000"
+    words = "05000000 03000000 01000000 01000000 40010000 05000000 00001000 05001000"
     assert header == bytes.fromhex(f"{words} 00000000 00000000")
     whole = packed(JPEG, view, 0, False, 1, Rows(0, 1, 1), (0.0, 0.0))
     assert struct.unpack("<8I2f", whole)[2:4] == (0, 0)
