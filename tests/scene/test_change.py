@@ -1,8 +1,13 @@
 """Changes of a scene by a few lines of TOML."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from renderer import DirectionalLight, OrthographicCamera, Scene
+from renderer.cli import main
+from renderer.picture.image import srgb
 from renderer.scene.change import changed
 
 SCENE = Scene(
@@ -39,3 +44,21 @@ def test_what_is_wrong_is_said_on_one_line(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said) as told:
         changed(SCENE, text)
     assert "\n" not in str(told.value)
+
+
+def test_the_command_renders_the_changed_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from PIL import Image as Pillow
+
+    (tmp_path / "a.toml").write_text("[camera]\neye = [0, 0, 4]\ntarget = [0, 0, 0]\n[materials]\n")
+    words = ["render", str(tmp_path / "a.toml"), "--quiet", "-o", str(tmp_path / "a.png")]
+    assert main([*words, "--resolution", "9x9", "--change", "render.resolution = [4, 2]"]) == 0
+    with Pillow.open(tmp_path / "a.png") as written:
+        assert written.size == (9, 9)  # options go before changes
+    assert main([*words, "--change", "render.samples = 4", "--change", "render.resolution = [4, 2]"]) == 0
+    with Pillow.open(tmp_path / "a.png") as written:
+        picture = np.asarray(written)[..., :3]
+    assert picture.shape == (2, 4, 3) and (picture == srgb(np.zeros((2, 4, 3), np.float32))).all()
+    capsys.readouterr()
+    assert main([*words, "--change", "colour = 3"]) == 2
+    said = capsys.readouterr().err
+    assert "--change: change: expected keys among" in said and said.count("\n") == 1

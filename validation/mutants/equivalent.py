@@ -123,8 +123,6 @@ LEFT: dict[str, str] = {
     "renderer.pyvista_accessor.OctreeAccessor.tree #0: self._dataset.is_all_triangles or self._dataset.n_cells == 0 -> "
     "(self._dataset.is_all_triangles) and (self._dataset.n_cells == 0)":
         "PyVista is not among the locked packages, so its tests, each of which notices this, are skipped",
-    "renderer.viewer.session.Session._show #0: view.mode == 'brute' -> (view.mode) != ('brute')":
-        "two pictures by brute force may be computed at once, for the time of a tile: slower, the same pictures",
     "renderer.kernels.store.KernelStore._digest #0: digest is None or is_ours(self._source) -> "
     "(digest is None) and (is_ours(self._source))":
         "the keys of kept kernels have more in them than they need: a start takes longer, the kernels are the same",
