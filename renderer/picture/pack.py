@@ -41,6 +41,14 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
     return mesh, arrays
 
 
+def repacked(arrays: SceneArrays, scene: Scene, needs: Needs) -> SceneArrays:
+    """``arrays`` with the materials and lights of ``scene``, which has the meshes that they were packed of, and as many
+    materials of the same names.
+    """
+    media = media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64)
+    return arrays._replace(materials=_materials(scene, needs), lights=light_rows(scene, needs), media=media)
+
+
 def _materials(scene: Scene, needs: Needs) -> NDArray[np.float64]:
     """The rows of the materials, of kinds that have all that ``needs`` names, whether the scene needs it or not."""
     rows = np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)

@@ -7,17 +7,21 @@ from pydantic import Field, ValidationError
 
 from renderer.errors import expect
 from renderer.scene.fields import Fields, first_fault
-from renderer.scene.scene import AnyCamera, AnyLight, Scene, checked_settings
+from renderer.scene.hide import without
+from renderer.scene.scene import AnyCamera, AnyLight, AnyMaterial, Scene, checked_settings
 
 
 class _Changes(Fields):
     camera: AnyCamera | None = None
     lights: tuple[AnyLight, ...] | None = None
+    materials: dict[str, AnyMaterial] = Field({})
     render: dict[str, Any] = Field({})
+    hide: tuple[str, ...] = ()
 
 
 def changed(scene: Scene, text: str) -> Scene:
-    """``scene`` with what ``text`` has of a scene file in its place: camera, lights, and single keys of ``render``.
+    """``scene`` with what ``text`` has of a scene file in its place: camera, lights, single materials, and single keys
+    of ``render``; and without the objects that a list ``hide`` names, such as ``objects.0`` or ``floor``.
 
     Raises ``ValueError`` with one line that names the key.
 
@@ -36,6 +40,9 @@ def changed(scene: Scene, text: str) -> Scene:
         changes = _Changes.model_validate(table)
     except ValidationError as error:
         raise ValueError(first_fault(error, Scene._union_member)) from None
+    for name in changes.materials:
+        expect(name in scene.materials, "materials", f"names among {sorted(scene.materials)}", repr(name))
     found = {"camera": changes.camera, "lights": changes.lights}
     given: dict[str, Any] = {key: value for key, value in found.items() if value is not None}
-    return scene.altered(**given, render=checked_settings(scene.render, changes.render))
+    given["materials"] = {**scene.materials, **changes.materials}
+    return without(scene.altered(**given, render=checked_settings(scene.render, changes.render)), changes.hide)

@@ -1,7 +1,7 @@
 """The server's routes: the page, the data that it fetches, and the WebSocket."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -23,7 +23,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from renderer.viewer.payload import Payload, boxes_payload, description, mesh_payload
 from renderer.viewer.security import ResponseHeaders, SameOrigin, TokenRequired, allowed_hosts
 from renderer.viewer.session import Connection, Session
-from renderer.viewer.shown import ShownScene, open_file
+from renderer.viewer.shown import ShownScene, hiding, open_file
 from renderer.viewer.watch import follow
 
 PAGE = Path(__file__).parent / "page"
@@ -53,10 +53,17 @@ class Viewer:
     async def open(self, file: str, fresh: bool) -> ShownScene:
         """The scene of one of the files offered, as ``SceneHost`` says."""
         async with self._one_opens:
-            known = [self.shown, *(session.shown for session in self.sessions)]
+            known = [self.shown, *(session.shown.whole for session in self.sessions)]
             shown = await run_in_threadpool(_opened, self.shown, known, file, fresh)
             if shown.path == self.shown.path:
                 self.shown = shown
+            self._scenes[shown.id] = shown
+            return shown
+
+    async def hide(self, shown: ShownScene, hidden: Collection[str]) -> ShownScene:
+        """``shown`` without those objects, as ``SceneHost`` says."""
+        async with self._one_opens:
+            shown = await run_in_threadpool(hiding, shown, hidden)
             self._scenes[shown.id] = shown
             return shown
 

@@ -16,7 +16,7 @@ from renderer.trace.spawn import BOUNDED
 from renderer.viewer.commands import lights_of
 from renderer.viewer.protocol import CameraMessage, ViewSettings
 from renderer.viewer.references import reference_picture
-from renderer.viewer.shown import ShownScene, render_settings, varied
+from renderer.viewer.shown import ShownScene, edited, render_settings, varied
 from renderer.viewer.viewpoint import camera_of
 
 # The two numbers of samples that are compared: few that show stairs at edges, and the most of a view.
@@ -138,7 +138,7 @@ def _for_others(shown: ShownScene, settings: ViewSettings) -> Scene:
     for switch in ("reflection", "refraction"):
         expect(getattr(settings, switch), "comparison", f"{switch} as the materials have it", "it switched off")
     render = shown.scene.render.model_copy(update={"shadows": settings.shadows})
-    return shown.scene.altered(lights=lights_of(shown, settings), render=render)
+    return edited(shown.scene, settings.edits).altered(lights=lights_of(shown, settings), render=render)
 
 
 def heat_map(comparison: Comparison) -> tuple[NDArray[np.uint8], Limits]:

@@ -12,6 +12,7 @@ from renderer.errors import expect
 from renderer.inspect.tree_boxes import boxes_at, levels
 from renderer.mesh.mesh import face_normals
 from renderer.picture.prepare import PreparedScene
+from renderer.scene.hide import FLOOR, object_names
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.material import Material
 from renderer.scene.needs import examine
@@ -42,6 +43,7 @@ def description(shown: ShownScene) -> dict[str, Any]:
         "vertices": len(mesh.vertices),
         "render": settings.model_dump(include={"resolution", "samples", "max_depth", "shadows"}),
         "materials": [_material(name, material) for name, material in scene.materials.items()],
+        "objects": _objects(shown),
         "lights": [_light(light) for light in scene.lights],
         "ambient": scene.ambient,
         "background": scene.background,
@@ -116,7 +118,25 @@ def _material(name: str, material: Material) -> dict[str, Any]:
         "type": material.type,
         **{color: row[column : column + 3] for color, column in colors.items()},
         "shininess": row[SHININESS],
+        "fields": material.model_dump(exclude_none=True),
     }
+
+
+def _objects(shown: ShownScene) -> list[dict[str, Any]]:
+    """All objects of the scene, hidden ones too."""
+    scene = shown.whole.scene
+    names, count = object_names(scene), len(scene.objects)
+    parts = [scene.instances[i : i + 1] for i in range(count)] + [scene.instances[count:]]
+    return [
+        {
+            "name": name,
+            "label": FLOOR if name == FLOOR else part[0].mesh.name or name,
+            "materials": sorted({instance.material for instance in part}),
+            "faces": sum(len(instance.mesh.faces) for instance in part),
+            "shown": name not in shown.hidden,
+        }
+        for name, part in zip(names, parts, strict=False)
+    ]
 
 
 def _light(light: Light) -> dict[str, Any]:

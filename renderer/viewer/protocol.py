@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 from renderer.limits import FARTHEST
 from renderer.scene.camera import sample_offsets
 from renderer.scene.fields import FiniteVector
+from renderer.scene.scene import AnyLight, AnyMaterial
 
 # The longest side of a picture and the most pixels, those of a screen called 4K, 3840 x 2160, and some more.
 MAX_SIDE, MAX_PIXELS = 4096, 1 << 23
@@ -35,6 +36,7 @@ _Matrix = Annotated[list[_Number], Field(min_length=16, max_length=16)]
 _Fovy = Annotated[float, Field(ge=MIN_FOVY, le=MAX_FOVY)]
 _Height = Annotated[float, Field(gt=0.0, le=FARTHEST)] | None
 _FileName = Annotated[str, Field(max_length=255)]  # the longest file name
+_Hidden = Annotated[list[Annotated[str, Field(max_length=40)]], Field(max_length=1024)]
 
 Mode = Literal["gl", "phong", "brute", "octree", "proof"]
 MODES: tuple[Mode, ...] = ("gl", "phong", "brute", "octree", "proof")
@@ -63,11 +65,24 @@ class _Sized(_Message):
         return self
 
 
+class Edits(_Message):
+    """What the page has in place of the file's: materials by their names, and all lights or null for the file's."""
+
+    materials: dict[str, AnyMaterial] = {}
+    lights: tuple[AnyLight, ...] | None = None
+
+    @property
+    def any(self) -> bool:
+        """Whether there are any."""
+        return bool(self.materials) or self.lights is not None
+
+
 class ViewSettings(_Message):
     """The settings of the panel. ``light`` is the direction in which the first directional light travels, null for the
     scene's own; ``aov`` the value that a pixel shows; ``pixels`` the format in which pictures are sent; ``pair`` what a
     proof compares: the octree and "brute" force, few and many "samples", or the octree and the reference of that name;
-    ``refine`` the samples per pixel up to which the picture of a camera at rest grows.
+    ``refine`` the samples per pixel up to which the picture of a camera at rest grows; ``edits`` the materials and
+    lights that differ from the file's.
     """
 
     max_depth: Annotated[int, Field(ge=0, le=64)] = 6
@@ -80,6 +95,7 @@ class ViewSettings(_Message):
     light: FiniteVector | None = None
     pixels: Literal["rgba", "jpeg"] = "rgba"
     pair: Annotated[str, Field(min_length=1, max_length=40)] = "brute"
+    edits: Edits = Edits()
 
     @field_validator("samples", "refine")
     @classmethod
@@ -146,11 +162,13 @@ class Pick(_Sized):
 
 class Hello(_Message):
     """A page that begins, or has lost its connection, wants to know its scene: ``file``, loaded anew only if it was
-    edited, where it had that from this ``server`` and it is offered still; else the server's own.
+    edited, where it had that from this ``server`` and it is offered still; else the server's own. Of the objects
+    ``hidden`` those that the scene has are left out.
     """
 
     type: Literal["hello"]
     file: _FileName = ""
+    hidden: _Hidden = []
     server: Annotated[str, Field(max_length=64)] = ""
 
 
@@ -159,6 +177,23 @@ class OpenScene(_Message):
 
     type: Literal["scene"]
     file: _FileName
+
+
+class HideObjects(_Message):
+    """Leave these objects of the scene out, and show all others."""
+
+    type: Literal["hide"]
+    hidden: _Hidden
+
+
+class SaveScene(_Message):
+    """Write the scene's file with this camera and these settings, and what of it differs from the file."""
+
+    type: Literal["save"]
+    m: _Matrix
+    fovy: _Fovy
+    height: _Height = None
+    settings: ViewSettings = ViewSettings()
 
 
 class SaveCamera(_Message):
@@ -231,7 +266,21 @@ class Stop(_Message):
     type: Literal["stop"]
 
 
-Message = CameraMessage | Ack | Cancel | Pick | Hello | OpenScene | SaveCamera | AskCommand | Still | Turntable | Stop
+Message = (
+    CameraMessage
+    | Ack
+    | Cancel
+    | Pick
+    | Hello
+    | OpenScene
+    | HideObjects
+    | SaveScene
+    | SaveCamera
+    | AskCommand
+    | Still
+    | Turntable
+    | Stop
+)
 _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 

@@ -7,12 +7,13 @@ for them. Of messages that arrive faster than they can be answered only the newe
 import asyncio
 import json
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Collection
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
-from renderer.viewer.commands import command_of, saved
+from renderer.scene.hide import object_names
+from renderer.viewer.commands import command_of, saved, scene_text
 from renderer.viewer.compare import Comparison
 from renderer.viewer.export import Exporter
 from renderer.viewer.growth import Growth
@@ -25,9 +26,11 @@ from renderer.viewer.protocol import (
     CameraMessage,
     Cancel,
     Hello,
+    HideObjects,
     OpenScene,
     Pick,
     SaveCamera,
+    SaveScene,
     Still,
     Stop,
     Turntable,
@@ -84,6 +87,9 @@ class SceneHost(Protocol):
         was loaded, and always if ``fresh``. Raises ``ValueError``.
         """
 
+    async def hide(self, shown: ShownScene, hidden: Collection[str]) -> ShownScene:
+        """``shown`` without those of its objects. Raises ``ValueError``."""
+
 
 @dataclass
 class Connection:
@@ -105,7 +111,7 @@ class Session:
     threads: Executor
     views: Newest[CameraMessage] = field(default_factory=Newest)
     picks: Newest[Pick] = field(default_factory=Newest)
-    scenes: Newest[Hello | OpenScene] = field(default_factory=Newest)
+    scenes: Newest[Hello | OpenScene | HideObjects] = field(default_factory=Newest)
 
     def __post_init__(self) -> None:
         self.shown = self.host.shown
@@ -133,13 +139,16 @@ class Session:
                 self.picks.put(message)
             elif isinstance(message, SaveCamera):
                 await self._tell(type="camera", name="camera.toml", text=saved(self.shown, message))
+            elif isinstance(message, SaveScene):
+                text, diff = scene_text(self.shown, message)
+                await self._tell(type="saved", name=self.shown.name, text=text, diff=diff)
             elif isinstance(message, AskCommand):
                 await self._tell(type="command", text=command_of(self.shown, message))
             elif isinstance(message, Still | Turntable):
                 self.exporter.begin(self.shown, message)
             elif isinstance(message, Stop):
                 self.exporter.stop()
-            elif isinstance(message, Hello | OpenScene):
+            elif isinstance(message, Hello | OpenScene | HideObjects):
                 self.scenes.put(message)
         except ValueError as error:
             await self.complain(error)
@@ -158,7 +167,8 @@ class Session:
 
     def reload(self) -> None:
         """Show the scene as its files have it now."""
-        self.scenes.put(Hello(type="hello", file=self.shown.path.name if self.shown.path else "", server=self.host.id))
+        file, hidden = self.shown.path.name if self.shown.path else "", list(self.shown.hidden)
+        self.scenes.put(Hello(type="hello", file=file, server=self.host.id, hidden=hidden))
 
     async def show_scene(self, shown: ShownScene) -> None:
         """Show ``shown`` from now on, and say which that is. Views of the one before are dropped."""
@@ -273,15 +283,25 @@ class Session:
     async def _open_scenes(self) -> None:
         while True:
             wanted = await self.scenes.take()
-            # A page of another server's begins anew here.
-            foreign = isinstance(wanted, Hello) and wanted.server != self.host.id
-            file = "" if foreign else wanted.file
             try:
-                await self.show_scene(await self.host.open(file, isinstance(wanted, OpenScene)))
+                await self.show_scene(await self._wanted(wanted))
             except Exception as error:  # as above
                 await self.complain(error)
                 if isinstance(wanted, Hello):  # a page that begins has no scene to go on with
                     await self.show_scene(self.shown)
+
+    async def _wanted(self, wanted: Hello | OpenScene | HideObjects) -> ShownScene:
+        """The scene that the page wants to see."""
+        if isinstance(wanted, HideObjects):
+            return await self.host.hide(self.shown, wanted.hidden)
+        if isinstance(wanted, OpenScene):
+            return await self.host.open(wanted.file, fresh=True)
+        # A page of another server's begins anew here.
+        shown = await self.host.open(wanted.file if wanted.server == self.host.id else "", fresh=False)
+        known = object_names(shown.whole.scene)
+        hidden = [name for name in wanted.hidden if name in known]
+        # What is hidden stays so where the file was edited, unless nothing else is left in it.
+        return await self.host.hide(shown, hidden) if len(hidden) < len(known) else shown
 
     async def _tell(self, **message: Any) -> None:
         await self.connection.text(json.dumps(message, allow_nan=False))

@@ -1,7 +1,7 @@
 """A scene on show: prepared once for its connections, and varied by the settings of their panels."""
 
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from secrets import token_hex
@@ -9,16 +9,18 @@ from typing import NamedTuple
 
 from renderer.errors import expect
 from renderer.lazy import lazy
-from renderer.picture.pack import light_rows
+from renderer.picture.pack import light_rows, repacked
 from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene, tree_for
 from renderer.precompile import touch_viewing
 from renderer.process.parallel import available_threads
 from renderer.scene.camera import unit
-from renderer.scene.needs import needs_of
+from renderer.scene.hide import object_names, without
+from renderer.scene.needs import Needs, needs_of
 from renderer.scene.scene import RenderSettings, Scene, load_scene
 from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
+from renderer.shade.surface import SceneArrays
 from renderer.trace.spawn import BOUNDED
-from renderer.viewer.protocol import ViewSettings
+from renderer.viewer.protocol import Edits, ViewSettings
 
 # The most bytes of a file that may be a saved camera alone: the viewer writes some 300, and 150 for each light.
 _CAMERA_BYTES = 16384
@@ -40,6 +42,8 @@ class ShownScene:
     prepared  the scene over its octree, ready for any number of bounces
     marks     the files that it was loaded from, as they were then
     id        what tells it from every other scene, also from the same file loaded anew or by another server
+    hidden    the objects that are left out, by name
+    all       the scene with all objects where some are hidden, else None
     """
 
     scene: Scene
@@ -48,6 +52,13 @@ class ShownScene:
     threads: int
     marks: dict[Path, _Mark | None] = field(default_factory=dict)
     id: str = field(default_factory=lambda: token_hex(8))
+    hidden: tuple[str, ...] = ()
+    all: "ShownScene | None" = None
+
+    @property
+    def whole(self) -> "ShownScene":
+        """The scene with all its objects."""
+        return self.all or self
 
     @property
     def name(self) -> str:
@@ -115,18 +126,40 @@ def _is_camera(path: Path) -> bool:
 def prepare_shown(scene: Scene, path: Path | None = None) -> ShownScene:
     """Prepare ``scene`` and load its kernels. Raises ``ValueError`` for a scene that cannot be shown."""
     expect(any(len(i.mesh.faces) for i in scene.instances), "scene", "at least one face", "none")
-    # At least one bounce, because a panel may ask for more than the file does; needs are the same for any number above.
-    threads, needs = available_threads(), needs_of(scene, max_depth=max(1, scene.render.max_depth))
-    prepared = prepare_scene(scene, needs, "octree", "midpoint", threads)
-    # No lights are packed for a scene of mirrors and glass alone, which needs none; but its face colours need them.
-    prepared = replace(
-        prepared, arrays=prepared.arrays._replace(lights=light_rows(scene, replace(prepared.needs, shadows=True)))
-    )
+    threads = available_threads()
+    prepared = prepare_scene(scene, _needs(scene), "octree", "midpoint", threads)
+    prepared = replace(prepared, arrays=_lit(prepared.arrays, scene, prepared.needs))
     # The first call of a kernel loads or compiles it; the first picture should not wait for that.
     few = {"resolution": (8, 8), "samples": 1, "max_rays": 1}
     prepared.picture(scene.camera, scene.render.model_copy(update=few), BOUNDED, threads)
     touch_viewing(prepared)
     return ShownScene(scene, path, prepared, threads)
+
+
+def _needs(scene: Scene) -> Needs:
+    """The needs of the scene's pictures with at least one bounce, because a panel may ask for more than the file does;
+    they are the same for any number above.
+    """
+    return needs_of(scene, max_depth=max(1, scene.render.max_depth))
+
+
+def _lit(arrays: SceneArrays, scene: Scene, needs: Needs) -> SceneArrays:
+    """``arrays`` with the scene's lights. None are packed for a scene of mirrors and glass alone, which needs none; but
+    its face colours need them.
+    """
+    return arrays._replace(lights=light_rows(scene, replace(needs, shadows=True)))
+
+
+def hiding(shown: ShownScene, hidden: Collection[str]) -> ShownScene:
+    """``shown`` without those of its objects, and with all others. Raises ``ValueError`` for names that it has not, and
+    where nothing would be left.
+    """
+    whole = shown.whole
+    names = tuple(name for name in object_names(whole.scene) if name in hidden)
+    scene = without(whole.scene, hidden)
+    if not names:
+        return whole
+    return replace(prepare_shown(scene, whole.path), marks=whole.marks, hidden=names, all=whole)
 
 
 def open_file(path: Path) -> ShownScene:
@@ -137,11 +170,37 @@ def open_file(path: Path) -> ShownScene:
     return replace(prepare_shown(scene, path), marks=marks)
 
 
+def edited(scene: Scene, edits: Edits) -> Scene:
+    """``scene`` with the materials and lights of ``edits``. Raises ``ValueError`` for a material that it has not."""
+    for name in edits.materials:
+        expect(name in scene.materials, "edits.materials", f"names among {sorted(scene.materials)}", repr(name))
+    lights = scene.lights if edits.lights is None else edits.lights
+    return scene.altered(materials={**scene.materials, **edits.materials}, lights=lights)
+
+
+def _edited(prepared: PreparedScene, edits: Edits) -> PreparedScene:
+    """``prepared`` with other materials and lights, over the same tree."""
+    if not edits.any:
+        return prepared
+    scene = edited(prepared.scene, edits)
+    own, geometry = _needs(scene), prepared.needs
+    needs = replace(
+        own,
+        smooth_normals=geometry.smooth_normals,
+        float64_vertices=geometry.float64_vertices,
+        octree=geometry.octree,
+    )
+    arrays = _lit(repacked(prepared.arrays, scene, needs), scene, needs)
+    return replace(prepared, scene=scene, needs=needs, arrays=arrays)
+
+
 def varied(prepared: PreparedScene, settings: ViewSettings) -> PreparedScene:
-    """``prepared`` without the features that ``settings`` switch off, and with its first directional light turned.
+    """``prepared`` with the materials and lights of ``settings``, without the features that they switch off, and with
+    its first directional light turned.
 
     No tree is rebuilt. Lights that are dark do not count, and without a directional light none is turned.
     """
+    prepared = _edited(prepared, settings.edits)
     materials, lights = prepared.arrays.materials.copy(), prepared.arrays.lights.copy()
     needs, media = prepared.needs, prepared.arrays.media
     if not settings.reflection:

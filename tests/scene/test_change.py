@@ -5,13 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from renderer import DirectionalLight, OrthographicCamera, Scene
+from renderer import DirectionalLight, Mirror, OrthographicCamera, Scene
 from renderer.cli import main
+from renderer.mesh.shapes import box, icosphere
 from renderer.picture.image import srgb
 from renderer.scene.change import changed
 
 SCENE = Scene(
-    camera={"eye": (0, 0, 1), "target": (0, 0, 0)}, materials={}, lights=[{"type": "point", "position": (0, 1, 0)}]
+    camera={"eye": (0, 0, 1), "target": (0, 0, 0)},
+    materials={"grey": {}, "glass": {"type": "dielectric"}},
+    lights=[{"type": "point", "position": (0, 1, 0)}],
+    objects=[{"mesh": box(), "material": "grey"}, {"mesh": icosphere(1), "material": "glass"}],
+    floor={"min": (-1, -1), "max": (1, 1), "materials": ["grey", "glass"], "squares": (2, 2)},
 )
 
 
@@ -26,13 +31,32 @@ def test_what_is_named_changes_and_nothing_else() -> None:
     assert [type(light) for light in lit.lights] == [DirectionalLight] and lit.camera == SCENE.camera
     assert changed(SCENE, "lights = []").lights == () and changed(SCENE, "") == SCENE
 
+    shiny = changed(SCENE, "materials.grey = {type = 'mirror', reflectance = 0.5}")
+    assert shiny.materials == {"grey": Mirror(reflectance=0.5), "glass": SCENE.materials["glass"]}
+
+
+@pytest.mark.parametrize(
+    ("hidden", "left"),
+    [([], [0, 1, 2, 3]), (["objects.0"], [1, 2, 3]), (["floor"], [0, 1]), (["floor", "objects.1"], [0])],
+)
+def test_what_is_hidden_is_left_out_and_the_rest_is_not_placed_again(hidden: list[str], left: list[int]) -> None:
+    new = changed(SCENE, f"hide = {hidden}")
+    assert [id(part) for part in new.instances] == [id(SCENE.instances[i]) for i in left]
+    assert new.objects == tuple(SCENE.objects[i] for i in left if i < 2) and (new.floor is None) == ("floor" in hidden)
+    assert len(SCENE.instances) == 4 and len(SCENE.objects) == 2
+
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("render.samples = ", "expected TOML, got a syntax error"),
         ("a" * 9 + " = " + "[" * 9999, "expected TOML, got a syntax error"),
-        ("materials = {}", "change: expected keys among .*'camera', 'lights', 'render'.*, got 'materials'"),
+        ("objects = []", "change: expected keys among .*'camera', 'lights', 'materials', 'render'.*, got 'objects'"),
+        ("materials.gold = {}", "materials: expected names among .*'grey'.*, got 'gold'"),
+        ("materials.grey = {shinyness = 3}", "materials.grey.shinyness: unknown key"),
+        ("materials.grey = {type = 'wood'}", "materials.grey"),
+        ("hide = ['objects.7']", "hide: expected objects among .*'objects.0', 'objects.1', 'floor'.*, got 'objects.7'"),
+        ("hide = 'floor'", "hide: expected a list"),
         ("render.samples = 3", "samples"),
         ("render.colour = 3", "colour"),
         ("camera = {eye = [0, 0, 1]}", "camera"),

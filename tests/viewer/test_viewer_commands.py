@@ -50,6 +50,9 @@ def client(url: str) -> Iterator[Client]:
         ({}, {"light": [1.0, -1.0, 0.5]}),
         (ORTHOGRAPHIC, {}),
         ({"mode": "brute", "w": 40, "h": 30}, {"samples": 4}),
+        ({}, {"edits": {"materials": {"red": {"type": "mirror", "reflectance": [0.5, 0.5, 0.9]}}}}),
+        ({}, {"edits": {"lights": [{"type": "point", "position": [1.0, 3.0, 1.0], "intensity": [4.0, 3.0, 2.0]}]}}),
+        ({}, {"light": [1.0, -1.0, 0.5], "edits": {"lights": [{"type": "directional", "direction": [0, -1, 0]}]}}),
     ],
 )
 def test_the_command_renders_the_picture_that_is_seen(

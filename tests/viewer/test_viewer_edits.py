@@ -1,0 +1,274 @@
+"""Materials, lights and objects as a page changes them, and the scene file that it saves."""
+
+import json
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from viewer_page import SCENE
+
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+from PIL import Image as Pillow
+from viewer_client import SIZE, Client, fetched, looking, rendered
+
+import renderer
+from renderer import Dielectric, DirectionalLight, Mirror, Phong, PointLight, Scene, SceneObject, load_scene
+from renderer.cli import main
+from renderer.mesh.shapes import icosphere
+from renderer.picture.image import srgb
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.hide import object_names, without
+from renderer.scene.scene import Floor
+
+COMMENTED = f"# kept\n{SCENE.replace('shininess = 40', 'shininess = 40 # like wax')}"
+RED = Phong(diffuse=(0.1, 0.2, 0.9), specular=0.6, shininess=9.0, reflectance=0.3)
+LAMP = PointLight(position=(1.0, 3.0, 2.0), intensity=(5.0, 4.0, 3.0))
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("edited") / "blocks.toml"
+    path.write_text(COMMENTED)
+    return path
+
+
+@pytest.fixture(scope="module")
+def url(scene: Path) -> Iterator[str]:
+    with renderer.view(scene, browser=False) as viewing:
+        yield viewing.url
+
+
+@pytest.fixture
+def client(url: str) -> Iterator[Client]:
+    with Client(url) as client:
+        yield client
+
+
+def described(client: Client, url: str) -> dict[str, Any]:
+    return json.loads(fetched(url, f"scene?id={client.told('scene')['id']}"))
+
+
+def plain(fields: Any) -> Any:
+    """As JSON has it."""
+    return fields.model_dump(mode="json", exclude_none=True)
+
+
+@pytest.mark.parametrize(
+    ("materials", "lights"),
+    [
+        ({"red": RED}, None),
+        ({"red": Mirror(reflectance=0.7)}, None),
+        ({"red": Dielectric(ior=1.3)}, None),
+        ({"glass": Phong(diffuse=0.4), "stone": Phong(diffuse=(0.2, 0.6, 0.2))}, None),  # nothing bounces any more
+        ({}, [LAMP]),
+        ({"stone": Mirror(), "red": RED}, [LAMP, DirectionalLight(direction=(0, -1, 0.2), irradiance=0.4)]),
+        ({"red": Mirror(), "glass": Mirror(), "stone": Mirror()}, None),  # which no light falls on
+        ({}, []),
+    ],
+)
+@pytest.mark.parametrize("mode", ["octree", "brute"])
+def test_the_picture_is_that_of_the_scene_with_these_materials_and_lights(
+    client: Client, scene: Path, materials: dict[str, Any], lights: list[Any] | None, mode: str
+) -> None:
+    size = SIZE if mode == "octree" else {"w": 40, "h": 30}
+    edits: dict[str, Any] = {"materials": {name: plain(material) for name, material in materials.items()}}
+    edits |= {} if lights is None else {"lights": [plain(light) for light in lights]}
+    seen = client.passes(client.view(mode=mode, settings={"edits": edits}, **size))[-1].rgb
+    loaded = load_scene(scene)
+    changes = {"materials": {**loaded.materials, **materials}}
+    changed = loaded.model_copy(update=changes | ({} if lights is None else {"lights": tuple(lights)}))
+    expected = srgb(rendered(changed, resolution=(size["w"], size["h"])).radiance)
+    np.testing.assert_array_equal(seen, expected)
+    # The scene itself is as it was.
+    np.testing.assert_array_equal(client.final().rgb, srgb(rendered(loaded).radiance))
+
+
+def test_no_tree_is_built_for_other_materials(url: str, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    from importlib import import_module
+
+    built: list[object] = []
+    for place in ("renderer.picture.prepare", "renderer.viewer.shown"):
+        module, name = import_module(place), "build_octree"
+        monkeypatch.setattr(module, name, lambda *arguments: built.append(arguments))
+    before = client.final().rgb
+    after = client.final(settings={"edits": {"materials": {"red": plain(RED)}}}).rgb
+    assert not built and (before != after).any()
+
+
+@pytest.mark.parametrize(
+    ("edits", "said"),
+    [
+        ({"materials": {"gold": {"type": "phong"}}}, "edits.materials: expected names among"),
+        ({"materials": {"red": {"type": "wood"}}}, "settings.edits.materials.red"),
+        ({"materials": {"red": {"type": "phong", "diffuse": -1}}}, "settings.edits.materials.red"),
+        ({"materials": {"red": {"type": "phong", "colour": 1}}}, "settings.edits.materials.red"),
+        ({"lights": [{"type": "directional", "direction": [0, 0, 0]}]}, "settings.edits.lights.0"),
+        ({"lights": 3}, "settings.edits.lights"),
+        ({"camera": {}}, "settings.edits.camera"),
+    ],
+)
+def test_what_is_no_edit_is_refused_on_one_line(client: Client, edits: dict[str, Any], said: str) -> None:
+    client.view(settings={"edits": edits})
+    told = client.told("error")["message"]
+    assert said in told and "\n" not in told
+    client.final()  # goes on
+
+
+@pytest.mark.parametrize("hidden", [["objects.0"], ["floor"], ["objects.1", "floor"]])
+def test_what_is_hidden_is_neither_seen_nor_hit(client: Client, url: str, scene: Path, hidden: list[str]) -> None:
+    client.send(type="hide", hidden=hidden)
+    told = described(client, url)
+    assert [part["name"] for part in told["objects"] if not part["shown"]] == hidden
+    smaller = without(load_scene(scene), hidden)
+    assert told["faces"] == sum(len(part.mesh.faces) for part in smaller.instances)
+    assert told["name"] == "blocks.toml" and len(told["objects"]) == 3
+    np.testing.assert_array_equal(client.final().rgb, srgb(rendered(smaller).radiance))
+    pixels = rendered(smaller).face
+    y, x = np.argwhere(pixels >= 0)[7].tolist()
+    client.send(**{"type": "pick", "seq": 9, "x": x, "y": y, **SIZE, **looking((0.5, 2.6, 5.5))})
+    assert client.told("pick")["face"] == pixels[y, x]
+    client.send(type="hide", hidden=[])
+    assert all(part["shown"] for part in described(client, url)["objects"])
+    np.testing.assert_array_equal(client.final().rgb, srgb(rendered(load_scene(scene)).radiance))
+
+
+def test_objects_hidden_in_one_page_are_seen_in_another(client: Client, url: str, scene: Path) -> None:
+    client.send(type="hide", hidden=["floor"])
+    client.told("scene")
+    with Client(url) as other:
+        other.send(type="hello")
+        assert all(part["shown"] for part in described(other, url)["objects"])
+        np.testing.assert_array_equal(other.final().rgb, srgb(rendered(load_scene(scene)).radiance))
+
+
+@pytest.mark.parametrize(
+    ("hidden", "said"),
+    [
+        (["objects.9"], "hide: expected objects among"),
+        (["objects.0", "objects.1", "floor"], "at least one face"),
+        (["x" * 41], "hidden.0"),
+        ("floor", "hidden"),
+    ],
+)
+def test_what_cannot_be_hidden_is_said(client: Client, hidden: Any, said: str) -> None:
+    client.send(type="hide", hidden=hidden)
+    assert said in client.told("error")["message"]
+    client.final()
+
+
+def test_a_page_that_comes_back_has_hidden_what_it_had(client: Client, url: str) -> None:
+    client.send(type="hello")
+    server = described(client, url)["server"]
+    for hidden, expected in ((["floor"], ["floor"]), (["floor", "objects.7"], ["floor"])):
+        client.send(type="hello", file="blocks.toml", server=server, hidden=hidden)
+        told = described(client, url)["objects"]
+        assert [part["name"] for part in told if not part["shown"]] == expected
+    client.send(type="hello", file="blocks.toml", server=server, hidden=["objects.0", "objects.1", "floor"])
+    assert all(part["shown"] for part in described(client, url)["objects"])  # or nothing would be seen
+
+
+def test_an_edited_file_is_shown_without_what_was_hidden(tmp_path: Path) -> None:
+    path = tmp_path / "blocks.toml"
+    path.write_text(SCENE)
+    with renderer.view(path, browser=False) as viewing, Client(viewing.url) as client:
+        client.send(type="hide", hidden=["objects.1"])
+        client.told("scene")
+        client.final()
+        path.write_text(SCENE.replace("0.45, 0.62, 0.82", "0.9, 0.5, 0.1"))
+        told = described(client, viewing.url)
+        assert [part["shown"] for part in told["objects"]] == [True, False, True] and told["background"][0] == 0.9
+
+
+def saved(client: Client, **settings: Any) -> dict[str, Any]:
+    own = {"samples": 1, "max_depth": 3, **settings}
+    client.send(**{"type": "save", **looking((0.5, 2.6, 5.5)), "settings": own})
+    return client.told("saved")
+
+
+def test_a_scene_without_edits_is_saved_as_it_is(tmp_path: Path) -> None:
+    """The camera of the page is that of the file but for rounding."""
+    text = COMMENTED.replace("target = [0.0, 0.5, 0.0]", "target = [0.0, 0.5, 0.0] # the middle")
+    (tmp_path / "blocks.toml").write_text(text)
+    with renderer.view(tmp_path / "blocks.toml", browser=False) as viewing, Client(viewing.url) as client:
+        told = saved(client)
+    assert told["text"] == text and told["diff"] == "" and told["name"] == "blocks.toml"
+
+
+def test_what_is_edited_is_saved_and_the_rest_stays_as_it_is_written(client: Client, scene: Path) -> None:
+    edits = {"materials": {"red": plain(RED), "stone": plain(load_scene(scene).materials["stone"])}}
+    told = saved(client, samples=4, shadows=False, edits=edits, light=[0.0, -1.0, 0.25])
+    lines = [line for line in told["diff"].splitlines() if line[0] in "+-" and line[:3] not in ("+++", "---")]
+    assert sorted(lines) == sorted([
+        "-diffuse = [0.7, 0.1, 0.1]", "+diffuse = [0.1, 0.2, 0.9]", "-specular = 0.4", "+specular = [0.6, 0.6, 0.6]",
+        "-shininess = 40 # like wax", "+shininess = 9.0 # like wax", "+reflectance = [0.3, 0.3, 0.3]", "+samples = 4",
+        "+shadows = false", "-direction = [-0.6, -1.4, -0.8]", "+direction = [0.0, -1.0, 0.25]",
+    ])  # fmt: skip
+    assert told["text"].startswith("# kept\n")
+    # It is the file of the picture that is seen.
+    copy = scene.parent / "copy.toml"
+    copy.write_text(told["text"])
+    again = load_scene(copy)
+    copy.unlink()
+    assert again.materials["red"] == RED and again.render.samples == 4 and again.lights[0].direction == (0.0, -1.0, 0.25)
+    assert again.camera == load_scene(scene).camera and again.objects == load_scene(scene).objects
+
+
+@pytest.mark.parametrize("number", [0, 2, 3])
+def test_lights_that_come_and_go_are_saved(client: Client, scene: Path, number: int) -> None:
+    told = saved(client, edits={"lights": [plain(LAMP)] * number})
+    copy = scene.parent / "lights.toml"
+    copy.write_text(told["text"])
+    again = load_scene(copy)
+    copy.unlink()
+    assert again.lights == (LAMP,) * number and again.floor == load_scene(scene).floor
+
+
+def test_another_type_of_material_is_saved_without_the_keys_of_the_old(client: Client, scene: Path) -> None:
+    told = saved(client, edits={"materials": {"red": plain(Mirror(reflectance=0.25))}})
+    copy = scene.parent / "mirror.toml"
+    copy.write_text(told["text"])
+    again = load_scene(copy)
+    copy.unlink()
+    assert again.materials["red"] == Mirror(reflectance=0.25)
+
+
+def test_a_scene_without_a_file_and_one_edited_meanwhile_are_not_saved(tmp_path: Path) -> None:
+    ball = SceneObject(mesh=icosphere(1), material="grey")
+    eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+    made = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball])
+    with renderer.view(made, browser=False) as viewing, Client(viewing.url) as client:
+        client.send(**{"type": "save", **looking((0.5, 2.6, 5.5))})
+        assert "save: expected a scene file" in client.told("error")["message"]
+    path = tmp_path / "blocks.toml"
+    path.write_text(SCENE)
+    with renderer.view(path, browser=False) as viewing, Client(viewing.url) as client:
+        path.unlink()
+        client.send(**{"type": "save", **looking((0.5, 2.6, 5.5))})
+        assert "save: expected the file as it was loaded" in client.told("error")["message"]
+
+
+def test_the_command_leaves_out_what_is_hidden(
+    client: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client.send(type="hide", hidden=["objects.1", "floor"])
+    client.told("scene")
+    seen = client.final().rgb
+    client.send(**{"type": "command", "mode": "octree", **looking((0.5, 2.6, 5.5)), **SIZE})
+    words = shlex.split(client.told("command")["text"])
+    monkeypatch.chdir(tmp_path)
+    assert main([*words[1:], "--quiet"]) == 0
+    with Pillow.open(tmp_path / "blocks.png") as written:
+        np.testing.assert_array_equal(np.asarray(written)[..., :3], seen)
+
+
+def test_names_of_objects() -> None:
+    ball = SceneObject(mesh=icosphere(1), material="grey")
+    eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+    made = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball, ball])
+    assert object_names(made) == ("objects.0", "objects.1")
+    tiled = Scene(camera=eye, materials={"grey": Phong()}, floor=Floor(min=(0, 0), max=(1, 1), materials=["grey"]))
+    assert object_names(tiled) == ("floor",) and without(tiled, ["floor"]).instances == ()
