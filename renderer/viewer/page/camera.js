@@ -3,8 +3,12 @@ import { add, cross, norm, scale, sub, unit, dot } from "./matrix.js";
 
 // Just short of the pole, where the horizontal would be undefined.
 const STEEPEST = (89.5 * Math.PI) / 180;
-// An angle that the server allows, for orthographic cameras, which have none.
-const UNUSED = 1;
+// The field of view that an orthographic camera has once it is a perspective one: the renderer's own default.
+const USUAL = Math.PI / 4;
+// Half the height of the film, in millimetres, for which focal lengths are given: 36 x 24, as of 35 mm cameras.
+const HALF_FILM = 12;
+// Fields of view that the server allows.
+const [NARROWEST, WIDEST] = [0.001, 3.1];
 
 // Around a scene that fits, a margin of a twentieth is left.
 const ROOM = 1.05;
@@ -27,7 +31,7 @@ export class Camera {
     const back = unit(offset);
     // The height of an orthographic camera's film; null for perspective.
     this.height = type === "orthographic" ? height : null;
-    this.fovy = type === "orthographic" ? UNUSED : (fov * Math.PI) / 180;
+    this.fovy = type === "orthographic" ? USUAL : (fov * Math.PI) / 180;
     this.distance = norm(offset);
     this.yaw = Math.atan2(dot(back, this.axes[0]), dot(back, this.axes[2]));
     this.pitch = Math.asin(Math.max(-1, Math.min(1, dot(back, vertical))));
@@ -36,8 +40,8 @@ export class Camera {
 
   // What the user changes, to be kept and set again.
   get state() {
-    const { yaw, pitch, distance, height, pivot } = this;
-    return { yaw, pitch, distance, height, pivot };
+    const { yaw, pitch, distance, height, fovy, pivot } = this;
+    return { yaw, pitch, distance, height, fovy, pivot };
   }
 
   set state(state) {
@@ -47,6 +51,29 @@ export class Camera {
   // The height of the picture in scene units, where the pivot is.
   get extent() {
     return this.height ?? 2 * this.distance * Math.tan(this.fovy / 2);
+  }
+
+  get orthographic() {
+    return this.height !== null;
+  }
+
+  // Change the projection; what is as far away as the pivot keeps its size.
+  set orthographic(wanted) {
+    if (wanted === this.orthographic) return;
+    const { extent } = this;
+    this.height = wanted ? extent : null;
+    // Nothing lies behind the eye of an orthographic camera that is so far away.
+    this.distance = wanted ? Math.max(this.distance, 2 * this.radius) : extent / (2 * Math.tan(this.fovy / 2));
+  }
+
+  // In millimetres, of a camera whose film is 24 high.
+  get focal() {
+    return HALF_FILM / Math.tan(this.fovy / 2);
+  }
+
+  // As another lens would: the eye stays.
+  set focal(millimetres) {
+    this.fovy = Math.min(Math.max(2 * Math.atan(HALF_FILM / millimetres), NARROWEST), WIDEST);
   }
 
   // The whole scene in view, seen from the side where the camera is.

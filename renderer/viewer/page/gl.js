@@ -40,6 +40,12 @@ export class GlLayer {
     this.model.clear();
   }
 
+  // Show other materials and lights of the same scene.
+  dress(scene) {
+    this.scene = scene;
+    this.model.dress(scene.materials);
+  }
+
   load(mesh) {
     this.model.load(mesh, this.scene);
   }

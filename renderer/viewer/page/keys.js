@@ -30,7 +30,7 @@ export function bindKeys(viewer) {
   };
   MODES.forEach((mode, i) => (commands[i + 1] = () => viewer.setMode(mode)));
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]")) return;
     const own = isForStage(event, stage) || isShortcut(event) || event.key === "Escape";
     const command = commands[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!own || !command) return;

@@ -1,17 +1,21 @@
-// The page: one camera, four modes, and the newest view on its way to the renderer.
+// The page: one camera, five modes, and the newest view on its way to the renderer.
+import { read, written } from "./address.js";
 import { Camera } from "./camera.js";
 import { Connection, FACE_COLORS, PROOF, fetchFrom } from "./connection.js";
 import { Controls } from "./controls.js";
 import { film } from "./film.js";
 import { GlLayer } from "./gl.js";
 import { Busy } from "./busy.js";
+import { Changes } from "./changes.js";
 import { bindKeys, returnKeys } from "./keys.js";
 import { drawing } from "./layers.js";
-import { kept, remember, remembered, stays } from "./memory.js";
+import { continues, kept, remember, remembered, stays } from "./memory.js";
+import { Hint } from "./hint.js";
 import { Legend } from "./legend.js";
 import { DEPTH, FACES, LIT } from "./model.js";
 import { Notices } from "./notices.js";
 import { fetchBoxes } from "./nodes.js";
+import { Objects } from "./objects.js";
 import { NO_BOXES } from "./overlay.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
@@ -35,6 +39,8 @@ const REST = 150;
 // So long what was drawn last stays while its successor is on its way: drawing the model in between, only to draw again
 // at once, would take where there is no graphics processor longer than all the rest.
 const HOLD = 50;
+// Milliseconds after which a view is written into the address: browsers refuse more than some writes a second.
+const WRITE = 400;
 
 const find = (selector) => document.querySelector(selector);
 
@@ -57,6 +63,9 @@ class Viewer {
     this.rays = new Rays(find("#card"), find("#frame"), () => this.request(), (pick) => this.seeAside(pick));
     this.readings = new Readings(find("#readings"), find("#hud"));
     this.panel = new Panel((name) => this.changed(name));
+    this.objects = new Objects(find("#objects"), (hidden) => this.hide(hidden));
+    this.changes = new Changes(find("#changes"));
+    this.hint = new Hint(find("#hint"));
     this.sharing = new Sharing(this, find("#share"));
     try {
       this.layer = new GlLayer(find("#gl"), () => this.lostGl());
@@ -73,7 +82,12 @@ class Viewer {
       changed: (open) => this.connected(open),
     });
     this.connection.open();
-    addEventListener("pagehide", () => this.scene && remember(kept(this.scene, this.camera)));
+    addEventListener("pagehide", () => this.scene && remember({ ...this.kept, hash: this.writeAddress() }));
+    addEventListener("hashchange", () => this.scene && this.goTo(read(location.hash)));
+    // A page that is loaded again goes on from where it was; another address says where to begin.
+    const before = remembered();
+    if (location.hash && location.hash !== before?.hash) this.asked = read(location.hash);
+    else this.before = before;
   }
 
   // What works once there is a scene.
@@ -105,22 +119,77 @@ class Viewer {
   }
 
   take(scene) {
-    const before = kept(this.scene, this.camera) ?? remembered();
+    const before = this.kept ?? this.before;
+    this.before = null;
     this.scene = scene;
     this.camera = new Camera(scene);
     if (stays(before, scene)) this.camera.state = before.camera;
-    this.forget();
     this.panel.load(scene);
+    if (stays(before, scene) || continues(before, scene)) this.panel.chosen = before.chosen;
+    this.objects.load(scene);
+    this.dress();
+    this.forget();
     this.proof.offer(scene.references);
     this.readings.ofScene(scene);
     find("#name").textContent = scene.name.replace(/\.toml$/, "").replaceAll("_", " ");
     document.title = `${scene.name} · octree-render`;
     if (!this.controls) this.begin();
     this.layout();
-    this.setMode(this.mode);
+    this.setMode(this.offers(before?.mode) ? before.mode : this.mode);
+    if (this.asked) this.goTo(this.asked);
     if (TRACED.includes(this.mode)) this.busy.begin("tracing", "Tracing the first picture …");
     if (scene.faces <= MANY_FACES) this.loadMesh();
     this.tryBoxes();
+  }
+
+  // What there is to come back to; null before there is a scene.
+  get kept() {
+    return this.scene && { ...kept(this.scene, this.camera), chosen: this.panel.chosen, mode: this.mode, hidden: this.objects.hidden };
+  }
+
+  // Show the view of an address: of a scene that is not shown, once it is.
+  goTo(asked) {
+    this.asked = null;
+    const { file, mode, state, hidden, chosen } = asked;
+    if (file && file !== this.scene.name && this.scene.files.includes(file)) {
+      this.asked = asked;
+      return this.open(file);
+    }
+    if (hidden.join() !== this.objects.hidden.join() && hidden.every((name) => this.scene.objects.some((one) => one.name === name))) {
+      this.asked = asked;
+      return this.hide(hidden);
+    }
+    this.panel.load(this.scene);
+    this.panel.chosen = chosen;
+    if (state) this.camera.state = state;
+    this.changed("edits");
+    this.layout();
+    this.setMode(this.offers(mode) ? mode : this.mode);
+  }
+
+  offers(mode) {
+    return mode !== undefined && !find(`[name=mode][value=${mode}]`).disabled;
+  }
+
+  // Write the view into the address, and return that part of it.
+  writeAddress() {
+    clearTimeout(this.writing);
+    this.writing = null;
+    const { scene, mode, camera, panel, objects } = this;
+    const hash = written({ file: scene.name, mode, state: camera.state, chosen: panel.chosen, hidden: objects.hidden });
+    if (hash !== location.hash) history.replaceState(history.state, "", location.pathname + location.search + hash);
+    return hash;
+  }
+
+  hide(hidden) {
+    this.busy.begin("opening", "Building the octree …");
+    this.connection.send({ type: "hide", hidden });
+  }
+
+  // The scene with the user's materials and lights, as WebGL and cards show it.
+  dress() {
+    this.dressed = this.panel.edits.dressed;
+    this.layer?.dress(this.dressed);
   }
 
   // Nothing of the scene before is shown any more, nor taken when it comes.
@@ -131,7 +200,7 @@ class Viewer {
     this.picture.clear();
     this.proof.forget();
     this.legend.show(null);
-    this.layer?.begin(this.scene);
+    this.layer?.begin(this.dressed);
     this.stopSaving();
     for (const name of ["mesh", "tracing"]) this.busy.end(name);
   }
@@ -215,10 +284,11 @@ class Viewer {
       this.connection.send({ type: "camera", m, fovy, height, walk: this.controls.walking, settings });
     });
     onClick("#copy-command", () => this.connection.send({ type: "command", mode: this.mode, ...this.view(), settings: this.panel.settings }));
-    onClick("#toggle-panel", () => {
-      const away = document.body.classList.toggle("wide");
-      find("#toggle-panel").setAttribute("aria-expanded", String(!away));
+    onClick("#save-scene", () => {
+      const { m, fovy, height } = this.view();
+      this.connection.send({ type: "save", m, fovy, height, settings: this.panel.settings });
     });
+    onClick("#show-boxes", () => this.panel.fields.boxes.click());
   }
 
   // What a change of a setting asks for.
@@ -230,7 +300,12 @@ class Viewer {
       this.tryBoxes();
     } else if (name === "walk") this.controls.walking = fields.walk.checked;
     else if (name === "size") this.layout();
-    else {
+    else if (name === "projection" || name === "focal") {
+      if (name === "focal") this.camera.focal = 10 ** fields.focal.value;
+      else this.camera.orthographic = fields.projection.value === "orthographic";
+      this.moved();
+    } else {
+      if (name === "edits") this.dress();
       this.moved();
       const question = this.rays.again(this.panel.settings);
       if (question) this.connection.send(question);
@@ -279,6 +354,8 @@ class Viewer {
     if (this.proof.told && !(this.current && this.shown.view.settings.pair === this.panel.settings.pair)) this.proof.forget();
     this.dirty = true;
     this.movedAt = now;
+    this.panel.showCamera(this.camera);
+    this.writing ??= setTimeout(() => this.writeAddress(), WRITE);
     this.request();
   }
 
@@ -446,6 +523,7 @@ class Viewer {
       refined: (told) => told.seq === this.seq && this.readings.refined(told),
       scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
       camera: ({ name, text }) => saveText(name, text),
+      saved: (told) => this.changes.show(told),
       command: ({ text }) => copyText(text).then((copied) => this.notices.say(copied ? `Copied: ${text}` : text)),
       export: (told) => this.sharing.told(told),
       error: ({ message: text }) => {
@@ -468,8 +546,8 @@ class Viewer {
     if (open) {
       this.notices.clear("lost");
       // The server may be another one by now, which shows its own scene.
-      const { name: file, server } = kept(this.scene, this.camera) ?? remembered() ?? { name: "", server: "" };
-      this.connection.send({ type: "hello", file, server });
+      const { name: file, server, hidden } = this.kept ?? this.before ?? { name: "", server: "", hidden: [] };
+      this.connection.send({ type: "hello", file, server, hidden });
     } else {
       this.announced = null;
       this.sharing.lost();
@@ -498,7 +576,8 @@ class Viewer {
 
   picked(pick) {
     if (pick.seq !== this.rays.seq) return;
-    this.rays.show(pick, this.scene);
+    this.hint.learnt();
+    this.rays.show(pick, this.dressed);
     if (this.focusing === pick.seq) this.focusOn(pick);
   }
 

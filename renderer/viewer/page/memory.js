@@ -19,6 +19,9 @@ export function remembered() {
   }
 }
 
+// Whether a page goes on with the same scene of the same server.
+export const continues = (before, scene) => before?.name === scene.name && before.server === scene.server;
+
 // The name of a scene, its server, its own camera, and the one that it is seen by; null for no scene.
 export const kept = (scene, camera) =>
   scene && { name: scene.name, server: scene.server, own: scene.camera, camera: camera.state };

@@ -139,7 +139,7 @@ export class Model {
 
   // Draw nothing until `load`.
   clear() {
-    Object.assign(this, { faces: 0, loaded: false, coloured: false, runs: { opaque: [], glass: [] } });
+    Object.assign(this, { faces: 0, loaded: false, coloured: false, glass: null, materialOf: null, runs: { opaque: [], glass: [] } });
   }
 
   // Take the triangles of the server's /mesh and the materials of its /scene.
@@ -162,9 +162,18 @@ export class Model {
     gl.vertexAttribIPointer(MATERIAL, 1, gl.UNSIGNED_SHORT, 0, 0);
     this.fill(COLOR, this.colors, gl.DYNAMIC_DRAW);
     gl.vertexAttribPointer(COLOR, 3, gl.UNSIGNED_BYTE, true, 4, 0);
-    this.runs = runs(materials, scene.materials.map((m) => m.type === "dielectric"));
-    this.setMaterials(scene.materials);
+    this.materialOf = materials;
     this.loaded = true;
+    this.dress(scene.materials);
+  }
+
+  // Take materials, as many as before.
+  dress(materials) {
+    if (!this.loaded) return;
+    const glass = materials.map((m) => m.type === "dielectric");
+    if (String(glass) !== this.glass) this.runs = runs(this.materialOf, glass);
+    this.glass = String(glass);
+    this.setMaterials(materials);
   }
 
   fill(location, values, usage) {

@@ -1,11 +1,15 @@
 // The panel: its form holds the settings, the rest shows what the scene is and how fast its pictures come.
+import { Edits } from "./edits.js";
 import { element } from "./element.js";
+import { Folds } from "./folds.js";
 import { levelColor } from "./overlay.js";
 import { count } from "./readings.js";
 
 // A pixel; the server allows no more.
 const MAX_SAMPLES = 64;
 const DEGREE = Math.PI / 180;
+// What the user chooses of a scene's picture, beside its camera, materials and lights.
+const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "azimuth", "elevation"];
 
 export class Panel {
   // `changed(name)` is called with the name of the field that the user moved.
@@ -13,6 +17,13 @@ export class Panel {
     this.form = document.querySelector("#settings");
     this.fields = this.form.elements;
     this.lightMoved = false;
+    this.folds = new Folds(document.querySelector("#panel"), document.querySelector("#toggle-panel"));
+    const find = (id) => document.querySelector(id);
+    this.edits = new Edits({ materials: find("#materials"), lights: find("#lights"), changed: () => {
+      this.offerLight();
+      this.showValues();
+      changed("edits");
+    } });
     this.form.addEventListener("submit", (event) => event.preventDefault());
     this.form.addEventListener("input", ({ target }) => {
       if (target.name === "azimuth" || target.name === "elevation") this.lightMoved = true;
@@ -27,6 +38,7 @@ export class Panel {
     const { fields } = this;
     fields.file.replaceChildren(...scene.files.map((f) => element("option", { value: f, textContent: f.replace(/\.toml$/, "") })));
     fields.file.value = scene.name;
+    this.edits.load(scene);
     fields.max_depth.value = Math.min(scene.render.max_depth, fields.max_depth.max);
     this.offerSamples(scene.render.samples);
     fields.shadows.checked = scene.render.shadows;
@@ -39,6 +51,50 @@ export class Panel {
     this.resetLight();
     this.showLevels(Math.max(scene.octree.levels, 1));
     this.showNeeds(scene.needs);
+    this.own = this.values;
+  }
+
+  // The values of CHOICES as they are, as text.
+  get values() {
+    const text = (field) => String(field.type === "checkbox" ? field.checked : field.value);
+    return Object.fromEntries(CHOICES.map((name) => [name, text(this.fields[name])]));
+  }
+
+  // What the user chose: the values that are not those with which the scene was loaded, and edits as JSON.
+  get chosen() {
+    const { values, lightMoved } = this;
+    const isLight = (name) => name === "azimuth" || name === "elevation";
+    const moved = CHOICES.filter((name) => (isLight(name) ? lightMoved : values[name] !== this.own[name]));
+    const edits = this.edits.value;
+    return { ...Object.fromEntries(moved.map((name) => [name, values[name]])), ...(edits ? { edits: JSON.stringify(edits) } : {}) };
+  }
+
+  // Choose it again, as far as this scene and this page have it.
+  set chosen(chosen) {
+    try {
+      if (chosen.edits) this.edits.value = JSON.parse(chosen.edits);
+    } catch {
+      // No edits, then.
+    }
+    for (const name of CHOICES) {
+      const field = this.fields[name];
+      if (chosen[name] === undefined) continue;
+      if (field.type === "checkbox") field.checked = chosen[name] === "true";
+      else if (field.type === "range" || [...field.options].some((option) => option.value === chosen[name])) field.value = chosen[name];
+      if (name === "azimuth" || name === "elevation") this.lightMoved = this.lit;
+    }
+    this.offerLight();
+    this.showValues();
+  }
+
+  // Whether there is a directional light, which the sliders turn.
+  get lit() {
+    return this.edits.now.lights.some((light) => light.type === "directional");
+  }
+
+  offerLight() {
+    document.querySelector("#light").disabled = !this.lit;
+    this.lightMoved &&= this.lit;
   }
 
   // Boxes need nodes, and WebGL.
@@ -56,10 +112,9 @@ export class Panel {
 
   // The sliders of the light back to where the scene's first directional light is.
   resetLight() {
-    const light = this.scene.lights.find((l) => l.type === "directional");
-    const fieldset = document.querySelector("#light");
-    fieldset.disabled = !light;
+    const light = this.edits.now.lights.find((l) => l.type === "directional");
     this.lightMoved = false;
+    this.offerLight();
     if (light) {
       const [x, y, z] = light.direction.map((v) => -v);
       this.fields.azimuth.value = Math.atan2(x, z) / DEGREE;
@@ -80,13 +135,42 @@ export class Panel {
     const { max_depth, samples, shadows, reflection, refraction, aov, refine } = this.fields;
     // Raw pixels cost nothing on this machine; through a network a tenth of them is worth the loss.
     const local = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
-    return { max_depth: Number(max_depth.value), samples: Number(samples.value), shadows: shadows.checked,
+    const edits = this.edits.value;
+    return { ...(edits ? { edits } : {}), max_depth: Number(max_depth.value), samples: Number(samples.value), shadows: shadows.checked,
       reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, light: this.light,
       refine: Number(refine.value), pair: document.querySelector("[name=pair]").value, pixels: local ? "rgba" : "jpeg" };
   }
 
+  // The fields of the camera as it is.
+  showCamera(camera) {
+    const { projection, focal, focal_shown: told } = this.fields;
+    projection.value = camera.orthographic ? "orthographic" : "perspective";
+    focal.value = Math.log10(camera.focal);
+    focal.disabled = camera.orthographic;
+    const lens = `${camera.focal.toFixed(camera.focal < 100 ? 1 : 0)} mm`;
+    told.value = camera.orthographic ? "–" : `${lens} · ${(camera.fovy / DEGREE).toFixed(1)}°`;
+    this.folds.tell("camera", camera.orthographic ? "orthographic" : lens);
+  }
+
+  // What folded parts say of themselves.
+  showFolded() {
+    const { fields, folds, scene, edits } = this;
+    if (!scene) return;
+    const samples = Number(fields.samples.value);
+    folds.tell("scene", scene.name.replace(/\.toml$/, ""));
+    folds.tell("traced", `${samples} ${samples === 1 ? "sample" : "samples"}, ${fields.max_depth.value} bounces`);
+    folds.tell("octree", fields.boxes.checked ? `level ${fields.level.value}` : `${scene.octree.levels} levels`);
+    folds.tell("light", count(edits.now.lights.length));
+    folds.tell("materials", `${count(scene.materials.length)}${edits.value ? ", changed" : ""}`);
+    const hidden = scene.objects.filter(({ shown }) => !shown).length;
+    folds.tell("objects", hidden ? `${scene.objects.length - hidden} of ${scene.objects.length}` : count(scene.objects.length));
+  }
+
   showValues() {
     const { fields } = this;
+    this.showFolded();
+    document.querySelector("#show-boxes").setAttribute("aria-pressed", String(fields.boxes.checked));
+    document.querySelector("#show-boxes").disabled = fields.boxes.disabled;
     fields.max_depth_shown.value = fields.max_depth.value;
     fields.level_shown.value = fields.level.value;
     document.querySelectorAll("#levels i").forEach((bar, i) => bar.classList.toggle("chosen", i === Number(fields.level.value)));

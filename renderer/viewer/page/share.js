@@ -26,7 +26,7 @@ export class Share {
   // The file as {blob, name, note}; the note says what it lacks, or is empty.
   async file() {
     const { viewer } = this;
-    const { scene } = viewer;
+    const { dressed: scene } = viewer;
     // At once, before anything moves.
     const { canvas, view, mode } = this.seen();
     const { boxes } = viewer;

@@ -50,7 +50,7 @@ export class Sharing {
       element("progress", { max: 1, ariaLabel: "File" }), element("output"),
       button("stop-export", "Cancel", "", () => this.exports.stop()));
     this.progress = new Progress(bar);
-    section.append(element("summary", { textContent: "Share" }), this.file,
+    section.append(element("summary", {}, element("h2", { textContent: "Share" })), this.file,
       element("div", { className: "row" }, this.size, this.still),
       element("div", { className: "choices" }, this.height, this.frames, this.format), this.turntable, bar);
   }

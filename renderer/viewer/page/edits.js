@@ -1,0 +1,173 @@
+// Materials and lights as the user changes them: their lists in the panel, and what differs from the scene's file.
+import { element, swatch } from "./element.js";
+import { numberField, pickerColor, vectorField } from "./fields.js";
+
+const [COLOR, VECTOR, NUMBER] = ["color", "vector", "number"];
+// The fields of each type in the order in which they are shown, with their kind and what a new one has.
+const MATERIALS = {
+  phong: { diffuse: [COLOR, [0.8, 0.8, 0.8]], ambient: [COLOR, null], specular: [COLOR, [0, 0, 0]], shininess: [NUMBER, 32],
+    reflectance: [COLOR, [0, 0, 0]], transmittance: [COLOR, [0, 0, 0]], ior: [NUMBER, 1.5] },
+  mirror: { reflectance: [COLOR, [1, 1, 1]] },
+  dielectric: { ior: [NUMBER, 1.5], reflectance: [COLOR, [1, 1, 1]], transmittance: [COLOR, [1, 1, 1]] },
+};
+const LIGHTS = {
+  directional: { direction: [VECTOR, [-0.5, -1, -0.5]], irradiance: [COLOR, [0.5, 0.5, 0.5]] },
+  point: { position: [VECTOR, null], intensity: [COLOR, null] },
+};
+// The least that numbers may be; an index of refraction is more than nothing.
+const LEAST = { shininess: 0, ior: 1e-6 };
+const BLACK = [0, 0, 0];
+// By which colour a material is known.
+const CHIEF = { phong: "diffuse", mirror: "reflectance", dielectric: "transmittance" };
+
+const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+const copy = (value) => JSON.parse(JSON.stringify(value));
+
+// Whether fields from an address are those of one of `types`, and of the kinds that these have.
+function fits(fields, types) {
+  const known = types[fields?.type];
+  const number = (x) => typeof x === "number" && Number.isFinite(x);
+  return Boolean(known) && Object.entries(fields).every(([name, value]) => name === "type" || (known[name] &&
+    (known[name][0] === NUMBER ? number(value) : Array.isArray(value) && value.length === 3 && value.every(number))));
+}
+
+const lightFields = (light) => {
+  const [place, color] = light.type === "directional" ? ["direction", "irradiance"] : ["position", "intensity"];
+  return { type: light.type, [place]: light[place], [color]: light.color };
+};
+
+export class Edits {
+  // `changed()` is called after each change.
+  constructor({ materials, lights, changed }) {
+    this.lists = { materials, lights };
+    this.changed = () => {
+      this.summarise();
+      changed();
+    };
+    for (const list of [materials, lights]) list.addEventListener("input", (event) => event.stopPropagation());
+  }
+
+  // Begin with what the scene's file has.
+  load(scene) {
+    this.scene = scene;
+    this.own = { materials: Object.fromEntries(scene.materials.map((m) => [m.name, m.fields])), lights: scene.lights.map(lightFields) };
+    this.now = copy(this.own);
+    this.show();
+  }
+
+  // What differs from the file, as the server reads it; null where nothing does.
+  get value() {
+    const materials = Object.entries(this.now.materials).filter(([name, fields]) => !same(fields, this.own.materials[name]));
+    const lights = same(this.now.lights, this.own.lights) ? {} : { lights: this.now.lights };
+    return materials.length || lights.lights ? { materials: Object.fromEntries(materials), ...lights } : null;
+  }
+
+  // Take edits over, as far as this scene has what they are of.
+  set value(given) {
+    for (const [name, fields] of Object.entries(given?.materials ?? {}))
+      if (Object.hasOwn(this.own.materials, name) && fits(fields, MATERIALS)) this.now.materials[name] = copy(fields);
+    if (Array.isArray(given?.lights) && given.lights.every((light) => fits(light, LIGHTS))) this.now.lights = copy(given.lights);
+    this.show();
+  }
+
+  // The scene with these materials and lights, as WebGL draws it.
+  get dressed() {
+    const materials = Object.entries(this.now.materials).map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
+      reflectance: BLACK, transmittance: BLACK, shininess: 0, ...fields, fields }));
+    const lights = this.now.lights.map((fields) => ({ ...fields, color: fields.irradiance ?? fields.intensity }));
+    return { ...this.scene, materials, lights };
+  }
+
+  show() {
+    const { materials, lights } = this.lists;
+    const open = new Set([...materials.querySelectorAll("details[open]")].map((entry) => entry.dataset.name));
+    materials.replaceChildren(...Object.keys(this.now.materials).map((name) => this.material(name, open.has(name))));
+    const add = (type) => this.button(`Add ${type} light`, () => this.addLight(type));
+    lights.replaceChildren(...this.now.lights.map((fields, i) => this.light(fields, i)),
+      element("div", { className: "buttons" }, add("directional"), add("point")));
+    this.summarise();
+  }
+
+  // The dots of materials and lights in their colours, and which of the materials are changed.
+  summarise() {
+    const entries = this.lists.materials.querySelectorAll("details");
+    Object.entries(this.now.materials).forEach(([name, fields], i) => {
+      const changed = !same(fields, this.own.materials[name]);
+      entries[i].querySelector(".swatch").style.background = pickerColor(fields[CHIEF[fields.type]] ?? BLACK);
+      entries[i].querySelector("summary output").textContent = changed ? `${fields.type}, changed` : fields.type;
+      entries[i].querySelector(".undo").disabled = !changed;
+    });
+    this.lists.lights.querySelectorAll("details").forEach((entry, i) => {
+      const { irradiance, intensity } = this.now.lights[i];
+      entry.querySelector(".swatch").style.background = pickerColor(irradiance ?? intensity);
+    });
+  }
+
+  button(text, act, className = "") {
+    const made = element("button", { type: "button", textContent: text, className });
+    made.addEventListener("click", act);
+    return made;
+  }
+
+  entry(title, type, name, open, ...children) {
+    const summary = element("summary", {}, swatch("#000"), element("span", { textContent: title }), element("output", { textContent: type }));
+    const made = element("details", { className: "entry", open }, summary, ...children);
+    made.dataset.name = name;
+    return made;
+  }
+
+  // A control for each field of `types` that is there.
+  controls(fields, types) {
+    return Object.entries(types[fields.type]).filter(([name]) => fields[name] !== undefined).map(([name, [kind]]) => {
+      const set = (value) => {
+        fields[name] = value;
+        this.changed();
+      };
+      if (kind === NUMBER) return numberField(name, fields[name], LEAST[name], set);
+      return vectorField(name, fields[name], kind === COLOR, set);
+    });
+  }
+
+  material(name, open) {
+    const fields = this.now.materials[name];
+    const put = (next) => {
+      this.now.materials[name] = next;
+      this.show();
+      this.changed();
+    };
+    const type = element("select", { ariaLabel: `Type of ${name}` });
+    type.append(...Object.keys(MATERIALS).map((value) => element("option", { value, textContent: value, selected: value === fields.type })));
+    type.addEventListener("change", () => put(this.retyped(fields, type.value)));
+    const undo = this.button("As in the file", () => put(copy(this.own.materials[name])), "undo");
+    return this.entry(name, fields.type, name, open, element("label", { className: "row" }, element("span", { textContent: "type" }), type),
+      ...this.controls(fields, MATERIALS), undo);
+  }
+
+  // A material of another type, with the fields that both have.
+  retyped(fields, type) {
+    const kept = Object.entries(MATERIALS[type]).map(([name, [, usual]]) => [name, fields[name] ?? usual]);
+    return { type, ...Object.fromEntries(kept.filter(([, value]) => value !== null)) };
+  }
+
+  light(fields, i) {
+    const remove = this.button("Remove", () => this.putLights(this.now.lights.filter((light) => light !== fields)));
+    return this.entry(`Light ${i + 1}`, fields.type, i, false, ...this.controls(fields, LIGHTS), remove);
+  }
+
+  // A point light begins above the scene, as bright in its middle as a directional one.
+  addLight(type) {
+    const [lower, upper] = this.scene.bounds;
+    const size = Math.hypot(...upper.map((x, k) => x - lower[k]));
+    const middle = upper.map((x, k) => (x + lower[k]) / 2);
+    const point = { position: [middle[0], upper[1] + 0.5 * size, middle[2]], intensity: [1, 1, 1].map(() => 0.5 * size * size) };
+    const { direction, irradiance } = LIGHTS.directional;
+    const added = type === "point" ? point : { direction: [...direction[1]], irradiance: [...irradiance[1]] };
+    this.putLights([...this.now.lights, { type, ...added }]);
+  }
+
+  putLights(lights) {
+    this.now.lights = lights;
+    this.show();
+    this.changed();
+  }
+}

@@ -1,0 +1,58 @@
+// Controls for numbers and colours of materials and lights.
+import { element } from "./element.js";
+
+const linear = (code) => (code <= 0.04045 ? code / 12.92 : ((code + 0.055) / 1.055) ** 2.4);
+const coded = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * Math.min(x, 1) ** (1 / 2.4) - 0.055);
+const hex = (x) => Math.round(255 * coded(Math.max(x, 0))).toString(16).padStart(2, "0");
+// A picker has 256 steps; four digits tell them apart.
+const rounded = (x) => Number(x.toPrecision(4));
+
+// The colour of a picker for linear red, green and blue; what is brighter than white is shown as bright as white.
+export const pickerColor = (rgb) => `#${rgb.map((x) => hex(x / Math.max(1, ...rgb))).join("")}`;
+
+// Linear red, green and blue of a picker's colour, as bright as those before if they were brighter than white.
+export const pickedColor = (color, before) =>
+  [1, 3, 5].map((i) => rounded(linear(parseInt(color.slice(i, i + 2), 16) / 255) * Math.max(1, ...before)));
+
+const finite = (input) => (input.value !== "" && Number.isFinite(input.valueAsNumber) ? input.valueAsNumber : null);
+
+function numberInput(value, label, least) {
+  const input = element("input", { type: "number", step: "any", value, ariaLabel: label });
+  if (least !== undefined) input.min = least;
+  return input;
+}
+
+// A number `value` of at least `least`; `changed(value)` is called with what the user enters, if it is one.
+export function numberField(name, value, least, changed) {
+  const input = numberInput(value, name, least);
+  input.addEventListener("input", () => {
+    const entered = finite(input);
+    if (entered !== null && input.checkValidity()) changed(entered);
+  });
+  return element("label", { className: "row" }, element("span", { textContent: name }), input);
+}
+
+// Three numbers, and for a colour a picker too.
+export function vectorField(name, value, isColor, changed) {
+  const axes = isColor ? ["red", "green", "blue"] : ["x", "y", "z"];
+  const inputs = value.map((x, i) => numberInput(x, `${name}, ${axes[i]}`, isColor ? 0 : undefined));
+  let current = value;
+  const take = (next) => {
+    current = next;
+    changed(next);
+  };
+  const picker = isColor && element("input", { type: "color", value: pickerColor(value), ariaLabel: name });
+  for (const input of inputs)
+    input.addEventListener("input", () => {
+      const entered = inputs.map(finite);
+      if (entered.includes(null) || !inputs.every((one) => one.checkValidity())) return;
+      if (picker) picker.value = pickerColor(entered);
+      take(entered);
+    });
+  picker?.addEventListener?.("input", () => {
+    const picked = pickedColor(picker.value, current);
+    inputs.forEach((input, i) => (input.value = picked[i]));
+    take(picked);
+  });
+  return element("div", { className: "vector" }, element("span", { textContent: name }), ...(picker ? [picker] : []), ...inputs);
+}

@@ -1,0 +1,49 @@
+// Which parts of the panel are open, and whether the panel itself is: as this browser was left.
+
+const KEY = "octree-render-folds";
+// On windows less wide than this the picture has the room, until the panel is asked for; below, on phones, the panel
+// stands under the picture.
+const NARROW = "(min-width: 761px) and (max-width: 1099px)";
+
+// Some frames and private windows keep nothing.
+function kept() {
+  try {
+    return JSON.parse(localStorage.getItem(KEY)) ?? {};
+  } catch {
+    return {};
+  }
+}
+
+export class Folds {
+  constructor(panel, toggle) {
+    Object.assign(this, { panel, toggle, state: kept() });
+    for (const fold of panel.querySelectorAll("details.fold")) {
+      fold.open = this.state[fold.id] === true;
+      fold.addEventListener("toggle", () => this.keep(fold.id, fold.open));
+    }
+    this.show(this.state.panel ?? !matchMedia(NARROW).matches);
+    toggle.addEventListener("click", () => {
+      this.show(document.body.classList.contains("wide"));
+      this.keep("panel", !document.body.classList.contains("wide"));
+    });
+  }
+
+  show(open) {
+    document.body.classList.toggle("wide", !open);
+    this.toggle.setAttribute("aria-expanded", String(open));
+  }
+
+  keep(name, open) {
+    this.state[name] = open;
+    try {
+      localStorage.setItem(KEY, JSON.stringify(this.state));
+    } catch {
+      // Then the page begins folded.
+    }
+  }
+
+  // What a folded part says of itself, beside its title.
+  tell(name, text) {
+    this.panel.querySelector(`#fold-${name} > summary output`).textContent = text;
+  }
+}
