@@ -86,7 +86,7 @@ class _Notices(logging.Handler):
 _SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb): camera, light and floor are then chosen to fit"
 _CHANGE = (
     "camera, lights, materials or keys of render in place of the file's, such as 'render.shadows = false', or objects "
-    "to leave out, such as 'hide = [\"objects.0\", \"floor\"]'; may be given again"
+    'to leave out, such as \'hide = ["objects.0", "floor"]\'; may be given again'
 )
 _WRITE_SCENE = "of a mesh file: write the scene chosen for it, to be changed at will"
 

@@ -99,15 +99,27 @@ STAYS = """document.addEventListener("readystatechange", () => {
 }, { once: true });"""
 
 
+# The panel and all of its parts are open, as a user leaves them who changes settings.
+OPEN = """try {
+    const parts = ["scene", "camera", "traced", "octree", "light", "materials", "objects", "readings"];
+    const open = Object.fromEntries(parts.map((part) => [`fold-${part}`, true]));
+    localStorage.setItem("octree-render-folds", JSON.stringify({ panel: true, ...open }));
+} catch {}"""
+
+
 class Viewer:
-    """One page in the browser, and what it says about itself. With ``refine`` its pictures grow at rest."""
+    """One page in the browser, and what it says about itself. With ``refine`` its pictures grow at rest; ``folded`` as
+    at first sight.
+    """
 
     faults: ClassVar[list[str]] = []  # of all pages
 
-    def __init__(self, browser: Any, url: str, refine: bool = False, **options: Any) -> None:
+    def __init__(self, browser: Any, url: str, refine: bool = False, folded: bool = False, **options: Any) -> None:
         self.context = browser.new_context(**{"viewport": {"width": 800, "height": 420}, **options})
         if not refine:
             self.context.add_init_script(STAYS)
+        if not folded:
+            self.context.add_init_script(OPEN)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
         self.page.on("console", lambda m: self.faults.append(m.text) if m.type in ("error", "warning") else None)
@@ -139,6 +151,8 @@ class Viewer:
 
     def restart(self) -> None:
         """Everything as it was when the page opened."""
+        if self.page.evaluate("() => viewer.objects.hidden.length && (viewer.hide([]), 1)"):
+            self.page.wait_for_function("() => !viewer.objects.hidden.length")
         self.page.evaluate(
             """() => {
                 const { viewer } = window;

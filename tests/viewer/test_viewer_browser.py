@@ -355,7 +355,7 @@ def test_a_phone_shows_everything(browser: Any, url: str) -> None:
 
 def test_all_of_it_by_keyboard(viewer: Viewer) -> None:
     reached = set()
-    for _ in range(45):  # once around the page, and some more
+    for _ in range(80):  # once around the page, and some more
         viewer.page.keyboard.press("Tab")
         name, outlined = viewer.page.evaluate(
             """() => {

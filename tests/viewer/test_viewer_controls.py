@@ -57,10 +57,10 @@ def test_who_comes_by_keyboard_stays_on_the_control(viewer: Viewer) -> None:
 def picked(viewer: Viewer) -> str:
     """The card of a pixel whose ray goes on, and sends shadow rays."""
     left, top, width, height = (viewer.page.locator("#frame").bounding_box()[k] for k in ("x", "y", "width", "height"))
-    for x, y in np.ndindex(9, 9):
-        # The card may cover the next pixel.
+    for x, y in np.ndindex(9, 8):
+        # The action bar covers the pixels at the top. The card may cover the next pixel.
         seq = viewer.page.evaluate("() => (viewer.rays.close(), viewer.rays.seq)")
-        viewer.page.mouse.click(left + width * (x + 1) / 10, top + height * (y + 1) / 10)
+        viewer.page.mouse.click(left + width * (x + 1) / 10, top + height * (y + 2) / 10)
         viewer.page.wait_for_function(
             "(seq) => viewer.rays.seq > seq && viewer.rays.pick?.seq === viewer.rays.seq", arg=seq
         )

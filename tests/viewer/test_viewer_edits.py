@@ -213,7 +213,9 @@ def test_what_is_edited_is_saved_and_the_rest_stays_as_it_is_written(client: Cli
     copy.write_text(told["text"])
     again = load_scene(copy)
     copy.unlink()
-    assert again.materials["red"] == RED and again.render.samples == 4 and again.lights[0].direction == (0.0, -1.0, 0.25)
+    assert (
+        again.materials["red"] == RED and again.render.samples == 4 and again.lights[0].direction == (0.0, -1.0, 0.25)
+    )
     assert again.camera == load_scene(scene).camera and again.objects == load_scene(scene).objects
 
 
@@ -251,9 +253,7 @@ def test_a_scene_without_a_file_and_one_edited_meanwhile_are_not_saved(tmp_path:
         assert "save: expected the file as it was loaded" in client.told("error")["message"]
 
 
-def test_the_command_leaves_out_what_is_hidden(
-    client: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_command_leaves_out_what_is_hidden(client: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     client.send(type="hide", hidden=["objects.1", "floor"])
     client.told("scene")
     seen = client.final().rgb

@@ -145,7 +145,9 @@ export class Edits {
 
   // A material of another type, with the fields that both have.
   retyped(fields, type) {
-    const kept = Object.entries(MATERIALS[type]).map(([name, [, usual]]) => [name, fields[name] ?? usual]);
+    const black = (value) => Array.isArray(value) && value.every((x) => x === 0); // as a mirror none would be seen
+    const kept = Object.entries(MATERIALS[type]).map(([name, [, usual]]) =>
+      [name, fields[name] === undefined || black(fields[name]) ? usual : fields[name]]);
     return { type, ...Object.fromEntries(kept.filter(([, value]) => value !== null)) };
   }
 

@@ -17,7 +17,7 @@ export const pickedColor = (color, before) =>
 const finite = (input) => (input.value !== "" && Number.isFinite(input.valueAsNumber) ? input.valueAsNumber : null);
 
 function numberInput(value, label, least) {
-  const input = element("input", { type: "number", step: "any", value, ariaLabel: label });
+  const input = element("input", { type: "number", step: "any", defaultValue: value, ariaLabel: label });
   if (least !== undefined) input.min = least;
   return input;
 }
@@ -41,7 +41,7 @@ export function vectorField(name, value, isColor, changed) {
     current = next;
     changed(next);
   };
-  const picker = isColor && element("input", { type: "color", value: pickerColor(value), ariaLabel: name });
+  const picker = isColor && element("input", { type: "color", defaultValue: pickerColor(value), ariaLabel: name });
   for (const input of inputs)
     input.addEventListener("input", () => {
       const entered = inputs.map(finite);

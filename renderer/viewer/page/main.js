@@ -82,11 +82,12 @@ class Viewer {
       changed: (open) => this.connected(open),
     });
     this.connection.open();
-    addEventListener("pagehide", () => this.scene && remember({ ...this.kept, hash: this.writeAddress() }));
+    addEventListener("pagehide", () => this.scene && remember({ ...this.kept, hash: location.hash }));
     addEventListener("hashchange", () => this.scene && this.goTo(read(location.hash)));
     // A page that is loaded again goes on from where it was; another address says where to begin.
     const before = remembered();
-    if (location.hash && location.hash !== before?.hash) this.asked = read(location.hash);
+    const [{ type }] = performance.getEntriesByType("navigation");
+    if (type === "navigate" && location.hash && location.hash !== before?.hash) this.asked = read(location.hash);
     else this.before = before;
   }
 
@@ -171,14 +172,12 @@ class Viewer {
     return mode !== undefined && !find(`[name=mode][value=${mode}]`).disabled;
   }
 
-  // Write the view into the address, and return that part of it.
+  // Write the view into the address.
   writeAddress() {
-    clearTimeout(this.writing);
     this.writing = null;
     const { scene, mode, camera, panel, objects } = this;
     const hash = written({ file: scene.name, mode, state: camera.state, chosen: panel.chosen, hidden: objects.hidden });
     if (hash !== location.hash) history.replaceState(history.state, "", location.pathname + location.search + hash);
-    return hash;
   }
 
   hide(hidden) {

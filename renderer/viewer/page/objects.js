@@ -12,7 +12,7 @@ export class Objects {
   load({ objects }) {
     this.objects = objects;
     this.switches = objects.map(({ name, shown }) => {
-      const input = element("input", { type: "checkbox", checked: shown });
+      const input = element("input", { type: "checkbox", defaultChecked: shown });
       input.setAttribute("role", "switch");
       input.dataset.name = name;
       input.addEventListener("change", () => this.hide(this.chosen));
