@@ -35,7 +35,7 @@ def run(command, folder, **variables):
         env={**kept, **variables},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=600,  # compiles all kernels anew, as an installed copy has none
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
