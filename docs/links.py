@@ -1,13 +1,18 @@
 #!/usr/bin/env python3
-"""Check a built site without a network: every link within it leads to a page, a file and an anchor that are there.
+"""Check a built site without a network: every link within it leads to a page, a file and an anchor that are there, and
+none to a server on the machine that built it, which no reader has.
 
 python docs/links.py build/site
 """
 
 import sys
 from html.parser import HTMLParser
+from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
+
+# Attributes that hold an address: links, pictures, frames, films, and the data of objects.
+LINKS = ("href", "src", "poster", "data", "action")
 
 
 class Page(HTMLParser):
@@ -23,8 +28,21 @@ class Page(HTMLParser):
         for name, value in attrs:
             if name in ("id", "name") and value:
                 self.anchors.add(value)
-            elif name in ("href", "src") and value and tag != "base":
+            elif name in LINKS and value and tag != "base":
                 self.links.append(value)
+            elif name == "srcset" and value:
+                self.links += [part.split()[0] for part in value.split(",") if part.strip()]
+
+
+def is_here(host: str | None) -> bool:
+    """Whether ``host`` names the machine itself: localhost, a loopback address, or the address of all its own."""
+    if host is None or host == "localhost" or host.endswith(".localhost"):
+        return host is not None
+    try:
+        address = ip_address(host)
+    except ValueError:
+        return False
+    return address.is_loopback or address.is_unspecified
 
 
 def main(site: Path) -> int:
@@ -35,6 +53,8 @@ def main(site: Path) -> int:
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:
                 outside.add(link)
+                if is_here(parts.hostname):
+                    broken.append(f"{path.relative_to(site.resolve())}: {link}: a server on the machine that built it")
                 continue
             count += 1
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path

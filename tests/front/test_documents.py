@@ -2,19 +2,25 @@
 
 import argparse
 import ast
+import inspect
 import os
 import re
+import runpy
 import shlex
+import shutil
 import subprocess
 import sys
 import textwrap
 import tomllib
 from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+import yaml
 
+from renderer import Octree, load_scene
 from renderer.cli import main, make_parser
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
@@ -25,9 +31,10 @@ from validation.thresholds import HitLimits, load_thresholds
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
-DOCS = sorted((ROOT / "docs").glob("*.md"))
+DOCS = sorted((ROOT / "docs").rglob("*.md"))
 PAGES = [README, *DOCS, ROOT / "reports" / "README.md", *sorted(ROOT.glob("[CS]*.md"))]
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
+FENCED = re.compile(r"```(toml|yaml)\n(.*?)```", re.DOTALL)
 # A line of a block to type, without its comment, and commands within a sentence or a table.
 TYPED = re.compile(r"^    (\S.*?)(?:\s+#.*)?$", re.MULTILINE)
 COMMAND = re.compile(r"(?:make|pip|python3?|pre-commit|octree-\w+|rm) ")
@@ -46,38 +53,67 @@ PARSERS = {
     "python -m validation.benchmark": benchmark_parser,
 }
 MOST_LINES = 110
-# Packages that pages show and requirements.lock leaves out; their Python is run where they are installed.
+# Packages that pages show and requirements.lock leaves out. Their Python is run where they are installed; elsewhere it
+# is compiled and its names of ours are looked up.
 ABSENT = {"open3d", "pyvista"}
-# Commands of pages that are not run here, by how they begin: where they are, or why nothing runs them.
+# Commands that are run here in a short form, by how they begin: words in the place of others, and words more.
+IN_SHORT: dict[str, tuple[dict[str, str], str]] = {
+    "octree-render render scenes/three_models.toml -o out.png --resolution 8192x8192": (
+        {"8192x8192": "64x48", "16": "1"},
+        "--threads 1",
+    ),
+    "octree-validate --scene my.toml": ({}, "--quick"),
+    "python -m validation --scene": ({}, "--quick"),
+    "python -m validation.benchmark.measures.queries": (
+        {"1000000": "1000", "city_100k": "city_1000", "200000": "100"},
+        "--rays 100",
+    ),
+    "python -m validation.benchmark.measures.studies": ({}, "--mesh city --faces 1000 --points 100"),
+    "python -m validation.benchmark.limits.counts": ({"city_1m": "city_2000"}, "--rays 2000"),
+    "python tests/fuzz --inputs 100000": ({"100000": "20"}, ""),
+    "python scenes/make_quarter.py": ({}, "--buildings 40"),
+}
+# Commands that another file runs, by how they begin: the file, and a pattern of the line there that runs it.
 RUN_ELSEWHERE = {
-    "make lint": ".ci/run",
-    "make test": ".ci/run",
-    "make docs": ".ci/run",
-    "make validate QUICK=1": ".ci/run",
-    "make validate": "as with QUICK=1, for longer",
-    "make bench": "tests/validation/benchmark/test_benchmark_page.py",
-    "make machines": "tests/machines.py",
-    "python3 -m venv": ".ci/installed.py",
-    "pip install": ".ci/installed.py",
-    "pre-commit install": "writes into .git",
-    "octree-render view": "tests/viewer_page.py",
-    "octree-render compile": "tests/front/test_startup.py",
-    "octree-render study sky city.ply -o sky.npy --cluster tcp://": "tests/cluster/test_commands.py, at an address",
-    "octree-render render scenes/three_models.toml -o out.png --resolution 8192x8192": "tests/cluster/test_commands.py",
-    "octree-validate --scene my.toml": ".ci/bounds.py",
-    "python -m validation --scene": ".ci/bounds.py",
-    "python -m validation [": "a line of usage, tests/validation/test_validation_main.py",
+    "make lint": (".ci/run", r"^step make lint$"),
+    "make test": (".ci/run", r"^step make test$"),
+    "make docs": (".ci/run", r"^step make docs$"),
+    "make validate QUICK=1": (".ci/run", r"^step make validate QUICK=1$"),
+    "python3 -m venv": ("tests/front/test_installing.py", r'\[sys\.executable, "-m", "venv", '),
+    "pip install": ("tests/front/test_installing.py", r"^PIP = re\.compile"),
+    "pre-commit install": ("tests/front/test_installing.py", r'"pre_commit", "install"'),
+    "python -m build": ("tests/front/test_installing.py", r'"python -m build --wheel"'),
+    "rm -r renderer/compiled": ("tests/front/test_installing.py", r'"rm -r renderer/compiled"'),
+    "python -m wheel tags": ("tests/front/test_installing.py", r'"python -m wheel tags '),
+    "octree-render view": ("tests/viewer/test_viewer_server.py", r'"renderer\.cli", "view", .*"--no-browser"\]'),
+    "octree-render compile --level": ("tests/front/test_startup.py", r'"compile", "--queries", "--level", level, "-o"'),
+    "octree-render study sky city.ply -o sky.npy --cluster tcp://": (
+        "tests/cluster/test_commands.py",
+        r'"--cluster", client\.scheduler\.address\]\) == 0',
+    ),
+    "python -m validation.benchmark.measures.cluster": (
+        "tests/validation/benchmark/test_cluster_scaling.py",
+        r"cluster\.main\(\[.*\]\) == 0",
+    ),
+    "python -m validation.benchmark.measures.versions": (
+        "tests/validation/benchmark/test_benchmark_versions.py",
+        r"versions\.main\(\[.*\]\) == 0",
+    ),
+}
+# Commands that nothing runs, by how they begin, and why. Their options are checked as those of all others are, and what
+# make would call is looked at.
+NOT_RUN = {
+    "make validate": "minutes to hours; CI has the short run, whose sections are the same",
+    "make bench": "an hour; tests/validation/benchmark/test_benchmark_page.py runs the module in short",
+    "make machines": "half an hour of all tests",
+    "python -m validation [": "a line of usage",
     "python -m validation --defects [": "a line of usage",
     "python -m validation --mutants": "a line of usage",
     "python -m validation --write-baseline [": "a line of usage",
-    "python -m validation.benchmark.": "tests/validation/benchmark/test_benchmark_page.py",
-    "python -m build": "tests/front/test_release.py",
-    "rm -r renderer/compiled": "removes what the line before it wrote",
-    "python -m wheel tags": "renames what the line before it wrote",
-    "python tests/fuzz --inputs 100000": "tests/front/test_fuzz.py",
-    "python scenes/make_quarter.py": "tests/scene/test_quarter.py",
-    "python script.py": "stands for a user's script",
 }
+NOT_HERE = (*RUN_ELSEWHERE, *NOT_RUN)
+# Files of a user that commands of pages name.
+OWN = {"my.toml", "my.ply", "city.ply", "scan.ply", "model.stl"}
 
 
 def shown(value):
@@ -112,12 +148,44 @@ def test_python_in_a_page_runs_as_it_stands(page, block, tmp_path, monkeypatch):
     """In a checkout, of which nothing is changed: pictures go elsewhere."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenes").symlink_to(ROOT / "scenes")
-    for package in ABSENT & set(re.findall(r"^import (\w+)", block, re.MULTILINE)):
-        pytest.importorskip(package, reason="not in requirements.lock")
+    code = compile(block, str(page), "exec")
+    for package in sorted(ABSENT & set(re.findall(r"^import (\w+)", block, re.MULTILINE))):
+        if find_spec(package) is None:
+            assert unknown_names(block) == []
+            pytest.skip(f"compiled and its names of ours found, but not run: {package} is not installed")
     names: dict[str, object] = {}
-    exec(compile(block, str(page), "exec"), names)
+    exec(code, names)
     if page == README and "closest_hit" in block:
         assert names["hits"].hit.tolist() == [True, False] and (tmp_path / "glass.png").stat().st_size > 10_000
+
+
+def unknown_names(block):
+    """What a block takes from our modules, or asks an octree for, and which is not there."""
+    absent = []
+    for node in ast.walk(ast.parse(block)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "renderer":
+            module = import_module(node.module)
+            absent += [f"{node.module}.{name.name}" for name in node.names if not hasattr(module, name.name)]
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value).split(".")[-1] == "octree":
+            call = next((c for c in ast.walk(ast.parse(block)) if isinstance(c, ast.Call) and same(c.func, node)), None)
+            found = getattr(Octree, node.attr, None)
+            known = set(inspect.signature(found).parameters) if call and callable(found) else set()
+            if found is None or (call and not {k.arg for k in call.keywords} <= known):
+                absent.append(ast.unparse(call or node))
+    return absent
+
+
+def same(one, other):
+    return ast.dump(one) == ast.dump(other)
+
+
+def test_names_that_are_not_there_are_found():
+    assert unknown_names("from renderer import Octree\nball.octree.contains([1], rule='nonzero').all()") == []
+    assert unknown_names("from renderer import Octtree") == ["renderer.Octtree"]
+    assert unknown_names("octree.first_hit(1)\nball.octree.contains(1, rules=2)") == [
+        "octree.first_hit(1)",
+        "ball.octree.contains(1, rules=2)",
+    ]
 
 
 def test_the_readme_has_python_to_run():
@@ -129,13 +197,34 @@ def test_the_readme_has_python_to_run():
 )
 def test_commands_in_a_page_are_ones_that_there_are(page, line):
     options = make_parser().parse_args(shlex.split(line)[1:])
-    assert not hasattr(options, "scene") or (ROOT / options.scene).is_file()
+    assert not hasattr(options, "scene") or str(options.scene) in OWN or (ROOT / options.scene).is_file()
 
 
 def runnable():
     """(page, command) of all commands of blocks that are run here."""
     pairs = dict.fromkeys((page, line) for page in PAGES for line in typed(page) if COMMAND.match(line))
-    return [(page, line) for page, line in pairs if not line.startswith(tuple(RUN_ELSEWHERE))]
+    return [(page, line) for page, line in pairs if not line.startswith(NOT_HERE)]
+
+
+def in_short(line):
+    """The words of a command, as it is run here."""
+    words = shlex.split(line)
+    for start, (others, more) in IN_SHORT.items():
+        if line.startswith(start):
+            assert others.keys() <= set(words) or "queries" in start
+            words = [others.get(word, word) for word in words] + shlex.split(more)
+    return words
+
+
+def blocks(kind):
+    """(page, block) of all blocks of TOML or YAML."""
+    return [(p, text) for p in PAGES for of, text in FENCED.findall(p.read_text(encoding="utf-8")) if of == kind]
+
+
+def kind_of(toml):
+    """What a block of TOML is: a scene, thresholds, or part of a project file."""
+    keys = set(tomllib.loads(toml))
+    return "scene" if "camera" in keys else "project" if "project" in keys else "thresholds"
 
 
 @pytest.fixture
@@ -146,6 +235,11 @@ def checkout(tmp_path, monkeypatch):
     for name in ("city.ply", "scan.ply"):
         save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / name)
     (tmp_path / "suns.txt").write_text("1 0 1\n-1 0 1\n")
+    save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / "my.ply")
+    (tmp_path / "script.py").write_text("from renderer import Octree\n")
+    for _, text in blocks("toml"):
+        if kind_of(text) != "project":
+            (tmp_path / {"scene": "my.toml", "thresholds": "thresholds.toml"}[kind_of(text)]).write_text(text)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -153,26 +247,69 @@ def checkout(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("page", "line"), runnable(), ids=shown)
 def test_a_command_of_a_page_runs(page, line, checkout):
     before = set(checkout.iterdir())
-    program, *arguments = shlex.split(line)
+    program, *arguments = in_short(line)
     if program == "octree-render":
         assert make_parser().prog == program and main(arguments) == 0
     else:
-        assert program == "python"
+        known = {"python": [sys.executable], "octree-validate": [Path(sys.executable).with_name("octree-validate")]}
+        command = [*known[program], *arguments]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        command = [sys.executable, *arguments]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
-        assert done.returncode == 0, done.stderr
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
     written = {word for word in arguments if word.endswith((".png", ".npy")) or word in ("hours.ply", "shaded.ply")}
     assert written <= {path.name for path in set(checkout.iterdir()) - before}
+    if "--output" in arguments:
+        page = checkout / arguments[arguments.index("--output") + 1] / "index.html"
+        assert "PASS" in done.stdout and page.stat().st_size > 10_000
 
 
-def test_what_is_run_elsewhere_is_told_where():
-    """Each entry is the start of a command that some page has, and names a file that is there."""
+@pytest.mark.parametrize(("page", "text"), blocks("toml"), ids=shown)
+def test_toml_in_a_page_is_what_it_stands_for(page, text, checkout):
+    kind = kind_of(text)
+    if kind == "scene":
+        assert load_scene("my.toml").instances
+    elif kind == "thresholds":
+        assert load_thresholds("thresholds.toml").moved()
+    else:
+        groups = set(tomllib.loads(text)["project"]["entry-points"])
+        own = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["entry-points"]
+        assert groups <= set(own)
+
+
+@pytest.mark.parametrize(("page", "text"), blocks("yaml"), ids=shown)
+def test_a_workflow_in_a_page_has_our_own_actions_and_options_that_there_are(page, text):
+    """Its commands are run by tests/front/test_installing.py."""
+    used, own = (
+        set(re.findall(r"uses: (\S+ # v[\d.]+)$", of, re.MULTILINE))
+        for of in (text, (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    )
+    assert used and used <= own and text.count("uses:") == len(used)
+    (job,) = yaml.safe_load(text)["jobs"].values()
+    (line,) = [step["run"] for step in job["steps"] if step.get("run", "").startswith("octree-validate")]
+    options = validation_parser().parse_args(shlex.split(line)[1:])
+    (upload,) = [step["with"] for step in job["steps"] if "upload-artifact" in step.get("uses", "")]
+    assert Path(upload["path"]) == options.output
+
+
+def test_what_is_not_run_here_is_run_where_it_is_said_to_be():
+    """Each entry is the start of a command that some page has. The file that runs it has the line that does."""
     lines = [line for page in PAGES for line in [*typed(page), *said(page)]]
-    for start, where in RUN_ELSEWHERE.items():
+    for start in (*IN_SHORT, *RUN_ELSEWHERE, *NOT_RUN):
         assert any(line.startswith(start) for line in lines), start
-        for path in re.findall(r"[\w.]+(?:/[\w.]+)+", where):
-            assert (ROOT / path).is_file(), path
+    for start, (path, pattern) in RUN_ELSEWHERE.items():
+        assert re.search(pattern, (ROOT / path).read_text(encoding="utf-8"), re.MULTILINE), start
+    for start, why in NOT_RUN.items():
+        for path in re.findall(r"[\w.]+(?:/[\w.]+)+", why):
+            assert (ROOT / path).is_file(), start
+    run = ROOT / "tests/validation/benchmark/test_benchmark_page.py"
+    assert "command.main(arguments)" in run.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("page", "line"), commands("python -m validation ["), ids=shown)
+def test_options_of_a_line_of_usage_are_ones_that_there_are(page, line):
+    known = validation_parser().format_help()
+    words = re.findall(r"--[\w-]+", line)
+    assert words and all(re.search(rf"{word}\b", known) for word in words)
 
 
 def test_thresholds_in_a_page_are_ones_that_there_are(tmp_path):
@@ -185,15 +322,16 @@ def test_thresholds_in_a_page_are_ones_that_there_are(tmp_path):
 
 @pytest.mark.parametrize("page", PAGES, ids=shown)
 def test_every_block_is_of_a_kind_that_is_run(page):
-    """Python is run above; what Sphinx and BibTeX read is neither's; nothing hides from the tests as text."""
+    """Python is run above, TOML and YAML are read; what Sphinx and BibTeX read is neither's; nothing hides as text."""
     kinds = re.findall(r"^```(.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     kinds = {kind.split()[0] for kind in kinds}
-    assert kinds <= {"python", "bibtex", *(("{include}", "{raw}", "{toctree}") if page.name == "index.md" else ())}
+    of_sphinx = {"{include}", "{raw}", "{toctree}"} if page.name == "index.md" else set()
+    assert kinds <= {"python", "toml", "yaml", "bibtex", *of_sphinx}
 
 
 @pytest.mark.parametrize(("page", "line"), commands("octree-", "python -m validation"), ids=shown)
 def test_options_in_a_page_are_ones_that_there_are(page, line):
-    words = shlex.split(line.split("[")[0])  # of a usage line what comes before its options
+    words = shlex.split(line.split(" [--")[0])  # of a usage line what comes before its options
     if any("..." in word for word in words):
         return
     start = max((s for s in PARSERS if words[: len(s.split())] == s.split()), key=len, default=None)
@@ -202,6 +340,8 @@ def test_options_in_a_page_are_ones_that_there_are(page, line):
         return
     parser = PARSERS[start]()
     arguments = words[len(start.split()) :]
+    if start == "octree-render" and len(arguments) == 1:  # a command by its name alone
+        arguments.append("--help")
     try:
         parser.parse_args(arguments)
     except SystemExit as ended:
@@ -231,6 +371,37 @@ def test_what_a_page_lets_make_make_is_a_target(page, line):
     if target in ("validate", "bench") and options:
         parser = validation_parser() if target == "validate" else benchmark_parser()
         assert isinstance(parser.parse_args(options), argparse.Namespace)
+    if target == "machines":
+        machines = runpy.run_path(str(ROOT / "tests" / "machines.py"))["MACHINES"]
+        assert {word.removeprefix("ARGS=") for word in given} <= set(machines)
+
+
+# What each target calls at last; lint and docs have more than one command.
+CALLS = {
+    "validate": "python -m validation", "test": "python -m pytest", "machines": "python tests/machines.py",
+    "bench": "python -m validation.benchmark", "conformance": "python -m validation.conformance",
+    "docs": "python docs/links.py", "lint": "lint-imports",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("page", "line"), commands("make "), ids=shown)
+def test_make_passes_on_what_a_page_gives_it(page, line):
+    """By a dry run, which prints what would be run."""
+    if shutil.which("make") is None:
+        pytest.skip("no make")
+    command = ["make", "--dry-run", "--no-print-directory", *shlex.split(line)[1:]]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    target = shlex.split(line)[1]
+    if target == "clean":
+        assert "rm -rf .venv " in done.stdout
+        return
+    (called,) = [words for words in done.stdout.splitlines() if words.startswith(f".venv/bin/{CALLS[target]}")]
+    passed = called.removeprefix(f".venv/bin/{CALLS[target]}").split("--dist worksteal")[-1].strip()
+    quick = ["--quick"] * ("QUICK=1" in line)
+    options = [word for text in shlex.split(line) if text.startswith("ARGS=") for word in shlex.split(text[5:])]
+    if target in ("validate", "test", "machines", "bench"):
+        assert shlex.split(passed) == quick + options
 
 
 def test_no_page_promises_a_package_on_an_index():

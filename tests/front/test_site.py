@@ -167,6 +167,37 @@ def test_links_that_lead_nowhere_are_found(tmp_path, capsys):
         assert main(tmp_path) == 1 and f"b.html: {broken}" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    "element",
+    [
+        '<iframe src="http://127.0.0.1:8123/"></iframe>',
+        '<a href="http://localhost:8888/tree">x</a>',
+        '<img src="https://[::1]/a.png">',
+        '<img srcset="a.svg 1x, http://0.0.0.0:80/b.png 2x">',
+        '<video poster="//app.localhost/a.png"></video>',
+    ],
+)
+def test_a_server_on_the_machine_that_built_a_page_is_no_link(tmp_path, capsys, element):
+    main = module("links")["main"]
+    (tmp_path / "a.svg").touch()
+    (tmp_path / "a.html").write_text(
+        '<p id="x"><a href="#x">x</a><code>http://127.0.0.1:1/</code><a href="https://localhost.example/">x</a>'
+    )
+    assert main(tmp_path) == 0
+    (tmp_path / "a.html").write_text(f'<p id="x"><a href="#x">x</a>{element}')
+    assert main(tmp_path) == 1 and "a server on the machine that built it" in capsys.readouterr().out
+
+
+def test_the_sites_notebook_shows_a_picture_of_the_viewer_and_no_frame():
+    """In Jupyter the cell shows the viewer; the tag leaves its output out of the site's page."""
+    notebook = ROOT / "docs" / "notebooks" / "first_look.ipynb"
+    (cell,) = [cell for cell in cells(notebook, "code") if "renderer.view(" in "".join(cell["source"])]
+    assert cell["source"][-1] == "viewing" and "remove-output" in cell["metadata"]["tags"]
+    text = "".join("".join(cell["source"]) for cell in cells(notebook, "markdown"))
+    (picture,) = re.findall(r"!\[[^]]+\]\((.+?)\)", text)
+    assert (notebook.parent / picture).resolve() == ROOT / "docs" / "drawings" / "viewer.webp"
+
+
 def test_every_public_name_is_in_the_reference():
     text = (ROOT / "docs" / "api" / "renderer.rst").read_text(encoding="utf-8")
     absent = [name for name in renderer.__all__ if f":: renderer.{name}\n" not in text]

@@ -359,7 +359,7 @@ class TestWhatTrimeshForgives:
             walled = [
                 sum((cells == cell + step).all(axis=1).any() for step in [*np.eye(3), *-np.eye(3)]) for cell in cells
             ]
-            free = cells[np.array(walled) < 6]  # see docs/coming-from.md on a body whose whole surface others share
+            free = cells[np.array(walled) < 6]  # see docs/guides/trimesh.md on a body whose whole surface others share
             expected = (around[:, None] == cells).all(axis=2).any(axis=1)
             asked_for = (around[:, None] == free).all(axis=2).any(axis=1) | ~expected
             found = asked(whole).contains_points(np.add(around, [0.3, 0.4, 0.6]))

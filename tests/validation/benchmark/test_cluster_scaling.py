@@ -13,7 +13,7 @@ from validation.benchmark.scaling import arithmetic, tables
 from validation.benchmark.scaling.figures import Figures, figures_of, hops, read
 from validation.benchmark.scaling.simulation import simulate
 
-PAGE = Path(__file__).parents[3] / "docs" / "cluster.md"
+PAGE = Path(__file__).parents[3] / "docs" / "guides" / "cluster.md"
 RECORD = read()
 MEASURED = figures_of(RECORD)
 SECONDS = {name: statistics.median(values) for name, values in RECORD["seconds"].items()}

@@ -1,4 +1,4 @@
-"""The tables of ``docs/cluster.md``: ``python -m validation.benchmark.scaling.tables`` prints them from the record."""
+"""The tables of ``docs/guides/cluster.md``, from the record: ``python -m validation.benchmark.scaling.tables``."""
 
 import statistics
 import sys
