@@ -23,15 +23,19 @@ _STEPS = 256
 _NEAR, _FAR = 240, 30
 # The least value of a face's red, green and blue, so that none is near black.
 _DARKEST = 48
+# The most colours of faces: of more, a picture of a million pixels shows noise in place of surfaces. The faces of a
+# group differ by a factor from _DIMMEST to 1, which is seen close by and leaves groups apart.
+_GROUPS, _DIMMEST = 512, 0.7
 
 
-def false_color(image: Image, aov: str, limits: Limits | None = None) -> NDArray[np.uint8]:
+def false_color(image: Image, aov: str, limits: Limits | None = None, faces: int = 0) -> NDArray[np.uint8]:
     """Draw an AOV of a picture, (h, w, 3) uint8 sRGB.
 
     color   the radiance itself
     depth   grey, the nearest surface the brightest
     normal  0.5 + 0.5 n: x, y, z of the shading normal as red, green, blue
-    face    a colour for each face, the same in every picture of the mesh
+    face    a colour for each face, the same in every picture of the mesh; where the mesh has more than 512 ``faces``,
+            one for each of as many groups of neighbours in its list, and a shade of it for each face
     cost    rays traced for the pixel, all samples together, from dark blue (few) over green to yellow (many)
 
     Where nothing was hit, all but the cost show the radiance, which is the background. The scales of depth and cost go
@@ -52,7 +56,7 @@ def false_color(image: Image, aov: str, limits: Limits | None = None) -> NDArray
         greys = np.rint(np.linspace(_NEAR, _FAR, _STEPS)).astype(np.uint8)
         colors[hit] = greys[_steps(image.depth[hit], low, high), None]
     else:
-        colors[hit] = _face_colors(image.face[hit]) if aov == "face" else _normal_colors(image.normal[hit])
+        colors[hit] = _face_colors(image.face[hit], faces) if aov == "face" else _normal_colors(image.normal[hit])
     return colors
 
 
@@ -97,12 +101,22 @@ def _normal_colors(normals: NDArray[np.float32]) -> NDArray[np.uint8]:
     return (np.clip(0.5 + 0.5 * normals, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
 
-def _face_colors(faces: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """(n, 3) colours of face numbers, by a hash, so that neighbouring numbers get unlike colours.
+def _face_colors(faces: NDArray[np.int32], count: int) -> NDArray[np.uint8]:
+    """(n, 3) colours of face numbers of a mesh that has ``count``."""
+    size = -(-max(count, 1) // _GROUPS)
+    colors = _hashed(faces // size)
+    if size == 1:
+        return colors
+    shades = _DIMMEST + (1.0 - _DIMMEST) / 255.0 * _hashed(faces)[:, :1]
+    return np.rint(shades * colors).astype(np.uint8)
+
+
+def _hashed(numbers: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """(n, 3) colours of numbers, by a hash, so that neighbouring ones get unlike colours.
 
     lowbias32 of Chris Wellons, Prospecting for Hash Functions, 2018 (public domain).
     """
-    x = faces.astype(np.uint32)
+    x = numbers.astype(np.uint32)
     x = (x ^ x >> np.uint32(16)) * np.uint32(0x7FEB352D)
     x = (x ^ x >> np.uint32(15)) * np.uint32(0x846CA68B)
     x = x ^ x >> np.uint32(16)

@@ -195,7 +195,7 @@ def colored(
         return _steps(shown, view, wanted, finished)
     image = picture(shown, view, wanted, finished)
     limits = limits_of(image, aov)
-    rgb = false_color(image, aov, limits if aov in _SCALED else None)
+    rgb = false_color(image, aov, limits if aov in _SCALED else None, len(shown.prepared.mesh.faces))
     return rgb, limits, float(image.rays.sum()) / image.render_seconds
 
 

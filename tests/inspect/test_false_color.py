@@ -96,6 +96,32 @@ class TestDepth:
         assert false_color(flat, "depth")[0, :3, 0].tolist() == [240] * 3
 
 
+class TestFacesOfLargeMeshes:
+    def test_of_few_faces_each_has_a_colour_of_its_own(self) -> None:
+        image = ball()
+        np.testing.assert_array_equal(false_color(image, "face", faces=512), false_color(image, "face"))
+
+    def test_of_many_neighbours_share_a_colour_and_differ_in_shade(self) -> None:
+        """A million faces showed noise."""
+        count = 1_000_000
+        faces = np.arange(0, count, 7, dtype=np.int32)[None]
+        flat = np.ones(faces.shape)
+        image = row(face=faces, depth=flat, rays=flat, radiance=np.zeros((*faces.shape, 3), np.float32))
+        colors = false_color(image, "face", faces=count)[0].astype(float)
+        group = faces[0] // -(-count // 512)
+        for number in range(0, group.max() + 1, 50):
+            of_group = colors[group == number]
+            brightest = of_group.max(axis=0)
+            # Each face has its group's colour, at 0.7 to all of its strength, rounded.
+            assert (of_group >= 0.7 * brightest - 1.0).all() and len(np.unique(of_group, axis=0)) > 10
+            np.testing.assert_allclose(
+                of_group / brightest, (of_group / brightest).mean(axis=1)[:, None] + [0] * 3, atol=0.03
+            )
+        tops = np.array([colors[group == number].max(axis=0) for number in range(group.max() + 1)])
+        assert 500 <= len(np.unique(tops, axis=0)) <= 512
+        assert np.abs(np.diff(tops, axis=0)).max(axis=1).mean() > 60  # neighbouring groups are unlike
+
+
 def test_normals_are_half_and_half() -> None:
     facing, left, tilted = false_color(row(), "normal")[0, :3].tolist()
     # 255 (0.5 + 0.5 n), rounded.
