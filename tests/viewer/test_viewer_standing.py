@@ -1,12 +1,13 @@
 """Which picture stands on the stage of the viewer's page, and which is saved: none older or coarser than one before."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image as Pillow
-from viewer_page import CHROMIUM, Viewer
+from viewer_page import CHROMIUM, MODELS, Viewer, served
 
 pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
@@ -140,3 +141,52 @@ def test_the_line_over_the_picture_says_that_it_is_not_the_last(odd: Viewer) -> 
     odd.page.evaluate(GO_ON)
     odd.settled("octree")
     assert odd.page.inner_text("#hud").startswith(f"{width} × {height} ·")
+
+
+# Each drawing, as it is seen: by which of the cameras that the page had, whether traced, how wide, and which answer.
+RECORD = """() => {
+    const { viewer } = window;
+    const cameras = [JSON.stringify(viewer.view().m)];
+    const index = (m) => cameras.lastIndexOf(JSON.stringify(m));
+    const { moved, draw } = viewer;
+    window.frames_seen = [];
+    viewer.moved = function () {
+        const now = JSON.stringify(this.view().m);
+        if (cameras.at(-1) !== now) cameras.push(now);
+        moved.call(this);
+    };
+    viewer.draw = function () {
+        draw.call(this);
+        const traced = this.current || this.recent;
+        const { view, seq, step, w } = traced ? this.shown : { view: this.view(), seq: 0, step: 0, w: 0 };
+        window.frames_seen.push({ traced, camera: index(view.m), now: cameras.length - 1, seq, step, w });
+    };
+}"""
+
+
+@pytest.mark.parametrize("pause", [4, 30, 120])
+def test_no_frame_of_a_drag_is_older_or_coarser_than_one_before(browser: Any, pause: int) -> None:
+    """At the default size, by a drag of forty movements with so many milliseconds between."""
+    with served(MODELS.parent / "three_models.toml") as address:
+        page = Viewer(browser, address, viewport={"width": 1280, "height": 800}, folded=True).open()
+        try:
+            page.page.evaluate(RECORD)
+            x, y = page.centre()
+            page.page.mouse.move(x, y)
+            page.page.mouse.down()
+            for step in range(1, 41):
+                page.page.mouse.move(x + 5 * step, y + 2 * step)
+                page.page.wait_for_timeout(pause)
+            page.page.mouse.up()
+            page.page.wait_for_timeout(50)
+            page.settled("octree")
+            frames = page.page.evaluate("() => window.frames_seen")
+        finally:
+            page.context.close()
+    assert len(frames) > 5 and frames[-1]["traced"] and frames[-1]["camera"] == frames[-1]["now"]
+    for before, after in pairwise(frames):
+        assert after["camera"] >= before["camera"], (before, after)
+        if before["traced"] and after["traced"]:
+            assert (after["seq"], after["step"]) >= (before["seq"], before["step"]), (before, after)
+        if before["traced"] and after["camera"] == before["camera"] == after["now"]:
+            assert after["traced"] and after["w"] >= before["w"], (before, after)
