@@ -173,21 +173,21 @@ LATE = """(late) => {
 
 @pytest.mark.parametrize(("pause", "late"), [(4, 0), (120, 0), (30, STALE)])
 def test_no_frame_of_a_drag_is_older_or_coarser_than_one_before(browser: Any, pause: int, late: int) -> None:
-    """At the default size, by a drag of forty movements with so many milliseconds between; of so many samples that the
+    """At the default size, by a drag of twenty movements with so many milliseconds between; of so many samples that the
     last picture takes longer than a picture of another camera may stand.
     """
     with served(MODELS.parent / "three_models.toml") as address:
         page = Viewer(browser, address, viewport={"width": 1280, "height": 800}, folded=True).open()
         try:
-            page.page.evaluate("() => (viewer.panel.fields.samples.value = '16')")
+            page.page.evaluate("() => (viewer.panel.fields.samples.value = '9')")
             page.page.evaluate(RECORD)
             if late:
                 page.page.evaluate(LATE, late)
             x, y = page.centre()
             page.page.mouse.move(x, y)
             page.page.mouse.down()
-            for step in range(1, 41):
-                page.page.mouse.move(x + 5 * step, y + 2 * step)
+            for step in range(1, 21):
+                page.page.mouse.move(x + 10 * step, y + 4 * step)
                 page.page.wait_for_timeout(pause)
             page.page.mouse.up()
             page.page.wait_for_timeout(50)
