@@ -64,6 +64,7 @@ def test_a_page_shows_the_scene_of_a_server_that_restarts(browser: Any, tmp_path
             page.page.wait_for_selector("body[data-connected=true]")
             page.page.wait_for_function("(sky) => String(viewer.scene.background) === sky", arg="0.9,0.5,0.1")
             shows_only(page, files[1])
+            page.context.close()  # before its server, or what it still fetches fails
         Viewer.faults[:] = [fault for fault in Viewer.faults if "ERR_CONNECTION" not in fault]  # the browser's own
     finally:
         page.context.close()
