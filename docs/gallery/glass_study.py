@@ -38,6 +38,5 @@ for axes, ior in zip(plots.flat, (1.05, 1.33, 1.5, 2.4), strict=True):
         background=(0.55, 0.68, 0.85),
     )
     axes.imshow(srgb(render(scene, resolution=(SIZE // 2, SIZE // 2), samples=9, max_depth=8).radiance))
-    axes.set_title(f"index {ior}")
-    axes.axis("off")
+    axes.set(title=f"index {ior}", xticks=[], yticks=[])
 plt.show()

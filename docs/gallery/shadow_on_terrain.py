@@ -18,10 +18,8 @@ SIZE = int(os.environ.get("GALLERY_SIZE", "400"))
 
 rng = np.random.default_rng(7)
 y, x = np.mgrid[0 : SIZE // 2, 0 : SIZE // 2] / (SIZE // 2)
-heights = np.zeros_like(x)
-for wave in range(1, 9):
-    a, b = rng.normal(0.0, wave, 2)
-    heights += 0.1 / wave**1.6 * np.sin(2 * np.pi * (a * x + b * y) + rng.uniform(0.0, 6.3))
+waves = [(0.1 / k**1.6, *rng.normal(0.0, k, 2), rng.uniform(0.0, 6.3)) for k in range(1, 9)]
+heights = sum(high * np.sin(2 * np.pi * (a * x + b * y) + phase) for high, a, b, phase in waves)
 octree = Octree.from_mesh(heightfield_mesh(heights, spacing=2.0 / SIZE))
 
 hours = np.linspace(-5.0, 5.0, 41)  # from noon
