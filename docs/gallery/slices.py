@@ -23,7 +23,7 @@ hits = octree.all_hits(origins, [0.0, 0.0, 1.0])
 assert (hits.counts % 2 == 0).all()  # a ray that enters a closed body leaves it
 ray, enters, leaves = hits.ray[::2], hits.points[::2], hits.points[1::2]
 
-figure, plots = plt.subplots(2, 2, figsize=(8, 7), layout="constrained")
+figure, plots = plt.subplots(2, 2, figsize=(8, 6), layout="constrained")
 for axes, row in zip(plots.flat, (SIZE // 4, SIZE // 2, 3 * SIZE // 4), strict=False):
     z = np.linspace(low[2], high[2], SIZE)[:, None]
     one = ray // SIZE == row  # these rays lie in a plane of one height
