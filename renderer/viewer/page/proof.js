@@ -104,6 +104,7 @@ export class Proof {
 
   show() {
     const split = this.told !== null && !this.differences;
+    this.bar.classList.toggle("split", split);
     this.divider.hidden = !split;
     this.divider.style.left = `${100 * this.split}%`;
     this.divider.setAttribute("aria-valuenow", Math.round(100 * this.split));

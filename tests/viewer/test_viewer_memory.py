@@ -1,0 +1,46 @@
+"""The memory of the viewer's page is bounded: it does not grow with what its user does."""
+
+from typing import Any
+
+import pytest
+from viewer_page import CHROMIUM, Viewer
+
+pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+
+_DRAGS = 12
+_WIDTH, _HEIGHT = 640, 400
+
+
+def held(page: Viewer, connection: Any) -> float:
+    """Bytes of what scripts hold, buffers of pictures and meshes with it, once what is left over is collected."""
+    page.page.wait_for_timeout(100)
+    connection.send("HeapProfiler.collectGarbage")
+    heap = connection.send("Runtime.getHeapUsage")
+    return heap["usedSize"] + heap["backingStorageSize"] + heap["embedderHeapUsedSize"]
+
+
+def test_drags_and_clicks_leave_nothing_behind(browser: Any, url: str) -> None:
+    """A page that kept one picture a drag, would hold twelve pictures more; what
+    the engine itself notes of code that it has seen often is far below one picture.
+    """
+    page = Viewer(browser, url, viewport={"width": _WIDTH, "height": _HEIGHT}, folded=True).open()
+    try:
+        connection = page.context.new_cdp_session(page.page)
+        connection.send("HeapProfiler.enable")
+
+        def drags() -> float:
+            for number in range(_DRAGS):
+                page.drag((-1) ** number * 40, 10)
+                page.settled("octree")
+                page.page.mouse.click(*page.centre())
+            return held(page, connection)
+
+        drags()
+        before, after = drags(), drags()
+        width, height = page.page.evaluate("() => [viewer.shown.w, viewer.shown.h]")
+    finally:
+        page.context.close()
+    assert after - before < 4 * width * height
