@@ -14,6 +14,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]  # docstrings.py, and the tree itself whatever is installed
 os.environ.setdefault("OCTREE_RENDERER_QUIET", "1")
 
+from api_links import link_api  # noqa: E402
 from docstrings import as_rst  # noqa: E402
 from figures import tiles  # noqa: E402
 from sphinx.util.logging import getLogger  # noqa: E402
@@ -36,16 +37,20 @@ include_patterns = [
     "SECURITY.md",
     "reports/README.md",
 ]
-exclude_patterns = ["docs/gallery/**", ".venv", ".git", "build"]
+exclude_patterns = ["docs/gallery/**", "docs/examples/sg_execution_times.rst", ".venv", ".git", "build"]
 highlight_language = "none"  # blocks without a language are commands and diagrams
 
 html_theme = "furo"
 html_title = "octree-renderer"
+html_favicon = "../renderer/viewer/page/icon.svg"
 html_extra_path = ["start"]  # the address without a page leads to the start page
 html_static_path = ["style"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_theme_options = {"sidebar_hide_name": False}
+
+# Pages of another make lead back.
+BACK = b'<p style="margin: 0.5rem 1rem"><a href="../docs/samples.html">octree-renderer: samples</a></p>'
 
 # Anchors as code hosts make them.
 myst_heading_anchors = 3
@@ -96,12 +101,13 @@ def unpack_samples(app, failed):
     for path in sorted((HERE / "samples").glob("*.html.gz")):
         page = Path(app.outdir, "samples", path.stem)
         page.parent.mkdir(exist_ok=True)
-        page.write_bytes(gzip.decompress(path.read_bytes()))
+        page.write_bytes(gzip.decompress(path.read_bytes()).replace(b"<body>", b"<body>" + BACK, 1))
 
 
 def setup(app):
     """Let autodoc read this project's docstrings, and add what is made at build."""
     app.connect("source-read", put_figures)
+    app.connect("doctree-resolved", link_api)
     app.connect("build-finished", unpack_samples)
     app.connect("autodoc-process-signature", short_types)
     app.connect("autodoc-process-docstring", lambda app, what, name, thing, options, lines: as_rst(lines), priority=100)

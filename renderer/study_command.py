@@ -78,10 +78,10 @@ def _study(options: argparse.Namespace) -> None:
 
 
 def _said(options: argparse.Namespace, parts: Any, seconds: float) -> str:
-    """What was made; of points that see nothing, as those within bodies do, how many, so that this is not silent."""
+    """What was made, and the number of points that see nothing, so that this is not silent."""
     outputs = ", ".join(map(str, options.output))
     blind = 0 if options.kind == "sun" else parts.count(0.0)
-    told = f"; {blind:,} see nothing, as points inside a body" if blind else ""
+    told = f"; {blind:,} see nothing: they face down, are hidden all around or lie inside a body" if blind else ""
     return f"{outputs}: {_KINDS[options.kind]} of {parts.plan.rows:,} points in {seconds:.2f} s{told}"
 
 

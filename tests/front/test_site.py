@@ -6,6 +6,8 @@ import re
 import runpy
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,6 +18,15 @@ import renderer
 ROOT = Path(__file__).parents[2]
 GALLERY = sorted((ROOT / "docs" / "gallery").glob("*.py"))
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+
+
+class Entry(NamedTuple):
+    """As Sphinx keeps what it has a page of."""
+
+    docname: str
+    node_id: str
+    aliased: str
+    objtype: str
 
 
 def module(name):
@@ -48,6 +59,37 @@ def test_a_script_without_mitsuba_says_that_it_is_skipped(monkeypatch, capsys):
     plt.close("all")
     runpy.run_path("error_map.py")
     assert capsys.readouterr().out.startswith("skipped: ") and not plt.get_fignums()
+
+
+def test_names_of_the_api_in_the_text_are_links():
+    """Whole names and ends, calls, what Octree and others have; not what two others have, nor titles and links."""
+    nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
+    objects = {
+        name: Entry("docs/api/renderer", name, "", kind)
+        for name, kind in {
+            "renderer.Octree": "class", "renderer.Octree.closest_hit": "method",
+            "renderer.cluster.closest_hit": "function",
+            "renderer.Octree.save": "method", "renderer.Image.open": "method", "renderer.Scene.open": "method",
+            "renderer.Hits.t": "attribute", "renderer.render": "function",
+        }.items()
+    }  # fmt: skip
+    domain = SimpleNamespace(objects=objects)
+    app = SimpleNamespace(
+        env=SimpleNamespace(get_domain=lambda name: domain),
+        builder=SimpleNamespace(get_relative_uri=lambda page, to: f"{page}->{to}"),
+    )
+    texts = ["closest_hit", "Octree.save(path)", "renderer.Octree", "open", "t", "render", "other"]
+    page = nodes.section("", nodes.title("", "", nodes.literal("", "save")))
+    page += nodes.reference("", "", nodes.literal("", "save"), refuri="elsewhere")
+    page += [nodes.paragraph("", "", nodes.literal("", text)) for text in texts]
+    module("api_links")["link_api"](app, page, "docs/page")
+    found = {link.astext(): link["refuri"] for link in page.findall(nodes.reference)}
+    assert found == {
+        "save": "elsewhere",
+        "closest_hit": "docs/page->docs/api/renderer#renderer.Octree.closest_hit",
+        "Octree.save(path)": "docs/page->docs/api/renderer#renderer.Octree.save",
+        "renderer.Octree": "docs/page->docs/api/renderer#renderer.Octree",
+    }
 
 
 @pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)

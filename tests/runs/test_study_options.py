@@ -170,7 +170,8 @@ def test_points_that_see_nothing_are_counted(tmp_path: Path, capsys: pytest.Capt
     for kind, counted in (("sky", True), ("ao", True), ("sun", False)):
         study(kind, *told, *(("--suns", tmp_path / "suns.txt") if kind == "sun" else ()))
         said = "".join(capsys.readouterr())
-        assert ("; 2 see nothing, as points inside a body" in said) == counted and "of 3 points" in said
+        blind = "; 2 see nothing: they face down, are hidden all around or lie inside a body"
+        assert (blind in said) == counted and "of 3 points" in said
         assert np.load(tmp_path / "a.npy").tolist() == [0, 0, 1]
     np.save(tmp_path / "p.npy", [[0.5, 0.5, 2.0]])
     study("sky", *told)

@@ -17,9 +17,9 @@ EACH = pytest.mark.parametrize("reference", REFERENCES, ids=lambda reference: re
 STORED = {"embree_robust": 1e-5, "embree_default": 1e-5, "igl": 1e-7, "mitsuba": 1e-5, "trimesh": 1e-11,
           "brute_force": 1e-11}  # fmt: skip
 
-# The same where every number on the way is a short binary fraction and no angle enlarges anything. Embree, and Mitsuba by
-# it, divide by the processor's approximate reciprocal, of an error up to 1.5 x 2^-12, and one step of Newton's method:
-# its square, 2.25 x 2^-24, and at most three roundings of 2^-24. Some processors give 0.49999997 for 0.5.
+# The same where every number on the way is a short binary fraction and no angle enlarges anything. Embree, and Mitsuba
+# by it, divide by the processor's approximate reciprocal, of an error up to 1.5 x 2^-12, and one step of Newton's
+# method: its square, 2.25 x 2^-24, and at most three roundings of 2^-24. Some processors give 0.49999997 for 0.5.
 SHORT = dict.fromkeys(STORED, 0.0) | dict.fromkeys(("embree_robust", "embree_default", "mitsuba"), 6 * 2.0**-24)
 
 
