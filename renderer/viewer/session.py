@@ -212,12 +212,14 @@ class Session:
         made = await self._computed(view, wanted, stubborn, span)
         if not stubborn:
             await self._unless_newer(self._acknowledged.wait())
+        # Before any acknowledgement is waited for: of what cannot be told there comes none.
+        told = None if made.told is None else _as_text(made.told)
         self._awaited = view.seq, wanted.step
         self._acknowledged.clear()
         if made.comparison is not None:
             self._proof = view.seq, made.comparison
-        if made.told is not None:
-            await self._tell(**made.told)
+        if told is not None:
+            await self.connection.text(told)
         await self.connection.binary(made.message)
         return made
 
@@ -304,4 +306,9 @@ class Session:
         return await self.host.hide(shown, hidden) if len(hidden) < len(known) else shown
 
     async def _tell(self, **message: Any) -> None:
-        await self.connection.text(json.dumps(message, allow_nan=False))
+        await self.connection.text(_as_text(message))
+
+
+def _as_text(message: dict[str, Any]) -> str:
+    """The message as JSON. Raises ``ValueError`` for numbers that JSON has not."""
+    return json.dumps(message, allow_nan=False)

@@ -28,7 +28,7 @@ from viewer_page import MODELS, SCENE
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
-from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camera, fetched, looking, rendered
+from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camera, fetched, looking, rendered, wait_for
 
 import renderer
 from renderer import load_scene, render
@@ -96,13 +96,6 @@ def left(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     monkeypatch.setattr(session, "answer", watched)
     return seen
-
-
-def wait_for(happened: Any, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while not happened():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 # Pictures
