@@ -115,7 +115,7 @@ class Connection:
 class Session:
     """One connection, which shows a scene of its own: at first the server's.
 
-    ``threads`` computes a picture, the one before it whose last tiles end, and a click.
+    ``threads`` computes a picture, the one before it whose last tiles end, a click, and a scene file to save.
     """
 
     host: SceneHost
@@ -123,6 +123,7 @@ class Session:
     threads: Executor
     views: Newest[CameraMessage] = field(default_factory=Newest)
     picks: Newest[Pick] = field(default_factory=Newest)
+    saves: Newest[SaveScene] = field(default_factory=Newest)
     scenes: Newest[Hello | OpenScene | HideObjects | Reload] = field(default_factory=Newest)
 
     def __post_init__(self) -> None:
@@ -153,8 +154,7 @@ class Session:
             elif isinstance(message, SaveCamera):
                 await self._tell(type="camera", name="camera.toml", text=saved(self.shown, message))
             elif isinstance(message, SaveScene):
-                text, diff = scene_text(self.shown, message)
-                await self._tell(type="saved", name=self.shown.name, text=text, diff=diff)
+                self.saves.put(message)
             elif isinstance(message, AskCommand):
                 await self._tell(type="command", text=command_of(self.shown, message))
             elif isinstance(message, Still | Turntable):
@@ -171,6 +171,7 @@ class Session:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._show_views())
             tasks.create_task(self._answer_picks())
+            tasks.create_task(self._save_scenes())
             tasks.create_task(self._open_scenes())
             tasks.create_task(self.exporter.run(self.complain))
 
@@ -288,6 +289,16 @@ class Session:
                     self.threads, picked, self.shown, pick, self._proof_of(pick)
                 )
                 await self._tell(**await running)
+            except Exception as error:  # as above
+                await self.complain(error)
+
+    async def _save_scenes(self) -> None:
+        while True:
+            asked, shown = await self.saves.take(), self.shown
+            try:
+                running = asyncio.get_running_loop().run_in_executor(self.threads, scene_text, shown, asked)
+                text, diff = await running
+                await self._tell(type="saved", name=shown.name, text=text, diff=diff)
             except Exception as error:  # as above
                 await self.complain(error)
 
