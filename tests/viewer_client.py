@@ -3,6 +3,7 @@
 import json
 import math
 import struct
+import time
 import urllib.request
 from dataclasses import dataclass
 from typing import Any
@@ -130,3 +131,10 @@ def rendered(scene: Scene, eye: tuple[float, float, float] = (0.5, 2.6, 5.5), **
 def fetched(url: str, path: str) -> bytes:
     with urllib.request.urlopen(url + path, timeout=PATIENCE) as answer:
         return answer.read()
+
+
+def wait_for(happened: Any, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < end
+        time.sleep(0.01)

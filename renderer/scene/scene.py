@@ -256,10 +256,7 @@ def load_scene(path: str | Path) -> Scene:
     >>> scene.camera.type, sorted(scene.materials), len(scene.objects)
     ('orthographic', ['ground', 'stone'], 1)
     """
-    try:
-        path = as_path("path", path)
-    except ValueError as error:
-        raise SceneError(str(error)) from None
+    path = _scene_path(path)
     if path.suffix.lower() in MESH_SUFFIXES:
         try:
             mesh = load_mesh(path)
@@ -268,13 +265,38 @@ def load_scene(path: str | Path) -> Scene:
         table = tomllib.loads(showcase_text(mesh, "model"))
         table["objects"][0]["mesh"] = mesh
         return _checked(table, path)
+    return _checked(_table(path), path)
+
+
+def mesh_files(path: str | Path) -> list[Path]:
+    """The files of meshes that a scene file names, none of which is read. Raises ``SceneError`` for what is no TOML."""
+    path = _scene_path(path)
+    if path.suffix.lower() in MESH_SUFFIXES:
+        return [path]
+    return [path.parent / entry["mesh"] for entry in _mesh_entries(_table(path))]
+
+
+def _scene_path(path: object) -> Path:
     try:
-        table = tomllib.loads(read_whole(path).decode("utf-8-sig"))
+        return as_path("path", path)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+
+
+def _table(path: Path) -> dict[str, Any]:
+    """What a scene file holds."""
+    try:
+        return tomllib.loads(read_whole(path).decode("utf-8-sig"))
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, too many digits
         raise SceneError(f"{path}: expected TOML, got a syntax error: {error}") from None
-    return _checked(table, path)
+
+
+def _mesh_entries(table: dict[str, Any]) -> list[dict[str, Any]]:
+    """The entries of objects, in a scene file's table, that name a file."""
+    entries = table.get("objects") if isinstance(table.get("objects"), list) else []
+    return [entry for entry in entries or [] if isinstance(entry, dict) and isinstance(entry.get("mesh"), str)]
 
 
 def write_scene(mesh_file: str | Path, path: str | Path) -> None:
@@ -297,9 +319,8 @@ def write_scene(mesh_file: str | Path, path: str | Path) -> None:
 
 def _checked(table: dict[str, Any], path: Path) -> Scene:
     """The scene in a file's table, whose meshes are loaded."""
-    for entry in table.get("objects") or [] if isinstance(table.get("objects"), list) else []:
-        if isinstance(entry, dict) and isinstance(entry.get("mesh"), str):
-            entry["mesh"] = path.parent / entry["mesh"]
+    for entry in _mesh_entries(table):
+        entry["mesh"] = path.parent / entry["mesh"]
     try:
         scene = Scene.model_validate(table)
     except ValidationError as error:

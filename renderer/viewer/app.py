@@ -29,8 +29,8 @@ from renderer.viewer.watch import follow
 PAGE = Path(__file__).parent / "page"
 # Each connection may keep all processors busy; beyond this many, pictures would come too slowly for all.
 MAX_CONNECTIONS = 16
-# Threads per session: for its picture under way, the one before it whose last tiles end, and a click.
-_THREADS_A_SESSION = 3
+# Threads per session: for its picture under way, the one before it whose last tiles end, a click, and a file to save.
+_THREADS_A_SESSION = 4
 _TRY_LATER = 1013  # RFC 6455's registry of close codes
 
 
@@ -53,12 +53,22 @@ class Viewer:
     async def open(self, file: str, fresh: bool) -> ShownScene:
         """The scene of one of the files offered, as ``SceneHost`` says."""
         async with self._one_opens:
-            known = [self.shown, *(session.shown.whole for session in self.sessions)]
-            shown = await run_in_threadpool(_opened, self.shown, known, file, fresh)
-            if shown.path == self.shown.path:
-                self.shown = shown
-            self._scenes[shown.id] = shown
-            return shown
+            return self._kept(await run_in_threadpool(_opened, self.shown, self._known(), file, fresh))
+
+    async def reload(self, shown: ShownScene) -> ShownScene:
+        """The scene of the file of ``shown`` as it is now, as ``SceneHost`` says."""
+        async with self._one_opens:
+            return self._kept(await run_in_threadpool(_current, shown, self._known()))
+
+    def _known(self) -> list[ShownScene]:
+        return [self.shown, *(session.shown.whole for session in self.sessions)]
+
+    def _kept(self, shown: ShownScene) -> ShownScene:
+        """``shown``, which can be found by its id from now on, and is the server's own if it is of its file."""
+        if shown.path == self.shown.path:
+            self.shown = shown
+        self._scenes[shown.id] = shown
+        return shown
 
     async def hide(self, shown: ShownScene, hidden: Collection[str]) -> ShownScene:
         """``shown`` without those objects, as ``SceneHost`` says."""
@@ -123,8 +133,18 @@ def _opened(own: ShownScene, known: list[ShownScene], file: str, fresh: bool) ->
         return own
     path = own.beside(file) if fresh or file in own.files else own.path
     assert path is not None  # which mypy cannot tell
+    return open_file(path) if fresh else _unedited(known, path)
+
+
+def _current(shown: ShownScene, known: list[ShownScene]) -> ShownScene:
+    """``shown``, or where its files were edited since, the scene that they hold now."""
+    return shown if shown.path is None else _unedited([shown, *known], shown.path)
+
+
+def _unedited(known: list[ShownScene], path: Path) -> ShownScene:
+    """The scene of the file: one of those ``known`` where it is as the file has it, or loaded anew."""
     for scene in known:
-        if scene.path == path and not fresh and not scene.edited:
+        if scene.path == path and not scene.edited:
             return scene
     return open_file(path)
 

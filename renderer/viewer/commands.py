@@ -2,14 +2,20 @@
 
 import difflib
 import json
+import math
 import shlex
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Iterator, Sequence
+from functools import reduce
+from operator import getitem
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from renderer.errors import expect
-from renderer.scene.camera import Camera
+from renderer.process.files import read_whole
+from renderer.scene.camera import Camera, OrthographicCamera
 from renderer.scene.fields import Fields
 from renderer.scene.light import DirectionalLight, Light
 from renderer.viewer.protocol import AskCommand, SaveCamera, SaveScene, ViewSettings
@@ -18,6 +24,8 @@ from renderer.viewer.viewpoint import camera_of, camera_toml
 
 # A page computes its matrix from angles, in float64: some ten roundings, each of 1e-16 of the largest number.
 _ROUNDING = 1e-12
+# Distances that are tried for a target, per doubling.
+_STEPS = 8
 
 
 def saved(shown: ShownScene, message: SaveCamera) -> str:
@@ -56,72 +64,133 @@ def command_of(shown: ShownScene, asked: AskCommand) -> str:
         changes.append(f"lights = [{', '.join(map(_inline, lights_of(shown, settings)))}]")
     if settings.shadows != scene.render.shadows:
         changes.append(f"render.shadows = {_value(settings.shadows)}")
-    words = ["octree-render", "render", str(path), "--resolution", f"{asked.w}x{asked.h}"]
+    words = ["octree-render", "render", _as_word(str(path)), "--resolution", f"{asked.w}x{asked.h}"]
     words += ["--samples", str(1 if brute else settings.samples), "--max-depth", str(settings.max_depth)]
     words += ["--accelerator", "brute"] if brute else []
     words += [word for change in changes for word in ("--change", change)]
-    return shlex.join([*words, "-o", f"{path.stem if path else ''}.png"])
+    return shlex.join([*words, "-o", _as_word(f"{path.stem if path else ''}.png")])
+
+
+def _as_word(file: str) -> str:
+    """The name of a file so that no command takes it for an option."""
+    return f"./{file}" if file.startswith("-") else file
 
 
 def _seen_by(shown: ShownScene, message: SaveCamera | SaveScene, walk: bool = False) -> Camera:
-    """The camera of a message, whose target is the point of its axis nearest the scene's middle, if that lies ahead and
-    it does not ``walk``.
+    """The camera of a message, whose target is about the point of its axis nearest the scene's middle, if that lies
+    ahead and it does not ``walk``. Its rays are those of the message's picture to the bit.
     """
     camera = camera_of(message.m, message.fovy, height=message.height)
     middle = np.mean(shown.prepared.mesh.bounds, axis=0)
     ahead = float((middle - camera.eye) @ camera.frame()[2])
-    return camera_of(message.m, message.fovy, ahead, message.height) if ahead > 0.0 and not walk else camera
+    if walk or not 0.0 < ahead < math.inf:
+        return camera
+    for distance in _distances(ahead):
+        # Multiples of few bits of the direction are exact mostly, and then their unit vectors are the same.
+        target = np.add(camera.eye, distance * np.subtract(camera.target, camera.eye))
+        farther = camera.model_copy(update={"target": tuple(target.tolist())})
+        if np.array_equal(farther.frame(), camera.frame()):
+            return farther
+    return camera
+
+
+def _distances(ahead: float) -> Iterator[float]:
+    """Distances of few bits about ``ahead``, the nearest first."""
+    exponent = math.frexp(ahead)[1] - 1
+    about = (math.ldexp(1.0 + step / _STEPS, exponent) for step in range(-_STEPS // 2, _STEPS + 1))
+    return iter(sorted(about, key=lambda distance: abs(distance - ahead)))
 
 
 def scene_text(shown: ShownScene, asked: SaveScene) -> tuple[str, str]:
     """The scene's file with the view's camera, materials, lights and settings, and a diff to it from the file.
 
-    What is not changed stays as it is written, comments too; so do objects that are hidden. Raises ``ValueError`` for a
-    scene of no such file.
+    What is not changed stays as it is written, comments and ends of lines too; so do objects that are hidden. Raises
+    ``ValueError`` for a scene of no such file, and for a file that cannot be read or changed.
     """
-    import tomlkit  # not needed before a scene is saved
-
-    path, scene, settings = shown.path, shown.whole.scene, asked.settings
+    path = shown.path
     told = "a scene that was made in Python" if path is None else str(path)
     expect(path is not None and path.suffix.lower() == ".toml", "save", "a scene file", told)
     assert path is not None  # which mypy cannot tell
     expect(not shown.edited, "save", "the file as it was loaded", "one that was edited since")
-    before = path.read_text("utf-8-sig")
-    document = tomlkit.parse(before)
-    camera = _seen_by(shown, asked)
-    if not _same_picture(camera, scene.camera):
-        _update(document["camera"], scene.camera, camera)
+    written = _text_of(path)
+    # tomlkit knows no mark of a text's order of bytes, and ends the lines that it adds with a line feed.
+    mark, before = ("\ufeff", written[1:]) if written.startswith("\ufeff") else ("", written)
+    returns = before.count("\r\n") == before.count("\n") > 0
+    if returns:
+        before = before.replace("\r\n", "\n")
+    after = _changed_text(before, shown, asked)
+    lines = difflib.unified_diff(before.splitlines(), after.splitlines(), path.name, "as shown", lineterm="")
+    return mark + (after.replace("\n", "\r\n") if returns else after), "\n".join(lines)
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return read_whole(path).decode()
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _changed_text(before: str, shown: ShownScene, asked: SaveScene) -> str:
+    """The text of a scene file with what the view has of its own. Raises ``ValueError`` where that cannot be written
+    into it.
+    """
+    import tomlkit  # not needed before a scene is saved
+
+    wanted, document = tomllib.loads(before), tomlkit.parse(before)
+    _write(wanted, shown, asked)
+    expected = "a file whose values can be changed one by one"
+    try:
+        _write(document, shown, asked)
+        after = tomlkit.dumps(document)
+        same = tomllib.loads(after) == wanted
+    except Exception as error:  # it has faults with keys in dots: IndexError, ...
+        raise ValueError(f"save: expected {expected}, got one on which tomlkit fails: {error!r}") from None
+    expect(same, "save", expected, "one that would hold other values")
+    return after
+
+
+def _write(document: Any, shown: ShownScene, asked: SaveScene) -> None:
+    """Write what the view has of its own into the tables of the scene's file."""
+    scene, settings = shown.whole.scene, asked.settings
+    if not _same_view(asked, scene.camera):
+        _update(document, ("camera",), scene.camera, _seen_by(shown, asked))
     for name, material in edited(scene, settings.edits).materials.items():
-        _update(document["materials"][name], scene.materials[name], material)
+        _update(document, ("materials", name), scene.materials[name], material)
     lights = lights_of(shown, settings)
     if len(lights) == len(scene.lights):
-        for table, old, new in zip(document.get("lights", []), scene.lights, lights, strict=True):
-            _update(table, old, new)
+        for i, (old, new) in enumerate(zip(scene.lights, lights, strict=True)):
+            _update(document, ("lights", i), old, new)
     else:
         document["lights"] = [_given(light) for light in lights]
     for key in ("samples", "max_depth", "shadows"):
         if getattr(settings, key) != getattr(scene.render, key):
             document.setdefault("render", {})[key] = getattr(settings, key)
-    after = tomlkit.dumps(document)
-    lines = difflib.unified_diff(before.splitlines(), after.splitlines(), path.name, "as shown", lineterm="")
-    return after, "\n".join(lines)
 
 
-def _update(table: Any, old: Fields, new: Fields) -> None:
-    """Write the fields of ``new`` that differ from those of ``old`` into its table of a file."""
+def _update(document: Any, keys: Sequence[str | int], old: Fields, new: Fields) -> None:
+    """Write the fields of ``new`` that differ from those of ``old`` into the table of a file that ``keys`` lead to."""
     before, after = _given(old), _given(new)
-    for key in before.keys() - after.keys():
-        table.pop(key, None)
+    # The new ones first, or a table of keys in dots would be gone; and each in a table looked up anew, since tomlkit's
+    # view of keys in dots is out of date after a change.
     for key, value in after.items():
         if key not in before or value != before[key]:
-            table[key] = value
+            reduce(getitem, keys, document)[key] = value
+    for key in sorted(before.keys() - after.keys()):
+        reduce(getitem, keys, document).pop(key, None)
 
 
-def _same_picture(one: Camera, other: Camera) -> bool:
-    """Whether cameras have the same rays, but for rounding: a page's matrix has no target."""
-    first, second = one.rows(1, 1), other.rows(1, 1)
-    size = max(1.0, float(np.abs(second).max()))
-    return one.type == other.type and bool(np.allclose(first, second, rtol=0.0, atol=_ROUNDING * size))
+def _same_view(asked: SaveScene, camera: Camera) -> bool:
+    """Whether a page's view is that of ``camera``, but for the rounding of its angles."""
+    right, up, forward = camera.frame()
+    *axes, eye = np.array(asked.m, np.float64).reshape(4, 4)[:, :3]
+    size = max(1.0, float(np.abs([camera.eye, camera.target]).max()))
+    if not np.allclose(eye, camera.eye, rtol=0.0, atol=_ROUNDING * size):
+        return False
+    if isinstance(camera, OrthographicCamera):
+        film = asked.height is not None and math.isclose(asked.height, camera.height, rel_tol=_ROUNDING)
+    else:
+        film = asked.height is None and math.isclose(math.degrees(asked.fovy), camera.fov, rel_tol=_ROUNDING)
+    return film and np.allclose(axes, [right, up, -forward], rtol=0.0, atol=_ROUNDING)
 
 
 def lights_of(shown: ShownScene, settings: ViewSettings) -> Sequence[Light]:
@@ -151,5 +220,6 @@ def _given(fields: Fields) -> dict[str, Any]:
 
 def _value(value: object) -> str:
     """Numbers, words and lists of numbers in the forms that TOML shares with JSON and Python."""
-    # Python writes the shortest decimal that reads back as the same float64.
-    return json.dumps(value, ensure_ascii=False)
+    # Python writes the shortest decimal that reads back as the same float64. Of all characters that JSON leaves as they
+    # are, TOML refuses this one.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -12,8 +12,10 @@ from renderer.scene.scene import AnyLight, AnyMaterial
 
 # The longest side of a picture and the most pixels, those of a screen called 4K, 3840 x 2160, and some more.
 MAX_SIDE, MAX_PIXELS = 4096, 1 << 23
-# A page's largest message is a pick of under 1 kB; this leaves room for numbers of any length.
-MAX_MESSAGE_BYTES = 16384
+# The most materials and lights that a page may change, and objects that it may hide.
+MAX_EDITS, MAX_HIDDEN = 1024, 4096
+# A view with so many of them, their numbers as long as they get: 500 bytes a material, and 200 a light.
+MAX_MESSAGE_BYTES = 1 << 20
 # An 8 x 8 grid per pixel: of a million pixels, 67 million camera rays, the most that are worth the wait.
 MAX_SAMPLES = 64
 # Below a thousandth of a radian neighbouring rays differ by less than a page's float32 matrices resolve; above 3.1
@@ -36,7 +38,7 @@ _Matrix = Annotated[list[_Number], Field(min_length=16, max_length=16)]
 _Fovy = Annotated[float, Field(ge=MIN_FOVY, le=MAX_FOVY)]
 _Height = Annotated[float, Field(gt=0.0, le=FARTHEST)] | None
 _FileName = Annotated[str, Field(max_length=255)]  # the longest file name
-_Hidden = Annotated[list[Annotated[str, Field(max_length=40)]], Field(max_length=1024)]
+_Hidden = Annotated[list[Annotated[str, Field(max_length=40)]], Field(max_length=MAX_HIDDEN)]
 
 Mode = Literal["gl", "phong", "brute", "octree", "proof"]
 MODES: tuple[Mode, ...] = ("gl", "phong", "brute", "octree", "proof")
@@ -68,8 +70,8 @@ class _Sized(_Message):
 class Edits(_Message):
     """What the page has in place of the file's: materials by their names, and all lights or null for the file's."""
 
-    materials: dict[str, AnyMaterial] = {}
-    lights: tuple[AnyLight, ...] | None = None
+    materials: Annotated[dict[str, AnyMaterial], Field(max_length=MAX_EDITS)] = {}
+    lights: Annotated[tuple[AnyLight, ...], Field(max_length=MAX_EDITS)] | None = None
 
     @property
     def any(self) -> bool:

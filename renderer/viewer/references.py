@@ -5,11 +5,15 @@ width, 3), and calls ``progress(done, of)``. Its process can be ended in the mid
 selects or leaks stays there.
 """
 
+import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint, entry_points
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +23,8 @@ from renderer.process import child
 from renderer.scene.scene import Scene
 
 GROUP = "octree_render.references"
+# Seconds between looks at whether a picture is still wanted while its reference says nothing.
+_TURN = 0.1
 
 
 def references() -> dict[str, EntryPoint]:
@@ -31,32 +37,70 @@ def reference_picture(
 ) -> NDArray[np.float32]:
     """The picture of ``scene`` by the reference of that name, of ``size`` (w, h), linear radiance (h, w, 3).
 
-    ``finished(share)`` is called as it grows; what it raises ends the other process. Raises ``ValueError`` where there
-    is no such reference, or it fails.
+    ``finished(share)`` is called as it grows, and with 0 while nothing is heard of it; what it raises ends the other
+    process. Raises ``ValueError`` where there is no such reference, or it fails.
     """
     expect(name in references(), "reference", f"one of {list(references())}", repr(name))
     asked = pickle.dumps((references()[name].value, scene, size, max_depth))
-    with subprocess.Popen(
+    other = subprocess.Popen(
         child.command(f"{__name__}:answer"), env=child.environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as other:
-        assert other.stdin is not None and other.stdout is not None
+    )
+    try:
+        for told in _heard(other, asked):
+            if not isinstance(told, float):
+                return _checked(name, told, size)
+            finished(told)
+    finally:
+        other.kill()
+        other.wait()
+    raise ValueError(f"reference: expected a picture by {name}, got its process ended")
+
+
+def _heard(other: "subprocess.Popen[bytes]", asked: bytes) -> Iterator[object]:
+    """What the other process tells once it is ``asked``, until it ends; and 0.0 where it tells nothing for a while."""
+    assert other.stdin is not None and other.stdout is not None
+    heard: SimpleQueue[Any] = SimpleQueue()
+    # It waits for the pipe on a thread, since only the other process ends such a wait.
+    Thread(target=_exchange, args=(other.stdin, other.stdout, asked, heard), daemon=True).start()
+    while True:
         try:
-            other.stdin.write(asked)
-            other.stdin.close()
-            while isinstance(told := pickle.load(other.stdout), float):
-                finished(told)
-        except (EOFError, BrokenPipeError, pickle.UnpicklingError):
-            told = "its process ended"
-        finally:
-            other.kill()
-    expect(not isinstance(told, str), "reference", f"a picture by {name}", str(told))
-    return np.asarray(told, np.float32)
+            told = heard.get(timeout=_TURN)
+        except Empty:
+            told = 0.0
+        if told is None:
+            return
+        yield told
+
+
+def _exchange(to: IO[bytes], of: IO[bytes], asked: bytes, heard: "SimpleQueue[Any]") -> None:
+    """Write what is ``asked``, and read answers until the other process ends, which is heard as None."""
+    # Its end of ``to`` tells the other process, by then, that this one has ended.
+    with to, of:
+        try:
+            to.write(asked)
+            to.flush()
+            while True:
+                heard.put(pickle.load(of))
+        except Exception:  # the pipe ends, in the middle of an answer too, or something else was written to it
+            heard.put(None)
+
+
+def _checked(name: str, told: object, size: tuple[int, int]) -> NDArray[np.float32]:
+    """The picture that was told. Raises ``ValueError`` where it is a fault, or none of that size and finite."""
+    expect(isinstance(told, np.ndarray), "reference", f"a picture by {name}", told)
+    assert isinstance(told, np.ndarray)  # which mypy cannot tell
+    shape = (size[1], size[0], 3)
+    expect(told.shape == shape, "reference", f"a picture of shape {shape} by {name}", told.shape)
+    wrong = told[~np.isfinite(told)]
+    expect(not len(wrong), "reference", f"finite radiance by {name}", f"{wrong[:1].sum()} in {len(wrong)} values")
+    return told
 
 
 def answer() -> None:
     """In the other process: compute the picture that is asked for, and tell shares of it, then all of it or a fault."""
     told, sys.stdout = sys.stdout.buffer, sys.stderr  # to which a reference may print
     target, scene, size, max_depth = pickle.load(sys.stdin.buffer)
+    Thread(target=_end_with, args=(sys.stdin.fileno(),), daemon=True).start()
     before = 0.0
 
     def progress(done: int, of: int) -> None:
@@ -67,8 +111,17 @@ def answer() -> None:
 
     try:
         found = EntryPoint("", target, GROUP).load()
-        picture: object = np.asarray(found(scene, *size, max_depth=max_depth, progress=progress), np.float32)
+        seen = np.asarray(found(scene, *size, max_depth=max_depth, progress=progress))
+        with np.errstate(over="ignore"):  # what is too large is told by the one who waits
+            picture: object = seen.astype(np.float32, casting="same_kind")
     except Exception as error:  # told, whatever it is, to whoever waits for the picture
         picture = " ".join(f"{type(error).__name__}: {error}".split())
     pickle.dump(picture, told)
     told.flush()
+
+
+def _end_with(pipe: int) -> None:
+    """End this process where the one that asks has ended, however it did."""
+    while os.read(pipe, 1):
+        pass
+    os._exit(1)

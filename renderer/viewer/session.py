@@ -56,6 +56,11 @@ class Newest(Generic[T]):
         self._item: T | None = None
         self._came = asyncio.Event()
 
+    def offer(self, item: T) -> None:
+        """Leave ``item``, unless one is there that is not yet taken."""
+        if self._item is None:
+            self.put(item)
+
     def put(self, item: T | None) -> None:
         """Leave ``item``. None leaves nothing, but makes the item that was taken last outdated all the same."""
         self._item = item
@@ -75,6 +80,10 @@ class Newest(Generic[T]):
         await self._came.wait()
 
 
+class Reload:
+    """The wish to see what is shown by then as its files have it, which no page sends."""
+
+
 class SceneHost(Protocol):
     """The holder of the scenes that connections show; ``files`` computes the files that pages ask for."""
 
@@ -86,6 +95,9 @@ class SceneHost(Protocol):
         """The scene of one of the files offered, or for "" the server's own; loaded anew where it was edited since it
         was loaded, and always if ``fresh``. Raises ``ValueError``.
         """
+
+    async def reload(self, shown: ShownScene) -> ShownScene:
+        """The scene of the file of ``shown``, loaded anew where it was edited. Raises ``ValueError``."""
 
     async def hide(self, shown: ShownScene, hidden: Collection[str]) -> ShownScene:
         """``shown`` without those of its objects. Raises ``ValueError``."""
@@ -103,7 +115,7 @@ class Connection:
 class Session:
     """One connection, which shows a scene of its own: at first the server's.
 
-    ``threads`` computes a picture, the one before it whose last tiles end, and a click.
+    ``threads`` computes a picture, the one before it whose last tiles end, a click, and a scene file to save.
     """
 
     host: SceneHost
@@ -111,11 +123,13 @@ class Session:
     threads: Executor
     views: Newest[CameraMessage] = field(default_factory=Newest)
     picks: Newest[Pick] = field(default_factory=Newest)
-    scenes: Newest[Hello | OpenScene | HideObjects] = field(default_factory=Newest)
+    saves: Newest[SaveScene] = field(default_factory=Newest)
+    scenes: Newest[Hello | OpenScene | HideObjects | Reload] = field(default_factory=Newest)
 
     def __post_init__(self) -> None:
         self.shown = self.host.shown
         self.exporter = Exporter(self._tell, self.connection.binary, self.host.files)
+        self._outdated = False  # whether what is shown was edited, and no reload begun
         self._awaited: tuple[int, int] | None = None
         self._proof: tuple[int, Comparison] | None = None
         self._told_at = 0.0
@@ -140,8 +154,7 @@ class Session:
             elif isinstance(message, SaveCamera):
                 await self._tell(type="camera", name="camera.toml", text=saved(self.shown, message))
             elif isinstance(message, SaveScene):
-                text, diff = scene_text(self.shown, message)
-                await self._tell(type="saved", name=self.shown.name, text=text, diff=diff)
+                self.saves.put(message)
             elif isinstance(message, AskCommand):
                 await self._tell(type="command", text=command_of(self.shown, message))
             elif isinstance(message, Still | Turntable):
@@ -158,6 +171,7 @@ class Session:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._show_views())
             tasks.create_task(self._answer_picks())
+            tasks.create_task(self._save_scenes())
             tasks.create_task(self._open_scenes())
             tasks.create_task(self.exporter.run(self.complain))
 
@@ -166,13 +180,13 @@ class Session:
         await self._tell(type="error", message=" ".join(str(error).split()) or type(error).__name__)
 
     def reload(self) -> None:
-        """Show the scene as its files have it now."""
-        file, hidden = self.shown.path.name if self.shown.path else "", list(self.shown.hidden)
-        self.scenes.put(Hello(type="hello", file=file, server=self.host.id, hidden=hidden))
+        """Show the scene as its files have it now, after what the page waits for."""
+        self._outdated = True
+        self.scenes.offer(Reload())
 
     async def show_scene(self, shown: ShownScene) -> None:
         """Show ``shown`` from now on, and say which that is. Views of the one before are dropped."""
-        self.shown, self._proof = shown, None
+        self.shown, self._proof, self._outdated = shown, None, False
         self.views.put(None)
         await self._tell(type="scene", id=shown.id)
 
@@ -212,12 +226,14 @@ class Session:
         made = await self._computed(view, wanted, stubborn, span)
         if not stubborn:
             await self._unless_newer(self._acknowledged.wait())
+        # Before any acknowledgement is waited for: of what cannot be told there comes none.
+        told = None if made.told is None else _as_text(made.told)
         self._awaited = view.seq, wanted.step
         self._acknowledged.clear()
         if made.comparison is not None:
             self._proof = view.seq, made.comparison
-        if made.told is not None:
-            await self._tell(**made.told)
+        if told is not None:
+            await self.connection.text(told)
         await self.connection.binary(made.message)
         return made
 
@@ -276,6 +292,16 @@ class Session:
             except Exception as error:  # as above
                 await self.complain(error)
 
+    async def _save_scenes(self) -> None:
+        while True:
+            asked, shown = await self.saves.take(), self.shown
+            try:
+                running = asyncio.get_running_loop().run_in_executor(self.threads, scene_text, shown, asked)
+                text, diff = await running
+                await self._tell(type="saved", name=shown.name, text=text, diff=diff)
+            except Exception as error:  # as above
+                await self.complain(error)
+
     def _proof_of(self, pick: Pick) -> Comparison | None:
         """The comparison that the click is on."""
         return self._proof[1] if self._proof is not None and self._proof[0] == pick.proof else None
@@ -284,24 +310,41 @@ class Session:
         while True:
             wanted = await self.scenes.take()
             try:
-                await self.show_scene(await self._wanted(wanted))
+                shown = await self._wanted(wanted)
+                if shown is not self.shown or not isinstance(wanted, Reload):
+                    await self.show_scene(shown)
             except Exception as error:  # as above
                 await self.complain(error)
                 if isinstance(wanted, Hello):  # a page that begins has no scene to go on with
                     await self.show_scene(self.shown)
+                elif self._outdated:  # and one that goes on has to be as its file is
+                    self.scenes.offer(Reload())
 
-    async def _wanted(self, wanted: Hello | OpenScene | HideObjects) -> ShownScene:
-        """The scene that the page wants to see."""
+    async def _wanted(self, wanted: Hello | OpenScene | HideObjects | Reload) -> ShownScene:
+        """The scene that the page is to see."""
+        if isinstance(wanted, Reload):
+            before, self._outdated = self.shown, False
+            shown = await self.host.reload(before.whole)
+            return before if shown is before.whole else await self._without(shown, before.hidden)
         if isinstance(wanted, HideObjects):
             return await self.host.hide(self.shown, wanted.hidden)
         if isinstance(wanted, OpenScene):
             return await self.host.open(wanted.file, fresh=True)
         # A page of another server's begins anew here.
         shown = await self.host.open(wanted.file if wanted.server == self.host.id else "", fresh=False)
+        return await self._without(shown, wanted.hidden)
+
+    async def _without(self, shown: ShownScene, hidden: Collection[str]) -> ShownScene:
+        """``shown`` without those of the objects that it has."""
         known = object_names(shown.whole.scene)
-        hidden = [name for name in wanted.hidden if name in known]
+        hidden = [name for name in hidden if name in known]
         # What is hidden stays so where the file was edited, unless nothing else is left in it.
         return await self.host.hide(shown, hidden) if len(hidden) < len(known) else shown
 
     async def _tell(self, **message: Any) -> None:
-        await self.connection.text(json.dumps(message, allow_nan=False))
+        await self.connection.text(_as_text(message))
+
+
+def _as_text(message: dict[str, Any]) -> str:
+    """The message as JSON. Raises ``ValueError`` for numbers that JSON has not."""
+    return json.dumps(message, allow_nan=False)

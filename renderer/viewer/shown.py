@@ -16,7 +16,7 @@ from renderer.process.parallel import available_threads
 from renderer.scene.camera import unit
 from renderer.scene.hide import object_names, without
 from renderer.scene.needs import Needs, needs_of
-from renderer.scene.scene import RenderSettings, Scene, load_scene
+from renderer.scene.scene import RenderSettings, Scene, load_scene, mesh_files
 from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
 from renderer.trace.spawn import BOUNDED
@@ -67,13 +67,12 @@ class ShownScene:
 
     @property
     def files(self) -> list[str]:
-        """The scene files that may be opened: this one and those beside it, but for pipes, names that are no text and
-        files of a camera without a scene, as the viewer saves them.
+        """The scene files that may be opened: this one and those beside it, but for pipes and devices, names that are
+        no text and files of a camera without a scene, as the viewer saves them.
         """
         if self.path is None:
             return []
-        # A pipe without a writer would be waited for.
-        beside = {path.name for path in self.path.parent.glob("*.toml") if not path.is_fifo() and not _is_camera(path)}
+        beside = {path.name for path in self.path.parent.glob("*.toml") if not (_is_special(path) or _is_camera(path))}
         return sorted(name for name in beside | {self.path.name} if name.encode(errors="replace").decode() == name)
 
     @property
@@ -112,12 +111,21 @@ def _mark(path: Path) -> _Mark | None:
     return _Mark(found.st_mtime_ns, found.st_size, found.st_ino)
 
 
+def _is_special(path: Path) -> bool:
+    """Whether it is a pipe, which may have no writer, or a device, which may have no end."""
+    return path.exists() and not (path.is_file() or path.is_dir())
+
+
 def _is_camera(path: Path) -> bool:
     """Whether a file holds what the viewer saves and nothing else: a scene has materials."""
     try:
-        if path.stat().st_size > _CAMERA_BYTES:
+        if not path.is_file():  # but a device, which may have no end
             return False
-        tables = tomllib.loads(path.read_text("utf-8-sig")).keys()
+        with path.open("rb") as file:
+            content = file.read(_CAMERA_BYTES + 1)
+        if len(content) > _CAMERA_BYTES:
+            return False
+        tables = tomllib.loads(content.decode("utf-8-sig")).keys()
         return "camera" in tables and tables <= {"camera", "render", "lights"}
     except (OSError, ValueError, RecursionError):
         return False  # opening it says what is wrong
@@ -164,10 +172,20 @@ def hiding(shown: ShownScene, hidden: Collection[str]) -> ShownScene:
 
 def open_file(path: Path) -> ShownScene:
     """Load a scene file and make it ready. Raises ``ValueError``, which ``SceneError`` is, naming file and fault."""
+    _expect_no_pipe(path)
+    # Before they are read: those of a file that changes meanwhile differ from then on.
     marks = _marks([path])
+    meshes = mesh_files(path)
+    for mesh in meshes:
+        _expect_no_pipe(mesh)
+    marks |= _marks(meshes)
     scene = load_scene(path)
-    marks |= _marks(entry.mesh for entry in scene.objects if isinstance(entry.mesh, Path))
     return replace(prepare_shown(scene, path), marks=marks)
+
+
+def _expect_no_pipe(path: Path) -> None:
+    """Raise ``ValueError`` for a pipe: one without a writer would be waited for."""
+    expect(not path.is_fifo(), str(path), "a file", "a pipe")
 
 
 def edited(scene: Scene, edits: Edits) -> Scene:

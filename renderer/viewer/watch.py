@@ -1,6 +1,7 @@
 """Files that are watched: scenes are loaded again soon after they were edited."""
 
 import asyncio
+import logging
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from renderer.viewer.shown import ShownScene
 # none is read while its editor still writes.
 PERIOD = 0.5
 Marks = Mapping[Path, object]
+_log = logging.getLogger(__name__)
 
 
 class Watch:
@@ -40,8 +42,19 @@ async def follow(sessions: set[Session]) -> None:
     watch = Watch()
     while True:
         await asyncio.sleep(PERIOD)
-        if sessions:
-            edited = await run_in_threadpool(watch.edited, [session.shown for session in sessions])
-            for session in sessions:
-                if session.shown in edited:
-                    session.reload()
+        try:
+            await _look(watch, sessions)
+        except Exception:  # or no page would see an edit from then on
+            _log.exception("the files on show could not be looked at")
+
+
+async def _look(watch: Watch, sessions: set[Session]) -> None:
+    if not sessions:
+        return
+    edited = await run_in_threadpool(watch.edited, [session.shown for session in sessions])
+    for session in tuple(sessions):
+        if session.shown in edited:
+            try:
+                session.reload()
+            except Exception:  # as above, for the other pages
+                _log.exception("an edited scene could not be loaded again")

@@ -1,5 +1,6 @@
 """A view as text: what is saved of it, and the command line that renders its picture."""
 
+import json
 import shlex
 import urllib.request
 from collections.abc import Iterator
@@ -18,6 +19,9 @@ from viewer_client import SIZE, Client, looking
 import renderer
 from renderer import load_scene
 from renderer.cli import main
+from renderer.viewer.commands import command_of
+from renderer.viewer.protocol import AskCommand
+from renderer.viewer.shown import open_file
 
 EYE = (0.3, 2.0, 4.0)
 ORTHOGRAPHIC = {"height": 3.0}
@@ -79,6 +83,24 @@ def test_a_scene_made_in_python_has_no_command(scene: Path) -> None:
     with renderer.view(load_scene(scene), browser=False) as viewing, Client(viewing.url) as client:
         client.send(**{"type": "command", "mode": "octree", **looking(EYE), **SIZE})
         assert "a scene that was made in Python" in client.told("error")["message"]
+
+
+@pytest.mark.parametrize(("file", "material"), [("-dash.toml", "red"), ("a.toml", "a\x7fb")])
+def test_names_that_look_like_options_or_that_toml_escapes_stand_in_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, material: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = SCENE.replace("[materials.red]", f"[materials.{json.dumps(material)}]").replace(
+        '"red"', json.dumps(material)
+    )
+    Path(file).write_text(text.replace("\x7f", "\\u007f"))
+    shown = open_file(Path(file))
+    edits = {"materials": {material: {"type": "phong", "diffuse": [0.1, 0.9, 0.2]}}}
+    asked = {"type": "command", "mode": "octree", **looking(EYE), **SIZE, "settings": {"edits": edits}}
+    words = shlex.split(command_of(shown, AskCommand.model_validate_json(json.dumps(asked))))
+    assert main([*words[1:], "--quiet"]) == 0
+    with Pillow.open(Path(file).with_suffix(".png")) as written:
+        assert written.size == (SIZE["w"], SIZE["h"])
 
 
 def test_what_is_saved_with_the_camera_makes_the_same_picture(client: Client, scene: Path, tmp_path: Path) -> None:

@@ -1,7 +1,9 @@
 """Materials, lights and objects as a page changes them, and the scene file that it saves."""
 
 import json
+import math
 import shlex
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ from viewer_page import SCENE
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
 from PIL import Image as Pillow
-from viewer_client import SIZE, Client, fetched, looking, rendered
+from viewer_client import PATIENCE, SIZE, Client, fetched, looking, rendered
 
 import renderer
 from renderer import Dielectric, DirectionalLight, Mirror, Phong, PointLight, Scene, SceneObject, load_scene
@@ -23,6 +25,12 @@ from renderer.picture.image import srgb
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.hide import object_names, without
 from renderer.scene.scene import Floor
+from renderer.viewer import session
+from renderer.viewer.commands import saved as camera_text
+from renderer.viewer.commands import scene_text
+from renderer.viewer.protocol import SaveCamera, SaveScene
+from renderer.viewer.shown import ShownScene, open_file
+from renderer.viewer.viewpoint import camera_of
 
 COMMENTED = f"# kept\n{SCENE.replace('shininess = 40', 'shininess = 40 # like wax')}"
 RED = Phong(diffuse=(0.1, 0.2, 0.9), specular=0.6, shininess=9.0, reflectance=0.3)
@@ -251,6 +259,155 @@ def test_a_scene_without_a_file_and_one_edited_meanwhile_are_not_saved(tmp_path:
         path.unlink()
         client.send(**{"type": "save", **looking((0.5, 2.6, 5.5))})
         assert "save: expected the file as it was loaded" in client.told("error")["message"]
+
+
+def text_of(shown: ShownScene, view: dict[str, Any], edits: dict[str, Any] | None = None) -> tuple[str, str]:
+    """The scene's file as it is saved for that view, and the diff."""
+    settings = {"max_depth": 3, "edits": edits or {}}
+    return scene_text(shown, SaveScene.model_validate_json(json.dumps({"type": "save", **view, "settings": settings})))
+
+
+RED_TABLE = """[materials.red]
+diffuse = [0.7, 0.1, 0.1]
+specular = 0.4
+shininess = 40
+"""
+RED_DOTTED = "red.diffuse = [0.7, 0.1, 0.1] # d\nred.specular = 0.4\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        SCENE.replace(RED_TABLE, f"[materials]\n{RED_DOTTED}red.shininess = 40\n"),
+        SCENE.replace(RED_TABLE, f"[materials]\n{RED_DOTTED}blue.diffuse = 0.2\nred.shininess = 40\n"),
+        SCENE.replace(RED_TABLE, "[materials]\nred.diffuse = 0.3\n"),
+        SCENE.replace(RED_TABLE, "[materials]\nred = {diffuse = 0.3, specular = 0.4}\n"),
+        SCENE.replace(RED_TABLE, "").replace(
+            "ambient", f"materials.{RED_DOTTED.replace(chr(10) + 'red', chr(10) + 'materials.red')}ambient", 1
+        ),
+    ],
+    ids=["dotted", "apart", "one", "inline", "at the top"],
+)
+def test_a_material_in_dotted_keys_becomes_one_of_another_type(tmp_path: Path, text: str) -> None:
+    """tomlkit failed, and that ended the connection."""
+    file = tmp_path / "a.toml"
+    file.write_text(text)
+    before = load_scene(file)
+    mirror = Mirror(reflectance=0.25)
+    after, _ = text_of(open_file(file), looking((0.5, 2.6, 5.5)), {"materials": {"red": plain(mirror)}})
+    file.write_text(after)
+    again = load_scene(file)
+    assert again.materials == {**before.materials, "red": mirror} and again.ambient == before.ambient
+
+
+def test_a_file_that_tomlkit_cannot_change_is_refused(scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rather than saved with other values, or not answered."""
+    import tomlkit
+
+    shown, edits = open_file(scene), {"materials": {"red": plain(RED)}}
+    expected = "save: expected a file whose values can be changed one by one, got one "
+    for dumps, says in ((lambda _document: "a = 1", "that would hold"), (lambda _document: [][1], "on which tomlkit")):
+        monkeypatch.setattr(tomlkit, "dumps", dumps)
+        with pytest.raises(ValueError, match=expected + says):
+            text_of(shown, looking((0.5, 2.6, 5.5)), edits)
+
+
+def test_a_file_that_may_not_be_read_any_more_is_told_of(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ended the connection."""
+
+    def refused(*_: Any, **_options: Any) -> Any:
+        raise PermissionError(13, "Permission denied")
+
+    for name in ("read_text", "read_bytes"):
+        monkeypatch.setattr(Path, name, refused)
+    client.send(**{"type": "save", **looking((0.5, 2.6, 5.5))})
+    assert client.told("error")["message"].endswith("blocks.toml: cannot be read: Permission denied")
+    client.final()
+
+
+def test_others_are_answered_while_a_scene_is_saved(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing else was done meanwhile, half a second for a file of 300 kB."""
+    answered = threading.Event()
+
+    def slow(*arguments: Any) -> tuple[str, str]:
+        assert answered.wait(PATIENCE)
+        return scene_text(*arguments)
+
+    monkeypatch.setattr(session, "scene_text", slow)
+    with Client(url) as one, Client(url) as other:
+        one.send(**{"type": "save", **looking((0.5, 2.6, 5.5))})
+        assert other.final(w=64, h=48).last and one.final(w=64, h=48).last
+        answered.set()
+        assert one.told("saved")["name"] == "blocks.toml"
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+def test_ends_of_lines_and_the_mark_of_the_encoding_stay(tmp_path: Path, mark: str, end: str) -> None:
+    """Each line ended in a line feed, which the diff did not show."""
+    file = tmp_path / "a.toml"
+    written = mark + COMMENTED.replace("\n", end)
+    file.write_bytes(written.encode())
+    shown = open_file(file)
+    assert text_of(shown, looking((0.5, 2.6, 5.5))) == (written, "")
+    after, diff = text_of(
+        shown, looking((0.5, 2.6, 5.5)), {"materials": {"red": plain(RED)}, "lights": [plain(LAMP)] * 2}
+    )
+    assert after.startswith(mark) and after.count("\n") == after.count(end) > 0
+    assert "+reflectance = [0.3, 0.3, 0.3]" in diff.split("\n") and "\r" not in diff
+    file.write_bytes(after.encode())
+    assert load_scene(file).lights == (LAMP, LAMP)
+
+
+def places(far: float) -> Iterator[tuple[float, float, float]]:
+    rng = np.random.default_rng(5)
+    for x, y, z in rng.uniform((-6.0, 0.5, 3.0), (6.0, 5.0, 7.0), (12, 3)).tolist():
+        yield x + far, y, z - far
+
+
+@pytest.mark.parametrize("far", [0.0, 5.4e6])
+@pytest.mark.parametrize("film", [{}, {"height": 3.0}])
+def test_a_saved_camera_has_the_rays_of_the_picture_to_the_bit(
+    tmp_path: Path, film: dict[str, Any], far: float
+) -> None:
+    """Its target was set farther away, and pixels seen through glass were others by its rounding."""
+    file = tmp_path / "a.toml"
+    text = SCENE.replace("[-0.8, 0.0, -0.3]", f"[{far - 0.8}, 0.0, {-far - 0.3}]").partition("[floor]")[0]
+    file.write_text(text.replace("[0.8, 0.01, 0.6]", f"[{far + 0.8}, 0.01, {0.6 - far}]"))
+    shown, middle = open_file(file), np.array([far, 0.5, -far])
+    for eye in places(far):
+        right, up, forward = PerspectiveCamera(eye=eye, target=middle.tolist()).frame()
+        view = {"m": [*right, 0.0, *up, 0.0, *-forward, 0.0, *eye, 1.0], "fovy": 0.7, **film}
+        rows = camera_of(view["m"], view["fovy"], height=view.get("height")).rows(72, 54)
+        file.with_name("b.toml").write_text(text_of(shown, view)[0])
+        again = load_scene(file.with_name("b.toml")).camera
+        assert again.rows(72, 54).tobytes() == rows.tobytes()
+        distance = math.dist(again.target, again.eye)
+        assert distance == pytest.approx(math.dist(eye, middle), rel=0.5)
+        asked = SaveCamera.model_validate_json(json.dumps({"type": "camera", **view}))
+        assert f"target = {list(again.target)!r}\n" in camera_text(shown, asked)
+
+
+FAR = (5e5, 100.0, 5.4e6)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 4e-6])
+def test_a_small_turn_far_from_the_origin_is_no_rounding(tmp_path: Path, turn: float) -> None:
+    """Directions were compared by the size of coordinates."""
+    x, y, z = FAR
+    text = SCENE.replace("eye = [0.5, 2.6, 5.5]", f"eye = [{x + 0.5}, {y + 2.6}, {z + 5.5}]")
+    text = text.replace("target = [0.0, 0.5, 0.0]", f"target = [{x}, {y + 0.5}, {z}]")
+    (tmp_path / "a.toml").write_text(text)
+    shown = open_file(tmp_path / "a.toml")
+    own = shown.scene.camera
+    right, up, forward = own.frame()
+    right, forward = (
+        right * math.cos(turn) + forward * math.sin(turn),
+        forward * math.cos(turn) - right * math.sin(turn),
+    )
+    m = [*right, 0.0, *up, 0.0, *-forward, 0.0, *own.eye, 1.0]
+    _, diff = text_of(shown, {"m": m, "fovy": math.radians(38.0)})
+    assert (diff == "") == (turn == 0.0)
 
 
 def test_the_command_leaves_out_what_is_hidden(client: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,9 @@
 import io
 import os
 import struct
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ from viewer_page import CHROMIUM, SCENE, Viewer
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
 from PIL import Image as Pillow
-from viewer_client import Client, Got, looking, rendered
+from viewer_client import PATIENCE, Client, Got, looking, rendered, wait_for
 
 import renderer
 from renderer import load_scene
@@ -45,7 +47,25 @@ def failing(*scene, **options):
 def ending(*scene, **options):
     import os
     os._exit(3)
+
+def turned(scene, width, height, **options):
+    return np.zeros((width, height, 3))
+
+def imaginary(scene, width, height, **options):
+    return np.full((height, width, 3), 1j)
+
+def nan(scene, width, height, **options):
+    return np.full((height, width, 3), np.nan)
+
+def infinite(scene, width, height, **options):
+    return np.full((height, width, 3), 1e39)
+
+def silent(*scene, **options):
+    import os, time
+    open(os.environ["SILENT"], "w").write(str(os.getpid()))
+    time.sleep(600)
 """
+OFFERED = ("picture", "failing", "ending", "turned", "imaginary", "nan", "infinite", "silent")
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +94,7 @@ def references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     info = tmp_path / "elsewhere-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: elsewhere\nVersion: 1.0\n")
-    lines = [f"{name} = elsewhere:{name}" for name in ("picture", "failing", "ending")]
+    lines = [f"{name} = elsewhere:{name}" for name in OFFERED]
     (info / "entry_points.txt").write_text("\n".join(["[octree_render.references]", *lines]))
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]).strip(":"))
@@ -167,6 +187,10 @@ def test_another_renderer_is_asked_in_its_own_process(references: None, scene: P
     [
         ("failing", {}, "reference: expected a picture by failing, got RuntimeError: no licence, no picture"),
         ("ending", {}, "reference: expected a picture by ending, got its process ended"),
+        ("turned", {}, "reference: expected a picture of shape (48, 64, 3) by turned, got (64, 48, 3)"),
+        ("imaginary", {}, "reference: expected a picture by imaginary, got TypeError: Cannot cast"),
+        ("nan", {}, "reference: expected finite radiance by nan, got nan in 9216 values"),
+        ("infinite", {}, "reference: expected finite radiance by infinite, got inf in 9216 values"),
         ("none", {}, "reference: expected one of"),
         ("picture", {"refraction": False}, "comparison: expected refraction as the materials have it"),
     ],
@@ -178,6 +202,68 @@ def test_a_reference_that_gives_no_picture_says_why(
         told, got = proof(client, w=64, h=48, settings={"pair": pair, **settings})
         assert not got and told[0]["type"] == "error" and told[0]["message"].startswith(says)
         assert client.final(w=64, h=48).last  # and the viewer goes on
+
+
+def has_ended(process: int) -> bool:
+    """Whether it is no more, or waits for its parent to notice."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+@pytest.fixture
+def silent(references: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
+    """The number of the process of the reference that says nothing, once it computes."""
+    monkeypatch.setenv("SILENT", str(tmp_path / "silent"))
+
+    def begun() -> int:
+        wait_for(lambda: (tmp_path / "silent").exists() and (tmp_path / "silent").read_text(), PATIENCE)
+        return int((tmp_path / "silent").read_text())
+
+    return begun
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes as Linux tells of them")
+@pytest.mark.parametrize("left", ["view", "page", "server"])
+def test_a_reference_that_says_nothing_ends_with_what_it_is_for(
+    silent: Callable[[], int], scene: Path, left: str
+) -> None:
+    """Its process went on, no other proof was computed, and Ctrl-C did not end the server."""
+    with renderer.view(scene, browser=False) as viewing, Client(viewing.url) as client:
+        client.view(mode="proof", w=64, h=48, settings={"pair": "silent"})
+        process = silent()
+        assert not has_ended(process)
+        if left == "view":
+            assert proof(client, w=64, h=48)[1][-1].last
+        elif left == "page":
+            client.socket.close()
+        else:
+            viewing.close()
+        wait_for(lambda: has_ended(process), PATIENCE)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes as Linux tells of them")
+def test_a_reference_ends_with_a_server_that_is_killed(silent: Callable[[], int], scene: Path) -> None:
+    text = "import sys; from renderer import load_scene; from renderer.viewer.references import reference_picture; "
+    text += "reference_picture('silent', load_scene(sys.argv[1]), (8, 8), 1, lambda share: None)"
+    environment = {**os.environ, "PYTHONPATH": f"{Path(__file__).parents[2]}:{os.environ['PYTHONPATH']}"}
+    server = subprocess.Popen([sys.executable, "-c", text, str(scene)], env=environment)
+    try:
+        process = silent()
+        assert not has_ended(process)
+    finally:
+        server.kill()
+        server.wait()
+    wait_for(lambda: has_ended(process), PATIENCE)
+
+
+def test_what_cannot_be_told_keeps_no_later_picture_waiting(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its acknowledgement was waited for, and no view was answered from then on."""
+    monkeypatch.setattr(Comparison, "described", lambda comparison: {"largest": float("nan")})
+    told, got = proof(client, w=64, h=48)
+    assert not got and "JSON" in told[-1]["message"]
+    assert client.final(w=64, h=48).last
 
 
 def test_mitsubas_recursion_is_offered_by_the_project() -> None:

@@ -13,9 +13,11 @@ from renderer.limits import FARTHEST
 from renderer.viewer.protocol import (
     FILE,
     JPEG,
+    MAX_EDITS,
     MAX_FOVY,
     MAX_FRAME_PIXELS,
     MAX_FRAMES,
+    MAX_HIDDEN,
     MAX_MESSAGE_BYTES,
     MAX_PIXELS,
     MAX_SIDE,
@@ -26,6 +28,7 @@ from renderer.viewer.protocol import (
     CameraMessage,
     Cancel,
     Hello,
+    HideObjects,
     OpenScene,
     Pick,
     Rows,
@@ -276,6 +279,45 @@ def test_a_picture_has_at_most_so_many_pixels(message: dict[str, Any]) -> None:
     assert parse(said(message | {"w": MAX_SIDE, "h": MAX_PIXELS // MAX_SIDE}))
     with pytest.raises(ValueError, match=rf"{message['type']}: .*at most {MAX_PIXELS} pixels, got 4096 x 2049"):
         parse(said(message | {"w": MAX_SIDE, "h": MAX_PIXELS // MAX_SIDE + 1}))
+
+
+COLOR = [0.12345678901234567, 1.2345678901234567e-10, 0.9876543210987654]
+MATERIAL = {
+    "type": "phong",
+    **dict.fromkeys(("ambient", "diffuse", "specular", "reflectance", "transmittance"), COLOR),
+    "shininess": COLOR[0],
+    "ior": 1.2345678901234567,
+}
+LIGHT = {"type": "point", "position": [-1234.5678901234567] * 3, "intensity": COLOR}
+
+
+def edited(materials: int, lights: int) -> str:
+    edits = {"materials": {f"material_{i}": MATERIAL for i in range(materials)}, "lights": [LIGHT] * lights}
+    return said(VIEW | {"settings": SETTINGS | {"edits": edits}})
+
+
+def test_a_page_may_change_many_materials_and_lights_and_hide_many_objects() -> None:
+    """A message of 121 lights or 150 materials ended its connection, and the page sent it again for ever."""
+    view = edited(MAX_EDITS, MAX_EDITS)
+    read = parse(view)
+    assert isinstance(read, CameraMessage) and len(view.encode()) < MAX_MESSAGE_BYTES
+    assert len(read.settings.edits.materials) == len(read.settings.edits.lights or ()) == MAX_EDITS
+    hide = said({"type": "hide", "hidden": ["x" * 40] * MAX_HIDDEN})
+    assert isinstance(parse(hide), HideObjects) and len(hide.encode()) < MAX_MESSAGE_BYTES
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        (edited(MAX_EDITS + 1, 0), r"settings\.edits\.materials: .* at most 1024 items"),
+        (edited(0, MAX_EDITS + 1), r"settings\.edits\.lights: .* at most 1024 items"),
+        (said({"type": "hide", "hidden": ["a"] * (MAX_HIDDEN + 1)}), r"hidden: .* at most 4096 items"),
+    ],
+    ids=["materials", "lights", "hidden"],
+)
+def test_more_of_them_are_refused_by_their_key(text: str, where: str) -> None:
+    with pytest.raises(ValueError, match=where):
+        parse(text)
 
 
 def test_the_header_is_40_bytes_little_endian() -> None:

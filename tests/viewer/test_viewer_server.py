@@ -28,7 +28,7 @@ from viewer_page import MODELS, SCENE
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
-from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camera, fetched, looking, rendered
+from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camera, fetched, looking, rendered, wait_for
 
 import renderer
 from renderer import load_scene, render
@@ -96,13 +96,6 @@ def left(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     monkeypatch.setattr(session, "answer", watched)
     return seen
-
-
-def wait_for(happened: Any, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while not happened():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 # Pictures
@@ -777,6 +770,35 @@ def test_a_pipe_beside_the_scene_is_no_scene(folder: Path, tmp_path: Path) -> No
     assert shown.files == ["a.toml"]
     with pytest.raises(ValueError, match=r"scene.file: expected one of \['a.toml'\]"):
         shown.beside("pipe.toml")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+@pytest.mark.parametrize("pipe", ["a.toml", "pipe.ply"])
+def test_a_scene_of_a_pipe_is_refused(tmp_path: Path, pipe: str) -> None:
+    """Reading it waited for a writer, and no page was told its scene from then on."""
+    (tmp_path / "a.toml").write_text(SCENE.replace(str(MODELS / "block.ply"), "pipe.ply"))
+    (tmp_path / pipe).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / pipe)
+    with pytest.raises(ValueError, match=f"{pipe}: expected a file, got a pipe"):
+        open_file(tmp_path / "a.toml")
+
+
+@pytest.mark.skipif(not Path("/dev/zero").is_char_device(), reason="this system has no such device")
+def test_a_device_beside_the_scene_is_no_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was read to its end, and has none."""
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
+    (tmp_path / "null.toml").symlink_to("/dev/null")
+    (tmp_path / "a.toml").write_text(PLAIN)
+    shown = open_file(tmp_path / "a.toml")
+    for name in ("open", "read_text", "read_bytes"):
+        kept = getattr(Path, name)
+
+        def safely(path: Path, *rest: Any, kept: Any = kept, **options: Any) -> Any:
+            assert path.is_file(), f"{path} is read"
+            return kept(path, *rest, **options)
+
+        monkeypatch.setattr(Path, name, safely)
+    assert shown.files == ["a.toml"]
 
 
 def test_names_that_are_no_text_are_left_out(folder: Path, tmp_path: Path) -> None:
