@@ -153,12 +153,14 @@ class Viewer {
     this.asked = null;
     const { file, mode, state, hidden, chosen } = asked;
     if (file && file !== this.scene.name && this.scene.files.includes(file)) {
+      this.open(file);
       this.asked = asked;
-      return this.open(file);
+      return;
     }
-    if (hidden.join() !== this.objects.hidden.join() && hidden.every((name) => this.scene.objects.some((one) => one.name === name))) {
-      this.asked = asked;
-      return this.hide(hidden);
+    if (hidden !== null && this.objects.differ(hidden)) {
+      this.hide(hidden);
+      this.asked = { ...asked, hidden: null }; // asked for once, whatever the answer is
+      return;
     }
     this.panel.load(this.scene);
     this.panel.chosen = chosen;
