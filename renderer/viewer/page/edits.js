@@ -23,12 +23,22 @@ const CHIEF = { phong: "diffuse", mirror: "reflectance", dielectric: "transmitta
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 const copy = (value) => JSON.parse(JSON.stringify(value));
 
-// Whether fields from an address are those of one of `types`, and of the kinds that these have.
+const finite = (x) => typeof x === "number" && Number.isFinite(x);
+const three = (value, allowed) => Array.isArray(value) && value.length === 3 && value.every((x) => finite(x) && allowed(x));
+// The fields that may be missing, and what the server takes as a field.
+const OPTIONAL = ["ambient"];
+const TAKEN = {
+  [COLOR]: (value) => three(value, (x) => x >= 0),
+  [VECTOR]: (value, name) => three(value, () => true) && (name !== "direction" || value.some((x) => x !== 0)),
+  [NUMBER]: (value, name) => finite(value) && (name === "ior" ? value > 0 : value >= 0),
+};
+
+// Whether fields from an address are all those of one of `types`, no others, and of values that the server takes.
 function fits(fields, types) {
-  const known = types[fields?.type];
-  const number = (x) => typeof x === "number" && Number.isFinite(x);
-  return Boolean(known) && Object.entries(fields).every(([name, value]) => name === "type" || (known[name] &&
-    (known[name][0] === NUMBER ? number(value) : Array.isArray(value) && value.length === 3 && value.every(number))));
+  if (!Object.hasOwn(types, fields?.type)) return false;
+  const { type, ...given } = fields, known = types[type];
+  return Object.keys(given).every((name) => Object.hasOwn(known, name)) &&
+    Object.entries(known).every(([name, [kind]]) => (given[name] === undefined ? OPTIONAL.includes(name) : TAKEN[kind](given[name], name)));
 }
 
 const lightFields = (light) => {
