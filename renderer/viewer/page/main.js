@@ -25,7 +25,7 @@ import { Rays } from "./rays.js";
 import { Readings } from "./readings.js";
 import { copyText, savePicture, saveText } from "./save.js";
 import { Sharing } from "./sharing.js";
-import { improves, sameCamera } from "./standing.js";
+import { improves, isOf, sameCamera } from "./standing.js";
 
 const TRACED = ["brute", "octree", "proof"];
 // Whose pictures take seconds, and are begun when the camera rests.
@@ -53,7 +53,7 @@ class Viewer {
     this.boxes = NO_BOXES;
     this.stage = find("#stage");
     this.proof = new Proof({
-      bar: find("#proof"), divider: find("#divider"), frame: find("#frame"), changed: () => this.picture?.paint(), asked: () => this.moved(),
+      bar: find("#proof"), divider: find("#divider"), frame: find("#frame"), changed: () => this.picture?.paint(), asked: () => this.changed("pair"),
     });
     this.picture = new Picture(find("#picture"), this.proof);
     this.legend = new Legend(find("#legend"));
@@ -308,8 +308,7 @@ class Viewer {
     } else {
       if (name === "edits") this.dress();
       this.moved();
-      const question = this.rays.again(this.panel.settings);
-      if (question) this.connection.send(question);
+      this.pickAgain();
     }
   }
 
@@ -350,9 +349,9 @@ class Viewer {
 
   moved() {
     const now = performance.now();
-    if (this.current) this.staleSince = null;
+    if (this.placed) this.staleSince = null;
     else this.staleSince ??= now;
-    if (this.proof.told && !(this.current && this.shown.view.settings.pair === this.panel.settings.pair)) this.proof.forget();
+    if (this.proof.told && !this.valid) this.proof.forget();
     this.dirty = true;
     this.movedAt = now;
     this.panel.showCamera(this.camera);
@@ -425,8 +424,18 @@ class Viewer {
   }
 
   // Whether the traced picture was taken by the current camera.
-  get current() {
+  get placed() {
     return this.shown !== null && TRACED.includes(this.mode) && sameCamera(this.shown.view, this.view());
+  }
+
+  // Whether it is that of the current settings, too.
+  get valid() {
+    return this.placed && isOf(this.shown.view, { ...this.view(), mode: this.mode, settings: this.panel.settings });
+  }
+
+  // Whether it may stand: one of other settings only until theirs comes, which it does not after a cancel.
+  get current() {
+    return this.placed && (this.dirty || this.sent.has(this.seq) || this.valid);
   }
 
   // Whether it may stand for the current camera all the same, because the next is about to come or nothing else is there.
@@ -453,6 +462,7 @@ class Viewer {
     const current = traced && this.current;
     const live = current || (traced && this.recent);
     this.picture.visible = live;
+    this.legend.show(live ? this.shown.legend : null);
     this.model = traced && !live && Boolean(this.layer?.loaded);
     this.stage.classList.toggle("waiting", traced && !live);
     if (this.layer) {
@@ -505,13 +515,18 @@ class Viewer {
     await this.picture.show(picture);
     if (this.scene !== scene) return this.picture.clear();
     const { seq, step, last, w, h } = picture;
-    this.shown = { view, w, h, seq, step, last };
-    this.staleSince = this.current ? null : performance.now();
+    this.shown = { view, w, h, seq, step, last, legend: view.legend ?? null };
+    this.staleSince = this.placed ? null : performance.now();
     this.busy.end("tracing");
-    this.legend.show(view.legend ?? null);
-    if (picture.kind === PROOF) this.proof.tell(view.legend);
+    if (picture.kind === PROOF && this.valid) this.proof.tell(view.legend);
     this.note(picture, { ...view, w, h });
     this.draw();
+    if (last && this.proofOf(this.rays.asked) !== null) this.pickAgain();
+  }
+
+  // The number of the proof that says something of `view`, null where none does or there is no view.
+  proofOf(view) {
+    return view && this.proof.told && this.valid && sameCamera(this.shown.view, view) ? this.shown.seq : null;
   }
 
   told(message) {
@@ -566,13 +581,19 @@ class Viewer {
     this.stopSaving();
     this.busy.end("tracing");
     this.progress.show(null);
+    this.request();
     this.notices.say("Cancelled; the next movement starts it again.");
   }
 
   pickAt(clientX, clientY) {
-    const proof = this.mode === "proof" && this.current && this.shown.view.mode === "proof" ? { proof: this.shown.seq } : {};
-    const question = this.rays.question({ ...this.view(), ...proof }, this.panel.settings, clientX, clientY);
-    if (question) this.connection.send(question);
+    const asked = this.rays.pixel(this.view(), clientX, clientY);
+    if (asked) this.connection.send(this.rays.ask(asked, this.panel.settings, this.proofOf(asked)));
+  }
+
+  // Ask for the same pixel by the settings and the proof as they are now.
+  pickAgain() {
+    const { asked } = this.rays;
+    if (asked) this.connection.send(this.rays.ask(asked, this.panel.settings, this.proofOf(asked)));
   }
 
   picked(pick) {
