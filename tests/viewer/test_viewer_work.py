@@ -105,6 +105,24 @@ def test_webgl_and_the_card_show_the_materials_as_they_are(viewer: Viewer) -> No
     assert found == [["dielectric", "dielectric", "phong"], ["phong", "dielectric", "phong"]]
 
 
+def test_webgl_has_the_materials_in_the_order_of_the_scene_whatever_their_names(viewer: Viewer) -> None:
+    """Those with names like integers came first, and faces had the colours of others."""
+    found = viewer.page.evaluate(
+        """async () => {
+            const { Edits } = await import("./static/edits.js");
+            const [materials, lights] = [document.createElement("div"), document.createElement("div")];
+            const edits = new Edits({ materials, lights, changed() {} });
+            const names = ["z9", "7", "1"];
+            const own = viewer.scene.materials.map((material, i) => ({ ...material, name: names[i] }));
+            edits.load({ ...viewer.scene, materials: own });
+            const listed = [...materials.querySelectorAll("details")];
+            const types = listed.map((entry) => entry.querySelector("summary output").textContent);
+            return [edits.dressed.materials.map((m) => m.name), listed.map((entry) => entry.dataset.name), types];
+        }"""
+    )
+    assert found == [["z9", "7", "1"], ["z9", "7", "1"], ["phong", "dielectric", "phong"]]
+
+
 def test_lights_come_and_go(viewer: Viewer, scenes: Path) -> None:
     scene = load_scene(scenes / "blocks.toml")
     viewer.page.click("text=Add point light")

@@ -80,9 +80,15 @@ export class Edits {
     this.show();
   }
 
+  // The names and fields of the materials in the order of the scene, by which faces have them; the keys of an object
+  // that look like integers are in another one.
+  get named() {
+    return this.scene.materials.map(({ name }) => [name, this.now.materials[name]]);
+  }
+
   // The scene with these materials and lights, as WebGL draws it.
   get dressed() {
-    const materials = Object.entries(this.now.materials).map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
+    const materials = this.named.map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
       reflectance: BLACK, transmittance: BLACK, shininess: 0, ...fields, fields }));
     const lights = this.now.lights.map((fields) => ({ ...fields, color: fields.irradiance ?? fields.intensity }));
     return { ...this.scene, materials, lights };
@@ -91,7 +97,7 @@ export class Edits {
   show() {
     const { materials, lights } = this.lists;
     const open = new Set([...materials.querySelectorAll("details[open]")].map((entry) => entry.dataset.name));
-    materials.replaceChildren(...Object.keys(this.now.materials).map((name) => this.material(name, open.has(name))));
+    materials.replaceChildren(...this.named.map(([name]) => this.material(name, open.has(name))));
     const add = (type) => this.button(`Add ${type} light`, () => this.addLight(type));
     lights.replaceChildren(...this.now.lights.map((fields, i) => this.light(fields, i)),
       element("div", { className: "buttons" }, add("directional"), add("point")));
@@ -101,7 +107,7 @@ export class Edits {
   // The dots of materials and lights in their colours, and which of the materials are changed.
   summarise() {
     const entries = this.lists.materials.querySelectorAll("details");
-    Object.entries(this.now.materials).forEach(([name, fields], i) => {
+    this.named.forEach(([name, fields], i) => {
       const changed = !same(fields, this.own.materials[name]);
       entries[i].querySelector(".swatch").style.background = pickerColor(fields[CHIEF[fields.type]] ?? BLACK);
       entries[i].querySelector("summary output").textContent = changed ? `${fields.type}, changed` : fields.type;
