@@ -186,6 +186,7 @@ class Viewer {
     this.busy.begin("opening", "Building the octree …");
     this.connection.send({ type: "hide", hidden });
   }
+    this.asked = null;
 
   // The scene with the user's materials and lights, as WebGL and cards show it.
   dress() {
@@ -315,6 +316,7 @@ class Viewer {
   open(file) {
     this.busy.begin("opening", `Opening ${file} …`);
     this.connection.send({ type: "scene", file });
+    this.asked = null;
   }
 
   setMode(mode) {
@@ -545,7 +547,9 @@ class Viewer {
       error: ({ message: text }) => {
         for (const name of ["opening", "tracing"]) this.busy.end(name);
         this.notices.say(text);
-        if (this.scene) this.panel.fields.file.value = this.scene.name; // the one that is still shown
+        if (!this.scene) return;
+        this.panel.fields.file.value = this.scene.name; // the one that is still shown
+        this.asked = null; // what could not be shown is not asked for again with the next scene
       },
     };
     acts[message.type]?.(message);
