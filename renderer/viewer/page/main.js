@@ -282,10 +282,9 @@ class Viewer {
     onClick("#save-picture", () => this.save());
     onClick("#save-camera", () => {
       const { m, fovy, height } = this.view();
-      const { settings } = this.panel;
-      this.connection.send({ type: "camera", m, fovy, height, walk: this.controls.walking, settings });
+      this.connection.send({ type: "camera", m, fovy, height, walk: this.controls.walking, settings: this.seen });
     });
-    onClick("#copy-command", () => this.connection.send({ type: "command", mode: this.mode, ...this.view(), settings: this.panel.settings }));
+    onClick("#copy-command", () => this.connection.send({ type: "command", mode: this.mode, ...this.view(), settings: this.seen }));
     onClick("#save-scene", () => {
       const { m, fovy, height } = this.view();
       this.connection.send({ type: "save", m, fovy, height, settings: this.panel.settings });
@@ -517,7 +516,8 @@ class Viewer {
     await this.picture.show(picture);
     if (this.scene !== scene) return this.picture.clear();
     const { seq, step, last, w, h } = picture;
-    this.shown = { view, w, h, seq, step, last, legend: view.legend ?? null };
+    const samples = this.shown?.seq === seq ? this.shown.samples : view.settings.samples;
+    this.shown = { view, w, h, seq, step, last, samples, legend: view.legend ?? null };
     this.staleSince = this.placed ? null : performance.now();
     this.busy.end("tracing");
     if (picture.kind === PROOF && this.valid) this.proof.tell(view.legend);
@@ -538,7 +538,7 @@ class Viewer {
       pick: (pick) => this.picked(pick),
       legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
       proof: (proof) => this.sent.has(proof.seq) && (this.sent.get(proof.seq).legend = proof),
-      refined: (told) => told.seq === this.seq && this.readings.refined(told),
+      refined: (told) => told.seq === this.seq && this.refined(told),
       scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
       camera: ({ name, text }) => saveText(name, text),
       saved: (told) => this.changes.show(told),
@@ -559,6 +559,17 @@ class Viewer {
     if (this.announced !== id || error.status === 404) return; // another has come or will, or the connection has gone
     this.busy.end("opening");
     this.notices.say(`The scene cannot be shown: ${error.message}`);
+  refined(told) {
+    if (this.shown?.seq === told.seq) this.shown.samples = told.samples;
+    this.readings.refined(told);
+  }
+
+  // The settings of the picture that is seen, which may have grown to more samples than are set.
+  get seen() {
+    const { settings } = this.panel;
+    return this.finished ? { ...settings, samples: this.shown.samples } : settings;
+  }
+
   }
 
   connected(open) {
