@@ -42,6 +42,8 @@ const HOLD = 50;
 // Milliseconds after which a view is written into the address: browsers refuse more than some writes a second.
 const WRITE = 400;
 
+const TOO_LARGE = "What this page sends of the change is too large for the server; it is shown once it is smaller.";
+
 const find = (selector) => document.querySelector(selector);
 
 class Viewer {
@@ -80,6 +82,7 @@ class Viewer {
       received: (picture) => this.sharing.received(picture) || this.received(picture),
       told: (message) => this.told(message),
       changed: (open) => this.connected(open),
+      refused: (too) => (too ? this.notices.say(TOO_LARGE, "large") : this.notices.clear("large")),
     });
     this.connection.open();
     addEventListener("pagehide", () => this.scene && remember({ ...this.kept, hash: location.hash }));
@@ -183,10 +186,10 @@ class Viewer {
   }
 
   hide(hidden) {
+    this.asked = null;
     this.busy.begin("opening", "Building the octree …");
     this.connection.send({ type: "hide", hidden });
   }
-    this.asked = null;
 
   // The scene with the user's materials and lights, as WebGL and cards show it.
   dress() {
@@ -313,9 +316,9 @@ class Viewer {
   }
 
   open(file) {
+    this.asked = null;
     this.busy.begin("opening", `Opening ${file} …`);
     this.connection.send({ type: "scene", file });
-    this.asked = null;
   }
 
   setMode(mode) {
@@ -420,8 +423,9 @@ class Viewer {
     if (this.mode !== "gl") this.sent.set(this.seq, view); // to which nothing is sent
     this.dirty = false;
     this.heldSince ??= at;
-    this.connection.send({ type: "view", seq: this.seq, ...message });
-    if (SLOW.includes(this.mode)) this.progress.show(0);
+    const sent = this.connection.send({ type: "view", seq: this.seq, ...message });
+    if (sent === false) this.sent.delete(this.seq);
+    else if (SLOW.includes(this.mode)) this.progress.show(0);
   }
 
   // Whether the traced picture was taken by the current camera.
@@ -555,10 +559,6 @@ class Viewer {
     acts[message.type]?.(message);
   }
 
-  cannotShow(id, error) {
-    if (this.announced !== id || error.status === 404) return; // another has come or will, or the connection has gone
-    this.busy.end("opening");
-    this.notices.say(`The scene cannot be shown: ${error.message}`);
   refined(told) {
     if (this.shown?.seq === told.seq) this.shown.samples = told.samples;
     this.readings.refined(told);
@@ -570,6 +570,10 @@ class Viewer {
     return this.finished ? { ...settings, samples: this.shown.samples } : settings;
   }
 
+  cannotShow(id, error) {
+    if (this.announced !== id || error.status === 404) return; // another has come or will, or the connection has gone
+    this.busy.end("opening");
+    this.notices.say(`The scene cannot be shown: ${error.message}`);
   }
 
   connected(open) {
