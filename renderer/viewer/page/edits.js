@@ -23,12 +23,22 @@ const CHIEF = { phong: "diffuse", mirror: "reflectance", dielectric: "transmitta
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 const copy = (value) => JSON.parse(JSON.stringify(value));
 
-// Whether fields from an address are those of one of `types`, and of the kinds that these have.
+const finite = (x) => typeof x === "number" && Number.isFinite(x);
+const three = (value, allowed) => Array.isArray(value) && value.length === 3 && value.every((x) => finite(x) && allowed(x));
+// The fields that may be missing, and what the server takes as a field.
+const OPTIONAL = ["ambient"];
+const TAKEN = {
+  [COLOR]: (value) => three(value, (x) => x >= 0),
+  [VECTOR]: (value, name) => three(value, () => true) && (name !== "direction" || value.some((x) => x !== 0)),
+  [NUMBER]: (value, name) => finite(value) && (name === "ior" ? value > 0 : value >= 0),
+};
+
+// Whether fields from an address are all those of one of `types`, no others, and of values that the server takes.
 function fits(fields, types) {
-  const known = types[fields?.type];
-  const number = (x) => typeof x === "number" && Number.isFinite(x);
-  return Boolean(known) && Object.entries(fields).every(([name, value]) => name === "type" || (known[name] &&
-    (known[name][0] === NUMBER ? number(value) : Array.isArray(value) && value.length === 3 && value.every(number))));
+  if (!Object.hasOwn(types, fields?.type)) return false;
+  const { type, ...given } = fields, known = types[type];
+  return Object.keys(given).every((name) => Object.hasOwn(known, name)) &&
+    Object.entries(known).every(([name, [kind]]) => (given[name] === undefined ? OPTIONAL.includes(name) : TAKEN[kind](given[name], name)));
 }
 
 const lightFields = (light) => {
@@ -70,9 +80,15 @@ export class Edits {
     this.show();
   }
 
+  // The names and fields of the materials in the order of the scene, by which faces have them; the keys of an object
+  // that look like integers are in another one.
+  get named() {
+    return this.scene.materials.map(({ name }) => [name, this.now.materials[name]]);
+  }
+
   // The scene with these materials and lights, as WebGL draws it.
   get dressed() {
-    const materials = Object.entries(this.now.materials).map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
+    const materials = this.named.map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
       reflectance: BLACK, transmittance: BLACK, shininess: 0, ...fields, fields }));
     const lights = this.now.lights.map((fields) => ({ ...fields, color: fields.irradiance ?? fields.intensity }));
     return { ...this.scene, materials, lights };
@@ -81,7 +97,7 @@ export class Edits {
   show() {
     const { materials, lights } = this.lists;
     const open = new Set([...materials.querySelectorAll("details[open]")].map((entry) => entry.dataset.name));
-    materials.replaceChildren(...Object.keys(this.now.materials).map((name) => this.material(name, open.has(name))));
+    materials.replaceChildren(...this.named.map(([name]) => this.material(name, open.has(name))));
     const add = (type) => this.button(`Add ${type} light`, () => this.addLight(type));
     lights.replaceChildren(...this.now.lights.map((fields, i) => this.light(fields, i)),
       element("div", { className: "buttons" }, add("directional"), add("point")));
@@ -91,7 +107,7 @@ export class Edits {
   // The dots of materials and lights in their colours, and which of the materials are changed.
   summarise() {
     const entries = this.lists.materials.querySelectorAll("details");
-    Object.entries(this.now.materials).forEach(([name, fields], i) => {
+    this.named.forEach(([name, fields], i) => {
       const changed = !same(fields, this.own.materials[name]);
       entries[i].querySelector(".swatch").style.background = pickerColor(fields[CHIEF[fields.type]] ?? BLACK);
       entries[i].querySelector("summary output").textContent = changed ? `${fields.type}, changed` : fields.type;
