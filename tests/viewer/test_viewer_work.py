@@ -219,6 +219,42 @@ def test_the_address_brings_the_view_back(browser: Any, url: str, scenes: Path) 
         two.context.close()
 
 
+def told(viewer: Viewer) -> dict[str, list[str]]:
+    return parse_qs(address(viewer).split("#")[1])
+
+
+def test_the_address_keeps_the_settings_of_the_page_when_the_scene_is_loaded_again(viewer: Viewer) -> None:
+    """They were left out from then on, as if they were the scene's own; and an address without them left them."""
+    chosen = {"size": "0.25", "aov": "depth", "refine": "4"}
+    for name, value in chosen.items():
+        viewer.page.select_option(f"[name={name}]", value)
+    before = viewer.page.evaluate("() => viewer.scene.id")
+    viewer.page.click("#reload")
+    viewer.page.wait_for_function("(id) => viewer.scene.id !== id", arg=before)
+    settled(viewer)
+    assert {name: told(viewer).get(name) for name in chosen} == {name: [value] for name, value in chosen.items()}
+    viewer.page.evaluate("() => (location.hash = 'file=blocks.toml')")
+    viewer.page.wait_for_function("() => viewer.panel.fields.size.value === '1'")
+    assert viewer.page.evaluate("() => viewer.panel.chosen") == {}
+    settled(viewer)
+
+
+def test_the_address_has_the_mode_and_what_a_proof_compares(viewer: Viewer) -> None:
+    """A change of mode was written with the next movement, and the pair never."""
+    told(viewer)
+    viewer.page.evaluate("() => viewer.setMode('proof')")
+    assert told(viewer)["mode"] == ["proof"] and "pair" not in told(viewer)
+    viewer.page.select_option("[name=pair]", "samples")
+    link = address(viewer)
+    assert parse_qs(link.split("#")[1])["pair"] == ["samples"]
+    viewer.page.select_option("[name=pair]", "brute")
+    address(viewer)
+    viewer.page.evaluate("(hash) => (location.hash = hash)", link.split("#")[1])
+    viewer.page.wait_for_function("() => viewer.panel.settings.pair === 'samples'")
+    viewer.page.evaluate("() => viewer.setMode('octree')")
+    settled(viewer)
+
+
 WRONG = [
     {"mode": "none", "camera": "1,2,3"},
     {"camera": "0,0,NaN,,0.5,0,0,0", "max_depth": "many", "samples": "7", "aov": "<b>"},

@@ -125,12 +125,12 @@ class Viewer {
     this.scene = scene;
     this.camera = new Camera(scene);
     if (stays(before, scene)) this.camera.state = before.camera;
+    this.proof.offer(scene.references);
     this.panel.load(scene);
     if (stays(before, scene) || continues(before, scene)) this.panel.chosen = before.chosen;
     this.objects.load(scene);
     this.dress();
     this.forget();
-    this.proof.offer(scene.references);
     this.readings.ofScene(scene);
     find("#name").textContent = scene.name.replace(/\.toml$/, "").replaceAll("_", " ");
     document.title = `${scene.name} · octree-render`;
@@ -161,6 +161,7 @@ class Viewer {
       return this.hide(hidden);
     }
     this.panel.load(this.scene);
+    this.panel.restart();
     this.panel.chosen = chosen;
     if (state) this.camera.state = state;
     this.changed("edits");
@@ -170,6 +171,11 @@ class Viewer {
 
   offers(mode) {
     return mode !== undefined && !find(`[name=mode][value=${mode}]`).disabled;
+  }
+
+  // Have the view written into the address soon.
+  keepAddress() {
+    this.writing ??= setTimeout(() => this.writeAddress(), WRITE);
   }
 
   // Write the view into the address.
@@ -333,6 +339,7 @@ class Viewer {
     find("#hud").textContent = "";
     this.dirty = true;
     this.movedAt = 0;
+    this.keepAddress();
     this.request();
   }
 
@@ -354,7 +361,7 @@ class Viewer {
     this.dirty = true;
     this.movedAt = now;
     this.panel.showCamera(this.camera);
-    this.writing ??= setTimeout(() => this.writeAddress(), WRITE);
+    this.keepAddress();
     this.request();
   }
 

@@ -9,7 +9,11 @@ import { count } from "./readings.js";
 const MAX_SAMPLES = 64;
 const DEGREE = Math.PI / 180;
 // What the user chooses of a scene's picture, beside its camera, materials and lights.
-const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "azimuth", "elevation"];
+const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair", "azimuth", "elevation"];
+// Those that are the page's and no scene's: they stay when a scene is loaded.
+const STAYING = ["size", "aov", "refine", "pair"];
+
+const usual = (list) => ([...list.options].find((option) => option.defaultSelected) ?? list.options[0]).value;
 
 export class Panel {
   // `changed(name)` is called with the name of the field that the user moved.
@@ -51,7 +55,17 @@ export class Panel {
     this.resetLight();
     this.showLevels(Math.max(scene.octree.levels, 1));
     this.showNeeds(scene.needs);
-    this.own = this.values;
+    this.own = { ...this.values, ...this.usual };
+  }
+
+  // The values that those of STAYING have at first.
+  get usual() {
+    return Object.fromEntries(STAYING.map((name) => [name, usual(this.fields[name])]));
+  }
+
+  // Begin anew with what `load` leaves as it is.
+  restart() {
+    for (const [name, value] of Object.entries(this.usual)) this.fields[name].value = value;
   }
 
   // The values of CHOICES as they are, as text.
@@ -60,7 +74,7 @@ export class Panel {
     return Object.fromEntries(CHOICES.map((name) => [name, text(this.fields[name])]));
   }
 
-  // What the user chose: the values that are not those with which the scene was loaded, and edits as JSON.
+  // What the user chose: the values that are not those of the scene or, at first, of the page; and edits as JSON.
   get chosen() {
     const { values, lightMoved } = this;
     const isLight = (name) => name === "azimuth" || name === "elevation";
@@ -132,13 +146,13 @@ export class Panel {
 
   // The settings of a view as the server reads them.
   get settings() {
-    const { max_depth, samples, shadows, reflection, refraction, aov, refine } = this.fields;
+    const { max_depth, samples, shadows, reflection, refraction, aov, refine, pair } = this.fields;
     // Raw pixels cost nothing on this machine; through a network a tenth of them is worth the loss.
     const local = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
     const edits = this.edits.value;
     return { ...(edits ? { edits } : {}), max_depth: Number(max_depth.value), samples: Number(samples.value), shadows: shadows.checked,
       reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, light: this.light,
-      refine: Number(refine.value), pair: document.querySelector("[name=pair]").value, pixels: local ? "rgba" : "jpeg" };
+      refine: Number(refine.value), pair: pair.value, pixels: local ? "rgba" : "jpeg" };
   }
 
   // The fields of the camera as it is.
