@@ -121,6 +121,61 @@ def test_lights_come_and_go(viewer: Viewer, scenes: Path) -> None:
     assert not viewer.page.is_disabled("[name=azimuth]")
 
 
+def test_sliders_and_fields_of_a_light_are_one_direction(viewer: Viewer, scenes: Path) -> None:
+    """Once a slider had moved, what was typed changed nothing, and was what Reset light went back to."""
+    scene, first = load_scene(scenes / "blocks.toml"), "#lights details:nth-of-type(1)"
+    before = viewer.pixels("picture")
+    unfold(viewer, first)
+    fields = [viewer.page.locator(f"{first} [aria-label='direction, {axis}']") for axis in "xyz"]
+    viewer.page.locator("[name=azimuth]").fill("90")
+    settled(viewer)
+    turned = [float(field.input_value()) for field in fields]
+    assert turned[0] < -0.5 and abs(turned[2]) < 1e-9 and viewer.page.inner_text("#light-note") == "Moved"
+    shows(viewer, scene.model_copy(update={"lights": (scene.lights[0].model_copy(update={"direction": turned}),)}))
+    fields[2].fill("-2")
+    settled(viewer)
+    typed = (turned[0], turned[1], -2.0)
+    shows(viewer, scene.model_copy(update={"lights": (scene.lights[0].model_copy(update={"direction": typed}),)}))
+    assert float(viewer.page.input_value("[name=azimuth]")) == round(np.degrees(np.arctan2(-turned[0], 2.0)))
+    viewer.page.click("#reset-light")
+    settled(viewer)
+    np.testing.assert_array_equal(viewer.pixels("picture"), before)
+    assert [float(field.input_value()) for field in fields] == [-0.6, -1.4, -0.8]
+    assert viewer.page.inner_text("#light-note") == "As the scene has it" and viewer.page.is_disabled("#reset-light")
+
+
+def test_opened_lights_stay_open_and_so_is_a_new_one(viewer: Viewer) -> None:
+    def opened() -> list[bool]:
+        return viewer.page.evaluate("() => [...document.querySelectorAll('#lights details')].map((one) => one.open)")
+
+    viewer.page.click("text=Add point light")
+    assert opened() == [False, True]
+    unfold(viewer, "#lights details:nth-of-type(1)")
+    viewer.page.click("text=Add directional light")
+    assert opened() == [True, True, True]
+    unfold(viewer, RED)
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    assert opened() == [True, True, True]
+    viewer.page.click("#lights details:nth-of-type(2) > summary")
+    viewer.page.click("#lights details:nth-of-type(1) >> text=Remove")
+    assert opened() == [False, True]
+
+
+def test_a_material_of_another_type_comes_back_as_it_was(viewer: Viewer) -> None:
+    """Its colours were lost, because a mirror has none of them."""
+    unfold(viewer, RED)
+    viewer.page.locator(f"{RED} [aria-label='diffuse, green']").fill("0.625")
+    before = viewer.page.evaluate("() => viewer.panel.settings.edits")
+    for kind in ("mirror", "dielectric", "phong"):
+        viewer.page.select_option("[aria-label='Type of red']", kind)
+    assert viewer.page.evaluate("() => viewer.panel.settings.edits") == before
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    viewer.page.click(f"{RED} .undo")
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    viewer.page.select_option("[aria-label='Type of red']", "phong")
+    assert viewer.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
+
+
 def test_objects_are_hidden_and_seen_again_with_all_else_as_it_was(viewer: Viewer, scenes: Path) -> None:
     scene = load_scene(scenes / "blocks.toml")
     viewer.page.locator("[name=max_depth]").fill("2")

@@ -278,10 +278,7 @@ class Viewer {
     onClick("#fit", () => this.fit());
     onClick("#cancel", () => this.cancel());
     onClick("#reload", () => this.open(this.scene.name));
-    onClick("#reset-light", () => {
-      this.panel.resetLight();
-      this.changed("light");
-    });
+    onClick("#reset-light", () => this.panel.edits.turnSun(this.panel.edits.sunlight));
     onClick("#save-picture", () => this.save());
     onClick("#save-camera", () => {
       const { m, fovy, height } = this.view();
@@ -463,7 +460,7 @@ class Viewer {
     if (this.layer) {
       const view = live ? { ...this.shown.view, w: this.shown.w, h: this.shown.h } : this.view();
       const shading = live ? DEPTH : this.shading;
-      this.layer.draw(view, drawing(shading, this.panel.light, this.boxes, this.rays));
+      this.layer.draw(view, drawing(shading, this.boxes, this.rays));
     }
     if (this.mode === "gl" && this.layer?.loaded) this.note({ seq: this.seq, step: 0, last: true }, this.view());
     // A picture of an earlier camera stands for a while only, unless another drawing has replaced it by then.

@@ -9,7 +9,7 @@ import { count } from "./readings.js";
 const MAX_SAMPLES = 64;
 const DEGREE = Math.PI / 180;
 // What the user chooses of a scene's picture, beside its camera, materials and lights.
-const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair", "azimuth", "elevation"];
+const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair"];
 // Those that are the page's and no scene's: they stay when a scene is loaded.
 const STAYING = ["size", "aov", "refine", "pair"];
 
@@ -20,17 +20,16 @@ export class Panel {
   constructor(changed) {
     this.form = document.querySelector("#settings");
     this.fields = this.form.elements;
-    this.lightMoved = false;
     this.folds = new Folds(document.querySelector("#panel"), document.querySelector("#toggle-panel"));
     const find = (id) => document.querySelector(id);
     this.edits = new Edits({ materials: find("#materials"), lights: find("#lights"), changed: () => {
-      this.offerLight();
+      this.showLight();
       this.showValues();
       changed("edits");
     } });
     this.form.addEventListener("submit", (event) => event.preventDefault());
     this.form.addEventListener("input", ({ target }) => {
-      if (target.name === "azimuth" || target.name === "elevation") this.lightMoved = true;
+      if (target.name === "azimuth" || target.name === "elevation") return this.edits.turnSun(this.sliders);
       this.showValues();
       changed(target.name);
     });
@@ -52,7 +51,7 @@ export class Panel {
     fields.level.value = Math.min(3, fields.level.max);
     document.querySelector("#reload").disabled = !scene.files.length;
     this.offerBoxes(scene.octree.nodes > 0);
-    this.resetLight();
+    this.showLight();
     this.showLevels(Math.max(scene.octree.levels, 1));
     this.showNeeds(scene.needs);
     this.own = { ...this.values, ...this.usual };
@@ -76,9 +75,8 @@ export class Panel {
 
   // What the user chose: the values that are not those of the scene or, at first, of the page; and edits as JSON.
   get chosen() {
-    const { values, lightMoved } = this;
-    const isLight = (name) => name === "azimuth" || name === "elevation";
-    const moved = CHOICES.filter((name) => (isLight(name) ? lightMoved : values[name] !== this.own[name]));
+    const { values } = this;
+    const moved = CHOICES.filter((name) => values[name] !== this.own[name]);
     const edits = this.edits.value;
     return { ...Object.fromEntries(moved.map((name) => [name, values[name]])), ...(edits ? { edits: JSON.stringify(edits) } : {}) };
   }
@@ -95,20 +93,9 @@ export class Panel {
       if (chosen[name] === undefined) continue;
       if (field.type === "checkbox") field.checked = chosen[name] === "true";
       else if (field.type === "range" || [...field.options].some((option) => option.value === chosen[name])) field.value = chosen[name];
-      if (name === "azimuth" || name === "elevation") this.lightMoved = this.lit;
     }
-    this.offerLight();
+    this.showLight();
     this.showValues();
-  }
-
-  // Whether there is a directional light, which the sliders turn.
-  get lit() {
-    return this.edits.now.lights.some((light) => light.type === "directional");
-  }
-
-  offerLight() {
-    document.querySelector("#light").disabled = !this.lit;
-    this.lightMoved &&= this.lit;
   }
 
   // Boxes need nodes, and WebGL.
@@ -124,22 +111,18 @@ export class Panel {
     this.fields.samples.value = Math.min(own, MAX_SAMPLES);
   }
 
-  // The sliders of the light back to where the scene's first directional light is.
-  resetLight() {
-    const light = this.edits.now.lights.find((l) => l.type === "directional");
-    this.lightMoved = false;
-    this.offerLight();
-    if (light) {
-      const [x, y, z] = light.direction.map((v) => -v);
-      this.fields.azimuth.value = Math.atan2(x, z) / DEGREE;
-      this.fields.elevation.value = Math.atan2(y, Math.hypot(x, z)) / DEGREE;
-    }
-    this.showValues();
+  // The sliders of the light where its direction is.
+  showLight() {
+    const { sun } = this.edits;
+    document.querySelector("#light").disabled = !sun;
+    if (!sun) return;
+    const [x, y, z] = sun.direction.map((v) => -v);
+    this.fields.azimuth.value = Math.atan2(x, z) / DEGREE;
+    this.fields.elevation.value = Math.atan2(y, Math.hypot(x, z)) / DEGREE;
   }
 
-  // The direction in which the light travels, or null for the scene's own.
-  get light() {
-    if (!this.lightMoved) return null;
+  // The direction in which light travels by the sliders.
+  get sliders() {
     const [a, e] = [this.fields.azimuth.value * DEGREE, this.fields.elevation.value * DEGREE];
     return [-Math.cos(e) * Math.sin(a), -Math.sin(e), -Math.cos(e) * Math.cos(a)];
   }
@@ -151,8 +134,7 @@ export class Panel {
     const local = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
     const edits = this.edits.value;
     return { ...(edits ? { edits } : {}), max_depth: Number(max_depth.value), samples: Number(samples.value), shadows: shadows.checked,
-      reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, light: this.light,
-      refine: Number(refine.value), pair: pair.value, pixels: local ? "rgba" : "jpeg" };
+      reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, refine: Number(refine.value), pair: pair.value, pixels: local ? "rgba" : "jpeg" };
   }
 
   // The fields of the camera as it is.
@@ -190,10 +172,11 @@ export class Panel {
     document.querySelectorAll("#levels i").forEach((bar, i) => bar.classList.toggle("chosen", i === Number(fields.level.value)));
     fields.azimuth_shown.value = `${Math.round(fields.azimuth.value)}°`;
     fields.elevation_shown.value = `${Math.round(fields.elevation.value)}°`;
-    const directional = !document.querySelector("#light").disabled;
-    document.querySelector("#reset-light").disabled = !this.lightMoved;
-    const note = this.lightMoved ? "Moved" : "As the scene has it";
-    document.querySelector("#light-note").textContent = directional ? note : "This scene has no directional light";
+    const { sun, sunlight } = this.edits;
+    const moved = Boolean(sunlight) && String(sun.direction) !== String(sunlight);
+    document.querySelector("#reset-light").disabled = !moved;
+    const note = moved ? "Moved" : sunlight ? "As the scene has it" : "Added here";
+    document.querySelector("#light-note").textContent = sun ? note : "This scene has no directional light";
   }
 
   showLevels(levels) {

@@ -35,7 +35,6 @@ export class Share {
       view: { m: view.m, fovy: view.fovy, height: view.height, w: canvas.width, h: canvas.height },
       camera: viewer.camera.state,
       mode,
-      direction: viewer.panel.light,
       boxes: { level: boxes.level, levels: boxes.levels, all: boxes.all },
       pick: viewer.rays.shown ? viewer.rays.pick : null,
       note: this.lacks(scene),
@@ -67,7 +66,7 @@ export class Share {
     if (!viewer.layer?.loaded) throw new Error("there is no picture yet");
     const { canvas } = viewer.layer;
     const copy = element("canvas", { width: canvas.width, height: canvas.height });
-    viewer.layer.draw(viewer.view(), drawing(viewer.shading, viewer.panel.light, NO_BOXES, NO_RAYS));
+    viewer.layer.draw(viewer.view(), drawing(viewer.shading, NO_BOXES, NO_RAYS));
     copy.getContext("2d").drawImage(canvas, 0, 0);
     viewer.draw();
     return { canvas: copy, view: viewer.view(), mode: viewer.mode === "phong" ? name : "GL lighting" };
