@@ -8,7 +8,7 @@ from urllib.parse import parse_qs, urlencode
 
 import numpy as np
 import pytest
-from viewer_page import CHROMIUM, SCENE, Viewer, served
+from viewer_page import CHROMIUM, MODELS, SCENE, Viewer, served
 
 from renderer import Mirror, Phong, PointLight, load_scene, render
 from renderer.picture.image import srgb
@@ -391,6 +391,18 @@ def test_everything_is_folded_at_first_and_as_it_was_left_later(browser: Any, ur
         assert narrow.page.locator("#frame").bounding_box()["width"] == 900
     finally:
         narrow.context.close()
+
+
+def test_a_scene_has_its_name_and_a_mesh_that_of_its_file(browser: Any) -> None:
+    """It was Block.Ply."""
+    with served(MODELS / "block.ply") as url:
+        page = Viewer(browser, url)
+        try:
+            page.page.goto(url)
+            page.page.wait_for_selector("body[data-ready]")
+            assert page.page.inner_text("#name") == "block.ply"
+        finally:
+            page.context.close()
 
 
 def test_the_hint_goes_with_the_first_click(browser: Any, url: str) -> None:

@@ -4,6 +4,7 @@ import { Camera } from "./camera.js";
 import { Connection, FACE_COLORS, PROOF, fetchFrom } from "./connection.js";
 import { Controls } from "./controls.js";
 import { film } from "./film.js";
+import { heading } from "./element.js";
 import { GlLayer } from "./gl.js";
 import { Busy } from "./busy.js";
 import { Changes } from "./changes.js";
@@ -132,7 +133,7 @@ class Viewer {
     this.dress();
     this.forget();
     this.readings.ofScene(scene);
-    find("#name").textContent = scene.name.replace(/\.toml$/, "").replaceAll("_", " ");
+    Object.assign(find("#name"), heading(scene.name));
     document.title = `${scene.name} · octree-render`;
     if (!this.controls) this.begin();
     this.layout();
@@ -586,8 +587,16 @@ class Viewer {
 
   // See the first ray of a pick from its side.
   seeAside({ path: [{ start, end }] }) {
-    this.camera.seeAside(start, end);
+    this.camera.seeAside(start, end, this.free);
     this.moved();
+  }
+
+  // The part of the picture beside the card, as `Camera.seeAside` takes it.
+  get free() {
+    const [frame, card] = ["#frame", "#card"].map((name) => find(name).getBoundingClientRect());
+    const beside = card.top < frame.bottom && card.right < frame.right; // on phones it stands below
+    const hidden = beside ? Math.max(card.right - frame.left, 0) : 0;
+    return { x: hidden / 2 / frame.height, width: (frame.width - hidden) / frame.height };
   }
 
   // Turn about what was clicked last, once it is known what that is.

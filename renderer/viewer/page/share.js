@@ -1,6 +1,6 @@
 // One HTML file that shows what the page shows, without a server: the picture, the model, boxes and rays.
 import { encoded, dataUrl } from "./base64.js";
-import { element } from "./element.js";
+import { element, heading } from "./element.js";
 import { fetchFrom } from "./connection.js";
 import { drawing } from "./layers.js";
 import { NO_BOXES, NO_RAYS } from "./overlay.js";
@@ -112,7 +112,7 @@ ${style.replaceAll("</", "<\\/")}
 <body>
 <header>
   <img class="logo" src="${icon}" alt="" width="26" height="26">
-  <h1 id="name">${escaped(name.replace(/\.toml$/, "").replaceAll("_", " "))}</h1>
+  <h1 id="name" class="${heading(name).className}">${escaped(heading(name).textContent)}</h1>
   <fieldset class="modes" id="shows">
     <legend class="unseen">Show</legend>
     <label><input type="radio" name="shows" value="picture" checked><span><kbd>1</kbd>Picture</span></label>
