@@ -320,6 +320,33 @@ def test_another_scene_and_a_broken_one(viewer: Viewer) -> None:
     viewer.settled("octree")
 
 
+def test_what_an_address_asked_for_is_forgotten_when_it_fails_and_when_the_user_opens_another(viewer: Viewer) -> None:
+    """The scene of an address came in place of the one that was chosen later."""
+    viewer.page.evaluate(
+        """() => {
+            const { connection } = viewer, { send } = connection;
+            window.opened = [];
+            connection.send = (message) => {
+                if (message.type === "scene") window.opened.push(message.file);
+                return send.call(connection, message);
+            };
+            location.hash = "#file=broken.toml";
+        }"""
+    )
+    viewer.page.locator("#notices p", has_text="fov").wait_for()
+    viewer.page.evaluate("() => viewer.open('other.toml')")
+    viewer.shows("other.toml")
+    opened = "() => { delete viewer.connection.send; return window.opened; }"
+    assert viewer.page.evaluate(opened) == ["broken.toml", "other.toml"]
+    asks = "viewer.goTo({ file: 'broken.toml', hidden: [], chosen: {} })"
+    asked = (
+        f"() => {{ {asks}; const {{ file }} = viewer.asked; viewer.open('blocks.toml'); return [file, viewer.asked]; }}"
+    )
+    assert viewer.page.evaluate(asked) == ["broken.toml", None]
+    viewer.shows("blocks.toml")
+    viewer.settled("octree")
+
+
 def test_picture_and_camera_are_saved(viewer: Viewer, tmp_path: Path) -> None:
     with viewer.page.expect_download() as picture:
         viewer.page.click("#save-picture")
@@ -404,6 +431,79 @@ def test_the_page_comes_back_when_the_connection_does(viewer: Viewer) -> None:
     viewer.drag(40, 0)
     viewer.page.wait_for_timeout(50)
     viewer.settled("octree")
+
+
+# A connection whose sockets are in the hands of a test; returns what `act` does with it.
+CONNECTION = """async () => {
+    const { Connection } = await import("./static/connection.js");
+    const { WebSocket, setTimeout } = window, waits = [], sockets = [], refused = [];
+    class Socket extends EventTarget {
+        static OPEN = 1;
+        constructor() { super(); sockets.push(this); this.readyState = 1; this.sent = []; }
+        send(text) { this.sent.push(text); }
+    }
+    const happens = (kind, Event, values) => sockets.at(-1).dispatchEvent(new Event(kind, values));
+    const opens = () => happens("open", Event), closes = (code) => happens("close", CloseEvent, { code });
+    const says = (message) => happens("message", MessageEvent, { data: JSON.stringify(message) });
+    window.WebSocket = Socket;
+    window.setTimeout = (act, wait) => { waits.push(wait); act(); };
+    try {
+        const nothing = () => {};
+        const connection =
+            new Connection({ received: nothing, told: nothing, changed: nothing, refused: (too) => refused.push(too) });
+        connection.open();
+        ACT
+    } finally {
+        Object.assign(window, { WebSocket, setTimeout });
+    }
+}"""
+
+
+def test_a_server_that_takes_no_more_pages_is_asked_ever_less_often(viewer: Viewer) -> None:
+    """It was asked three times a second, because it opens a connection before it closes it."""
+    waits = viewer.page.evaluate(
+        CONNECTION.replace(
+            "ACT",
+            """
+            for (let i = 0; i < 5; i++) { opens(); says({ type: "error", message: "too many" }); closes(1013); }
+            opens(); says({ type: "scene", id: "1" }); closes(1006);
+            return waits;
+            """,
+        )
+    )
+    assert waits == [300, 1000, 2000, 5000, 5000, 300]
+    shown = """() => {
+        for (let i = 0; i < 3; i++) viewer.notices.say("connections: too many");
+        return [...document.querySelectorAll("#notices p")].filter((p) => p.textContent.includes("too many")).length;
+    }"""
+    assert viewer.page.evaluate(shown) == 1
+
+
+def test_a_message_that_is_too_large_is_not_sent_again(viewer: Viewer) -> None:
+    """The connection was closed for it without end."""
+    sent, refused = viewer.page.evaluate(
+        CONNECTION.replace(
+            "ACT",
+            """
+            const view = (number) => ({ type: "view", edits: "x".repeat(number) });
+            opens();
+            const sent = [connection.send(view(100))];
+            closes(1009);
+            opens();
+            const later = [view(100), view(200), { type: "ack" }, view(99)];
+            sent.push(...later.map((message) => connection.send(message)));
+            return [sent, refused];
+            """,
+        )
+    )
+    assert sent == [True, False, False, True, True] and refused == [True, True, True, False]
+    # And the page says so as long as it is so, and waits for nothing.
+    viewer.page.evaluate("() => { viewer.connection.limit = 100; viewer.moved(); }")
+    viewer.page.locator("#notices p", has_text="too large").wait_for()
+    assert not viewer.page.evaluate("() => viewer.coming")
+    viewer.page.evaluate("() => { viewer.connection.limit = Infinity; viewer.moved(); }")
+    viewer.settled("octree")
+    assert "too large" not in viewer.page.inner_text("#notices")
 
 
 def test_ray_tracing_goes_on_when_the_browser_takes_webgl_away(browser: Any, url: str) -> None:

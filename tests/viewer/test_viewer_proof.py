@@ -356,3 +356,69 @@ def test_nothing_of_a_proof_stands_for_another_view(page: Viewer) -> None:
     page.page.evaluate("() => viewer.reset()")
     kept(page)
     page.choose("octree")
+
+
+# All of the scene's colours, which a click on the panel would change one by one.
+EDIT = """(green) => {
+    const { edits } = viewer.panel;
+    for (const fields of Object.values(edits.now.materials)) if (fields.diffuse) fields.diffuse = [0, green, 0];
+    edits.changed();
+}"""
+
+# The click that is asked for again when another pair is chosen.
+OTHER_PAIR = """() => {
+    const { connection, proof: { pair } } = viewer, choose = (value) => {
+        pair.value = value;
+        pair.dispatchEvent(new Event("change", { bubbles: true }));
+    };
+    let asked = {};
+    connection.send = (message) => (asked = message);
+    choose("samples");
+    delete connection.send;
+    choose("brute");
+    return asked;
+}"""
+
+
+@needs_browser
+def test_the_values_on_the_card_are_those_of_the_proof_that_stands(page: Viewer) -> None:
+    """After an edit they stayed those of the scene before, for ever."""
+    page.page.select_option("[name=size]", "0.25")
+    page.choose("proof")
+    x, y = page.centre()
+    page.page.mouse.click(x + 60, y + 20)
+    page.page.wait_for_selector("#card .values")
+    before = page.page.locator("#card .values tr").all_inner_texts()
+    try:
+        page.page.evaluate(EDIT, 0.25)
+        page.settled("proof")
+        page.page.wait_for_function("() => viewer.rays.pick.seq === viewer.rays.seq")
+        assert page.page.locator("#card .values tr").count() == 3
+        assert page.page.locator("#card .values tr").all_inner_texts() != before
+        asked = page.page.evaluate(OTHER_PAIR)
+        assert asked["type"] == "pick" and "proof" not in asked  # which is of the pair before
+    finally:
+        page.restart()
+
+
+@needs_browser
+def test_neither_verdict_nor_picture_of_a_proof_stands_for_an_edited_scene(page: Viewer) -> None:
+    """Cancelled, the edit stood under the picture and the verdict of the scene before."""
+    page.page.select_option("[name=size]", "0.25")
+    page.choose("proof")
+    page.page.wait_for_function("() => viewer.layer.loaded")
+    try:
+        seen = """() => [document.querySelector("#proof output").value,
+            viewer.picture.canvas.classList.contains("away"), document.querySelector("#legend").hidden]"""
+        assert page.page.evaluate(seen)[1:] == [False, False]
+        # Nothing of the next one comes before it is cancelled.
+        page.page.evaluate("() => { viewer.connection.send = () => {}; }")
+        page.page.evaluate(EDIT, 0.5)
+        page.page.wait_for_function("() => !viewer.dirty")
+        assert page.page.evaluate(seen) == ["", False, False]  # the picture stands until the next one comes
+        page.page.evaluate("() => viewer.cancel()")
+        page.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        assert page.page.evaluate(seen) == ["", True, True]
+    finally:
+        page.page.evaluate("() => { delete viewer.connection.send; }")
+        page.restart()

@@ -114,6 +114,46 @@ def test_of_two_pictures_the_newer_and_finer_one_stands(viewer: Viewer) -> None:
     assert seen == [[True] * 6 + [False] * 4 + [True] * 4 + [False] * 2, True, False]
 
 
+def test_a_cancelled_view_leaves_only_a_picture_that_is_true_of_it(viewer: Viewer) -> None:
+    """In brute force stood the nodes that the octree visited, with their scale."""
+    true = viewer.page.evaluate(
+        """async () => {
+            const { isOf, improves } = await import("./static/standing.js");
+            const of = { m: [...Array(16).keys()], fovy: 1, w: 9, h: 7 };
+            const view = (mode, aov, others) =>
+                ({ ...of, mode, settings: { aov, pair: "brute", samples: 1, ...others } });
+            const pairs = [
+                [view("octree", "color"), view("brute", "color", { samples: 4 })],
+                [view("octree", "depth"), view("brute", "depth")],
+                [view("octree", "color"), view("proof", "color")], [view("octree", "nodes"), view("octree", "nodes")],
+                [view("octree", "nodes"), view("brute", "nodes")],
+                [view("octree", "triangles"), view("brute", "triangles")],
+                [view("proof", "color"), view("brute", "color")], [view("octree", "depth"), view("proof", "depth")],
+                [view("proof", "color"), view("proof", "color", { pair: "samples" })],
+                [view("brute", "color"), view("brute", "color", { edits: { lights: [] } })],
+            ];
+            const few = { w: 2, last: false }, replaced = ([from, to]) =>
+                improves(few, to, { shown: { view: from, w: 9, last: true }, now: to, model: false });
+            return [pairs.map(([from, to]) => isOf(from, to)), pairs.slice(4, 6).map(replaced)];
+        }"""
+    )
+    assert true == [[True] * 4 + [False] * 6, [True, True]]
+    # And on the page, where none comes.
+    nodes = "() => { viewer.panel.fields.aov.value = 'nodes'; viewer.changed('aov'); }"
+    viewer.page.evaluate(nodes)
+    viewer.settled("octree")
+    viewer.page.wait_for_function("() => viewer.layer.loaded")
+    assert viewer.page.is_visible("#legend")
+    viewer.page.evaluate("() => { viewer.connection.send = () => {}; viewer.setMode('brute'); }")
+    try:
+        viewer.page.wait_for_function("() => !viewer.dirty")
+        viewer.page.evaluate("() => viewer.cancel()")
+        viewer.page.wait_for_function("() => viewer.picture.canvas.classList.contains('away')", timeout=5000)
+        assert viewer.page.is_hidden("#legend")
+    finally:
+        viewer.page.evaluate("() => { delete viewer.connection.send; }")
+
+
 def test_a_picture_that_is_not_finished_is_saved_when_it_is(odd: Viewer, tmp_path: Path) -> None:
     """The coarse one that stood there was written, without a word."""
     odd.page.evaluate(HOLD)

@@ -105,6 +105,24 @@ def test_webgl_and_the_card_show_the_materials_as_they_are(viewer: Viewer) -> No
     assert found == [["dielectric", "dielectric", "phong"], ["phong", "dielectric", "phong"]]
 
 
+def test_webgl_has_the_materials_in_the_order_of_the_scene_whatever_their_names(viewer: Viewer) -> None:
+    """Those with names like integers came first, and faces had the colours of others."""
+    found = viewer.page.evaluate(
+        """async () => {
+            const { Edits } = await import("./static/edits.js");
+            const [materials, lights] = [document.createElement("div"), document.createElement("div")];
+            const edits = new Edits({ materials, lights, changed() {} });
+            const names = ["z9", "7", "1"];
+            const own = viewer.scene.materials.map((material, i) => ({ ...material, name: names[i] }));
+            edits.load({ ...viewer.scene, materials: own });
+            const listed = [...materials.querySelectorAll("details")];
+            const types = listed.map((entry) => entry.querySelector("summary output").textContent);
+            return [edits.dressed.materials.map((m) => m.name), listed.map((entry) => entry.dataset.name), types];
+        }"""
+    )
+    assert found == [["z9", "7", "1"], ["z9", "7", "1"], ["phong", "dielectric", "phong"]]
+
+
 def test_lights_come_and_go(viewer: Viewer, scenes: Path) -> None:
     scene = load_scene(scenes / "blocks.toml")
     viewer.page.click("text=Add point light")
@@ -310,12 +328,34 @@ def test_the_address_has_the_mode_and_what_a_proof_compares(viewer: Viewer) -> N
     settled(viewer)
 
 
+@pytest.mark.parametrize("hidden", ["floor,objects.0", "objects.0,objects.0"])
+def test_an_address_hides_objects_once(viewer: Viewer, hidden: str) -> None:
+    """In another order than the scene's, or one of them twice: the server built trees without end."""
+    names = sorted(set(hidden.split(",")), reverse=True)
+    viewer.page.evaluate(
+        """(hidden) => {
+            const { connection } = viewer, { send } = connection;
+            window.hides = 0;
+            connection.send = (message) => {
+                window.hides += message.type === "hide";
+                if (window.hides < 4) send.call(connection, message);
+            };
+            location.hash = `#hidden=${hidden}`;
+        }""",
+        hidden,
+    )
+    again = "(names) => window.hides > 1 || (String(viewer.objects.hidden) === names && viewer.finished)"
+    viewer.page.wait_for_function(again, arg=",".join(names))
+    assert viewer.page.evaluate("() => { delete viewer.connection.send; return window.hides; }") == 1
+
+
 WRONG = [
     {"mode": "none", "camera": "1,2,3"},
     {"camera": "0,0,NaN,,0.5,0,0,0", "max_depth": "many", "samples": "7", "aov": "<b>"},
     {"camera": "0,0,-4,,0.5,0,0,0", "hidden": "objects.9,floor"},
     {"camera": "0,0,4,,4,0,0,0", "edits": "{"},
     {"camera": "0,0,4,0,1,0,0,0", "edits": json.dumps({"materials": {"red": {"type": "phong", "diffuse": "red"}}})},
+    {"edits": json.dumps({"lights": [{"type": "point"}], "materials": {"glass": {"type": "dielectric", "ior": 0}}})},
     {"edits": json.dumps({"materials": {"__proto__": {"type": "phong"}, "gold": {"type": "mirror"}}, "lights": [3]})},
     {"edits": "null", "file": "../secret.toml", "unknown": "1"},
 ]

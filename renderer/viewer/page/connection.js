@@ -8,6 +8,8 @@ export const FILE = 5;
 const HEADER = 40;
 // Seconds between attempts: at once after a hiccup, then slow enough not to be a load.
 const PATIENCE = [0.3, 1, 2, 5];
+// RFC 6455, 7.4.1: a message was larger than the other side takes.
+const TOO_LARGE = 1009;
 
 // A path of the server as a full address, with the token that this page was opened with.
 export function address(path, query = {}) {
@@ -38,9 +40,10 @@ export function decode(buffer) {
 }
 
 export class Connection {
-  // Begins with `open`. `received(picture)`, `told(message)` and `changed(open)` are called as things arrive.
-  constructor({ received, told, changed }) {
-    Object.assign(this, { received, told, changed, attempts: 0 });
+  // Begins with `open`. `received(picture)`, `told(message)` and `changed(open)` are called as things arrive;
+  // `refused(true)` where a message is too large for the server, and `refused(false)` once one of its type is not.
+  constructor({ received, told, changed, refused }) {
+    Object.assign(this, { received, told, changed, refused, attempts: 0, limit: Infinity, refusedType: null });
   }
 
   open() {
@@ -48,19 +51,27 @@ export class Connection {
     url.protocol = url.protocol.replace("http", "ws");
     this.socket = new WebSocket(url);
     this.socket.binaryType = "arraybuffer";
-    this.socket.addEventListener("open", () => {
-      this.attempts = 0;
-      this.changed(true);
-    });
+    this.largest = { size: 0, type: null };
+    this.socket.addEventListener("open", () => this.changed(true));
     this.socket.addEventListener("message", ({ data }) => {
-      if (typeof data === "string") this.told(JSON.parse(data));
+      if (typeof data === "string") this.text(JSON.parse(data));
       else this.received(decode(data));
     });
-    this.socket.addEventListener("close", () => this.closed());
+    this.socket.addEventListener("close", ({ code }) => this.closed(code));
   }
 
-  closed() {
+  text(message) {
+    // A server that has too many pages opens the connection, and closes it before it tells of a scene.
+    if (message.type === "scene") this.attempts = 0;
+    this.told(message);
+  }
+
+  closed(code) {
     this.changed(false);
+    if (code === TOO_LARGE) {
+      this.limit = this.largest.size;
+      this.refuse(this.largest.type);
+    }
     const wait = PATIENCE[Math.min(this.attempts++, PATIENCE.length - 1)];
     setTimeout(() => this.open(), wait * 1000);
   }
@@ -69,8 +80,26 @@ export class Connection {
     return this.socket?.readyState === WebSocket.OPEN;
   }
 
-  // Drops the message where there is no connection: only the newest view matters, and it is sent again on return.
+  refuse(type) {
+    this.refusedType = type;
+    this.refused(true);
+  }
+
+  // Whether the message was sent. Drops it where there is no connection: only the newest view matters, and it is sent
+  // again on return; and where it is as large as one for which the server closed the connection.
   send(message) {
-    if (this.ready) this.socket.send(JSON.stringify(message));
+    if (!this.ready) return false;
+    const text = JSON.stringify(message), { type } = message;
+    if (text.length >= this.limit) {
+      this.refuse(type);
+      return false;
+    }
+    if (text.length > this.largest.size) this.largest = { size: text.length, type };
+    this.socket.send(text);
+    if (type === this.refusedType) {
+      this.refusedType = null;
+      this.refused(false);
+    }
+    return true;
   }
 }

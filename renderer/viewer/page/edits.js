@@ -23,12 +23,22 @@ const CHIEF = { phong: "diffuse", mirror: "reflectance", dielectric: "transmitta
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 const copy = (value) => JSON.parse(JSON.stringify(value));
 
-// Whether fields from an address are those of one of `types`, and of the kinds that these have.
+const finite = (x) => typeof x === "number" && Number.isFinite(x);
+const three = (value, allowed) => Array.isArray(value) && value.length === 3 && value.every((x) => finite(x) && allowed(x));
+// The fields that may be missing, and what the server takes as a field.
+const OPTIONAL = ["ambient"];
+const TAKEN = {
+  [COLOR]: (value) => three(value, (x) => x >= 0),
+  [VECTOR]: (value, name) => three(value, () => true) && (name !== "direction" || value.some((x) => x !== 0)),
+  [NUMBER]: (value, name) => finite(value) && (name === "ior" ? value > 0 : value >= 0),
+};
+
+// Whether fields from an address are all those of one of `types`, no others, and of values that the server takes.
 function fits(fields, types) {
-  const known = types[fields?.type];
-  const number = (x) => typeof x === "number" && Number.isFinite(x);
-  return Boolean(known) && Object.entries(fields).every(([name, value]) => name === "type" || (known[name] &&
-    (known[name][0] === NUMBER ? number(value) : Array.isArray(value) && value.length === 3 && value.every(number))));
+  if (!Object.hasOwn(types, fields?.type)) return false;
+  const { type, ...given } = fields, known = types[type];
+  return Object.keys(given).every((name) => Object.hasOwn(known, name)) &&
+    Object.entries(known).every(([name, [kind]]) => (given[name] === undefined ? OPTIONAL.includes(name) : TAKEN[kind](given[name], name)));
 }
 
 const shines = (light) => light.type === "directional" && light.irradiance.some((x) => x > 0);
@@ -54,7 +64,7 @@ export class Edits {
     this.scene = scene;
     this.own = { materials: Object.fromEntries(scene.materials.map((m) => [m.name, m.fields])), lights: scene.lights.map(lightFields) };
     this.now = copy(this.own);
-    this.left = {}; // of each material the fields of its other types, as they were left
+    this.left = new Map(); // of each material, by its name and a type, the fields that were left
     this.show();
   }
 
@@ -89,9 +99,15 @@ export class Edits {
     this.show();
   }
 
+  // The names and fields of the materials in the order of the scene, by which faces have them; the keys of an object
+  // that look like integers are in another one.
+  get named() {
+    return this.scene.materials.map(({ name }) => [name, this.now.materials[name]]);
+  }
+
   // The scene with these materials and lights, as WebGL draws it.
   get dressed() {
-    const materials = Object.entries(this.now.materials).map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
+    const materials = this.named.map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
       reflectance: BLACK, transmittance: BLACK, shininess: 0, ...fields, fields }));
     const lights = this.now.lights.map((fields) => ({ ...fields, color: fields.irradiance ?? fields.intensity }));
     return { ...this.scene, materials, lights };
@@ -100,7 +116,7 @@ export class Edits {
   show() {
     const { materials } = this.lists;
     const open = new Set([...materials.querySelectorAll("details[open]")].map((entry) => entry.dataset.name));
-    materials.replaceChildren(...Object.keys(this.now.materials).map((name) => this.material(name, open.has(name))));
+    materials.replaceChildren(...this.named.map(([name]) => this.material(name, open.has(name))));
     this.showLights();
     this.summarise();
   }
@@ -117,7 +133,7 @@ export class Edits {
   // The dots of materials and lights in their colours, and which of the materials are changed.
   summarise() {
     const entries = this.lists.materials.querySelectorAll("details");
-    Object.entries(this.now.materials).forEach(([name, fields], i) => {
+    this.named.forEach(([name, fields], i) => {
       const changed = !same(fields, this.own.materials[name]);
       entries[i].querySelector(".swatch").style.background = pickerColor(fields[CHIEF[fields.type]] ?? BLACK);
       entries[i].querySelector("summary output").textContent = changed ? `${fields.type}, changed` : fields.type;
@@ -164,9 +180,9 @@ export class Edits {
     const type = element("select", { ariaLabel: `Type of ${name}` });
     type.append(...Object.keys(MATERIALS).map((value) => element("option", { value, textContent: value, selected: value === fields.type })));
     type.addEventListener("change", () => {
-      const left = (this.left[name] ??= {});
-      left[fields.type] = fields;
-      put(left[type.value] ?? this.retyped(fields, type.value));
+      const key = (of) => JSON.stringify([name, of]);
+      this.left.set(key(fields.type), fields);
+      put(this.left.get(key(type.value)) ?? this.retyped(fields, type.value));
     });
     const undo = this.button("As in the file", () => put(copy(this.own.materials[name])), "undo");
     return this.entry(name, fields.type, name, open, element("label", { className: "row" }, element("span", { textContent: "type" }), type),

@@ -12,11 +12,13 @@ const value = (aov, x) => (WHOLE.includes(aov) ? count(x) : aov === "difference"
 
 export class Legend {
   constructor(box) {
-    this.box = box;
+    Object.assign(this, { box, told: undefined });
   }
 
   // Show the scale that the server told of; null for none.
   show(told) {
+    if (told === this.told) return;
+    this.told = told;
     this.box.hidden = told === null;
     if (told === null) return;
     const { aov, low, high, colors } = told;

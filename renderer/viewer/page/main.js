@@ -26,7 +26,7 @@ import { Rays } from "./rays.js";
 import { Readings } from "./readings.js";
 import { copyText, savePicture, saveText } from "./save.js";
 import { Sharing } from "./sharing.js";
-import { improves, sameCamera } from "./standing.js";
+import { improves, isOf, sameCamera } from "./standing.js";
 
 const TRACED = ["brute", "octree", "proof"];
 // Whose pictures take seconds, and are begun when the camera rests.
@@ -43,6 +43,8 @@ const HOLD = 50;
 // Milliseconds after which a view is written into the address: browsers refuse more than some writes a second.
 const WRITE = 400;
 
+const TOO_LARGE = "What this page sends of the change is too large for the server; it is shown once it is smaller.";
+
 const find = (selector) => document.querySelector(selector);
 
 class Viewer {
@@ -54,7 +56,7 @@ class Viewer {
     this.boxes = NO_BOXES;
     this.stage = find("#stage");
     this.proof = new Proof({
-      bar: find("#proof"), divider: find("#divider"), frame: find("#frame"), changed: () => this.picture?.paint(), asked: () => this.moved(),
+      bar: find("#proof"), divider: find("#divider"), frame: find("#frame"), changed: () => this.picture?.paint(), asked: () => this.changed("pair"),
     });
     this.picture = new Picture(find("#picture"), this.proof);
     this.legend = new Legend(find("#legend"));
@@ -81,6 +83,7 @@ class Viewer {
       received: (picture) => this.sharing.received(picture) || this.received(picture),
       told: (message) => this.told(message),
       changed: (open) => this.connected(open),
+      refused: (too) => (too ? this.notices.say(TOO_LARGE, "large") : this.notices.clear("large")),
     });
     this.connection.open();
     addEventListener("pagehide", () => this.scene && remember({ ...this.kept, hash: location.hash }));
@@ -154,12 +157,14 @@ class Viewer {
     this.asked = null;
     const { file, mode, state, hidden, chosen } = asked;
     if (file && file !== this.scene.name && this.scene.files.includes(file)) {
+      this.open(file);
       this.asked = asked;
-      return this.open(file);
+      return;
     }
-    if (hidden.join() !== this.objects.hidden.join() && hidden.every((name) => this.scene.objects.some((one) => one.name === name))) {
-      this.asked = asked;
-      return this.hide(hidden);
+    if (hidden !== null && this.objects.differ(hidden)) {
+      this.hide(hidden);
+      this.asked = { ...asked, hidden: null }; // asked for once, whatever the answer is
+      return;
     }
     this.panel.load(this.scene);
     this.panel.restart();
@@ -188,6 +193,7 @@ class Viewer {
   }
 
   hide(hidden) {
+    this.asked = null;
     this.busy.begin("opening", "Building the octree …");
     this.connection.send({ type: "hide", hidden });
   }
@@ -283,10 +289,9 @@ class Viewer {
     onClick("#save-picture", () => this.save());
     onClick("#save-camera", () => {
       const { m, fovy, height } = this.view();
-      const { settings } = this.panel;
-      this.connection.send({ type: "camera", m, fovy, height, walk: this.controls.walking, settings });
+      this.connection.send({ type: "camera", m, fovy, height, walk: this.controls.walking, settings: this.seen });
     });
-    onClick("#copy-command", () => this.connection.send({ type: "command", mode: this.mode, ...this.view(), settings: this.panel.settings }));
+    onClick("#copy-command", () => this.connection.send({ type: "command", mode: this.mode, ...this.view(), settings: this.seen }));
     onClick("#save-scene", () => {
       const { m, fovy, height } = this.view();
       this.connection.send({ type: "save", m, fovy, height, settings: this.panel.settings });
@@ -310,12 +315,12 @@ class Viewer {
     } else {
       if (name === "edits") this.dress();
       this.moved();
-      const question = this.rays.again(this.panel.settings);
-      if (question) this.connection.send(question);
+      this.pickAgain();
     }
   }
 
   open(file) {
+    this.asked = null;
     this.busy.begin("opening", `Opening ${file} …`);
     this.connection.send({ type: "scene", file });
   }
@@ -353,9 +358,9 @@ class Viewer {
 
   moved() {
     const now = performance.now();
-    if (this.current) this.staleSince = null;
+    if (this.placed) this.staleSince = null;
     else this.staleSince ??= now;
-    if (this.proof.told && !(this.current && this.shown.view.settings.pair === this.panel.settings.pair)) this.proof.forget();
+    if (this.proof.told && !this.valid) this.proof.forget();
     this.dirty = true;
     this.movedAt = now;
     this.panel.showCamera(this.camera);
@@ -423,13 +428,24 @@ class Viewer {
     if (this.mode !== "gl") this.sent.set(this.seq, view); // to which nothing is sent
     this.dirty = false;
     this.heldSince ??= at;
-    this.connection.send({ type: "view", seq: this.seq, ...message });
-    if (SLOW.includes(this.mode)) this.progress.show(0);
+    const sent = this.connection.send({ type: "view", seq: this.seq, ...message });
+    if (sent === false) this.sent.delete(this.seq);
+    else if (SLOW.includes(this.mode)) this.progress.show(0);
   }
 
   // Whether the traced picture was taken by the current camera.
-  get current() {
+  get placed() {
     return this.shown !== null && TRACED.includes(this.mode) && sameCamera(this.shown.view, this.view());
+  }
+
+  // Whether it is that of the current settings, too.
+  get valid() {
+    return this.placed && isOf(this.shown.view, { ...this.view(), mode: this.mode, settings: this.panel.settings });
+  }
+
+  // Whether it may stand: one of other settings only until theirs comes, which it does not after a cancel.
+  get current() {
+    return this.placed && (this.dirty || this.sent.has(this.seq) || this.valid);
   }
 
   // Whether it may stand for the current camera all the same, because the next is about to come or nothing else is there.
@@ -456,6 +472,7 @@ class Viewer {
     const current = traced && this.current;
     const live = current || (traced && this.recent);
     this.picture.visible = live;
+    this.legend.show(live ? this.shown.legend : null);
     this.model = traced && !live && Boolean(this.layer?.loaded);
     this.stage.classList.toggle("waiting", traced && !live);
     if (this.layer) {
@@ -508,13 +525,19 @@ class Viewer {
     await this.picture.show(picture);
     if (this.scene !== scene) return this.picture.clear();
     const { seq, step, last, w, h } = picture;
-    this.shown = { view, w, h, seq, step, last };
-    this.staleSince = this.current ? null : performance.now();
+    const samples = this.shown?.seq === seq ? this.shown.samples : view.settings.samples;
+    this.shown = { view, w, h, seq, step, last, samples, legend: view.legend ?? null };
+    this.staleSince = this.placed ? null : performance.now();
     this.busy.end("tracing");
-    this.legend.show(view.legend ?? null);
-    if (picture.kind === PROOF) this.proof.tell(view.legend);
+    if (picture.kind === PROOF && this.valid) this.proof.tell(view.legend);
     this.note(picture, { ...view, w, h });
     this.draw();
+    if (last && this.proofOf(this.rays.asked) !== null) this.pickAgain();
+  }
+
+  // The number of the proof that says something of `view`, null where none does or there is no view.
+  proofOf(view) {
+    return view && this.proof.told && this.valid && sameCamera(this.shown.view, view) ? this.shown.seq : null;
   }
 
   told(message) {
@@ -524,7 +547,7 @@ class Viewer {
       pick: (pick) => this.picked(pick),
       legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
       proof: (proof) => this.sent.has(proof.seq) && (this.sent.get(proof.seq).legend = proof),
-      refined: (told) => told.seq === this.seq && this.readings.refined(told),
+      refined: (told) => told.seq === this.seq && this.refined(told),
       scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
       camera: ({ name, text }) => saveText(name, text),
       saved: (told) => this.changes.show(told),
@@ -533,10 +556,23 @@ class Viewer {
       error: ({ message: text }) => {
         for (const name of ["opening", "tracing"]) this.busy.end(name);
         this.notices.say(text);
-        if (this.scene) this.panel.fields.file.value = this.scene.name; // the one that is still shown
+        if (!this.scene) return;
+        this.panel.fields.file.value = this.scene.name; // the one that is still shown
+        this.asked = null; // what could not be shown is not asked for again with the next scene
       },
     };
     acts[message.type]?.(message);
+  }
+
+  refined(told) {
+    if (this.shown?.seq === told.seq) this.shown.samples = told.samples;
+    this.readings.refined(told);
+  }
+
+  // The settings of the picture that is seen, which may have grown to more samples than are set.
+  get seen() {
+    const { settings } = this.panel;
+    return this.finished ? { ...settings, samples: this.shown.samples } : settings;
   }
 
   cannotShow(id, error) {
@@ -569,13 +605,19 @@ class Viewer {
     this.stopSaving();
     this.busy.end("tracing");
     this.progress.show(null);
+    this.request();
     this.notices.say("Cancelled; the next movement starts it again.");
   }
 
   pickAt(clientX, clientY) {
-    const proof = this.mode === "proof" && this.current && this.shown.view.mode === "proof" ? { proof: this.shown.seq } : {};
-    const question = this.rays.question({ ...this.view(), ...proof }, this.panel.settings, clientX, clientY);
-    if (question) this.connection.send(question);
+    const asked = this.rays.pixel(this.view(), clientX, clientY);
+    if (asked) this.connection.send(this.rays.ask(asked, this.panel.settings, this.proofOf(asked)));
+  }
+
+  // Ask for the same pixel by the settings and the proof as they are now.
+  pickAgain() {
+    const { asked } = this.rays;
+    if (asked) this.connection.send(this.rays.ask(asked, this.panel.settings, this.proofOf(asked)));
   }
 
   picked(pick) {

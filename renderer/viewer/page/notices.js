@@ -9,9 +9,10 @@ export class Notices {
     this.list = list;
   }
 
-  // Show `text`; one with a `name` stays until it is cleared.
+  // Show `text`; one with a `name` stays until it is cleared. What is said again takes the place of what was said.
   say(text, name) {
     if (name && this.list.querySelector(`[data-name="${name}"]`)) return;
+    for (const old of [...this.list.children]) if (!name && !old.dataset.name && old.textContent === text) old.remove();
     const notice = element("p", { textContent: text });
     if (name) notice.dataset.name = name;
     else setTimeout(() => notice.remove(), SHOWN);

@@ -31,6 +31,12 @@ export class Objects {
     return this.objects.filter(({ shown }) => !shown).map(({ name }) => name);
   }
 
+  // Whether `names` are of objects, in any order, and others than those that are hidden now.
+  differ(names) {
+    const known = names.every((name) => this.objects.some((one) => one.name === name));
+    return known && this.objects.some(({ name, shown }) => names.includes(name) === shown);
+  }
+
   // The names of those that are to be hidden.
   get chosen() {
     return this.switches.filter((input) => !input.checked).map((input) => input.dataset.name);

@@ -19,23 +19,19 @@ export class Rays {
     return this.showNodes ? this.nodes : NONE;
   }
 
-  // The question for the pixel of `view` under a point of the window, or null beside the picture.
-  question(view, settings, clientX, clientY) {
+  // The pixel of `view` under a point of the window, as {x, y} and that view; null beside the picture.
+  pixel(view, clientX, clientY) {
     const { left, top, width, height } = this.frame.getBoundingClientRect();
     const x = Math.floor(((clientX - left) / width) * view.w);
     const y = Math.floor(((clientY - top) / height) * view.h);
     if (x < 0 || y < 0 || x >= view.w || y >= view.h) return null;
-    return this.ask({ x, y, ...view }, settings);
+    return { x, y, ...view };
   }
 
-  // The question for the same pixel with other settings, or null where none is picked.
-  again(settings) {
-    return this.asked && this.ask(this.asked, settings);
-  }
-
-  ask(asked, settings) {
+  // The question for a pixel, with its values in the proof of that number, if there is one.
+  ask(asked, settings, proof) {
     this.asked = asked;
-    return { type: "pick", seq: ++this.seq, ...asked, settings };
+    return { type: "pick", seq: ++this.seq, ...asked, ...(proof === null ? {} : { proof }), settings };
   }
 
   // Show the renderer's answer.

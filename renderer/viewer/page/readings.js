@@ -14,7 +14,7 @@ const scale = ({ aov, low, high }) =>
 
 export class Readings {
   constructor(list, line) {
-    Object.assign(this, { list, line, values: {} });
+    Object.assign(this, { list, line, values: {}, grown: null });
   }
 
   // Update some of the readings by name.
@@ -30,26 +30,37 @@ export class Readings {
 
   // What the server's /scene says of the scene and its octree.
   ofScene({ faces, vertices, octree, threads }) {
+    this.coarse();
     this.read({ faces: count(faces), vertices: count(vertices), nodes: count(octree.nodes), leaves: count(octree.leaves),
       levels: octree.levels, memory: bytes(octree.bytes), built: seconds(octree.build_seconds), threads });
   }
 
   // A picture that the page draws by itself, of {w, h}.
   ofGl({ w, h }) {
+    this.coarse();
     this.line.textContent = `WebGL · ${w} × ${h}`;
     this.read({ picture: `${w} × ${h}`, pass: "–", time: "–", shown: "–", speed: "–", scale: "–" });
   }
 
-  // A picture at rest that has grown finer: its samples a pixel, and what is left of its error in 255ths, as estimated.
-  refined({ samples, error }) {
+  // A picture at rest that has grown finer: the number of its view, its samples a pixel, and what is left of its error
+  // in 255ths, as estimated.
+  refined({ seq, samples, error }) {
+    this.grown = seq;
     const told = `${samples} samples a pixel, within about ${error.toFixed(error < 1 ? 2 : 1)} of 255`;
     this.line.textContent = told;
     this.read({ refined: told });
   }
 
-  // A picture or colours that arrived: {kind, step, last, w, h, ms, rate}, `late` milliseconds after `view` was sent; its
+  // What is seen now has not grown.
+  coarse() {
+    this.grown = null;
+    if (this.values.refined) this.read({ refined: "–" });
+  }
+
+  // A picture or colours that arrived: {kind, seq, step, last, w, h, ms, rate}, `late` milliseconds after `view` was sent; its
   // `legend` has the values at the ends of a scale of colours, where the picture has one.
-  ofPicture({ kind, step, last, w, h, ms, rate }, late, faces, view) {
+  ofPicture({ kind, seq, step, last, w, h, ms, rate }, late, faces, view) {
+    if (seq !== this.grown) this.coarse();
     const { legend } = view;
     const [time, shown] = [milliseconds(ms), `after ${milliseconds(late)}`];
     const ends = legend ? scale(legend) : "–";

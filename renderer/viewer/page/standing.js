@@ -8,10 +8,20 @@ export const sameCamera = (a, b) =>
   a.fovy === b.fovy && a.height === b.height && sameShape(a, b) && a.m.every((x, i) => x === b.m[i]);
 
 const FINENESS = { samples: 0, refine: 0 };
+// Values of which the octree and brute force have different ones.
+const BY_TREE = ["nodes", "triangles"];
 
-// Whether they differ at most in how finely they are traced. Brute force gives the octree's picture; a proof has two.
-const sameButFiner = (a, b) =>
-  sameCamera(a, b) && (a.mode === "proof") === (b.mode === "proof") && JSON.stringify({ ...a.settings, ...FINENESS }) === JSON.stringify({ ...b.settings, ...FINENESS });
+const sameSettings = (a, b) => JSON.stringify({ ...a.settings, ...FINENESS }) === JSON.stringify({ ...b.settings, ...FINENESS });
+
+// Whether pictures of both modes are the same. Brute force gives the octree's colours; a proof has two pictures.
+const sameWay = (a, b) => a.mode === b.mode || (a.mode !== "proof" && b.mode !== "proof" && !BY_TREE.includes(a.settings.aov));
+
+// Whether they differ at most in how finely they are traced.
+const sameButFiner = (a, b) => sameCamera(a, b) && sameWay(a, b) && sameSettings(a, b);
+
+// Whether the picture of view `a` is true of view `b`: the octree's colours are one of the two pictures of a proof.
+export const isOf = (a, b) =>
+  sameCamera(a, b) && sameSettings(a, b) && (sameWay(a, b) || (b.mode === "proof" && a.settings.aov === "color"));
 
 // Whether a picture {w, h, rows, last} that came for `view` is to take the place of `shown`, {view, w} or null. `now` is
 // the view of the camera as it is, and `model` whether WebGL's model stands in for the picture. A band of rows is as fine
