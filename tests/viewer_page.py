@@ -161,6 +161,7 @@ class Viewer:
                 viewer.changed("boxes");
                 viewer.changed("walk");
                 viewer.rays.close();
+                viewer.changed("edits");
                 viewer.camera.reset();
                 viewer.layout();
                 viewer.setMode("octree");

@@ -56,8 +56,8 @@ def turntable(shown: ShownScene, asked: Turntable, finished: Callable[[float], o
     duration = max(_SHORTEST, round(_TURN / asked.frames / 10) * 10)  # GIF counts in hundredths of a second
     buffer, first = io.BytesIO(), next(frames)
     lossless = {"lossless": True} if asked.format == "webp" else {}
-    # GIF takes each frame as it comes, at a byte a pixel; WebP all of them first.
-    first.save(buffer, asked.format, save_all=True, append_images=frames, duration=duration, loop=0, **lossless)
+    rest: Any = [_Sequence(frames, asked.frames - 1)]
+    first.save(buffer, asked.format, save_all=True, append_images=rest, duration=duration, loop=0, **lossless)
     return buffer.getvalue()
 
 
@@ -162,6 +162,24 @@ def _heard(ended: "asyncio.Future[Any]") -> None:
     """Ask for the error of what was given up, so that none is reported as lost."""
     if not ended.cancelled():
         ended.exception()
+
+
+class _Sequence:
+    """Frames as one image of several, for Pillow, each made when it is sought: WebP takes all images first, which were
+    four bytes a pixel.
+    """
+
+    def __init__(self, frames: "Iterator[Pillow]", number: int) -> None:
+        self.n_frames = number
+        self._frames = frames
+        self._frame: Pillow | None = None
+
+    def seek(self, _: int) -> None:
+        """Take the next frame, in whose order they are sought."""
+        self._frame = next(self._frames)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._frame, name)
 
 
 def _frames(shown: ShownScene, asked: Turntable, finished: Callable[[float], object]) -> "Iterator[Pillow]":

@@ -22,9 +22,9 @@ MAX_SAMPLES = 64
 # almost all of the picture is its rim.
 MIN_FOVY, MAX_FOVY = 0.001, 3.1
 
-# A turn in steps of a degree; and the pixels of all its frames together, those of 36 of 1280 x 720 and some more: while
-# they are encoded they are 100 MB.
-MAX_FRAMES, MAX_FRAME_PIXELS = 360, 1 << 25
+# A turn in steps of a degree; and the pixels of all its frames together, those of 72 of 4096 x 720, the most that the
+# page offers, and some more: a GIF is a byte a pixel while it is encoded, 270 MB.
+MAX_FRAMES, MAX_FRAME_PIXELS = 360, 1 << 28
 
 RGBA, JPEG, FACE_COLORS, PROOF, FILE = 1, 2, 3, 4, 5
 # kind, seq, step, last, w, h, first row and rows of the whole as uint32, then milliseconds and million rays per second
@@ -286,6 +286,10 @@ Message = (
 _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
+# Faults of a message, or of an object in it, that lie in no one value.
+_OF_A_WHOLE = ("value_error", "missing", "union_tag_invalid", "union_tag_not_found")
+
+
 def parse(text: str) -> Message:
     """The message in ``text``. Raises ``ValueError`` with one line: the key, what was expected, and what was given."""
     try:
@@ -293,8 +297,11 @@ def parse(text: str) -> Message:
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         where = ".".join(str(key) for key in fault["loc"]) or "message"
-        # The given value may be long; forty characters show which one it is.
-        raise ValueError(f"{where}: {fault['msg']}, got {repr(fault['input'])[:40]}") from None
+        expected = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else fault["msg"]
+        # A value may be long; forty characters show which one it is. Of a whole message they would show nothing.
+        whole = isinstance(fault["input"], dict) and fault["type"] in _OF_A_WHOLE
+        got = "" if whole else f", got {repr(fault['input'])[:40]}"
+        raise ValueError(f"{where}: {expected}{got}") from None
 
 
 class Rows(NamedTuple):

@@ -222,6 +222,28 @@ def test_a_double_click_turns_about_what_is_there(viewer: Viewer) -> None:
     assert math.dist(viewer.camera["m"][12:15], point) == pytest.approx(distance)
 
 
+def test_a_ray_is_seen_from_the_side_beside_its_card(viewer: Viewer) -> None:
+    """Its middle was the picture's, beneath the card."""
+    viewer.page.mouse.click(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
+    viewer.page.click("#card >> text=View from the side")
+    card, frame = (viewer.page.locator(name).bounding_box() for name in ("#card", "#frame"))
+    left, right = card["x"] + card["width"], frame["x"] + frame["width"]
+    start, end = viewer.page.evaluate("() => [viewer.rays.pick.path[0].start, viewer.rays.pick.path[0].end]")
+    seen = [place(viewer, point)[0] for point in (start, end)]
+    assert left < min(seen) < max(seen) < right and frame["x"] < left
+    middle = place(viewer, ((np.array(start) + end) / 2).tolist())
+    assert middle[0] == pytest.approx((left + right) / 2)
+
+
+def test_the_divider_goes_to_its_ends(viewer: Viewer) -> None:
+    viewer.choose("proof")
+    divider = viewer.page.locator("#divider")
+    for key, value in (("Home", "0"), ("End", "100"), ("ArrowLeft", "98")):
+        divider.press(key)
+        assert divider.get_attribute("aria-valuenow") == value
+    viewer.page.evaluate("() => viewer.proof.move(0.5)")
+
+
 LUMINANCE = """() => {
     const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
     const of = (element) => {
@@ -259,5 +281,21 @@ def test_a_phone_shows_the_modes_whole_and_the_cameras_buttons_at_once(
         for button in ("#reset-view", "#fit", "#save-picture"):
             box = page.page.locator(button).bounding_box()
             assert box["y"] + box["height"] <= height, button
+    finally:
+        page.context.close()
+
+
+def test_settings_on_a_phone_are_folded_and_come_into_view(browser: Any, url: str) -> None:
+    """They were open below the window, and the first touch hid them."""
+    size = {"width": 390, "height": 844}
+    page = Viewer(browser, url, folded=True, viewport=size, has_touch=True, is_mobile=True)
+    try:
+        page.open()
+        assert page.page.is_hidden("#panel")
+        page.page.tap("#frame")
+        page.page.wait_for_selector("#card:not([hidden])")
+        page.page.tap("#toggle-panel")
+        page.page.wait_for_function("() => document.querySelector('#panel').getBoundingClientRect().top < 400")
+        assert page.page.is_visible("#fold-scene > summary")
     finally:
         page.context.close()

@@ -110,7 +110,16 @@ def overlapping(page: Viewer, names: list[str]) -> list[tuple[str, str]]:
     return [(a, b) for a in boxes for b in boxes if a < b and not apart(boxes[a], boxes[b])]
 
 
-@pytest.mark.parametrize("size", SIZES)
+# Where the divider's handle begins and ends, from top to bottom.
+HANDLE = """() => {
+    const divider = document.querySelector("#divider");
+    const [top, height] = ["top", "height"].map((name) => parseFloat(getComputedStyle(divider, "::after")[name]));
+    const begin = divider.getBoundingClientRect().top + top;
+    return [begin, begin + height];
+}"""
+
+
+@pytest.mark.parametrize("size", [*SIZES, (320, 568), (1000, 700), (1400, 900)])
 def test_what_stands_on_the_picture_does_not_overlap(browser: Any, url: str, size: tuple[int, int]) -> None:
     page = opened(browser, url, size=size, folded=True)
     try:
@@ -127,6 +136,14 @@ def test_what_stands_on_the_picture_does_not_overlap(browser: Any, url: str, siz
         page.page.evaluate("() => (document.querySelector('#progress').hidden = false)")
         names += [".way:not(.right)", ".way.right"]
         assert overlapping(page, names) == []
+        top, bottom = page.page.evaluate(HANDLE)
+        box = page.page.locator("#progress").bounding_box()
+        assert box["y"] >= bottom or box["y"] + box["height"] <= top
+        x, y = page.centre()
+        page.page.mouse.click(x + 40, y)  # beside the divider
+        page.page.wait_for_selector("#card:not([hidden])")
+        assert overlapping(page, [*names, "#card"]) == []
+        page.page.click("#card .close")
         page.page.locator("#stage").press("x")
         page.page.wait_for_selector("#legend:not([hidden])")
         assert overlapping(page, names) == []

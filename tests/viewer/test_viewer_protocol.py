@@ -2,13 +2,16 @@
 
 import json
 import math
+import re
 import struct
+from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from renderer import viewer
 from renderer.limits import FARTHEST
 from renderer.viewer.protocol import (
     FILE,
@@ -260,6 +263,27 @@ def test_a_turntable_turns_a_few_times_about_a_line(key: str, values: list[Any])
     for value in values:
         with pytest.raises(ValueError, match=rf"^turntable\.{key}(\.\d)?: .*, got "):
             parse(said(TURNTABLE | {key: value}))
+
+
+def test_what_the_page_offers_is_allowed() -> None:
+    """A turntable of 72 frames 720 high was offered, and refused."""
+    lists = (Path(viewer.__file__).parent / "page" / "sharing.js").read_text()
+    height, frames = (
+        max(int(n) for n in re.findall(r'\["(\d+)"', re.findall(f"const {name} = (.*)", lists)[0]))
+        for name in ("HEIGHTS", "FRAMES")
+    )
+    assert (height, frames) == (720, 72)
+    assert parse(said(TURNTABLE | {"w": MAX_SIDE, "h": height, "frames": frames}))
+
+
+def test_a_rule_of_a_whole_message_is_told_without_the_message() -> None:
+    """It was told as a Value error, with the message's first forty characters as Python writes a dict."""
+    with pytest.raises(ValueError) as told:
+        parse(said(TURNTABLE | {"w": 1024, "h": 1024, "frames": 257}))
+    of = "257 frames of 1024 x 1024"
+    assert str(told.value) == f"turntable: expected at most {MAX_FRAME_PIXELS} pixels in all frames, got {of}"
+    with pytest.raises(ValueError, match=r"turntable\.w: Field required$"):
+        parse(said({key: value for key, value in TURNTABLE.items() if key != "w"}))
 
 
 def test_a_turntable_has_at_most_so_many_pixels() -> None:

@@ -303,7 +303,10 @@ TURN = FILE_OF_VIEW | {"type": "turntable", "pivot": [0, 0, 0], "axis": [0, 1, 0
         (LONG_STILL | {"w": 4096, "h": 4096}, "still: .*at most 8388608 pixels, got 4096 x 4096"),
         (LONG_STILL | {"w": 5000}, "still.w: .*, got 5000"),
         (LONG_STILL | {"settings": {"samples": 100}}, "still.settings.samples: .*, got 100"),
-        (TURN, "turntable: .*at most 33554432 pixels in all frames, got 36 frames of 2048 x 2048"),
+        (
+            TURN | {"frames": 65},
+            "turntable: .*at most 268435456 pixels in all frames, got 65 frames of 2048 x 2048",
+        ),
         (TURN | {"w": 8, "h": 8, "frames": 10**9}, "turntable.frames: .*, got 1000000000"),
         (LONG_STILL | {"file": "/etc/passwd"}, "still.file: Extra inputs are not permitted"),
         (LONG_STILL | {"m": [0] * 16}, "m: expected a last row of 0, 0, 0, 1"),

@@ -8,7 +8,7 @@ from urllib.parse import parse_qs, urlencode
 
 import numpy as np
 import pytest
-from viewer_page import CHROMIUM, SCENE, Viewer, served
+from viewer_page import CHROMIUM, MODELS, SCENE, Viewer, served
 
 from renderer import Mirror, Phong, PointLight, load_scene, render
 from renderer.picture.image import srgb
@@ -139,6 +139,61 @@ def test_lights_come_and_go(viewer: Viewer, scenes: Path) -> None:
     assert not viewer.page.is_disabled("[name=azimuth]")
 
 
+def test_sliders_and_fields_of_a_light_are_one_direction(viewer: Viewer, scenes: Path) -> None:
+    """Once a slider had moved, what was typed changed nothing, and was what Reset light went back to."""
+    scene, first = load_scene(scenes / "blocks.toml"), "#lights details:nth-of-type(1)"
+    before = viewer.pixels("picture")
+    unfold(viewer, first)
+    fields = [viewer.page.locator(f"{first} [aria-label='direction, {axis}']") for axis in "xyz"]
+    viewer.page.locator("[name=azimuth]").fill("90")
+    settled(viewer)
+    turned = [float(field.input_value()) for field in fields]
+    assert turned[0] < -0.5 and abs(turned[2]) < 1e-9 and viewer.page.inner_text("#light-note") == "Moved"
+    shows(viewer, scene.model_copy(update={"lights": (scene.lights[0].model_copy(update={"direction": turned}),)}))
+    fields[2].fill("-2")
+    settled(viewer)
+    typed = (turned[0], turned[1], -2.0)
+    shows(viewer, scene.model_copy(update={"lights": (scene.lights[0].model_copy(update={"direction": typed}),)}))
+    assert float(viewer.page.input_value("[name=azimuth]")) == round(np.degrees(np.arctan2(-turned[0], 2.0)))
+    viewer.page.click("#reset-light")
+    settled(viewer)
+    np.testing.assert_array_equal(viewer.pixels("picture"), before)
+    assert [float(field.input_value()) for field in fields] == [-0.6, -1.4, -0.8]
+    assert viewer.page.inner_text("#light-note") == "As the scene has it" and viewer.page.is_disabled("#reset-light")
+
+
+def test_opened_lights_stay_open_and_so_is_a_new_one(viewer: Viewer) -> None:
+    def opened() -> list[bool]:
+        return viewer.page.evaluate("() => [...document.querySelectorAll('#lights details')].map((one) => one.open)")
+
+    viewer.page.click("text=Add point light")
+    assert opened() == [False, True]
+    unfold(viewer, "#lights details:nth-of-type(1)")
+    viewer.page.click("text=Add directional light")
+    assert opened() == [True, True, True]
+    unfold(viewer, RED)
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    assert opened() == [True, True, True]
+    viewer.page.click("#lights details:nth-of-type(2) > summary")
+    viewer.page.click("#lights details:nth-of-type(1) >> text=Remove")
+    assert opened() == [False, True]
+
+
+def test_a_material_of_another_type_comes_back_as_it_was(viewer: Viewer) -> None:
+    """Its colours were lost, because a mirror has none of them."""
+    unfold(viewer, RED)
+    viewer.page.locator(f"{RED} [aria-label='diffuse, green']").fill("0.625")
+    before = viewer.page.evaluate("() => viewer.panel.settings.edits")
+    for kind in ("mirror", "dielectric", "phong"):
+        viewer.page.select_option("[aria-label='Type of red']", kind)
+    assert viewer.page.evaluate("() => viewer.panel.settings.edits") == before
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    viewer.page.click(f"{RED} .undo")
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    viewer.page.select_option("[aria-label='Type of red']", "phong")
+    assert viewer.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
+
+
 def test_objects_are_hidden_and_seen_again_with_all_else_as_it_was(viewer: Viewer, scenes: Path) -> None:
     scene = load_scene(scenes / "blocks.toml")
     viewer.page.locator("[name=max_depth]").fill("2")
@@ -235,6 +290,42 @@ def test_the_address_brings_the_view_back(browser: Any, url: str, scenes: Path) 
         two.settled("phong")
     finally:
         two.context.close()
+
+
+def told(viewer: Viewer) -> dict[str, list[str]]:
+    return parse_qs(address(viewer).split("#")[1])
+
+
+def test_the_address_keeps_the_settings_of_the_page_when_the_scene_is_loaded_again(viewer: Viewer) -> None:
+    """They were left out from then on, as if they were the scene's own; and an address without them left them."""
+    chosen = {"size": "0.25", "aov": "depth", "refine": "4"}
+    for name, value in chosen.items():
+        viewer.page.select_option(f"[name={name}]", value)
+    before = viewer.page.evaluate("() => viewer.scene.id")
+    viewer.page.click("#reload")
+    viewer.page.wait_for_function("(id) => viewer.scene.id !== id", arg=before)
+    settled(viewer)
+    assert {name: told(viewer).get(name) for name in chosen} == {name: [value] for name, value in chosen.items()}
+    viewer.page.evaluate("() => (location.hash = 'file=blocks.toml')")
+    viewer.page.wait_for_function("() => viewer.panel.fields.size.value === '1'")
+    assert viewer.page.evaluate("() => viewer.panel.chosen") == {}
+    settled(viewer)
+
+
+def test_the_address_has_the_mode_and_what_a_proof_compares(viewer: Viewer) -> None:
+    """A change of mode was written with the next movement, and the pair never."""
+    told(viewer)
+    viewer.page.evaluate("() => viewer.setMode('proof')")
+    assert told(viewer)["mode"] == ["proof"] and "pair" not in told(viewer)
+    viewer.page.select_option("[name=pair]", "samples")
+    link = address(viewer)
+    assert parse_qs(link.split("#")[1])["pair"] == ["samples"]
+    viewer.page.select_option("[name=pair]", "brute")
+    address(viewer)
+    viewer.page.evaluate("(hash) => (location.hash = hash)", link.split("#")[1])
+    viewer.page.wait_for_function("() => viewer.panel.settings.pair === 'samples'")
+    viewer.page.evaluate("() => viewer.setMode('octree')")
+    settled(viewer)
 
 
 @pytest.mark.parametrize("hidden", ["floor,objects.0", "objects.0,objects.0"])
@@ -340,6 +431,18 @@ def test_everything_is_folded_at_first_and_as_it_was_left_later(browser: Any, ur
         assert narrow.page.locator("#frame").bounding_box()["width"] == 900
     finally:
         narrow.context.close()
+
+
+def test_a_scene_has_its_name_and_a_mesh_that_of_its_file(browser: Any) -> None:
+    """It was Block.Ply."""
+    with served(MODELS / "block.ply") as url:
+        page = Viewer(browser, url)
+        try:
+            page.page.goto(url)
+            page.page.wait_for_selector("body[data-ready]")
+            assert page.page.inner_text("#name") == "block.ply"
+        finally:
+            page.context.close()
 
 
 def test_the_hint_goes_with_the_first_click(browser: Any, url: str) -> None:

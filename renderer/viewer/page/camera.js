@@ -149,15 +149,17 @@ export class Camera {
     this.pivot = [...point];
   }
 
-  // Look at the middle of a way from its side, so far off that all of it is in view.
-  seeAside(start, end) {
+  // Look at the middle of a way from its side, so far off that all of it is in view: in a part of the picture that is
+  // `width` wide and whose middle is `x` to the right of the picture's, in shares of the picture's height.
+  seeAside(start, end, { x, width }) {
     const way = sub(end, start);
     this.pivot = add(start, scale(way, 0.5));
     this.yaw = Math.atan2(dot(way, this.axes[0]), dot(way, this.axes[2])) + Math.PI / 2;
     this.pitch = 0.15;
-    const wanted = 1.2 * norm(way);
+    const wanted = (1.2 * norm(way)) / Math.min(width, 1);
     if (this.height !== null) this.height = wanted;
     else this.distance = wanted / (2 * Math.tan(this.fovy / 2));
+    this.pan(-x, 0);
   }
 
   // Walk: right, up and forward in scene units.

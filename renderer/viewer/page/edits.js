@@ -41,6 +41,8 @@ function fits(fields, types) {
     Object.entries(known).every(([name, [kind]]) => (given[name] === undefined ? OPTIONAL.includes(name) : TAKEN[kind](given[name], name)));
 }
 
+const shines = (light) => light.type === "directional" && light.irradiance.some((x) => x > 0);
+
 const lightFields = (light) => {
   const [place, color] = light.type === "directional" ? ["direction", "irradiance"] : ["position", "intensity"];
   return { type: light.type, [place]: light[place], [color]: light.color };
@@ -62,7 +64,24 @@ export class Edits {
     this.scene = scene;
     this.own = { materials: Object.fromEntries(scene.materials.map((m) => [m.name, m.fields])), lights: scene.lights.map(lightFields) };
     this.now = copy(this.own);
+    this.left = new Map(); // of each material, by its name and a type, the fields that were left
     this.show();
+  }
+
+  // The first directional light that shines, which sliders turn; undefined where there is none.
+  get sun() {
+    return this.now.lights.find(shines);
+  }
+
+  // Its direction in the file; undefined where that has none.
+  get sunlight() {
+    return this.own.lights[this.now.lights.indexOf(this.sun)]?.direction;
+  }
+
+  turnSun(direction) {
+    this.sun.direction = [...direction];
+    this.showLights();
+    this.changed();
   }
 
   // What differs from the file, as the server reads it; null where nothing does.
@@ -95,13 +114,20 @@ export class Edits {
   }
 
   show() {
-    const { materials, lights } = this.lists;
+    const { materials } = this.lists;
     const open = new Set([...materials.querySelectorAll("details[open]")].map((entry) => entry.dataset.name));
     materials.replaceChildren(...this.named.map(([name]) => this.material(name, open.has(name))));
-    const add = (type) => this.button(`Add ${type} light`, () => this.addLight(type));
-    lights.replaceChildren(...this.now.lights.map((fields, i) => this.light(fields, i)),
-      element("div", { className: "buttons" }, add("directional"), add("point")));
+    this.showLights();
     this.summarise();
+  }
+
+  // The lights, those open that were and the one that is `added`.
+  showLights(added) {
+    const before = this.entries ?? new Map();
+    const { lights } = this.now;
+    this.entries = new Map(lights.map((fields, i) => [fields, this.light(fields, i, fields === added || before.get(fields)?.open)]));
+    const add = (type) => this.button(`Add ${type} light`, () => this.addLight(type));
+    this.lists.lights.replaceChildren(...this.entries.values(), element("div", { className: "buttons" }, add("directional"), add("point")));
   }
 
   // The dots of materials and lights in their colours, and which of the materials are changed.
@@ -153,7 +179,11 @@ export class Edits {
     };
     const type = element("select", { ariaLabel: `Type of ${name}` });
     type.append(...Object.keys(MATERIALS).map((value) => element("option", { value, textContent: value, selected: value === fields.type })));
-    type.addEventListener("change", () => put(this.retyped(fields, type.value)));
+    type.addEventListener("change", () => {
+      const key = (of) => JSON.stringify([name, of]);
+      this.left.set(key(fields.type), fields);
+      put(this.left.get(key(type.value)) ?? this.retyped(fields, type.value));
+    });
     const undo = this.button("As in the file", () => put(copy(this.own.materials[name])), "undo");
     return this.entry(name, fields.type, name, open, element("label", { className: "row" }, element("span", { textContent: "type" }), type),
       ...this.controls(fields, MATERIALS), undo);
@@ -167,9 +197,9 @@ export class Edits {
     return { type, ...Object.fromEntries(kept.filter(([, value]) => value !== null)) };
   }
 
-  light(fields, i) {
+  light(fields, i, open = false) {
     const remove = this.button("Remove", () => this.putLights(this.now.lights.filter((light) => light !== fields)));
-    return this.entry(`Light ${i + 1}`, fields.type, i, false, ...this.controls(fields, LIGHTS), remove);
+    return this.entry(`Light ${i + 1}`, fields.type, i, open, ...this.controls(fields, LIGHTS), remove);
   }
 
   // A point light begins above the scene, as bright in its middle as a directional one.
@@ -180,12 +210,13 @@ export class Edits {
     const point = { position: [middle[0], upper[1] + 0.5 * size, middle[2]], intensity: [1, 1, 1].map(() => 0.5 * size * size) };
     const { direction, irradiance } = LIGHTS.directional;
     const added = type === "point" ? point : { direction: [...direction[1]], irradiance: [...irradiance[1]] };
-    this.putLights([...this.now.lights, { type, ...added }]);
+    const light = { type, ...added };
+    this.putLights([...this.now.lights, light], light);
   }
 
-  putLights(lights) {
+  putLights(lights, added) {
     this.now.lights = lights;
-    this.show();
+    this.showLights(added);
     this.changed();
   }
 }

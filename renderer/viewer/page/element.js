@@ -12,3 +12,9 @@ export function swatch(color) {
   dot.style.background = color;
   return dot;
 }
+
+// The text of a page's heading and its class: a scene's name in words, or the name of another file as it is.
+export function heading(name) {
+  const words = name.replace(/\.toml$/, "");
+  return words.includes(".") ? { textContent: words, className: "" } : { textContent: words.replaceAll("_", " "), className: "words" };
+}

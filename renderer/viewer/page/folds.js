@@ -1,9 +1,8 @@
 // Which parts of the panel are open, and whether the panel itself is: as this browser was left.
 
 const KEY = "octree-render-folds";
-// On windows less wide than this the picture has the room, until the panel is asked for; below, on phones, the panel
-// stands under the picture.
-const NARROW = "(min-width: 761px) and (max-width: 1099px)";
+// On windows less wide than this the picture has the room, until the panel is opened.
+const NARROW = "(max-width: 1099px)";
 
 // Some frames and private windows keep nothing.
 function kept() {
@@ -24,6 +23,7 @@ export class Folds {
     this.show(this.state.panel ?? !matchMedia(NARROW).matches);
     toggle.addEventListener("click", () => {
       this.show(document.body.classList.contains("wide"));
+      if (!document.body.classList.contains("wide")) panel.scrollIntoView(); // on phones it stands under the picture
       this.keep("panel", !document.body.classList.contains("wide"));
     });
   }

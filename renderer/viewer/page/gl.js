@@ -65,7 +65,7 @@ export class GlLayer {
 
   // Draw for `view`; with the shading DEPTH only lines are seen, and what lies under them darkened by the share `veil`.
   // `panes` are the boxes' faces, `layers` are {name, set, hidden, fades}.
-  draw(view, { shading, veil, direction, panes, layers }) {
+  draw(view, { shading, veil, panes, layers }) {
     const { gl } = this;
     const seen = layers.filter(({ set }) => set.count);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
@@ -78,7 +78,7 @@ export class GlLayer {
     if (shading === DEPTH && !seen.length) return;
     const clip = clipMatrix(view, this.scene.bounds);
     const eye = seenFrom(view, this.scene.bounds);
-    this.model.draw(shading, clip, { eye, scene: this.scene, direction, veil: [...dark, veil] });
+    this.model.draw(shading, clip, { eye, scene: this.scene, veil: [...dark, veil] });
     this.boxes.draw(panes, clip);
     for (const { name, set, hidden, fades } of seen) this.lines.draw(name, set, clip, this.fade(view, fades), hidden);
   }

@@ -6,9 +6,8 @@ const HIDDEN = { boxes: 0.1, visited: 0.3, rays: 0.65 };
 const VEIL = 0.66;
 
 // What GlLayer.draw takes beside the view, for `boxes` {edges, panes, count} and `rays` {path, visited}.
-export const drawing = (shading, direction, boxes, rays) => ({
+export const drawing = (shading, boxes, rays) => ({
   shading,
-  direction,
   veil: boxes.count ? VEIL : 0,
   panes: boxes.panes,
   layers: [

@@ -4,6 +4,7 @@ import { Camera } from "./camera.js";
 import { Connection, FACE_COLORS, PROOF, fetchFrom } from "./connection.js";
 import { Controls } from "./controls.js";
 import { film } from "./film.js";
+import { heading } from "./element.js";
 import { GlLayer } from "./gl.js";
 import { Busy } from "./busy.js";
 import { Changes } from "./changes.js";
@@ -128,14 +129,14 @@ class Viewer {
     this.scene = scene;
     this.camera = new Camera(scene);
     if (stays(before, scene)) this.camera.state = before.camera;
+    this.proof.offer(scene.references);
     this.panel.load(scene);
     if (stays(before, scene) || continues(before, scene)) this.panel.chosen = before.chosen;
     this.objects.load(scene);
     this.dress();
     this.forget();
-    this.proof.offer(scene.references);
     this.readings.ofScene(scene);
-    find("#name").textContent = scene.name.replace(/\.toml$/, "").replaceAll("_", " ");
+    Object.assign(find("#name"), heading(scene.name));
     document.title = `${scene.name} · octree-render`;
     if (!this.controls) this.begin();
     this.layout();
@@ -166,6 +167,7 @@ class Viewer {
       return;
     }
     this.panel.load(this.scene);
+    this.panel.restart();
     this.panel.chosen = chosen;
     if (state) this.camera.state = state;
     this.changed("edits");
@@ -175,6 +177,11 @@ class Viewer {
 
   offers(mode) {
     return mode !== undefined && !find(`[name=mode][value=${mode}]`).disabled;
+  }
+
+  // Have the view written into the address soon.
+  keepAddress() {
+    this.writing ??= setTimeout(() => this.writeAddress(), WRITE);
   }
 
   // Write the view into the address.
@@ -278,10 +285,7 @@ class Viewer {
     onClick("#fit", () => this.fit());
     onClick("#cancel", () => this.cancel());
     onClick("#reload", () => this.open(this.scene.name));
-    onClick("#reset-light", () => {
-      this.panel.resetLight();
-      this.changed("light");
-    });
+    onClick("#reset-light", () => this.panel.edits.turnSun(this.panel.edits.sunlight));
     onClick("#save-picture", () => this.save());
     onClick("#save-camera", () => {
       const { m, fovy, height } = this.view();
@@ -338,6 +342,7 @@ class Viewer {
     find("#hud").textContent = "";
     this.dirty = true;
     this.movedAt = 0;
+    this.keepAddress();
     this.request();
   }
 
@@ -359,7 +364,7 @@ class Viewer {
     this.dirty = true;
     this.movedAt = now;
     this.panel.showCamera(this.camera);
-    this.writing ??= setTimeout(() => this.writeAddress(), WRITE);
+    this.keepAddress();
     this.request();
   }
 
@@ -473,7 +478,7 @@ class Viewer {
     if (this.layer) {
       const view = live ? { ...this.shown.view, w: this.shown.w, h: this.shown.h } : this.view();
       const shading = live ? DEPTH : this.shading;
-      this.layer.draw(view, drawing(shading, this.panel.light, this.boxes, this.rays));
+      this.layer.draw(view, drawing(shading, this.boxes, this.rays));
     }
     if (this.mode === "gl" && this.layer?.loaded) this.note({ seq: this.seq, step: 0, last: true }, this.view());
     // A picture of an earlier camera stands for a while only, unless another drawing has replaced it by then.
@@ -624,8 +629,16 @@ class Viewer {
 
   // See the first ray of a pick from its side.
   seeAside({ path: [{ start, end }] }) {
-    this.camera.seeAside(start, end);
+    this.camera.seeAside(start, end, this.free);
     this.moved();
+  }
+
+  // The part of the picture beside the card, as `Camera.seeAside` takes it.
+  get free() {
+    const [frame, card] = ["#frame", "#card"].map((name) => find(name).getBoundingClientRect());
+    const beside = card.top < frame.bottom && card.right < frame.right; // on phones it stands below
+    const hidden = beside ? Math.max(card.right - frame.left, 0) : 0;
+    return { x: hidden / 2 / frame.height, width: (frame.width - hidden) / frame.height };
   }
 
   // Turn about what was clicked last, once it is known what that is.

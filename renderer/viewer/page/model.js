@@ -202,7 +202,7 @@ export class Model {
     this.coloured = true;
   }
 
-  // Draw by `clip` (world to clip space); `appearance` is {eye, scene, direction or null, veil}.
+  // Draw by `clip` (world to clip space); `appearance` is {eye, scene, veil}.
   draw(shading, clip, appearance) {
     const { gl } = this;
     const seen = shading === FACES && !this.coloured ? LIT : shading;
@@ -221,7 +221,7 @@ export class Model {
     gl.disable(gl.POLYGON_OFFSET_FILL);
   }
 
-  drawRuns(runs, shading, glass, clip, { eye, scene, direction, veil }) {
+  drawRuns(runs, shading, glass, clip, { eye, scene, veil }) {
     if (!runs.length) return;
     const { gl } = this;
     this.programs[[shading, glass]] ??= program(gl, source(shading, glass, VERTEX), source(shading, glass, FRAGMENT));
@@ -230,18 +230,14 @@ export class Model {
     gl.uniformMatrix4fv(uniforms.clip, false, clip);
     gl.uniform4fv(uniforms.veil, veil);
     if (uniforms.eye) gl.uniform3fv(uniforms.eye, eye);
-    if (shading === LIT) this.setLights(uniforms, scene, direction);
+    if (shading === LIT) this.setLights(uniforms, scene);
     for (const [first, count] of runs) gl.drawArrays(gl.TRIANGLES, 3 * first, 3 * count);
   }
 
-  setLights(uniforms, scene, direction) {
+  setLights(uniforms, scene) {
     const { gl } = this;
     const lights = scene.lights.slice(0, MAX_LIGHTS);
-    const turned = direction ? lights.findIndex((l) => l.type === "directional") : -1;
-    const places = lights.flatMap((l, i) => {
-      if (l.type !== "directional") return [...l.position, 1];
-      return [...(i === turned ? direction : l.direction).map((x) => -x), 0];
-    });
+    const places = lights.flatMap((l) => (l.type === "directional" ? [...l.direction.map((x) => -x), 0] : [...l.position, 1]));
     gl.uniform1i(uniforms.light_count, lights.length);
     if (lights.length) {
       gl.uniform4fv(uniforms.light_places, places);

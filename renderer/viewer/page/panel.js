@@ -9,24 +9,27 @@ import { count } from "./readings.js";
 const MAX_SAMPLES = 64;
 const DEGREE = Math.PI / 180;
 // What the user chooses of a scene's picture, beside its camera, materials and lights.
-const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "azimuth", "elevation"];
+const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair"];
+// Those that are the page's and no scene's: they stay when a scene is loaded.
+const STAYING = ["size", "aov", "refine", "pair"];
+
+const usual = (list) => ([...list.options].find((option) => option.defaultSelected) ?? list.options[0]).value;
 
 export class Panel {
   // `changed(name)` is called with the name of the field that the user moved.
   constructor(changed) {
     this.form = document.querySelector("#settings");
     this.fields = this.form.elements;
-    this.lightMoved = false;
     this.folds = new Folds(document.querySelector("#panel"), document.querySelector("#toggle-panel"));
     const find = (id) => document.querySelector(id);
     this.edits = new Edits({ materials: find("#materials"), lights: find("#lights"), changed: () => {
-      this.offerLight();
+      this.showLight();
       this.showValues();
       changed("edits");
     } });
     this.form.addEventListener("submit", (event) => event.preventDefault());
     this.form.addEventListener("input", ({ target }) => {
-      if (target.name === "azimuth" || target.name === "elevation") this.lightMoved = true;
+      if (target.name === "azimuth" || target.name === "elevation") return this.edits.turnSun(this.sliders);
       this.showValues();
       changed(target.name);
     });
@@ -48,10 +51,20 @@ export class Panel {
     fields.level.value = Math.min(3, fields.level.max);
     document.querySelector("#reload").disabled = !scene.files.length;
     this.offerBoxes(scene.octree.nodes > 0);
-    this.resetLight();
+    this.showLight();
     this.showLevels(Math.max(scene.octree.levels, 1));
     this.showNeeds(scene.needs);
-    this.own = this.values;
+    this.own = { ...this.values, ...this.usual };
+  }
+
+  // The values that those of STAYING have at first.
+  get usual() {
+    return Object.fromEntries(STAYING.map((name) => [name, usual(this.fields[name])]));
+  }
+
+  // Begin anew with what `load` leaves as it is.
+  restart() {
+    for (const [name, value] of Object.entries(this.usual)) this.fields[name].value = value;
   }
 
   // The values of CHOICES as they are, as text.
@@ -60,11 +73,10 @@ export class Panel {
     return Object.fromEntries(CHOICES.map((name) => [name, text(this.fields[name])]));
   }
 
-  // What the user chose: the values that are not those with which the scene was loaded, and edits as JSON.
+  // What the user chose: the values that are not those of the scene or, at first, of the page; and edits as JSON.
   get chosen() {
-    const { values, lightMoved } = this;
-    const isLight = (name) => name === "azimuth" || name === "elevation";
-    const moved = CHOICES.filter((name) => (isLight(name) ? lightMoved : values[name] !== this.own[name]));
+    const { values } = this;
+    const moved = CHOICES.filter((name) => values[name] !== this.own[name]);
     const edits = this.edits.value;
     return { ...Object.fromEntries(moved.map((name) => [name, values[name]])), ...(edits ? { edits: JSON.stringify(edits) } : {}) };
   }
@@ -81,20 +93,9 @@ export class Panel {
       if (chosen[name] === undefined) continue;
       if (field.type === "checkbox") field.checked = chosen[name] === "true";
       else if (field.type === "range" || [...field.options].some((option) => option.value === chosen[name])) field.value = chosen[name];
-      if (name === "azimuth" || name === "elevation") this.lightMoved = this.lit;
     }
-    this.offerLight();
+    this.showLight();
     this.showValues();
-  }
-
-  // Whether there is a directional light, which the sliders turn.
-  get lit() {
-    return this.edits.now.lights.some((light) => light.type === "directional");
-  }
-
-  offerLight() {
-    document.querySelector("#light").disabled = !this.lit;
-    this.lightMoved &&= this.lit;
   }
 
   // Boxes need nodes, and WebGL.
@@ -110,35 +111,30 @@ export class Panel {
     this.fields.samples.value = Math.min(own, MAX_SAMPLES);
   }
 
-  // The sliders of the light back to where the scene's first directional light is.
-  resetLight() {
-    const light = this.edits.now.lights.find((l) => l.type === "directional");
-    this.lightMoved = false;
-    this.offerLight();
-    if (light) {
-      const [x, y, z] = light.direction.map((v) => -v);
-      this.fields.azimuth.value = Math.atan2(x, z) / DEGREE;
-      this.fields.elevation.value = Math.atan2(y, Math.hypot(x, z)) / DEGREE;
-    }
-    this.showValues();
+  // The sliders of the light where its direction is.
+  showLight() {
+    const { sun } = this.edits;
+    document.querySelector("#light").disabled = !sun;
+    if (!sun) return;
+    const [x, y, z] = sun.direction.map((v) => -v);
+    this.fields.azimuth.value = Math.atan2(x, z) / DEGREE;
+    this.fields.elevation.value = Math.atan2(y, Math.hypot(x, z)) / DEGREE;
   }
 
-  // The direction in which the light travels, or null for the scene's own.
-  get light() {
-    if (!this.lightMoved) return null;
+  // The direction in which light travels by the sliders.
+  get sliders() {
     const [a, e] = [this.fields.azimuth.value * DEGREE, this.fields.elevation.value * DEGREE];
     return [-Math.cos(e) * Math.sin(a), -Math.sin(e), -Math.cos(e) * Math.cos(a)];
   }
 
   // The settings of a view as the server reads them.
   get settings() {
-    const { max_depth, samples, shadows, reflection, refraction, aov, refine } = this.fields;
+    const { max_depth, samples, shadows, reflection, refraction, aov, refine, pair } = this.fields;
     // Raw pixels cost nothing on this machine; through a network a tenth of them is worth the loss.
     const local = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
     const edits = this.edits.value;
     return { ...(edits ? { edits } : {}), max_depth: Number(max_depth.value), samples: Number(samples.value), shadows: shadows.checked,
-      reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, light: this.light,
-      refine: Number(refine.value), pair: document.querySelector("[name=pair]").value, pixels: local ? "rgba" : "jpeg" };
+      reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, refine: Number(refine.value), pair: pair.value, pixels: local ? "rgba" : "jpeg" };
   }
 
   // The fields of the camera as it is.
@@ -176,10 +172,11 @@ export class Panel {
     document.querySelectorAll("#levels i").forEach((bar, i) => bar.classList.toggle("chosen", i === Number(fields.level.value)));
     fields.azimuth_shown.value = `${Math.round(fields.azimuth.value)}°`;
     fields.elevation_shown.value = `${Math.round(fields.elevation.value)}°`;
-    const directional = !document.querySelector("#light").disabled;
-    document.querySelector("#reset-light").disabled = !this.lightMoved;
-    const note = this.lightMoved ? "Moved" : "As the scene has it";
-    document.querySelector("#light-note").textContent = directional ? note : "This scene has no directional light";
+    const { sun, sunlight } = this.edits;
+    const moved = Boolean(sunlight) && String(sun.direction) !== String(sunlight);
+    document.querySelector("#reset-light").disabled = !moved;
+    const note = moved ? "Moved" : sunlight ? "As the scene has it" : "Added here";
+    document.querySelector("#light-note").textContent = sun ? note : "This scene has no directional light";
   }
 
   showLevels(levels) {

@@ -1,6 +1,6 @@
 // One HTML file that shows what the page shows, without a server: the picture, the model, boxes and rays.
 import { encoded, dataUrl } from "./base64.js";
-import { element } from "./element.js";
+import { element, heading } from "./element.js";
 import { fetchFrom } from "./connection.js";
 import { drawing } from "./layers.js";
 import { NO_BOXES, NO_RAYS } from "./overlay.js";
@@ -35,7 +35,6 @@ export class Share {
       view: { m: view.m, fovy: view.fovy, height: view.height, w: canvas.width, h: canvas.height },
       camera: viewer.camera.state,
       mode,
-      direction: viewer.panel.light,
       boxes: { level: boxes.level, levels: boxes.levels, all: boxes.all },
       pick: viewer.rays.shown ? viewer.rays.pick : null,
       note: this.lacks(scene),
@@ -67,7 +66,7 @@ export class Share {
     if (!viewer.layer?.loaded) throw new Error("there is no picture yet");
     const { canvas } = viewer.layer;
     const copy = element("canvas", { width: canvas.width, height: canvas.height });
-    viewer.layer.draw(viewer.view(), drawing(viewer.shading, viewer.panel.light, NO_BOXES, NO_RAYS));
+    viewer.layer.draw(viewer.view(), drawing(viewer.shading, NO_BOXES, NO_RAYS));
     copy.getContext("2d").drawImage(canvas, 0, 0);
     viewer.draw();
     return { canvas: copy, view: viewer.view(), mode: viewer.mode === "phong" ? name : "GL lighting" };
@@ -113,7 +112,7 @@ ${style.replaceAll("</", "<\\/")}
 <body>
 <header>
   <img class="logo" src="${icon}" alt="" width="26" height="26">
-  <h1 id="name">${escaped(name.replace(/\.toml$/, "").replaceAll("_", " "))}</h1>
+  <h1 id="name" class="${heading(name).className}">${escaped(heading(name).textContent)}</h1>
   <fieldset class="modes" id="shows">
     <legend class="unseen">Show</legend>
     <label><input type="radio" name="shows" value="picture" checked><span><kbd>1</kbd>Picture</span></label>

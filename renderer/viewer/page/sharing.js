@@ -90,7 +90,7 @@ export class Sharing {
     const h = Number(this.height.value);
     const [format, frames] = [this.format.value, Number(this.frames.value)];
     const turn = { pivot: camera.pivot, axis: camera.axes[1], frames, format };
-    const film = { w: Math.max(Math.round((h * size.w) / size.h), 1), h };
+    const film = allowed([(h * size.w) / size.h, h]);
     this.ask({ type: "turntable", ...this.asked, ...film, ...turn }, `-turntable.${format}`);
   }
 

@@ -142,7 +142,7 @@ class Standalone {
     const boxes = this.fields.boxes.checked ? this.boxes : NO_BOXES;
     const rays = this.fields.rays.checked ? this.rays : NO_RAYS;
     const seen = { path: rays.path, visited: this.showNodes ? rays.visited : NO_RAYS.visited };
-    this.layer.draw(view, drawing(picture ? DEPTH : LIT, known.direction, boxes, seen));
+    this.layer.draw(view, drawing(picture ? DEPTH : LIT, boxes, seen));
   }
 
   // The card of the picked ray, as long as the ray is shown.
