@@ -175,9 +175,9 @@ class Session:
             tasks.create_task(self._open_scenes())
             tasks.create_task(self.exporter.run(self.complain))
 
-    async def complain(self, error: Exception) -> None:
-        """Send the page an error's message, on one line."""
-        await self._tell(type="error", message=" ".join(str(error).split()) or type(error).__name__)
+    async def complain(self, error: Exception, **more: bool) -> None:
+        """Send the page an error's message, on one line; with ``stays=True`` one that holds until the next scene."""
+        await self._tell(type="error", message=" ".join(str(error).split()) or type(error).__name__, **more)
 
     def reload(self) -> None:
         """Show the scene as its files have it now, after what the page waits for."""
@@ -314,7 +314,8 @@ class Session:
                 if shown is not self.shown or not isinstance(wanted, Reload):
                     await self.show_scene(shown)
             except Exception as error:  # as above
-                await self.complain(error)
+                # What is shown is older than its file for as long as that cannot be loaded.
+                await self.complain(error, **({"stays": True} if isinstance(wanted, Reload) else {}))
                 if isinstance(wanted, Hello):  # a page that begins has no scene to go on with
                     await self.show_scene(self.shown)
                 elif self._outdated:  # and one that goes on has to be as its file is

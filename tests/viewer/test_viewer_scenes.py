@@ -98,6 +98,25 @@ def test_an_edited_scene_is_loaded_again_and_its_camera_stays(browser: Any, tmp_
             page.context.close()
 
 
+def test_a_fault_of_an_edited_file_is_told_until_it_is_mended(browser: Any, tmp_path: Path) -> None:
+    """It went after eight seconds, and the picture of the file before stood there without a word."""
+    file = tmp_path / "blocks.toml"
+    file.write_text(SCENE)
+    with served(file) as address:
+        page = Viewer(browser, address).open()
+        try:
+            notice = page.page.locator("#notices [data-name=edited]")
+            for fault in ("fov = 400", "fov = 500"):  # the newer one takes the other's place
+                file.write_text(SCENE.replace("fov = 38", fault))
+                notice.filter(has_text=fault.removeprefix("fov = ")).wait_for()
+                assert notice.count() == 1
+            file.write_text(SCENE)
+            notice.wait_for(state="detached")
+            shows_only(page, file)
+        finally:
+            page.context.close()
+
+
 def test_a_scene_is_opened_in_the_tab_that_asked_and_stays_when_it_is_loaded_again(browser: Any, url: str) -> None:
     one, two = Viewer(browser, url).open(), Viewer(browser, url).open()
     try:

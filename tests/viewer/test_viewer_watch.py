@@ -211,7 +211,7 @@ def test_a_scene_beside_that_is_gone_is_told_of_and_stays(tmp_path: Path) -> Non
     page = lives(file, scenario)
     assert page.session.shown.name == "b.toml"
     assert [message["type"] for message in page.told] == ["scene", "error"]
-    assert "b.toml: cannot be read" in page.told[-1]["message"]
+    assert "b.toml: cannot be read" in page.told[-1]["message"] and page.told[-1]["stays"]
 
 
 def test_a_scene_whose_name_is_no_text_is_shown_anew(tmp_path: Path) -> None:

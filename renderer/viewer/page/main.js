@@ -548,14 +548,18 @@ class Viewer {
       legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
       proof: (proof) => this.sent.has(proof.seq) && (this.sent.get(proof.seq).legend = proof),
       refined: (told) => told.seq === this.seq && this.refined(told),
-      scene: ({ id }) => this.showScene(id).catch((error) => this.cannotShow(id, error)),
+      scene: ({ id }) => {
+        this.notices.clear("edited");
+        this.showScene(id).catch((error) => this.cannotShow(id, error));
+      },
       camera: ({ name, text }) => saveText(name, text),
       saved: (told) => this.changes.show(told),
       command: ({ text }) => copyText(text).then((copied) => this.notices.say(copied ? `Copied: ${text}` : text)),
       export: (told) => this.sharing.told(told),
-      error: ({ message: text }) => {
+      error: ({ message: text, stays }) => {
         for (const name of ["opening", "tracing"]) this.busy.end(name);
-        this.notices.say(text);
+        if (stays) this.notices.clear("edited"); // what was wrong before
+        this.notices.say(text, stays && "edited");
         if (!this.scene) return;
         this.panel.fields.file.value = this.scene.name; // the one that is still shown
         this.asked = null; // what could not be shown is not asked for again with the next scene
