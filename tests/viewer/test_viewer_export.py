@@ -292,6 +292,13 @@ def given_up(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
     return ended
 
 
+def begun(client: Any, asked: dict[str, Any]) -> None:
+    """Ask for a file and wait until some of its rays are traced: what has not begun has no work to end."""
+    client.send(**asked)
+    while not client.told("export")["done"]:
+        pass
+
+
 LONG = [still(w=2048, h=2048, settings={"samples": 64}), turntable(w=512, h=512, frames=120)]
 
 
@@ -299,8 +306,7 @@ LONG = [still(w=2048, h=2048, settings={"samples": 64}), turntable(w=512, h=512,
 def test_a_stopped_file_ends_its_work_and_another_can_be_asked_for(
     client: Any, given_up: threading.Event, asked: dict[str, Any]
 ) -> None:
-    client.send(**asked)
-    client.told("export")
+    begun(client, asked)
     client.send(type="stop")
     while (share := client.told("export")["done"]) is not None:
         assert share < 1.0
@@ -313,8 +319,7 @@ def test_a_page_that_leaves_ends_the_work_on_its_file(
     server: str, given_up: threading.Event, asked: dict[str, Any]
 ) -> None:
     with Client(server) as leaving:
-        leaving.send(**asked)
-        leaving.told("export")
+        begun(leaving, asked)
     assert given_up.wait(30)
 
 
