@@ -14,9 +14,12 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]  # docstrings.py, and the tree itself whatever is installed
 os.environ.setdefault("OCTREE_RENDERER_QUIET", "1")
 
+import downloads  # noqa: E402
 from api_links import link_api  # noqa: E402
+from case_links import link_cases  # noqa: E402
 from docstrings import as_rst  # noqa: E402
 from figures import tiles  # noqa: E402
+from source_links import link_sources, source_pages  # noqa: E402
 from sphinx.util.logging import getLogger  # noqa: E402
 
 import renderer  # noqa: E402
@@ -31,9 +34,7 @@ include_patterns = [
     "docs/**.md",
     "docs/**.rst",
     "docs/notebooks/*.ipynb",
-    "README.md",
     "CHANGELOG.md",
-    "CONTRIBUTING.md",
     "SECURITY.md",
     "reports/README.md",
 ]
@@ -96,6 +97,13 @@ def put_figures(app, page, source):
         source[0] = source[0].replace("FIGURES", tiles((HERE.parent / "README.md").read_text(encoding="utf-8")))
 
 
+def put_downloads(app, page, source):
+    """The page of downloads has the files that are built now."""
+    if page == "docs/downloads":
+        files = downloads.build(Path(app.outdir, "downloads"))
+        source[0] = source[0].replace("FILES", downloads.listed(files)).replace("VERSION", version)
+
+
 def unpack_samples(app, failed):
     """Reports that are kept compressed are pages of the site."""
     for path in sorted((HERE / "samples").glob("*.html.gz")):
@@ -107,7 +115,12 @@ def unpack_samples(app, failed):
 def setup(app):
     """Let autodoc read this project's docstrings, and add what is made at build."""
     app.connect("source-read", put_figures)
+    app.connect("source-read", put_downloads)
+    app.connect("env-get-outdated", lambda app, env, added, changed, removed: ["docs/downloads"])
     app.connect("doctree-resolved", link_api)
+    app.connect("doctree-resolved", link_sources)
+    app.connect("doctree-resolved", link_cases)
+    app.connect("html-collect-pages", source_pages)
     app.connect("build-finished", unpack_samples)
     app.connect("autodoc-process-signature", short_types)
     app.connect("autodoc-process-docstring", lambda app, what, name, thing, options, lines: as_rst(lines), priority=100)

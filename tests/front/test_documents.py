@@ -276,7 +276,12 @@ def test_toml_in_a_page_is_what_it_stands_for(page, text, checkout):
         assert groups <= set(own)
 
 
-@pytest.mark.parametrize(("page", "text"), blocks("yaml"), ids=shown)
+def workflows(host):
+    """(page, block) of the blocks of YAML for that host: GitHub's have jobs, GitLab's are jobs."""
+    return [(p, text) for p, text in blocks("yaml") if ("jobs" in yaml.safe_load(text)) == (host == "GitHub")]
+
+
+@pytest.mark.parametrize(("page", "text"), workflows("GitHub"), ids=shown)
 def test_a_workflow_in_a_page_has_our_own_actions_and_options_that_there_are(page, text):
     """Its commands are run by tests/front/test_installing.py."""
     used, own = (
@@ -289,6 +294,20 @@ def test_a_workflow_in_a_page_has_our_own_actions_and_options_that_there_are(pag
     options = validation_parser().parse_args(shlex.split(line)[1:])
     (upload,) = [step["with"] for step in job["steps"] if "upload-artifact" in step.get("uses", "")]
     assert Path(upload["path"]) == options.output
+
+
+@pytest.mark.parametrize(("page", "text"), workflows("GitLab"), ids=shown)
+def test_a_job_in_a_page_has_the_commands_of_the_workflow_and_keeps_what_they_write(page, text):
+    """So what is run for the workflow is run for it too, but for where the wheel comes from."""
+    (job,) = yaml.safe_load(text).values()
+    install, validate = job["script"]
+    (other,) = [of for p, of in workflows("GitHub") if p == page]
+    assert validate in other and re.fullmatch(
+        r'pip install "octree_renderer-[\d.]+-py3-none-any\.whl\[validate]"', install
+    )
+    output = validation_parser().parse_args(shlex.split(validate)[1:]).output
+    assert [Path(kept) for kept in job["artifacts"]["paths"]] == [output]
+    assert Path(job["artifacts"]["reports"]["junit"]) == output / "junit.xml"
 
 
 def test_what_is_not_run_here_is_run_where_it_is_said_to_be():
@@ -325,7 +344,7 @@ def test_every_block_is_of_a_kind_that_is_run(page):
     """Python is run above, TOML and YAML are read; what Sphinx and BibTeX read is neither's; nothing hides as text."""
     kinds = re.findall(r"^```(.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     kinds = {kind.split()[0] for kind in kinds}
-    of_sphinx = {"{include}", "{raw}", "{toctree}"} if page.name == "index.md" else set()
+    of_sphinx = {"index.md": {"{include}", "{raw}", "{toctree}"}, "downloads.md": {"{raw}"}}.get(page.name, set())
     assert kinds <= {"python", "toml", "yaml", "bibtex", *of_sphinx}
 
 

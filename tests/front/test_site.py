@@ -1,6 +1,7 @@
 """The site's parts: gallery and notebooks run, docstrings become lists, links are checked, names have a place."""
 
 import gzip
+import hashlib
 import json
 import re
 import runpy
@@ -92,6 +93,66 @@ def test_names_of_the_api_in_the_text_are_links():
     }
 
 
+def test_sources_that_the_text_names_are_pages():
+    """Files and names in them; not a file that is not there, nor one that a folder does not tell apart."""
+    nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
+    made, here = module("source_links"), "tests/front/test_site.py"
+    lines = (ROOT / here).read_text(encoding="utf-8").splitlines()
+    (constant,) = (i for i, line in enumerate(lines, 1) if line.startswith("GALLERY = "))
+    texts = [here, f"{here}::GALLERY", f"{here}::Entry", "tests/nowhere.py", "conf.py", "renderer/", "closest_hit"]
+    page = nodes.section("", *(nodes.paragraph("", "", nodes.literal("", text)) for text in texts))
+    page += nodes.reference("", "", nodes.literal("", here), refuri="elsewhere")
+    read = page.deepcopy()
+    app = SimpleNamespace(
+        env=SimpleNamespace(found_docs=["docs/page"], get_doctree=lambda name: read),
+        builder=SimpleNamespace(get_relative_uri=lambda page, to: f"{page}->{to}"),
+    )
+    made["link_sources"](app, page, "docs/page")
+    assert {
+        link.astext(): link["refuri"] for link in page.findall(nodes.reference) if link["refuri"] != "elsewhere"
+    } == {
+        here: f"docs/page->source/{here}",
+        f"{here}::GALLERY": f"docs/page->source/{here}#line-{constant}",
+        f"{here}::Entry": f"docs/page->source/{here}#line-{1 + lines.index('class Entry(NamedTuple):')}",
+    }
+    ((name, context, template),) = made["source_pages"](app)
+    assert name == f"source/{here}" and template == "page.html"
+    assert context["body"].count('name="line-') == len(lines) and "test_twelve_examples" in context["body"]
+
+
+def test_a_name_that_its_file_has_not_is_an_error_of_the_build():
+    nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
+    page = nodes.paragraph("", "", nodes.literal("", "tests/front/test_site.py::test_of_yesterday"))
+    app = SimpleNamespace(builder=SimpleNamespace(get_relative_uri=lambda page, to: to))
+    with pytest.raises(ValueError, match="test_of_yesterday"):
+        module("source_links")["link_sources"](app, page, "docs/page")
+
+
+def test_cases_that_the_text_names_are_links_to_their_rows():
+    nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
+    page = nodes.section("", nodes.title("", "case 1"), nodes.paragraph("", "by case 12, case 3 and a showcase 4"))
+    page += nodes.paragraph("", "", nodes.literal("", "case 5"))
+    module("case_links")["link_cases"](None, page, "docs/guides/page")
+    assert {link.astext(): link["refuri"] for link in page.findall(nodes.reference)} == {
+        "case 12": "../../samples/report.html#case-12",
+        "case 3": "../../samples/report.html#case-3",
+    }
+    assert page.astext() == "case 1\n\nby case 12, case 3 and a showcase 4\n\ncase 5"
+
+
+def test_wheel_and_source_are_built_for_the_site_without_a_network(tmp_path):
+    pytest.importorskip("build", reason="pip install '.[docs]'")
+    (tmp_path / "octree_renderer-0.0.9.tar.gz").touch()  # of the build before
+    made = module("downloads")
+    files = made["build"](tmp_path)
+    name = f"octree_renderer-{renderer.__version__}"
+    assert [file.name for file in files] == [f"{name}-py3-none-any.whl", f"{name}.tar.gz"]
+    assert sorted(tmp_path.iterdir()) == files
+    html = made["listed"](files)
+    for file in files:
+        assert f'href="../downloads/{file.name}"' in html and hashlib.sha256(file.read_bytes()).hexdigest() in html
+
+
 @pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)
 def test_a_script_is_short_and_named_by_its_title(script):
     _, head, code = script.read_text(encoding="utf-8").split('"""', 2)
@@ -146,7 +207,10 @@ def test_tiles_have_the_readmes_figures():
     html = module("figures")["tiles"]((ROOT / "README.md").read_text(encoding="utf-8"))
     assert html.count("<p>") == 4 and "<b>0</b> wrong hits in " in html and "0.99993" in html
     made = module("figures")["tiles"]("| a < b | 7 | c | `make x` |\n| d | 8 | | `make y` |\n| no figure | 9 | |")
-    assert made.splitlines()[1:3] == ["<p><b>7</b> a &lt; b<small>c</small></p>", "<p><b>8</b> d</p>"]
+    assert made.splitlines()[1:3] == [
+        "<p><b>7</b> a &lt; b<small>c</small><small><code>make x</code></small></p>",
+        "<p><b>8</b> d<small><code>make y</code></small></p>",
+    ]
     assert len(made.splitlines()) == 4
 
 
