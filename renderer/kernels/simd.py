@@ -546,43 +546,37 @@ def bits_float(typingctx, bits):
     return types.float32(types.int64), codegen
 
 
-@intrinsic
-def above(typingctx, high, low, index):
-    """Eight int64: the bits of eight float32 above as many int32, which a ``pointer`` has from ``index`` on."""
-
-    def codegen(context, builder, sig, args):
-        word, wide = ir.VectorType(ir.IntType(32), 8), _llvm(I64X8)
-        lower = _load(builder, _pointer(context, builder, sig.args[1], args[1], args[2], word), sig.args[1])
-        upper = builder.shl(builder.zext(builder.bitcast(args[0], word), wide), ir.Constant(wide, [32] * 8))
-        return builder.or_(upper, builder.zext(lower, wide))
-
-    return I64X8(high, low, types.intp), codegen
-
-
-# The comparisons of a network that sorts eight values: those of a row are made at once (Knuth 3, 5.3.4: 19 in all, and
-# no network has fewer rows).
-_NETWORK = (
-    ((0, 2), (1, 3), (4, 6), (5, 7)), ((0, 4), (1, 5), (2, 6), (3, 7)), ((0, 1), (2, 3), (4, 5), (6, 7)),
-    ((2, 4), (3, 5)), ((1, 4), (3, 6)), ((1, 2), (3, 4), (5, 6)),
-)  # fmt: skip
+# A bitonic network that sorts eight values (Batcher 1968): in each row lane i is compared with lane i ^ step, and keeps
+# the larger where both or neither of i & step and i & run are 0. Networks of fewer comparisons take as many rows, and
+# more time to move lanes: here all moves but one stay within four lanes.
+_NETWORK = ((1, 2), (2, 4), (1, 4), (4, 8), (2, 8), (1, 8))
 
 
 @intrinsic
-def greatest_first(typingctx, mask, vector):
-    """The lanes of eight int64 that the mask sets, in falling order; then the least int64 in place of the others."""
+def farthest_first(typingctx, mask, distances, links, index):
+    """Eight int64 in falling order: a distance that the mask sets, float32 and not negative, above its int32 of those
+    that the ``pointer`` links has from ``index`` on. What the mask does not set comes last, with any values.
+
+    The last three bits of a distance are lost, downwards: while they are sorted the lane's number takes their place. So
+    no two are equal, and words of 32 bits are all that is compared: AVX2 has minima and maxima of these, not of 64.
+    """
 
     def codegen(context, builder, sig, args):
-        lanes = ir.VectorType(ir.IntType(32), 8)
-        found = builder.select(args[0], args[1], ir.Constant(_llvm(I64X8), [-(1 << 63)] * 8))
-        for row in _NETWORK:
-            partner = list(range(8))
-            for a, b in row:
-                partner[a], partner[b] = b, a
-            other = builder.shuffle_vector(found, found, ir.Constant(lanes, partner))
-            larger_first = builder.icmp_signed(">", found, other)
-            high, low = builder.select(larger_first, found, other), builder.select(larger_first, other, found)
-            chosen = [i if partner[i] >= i else 8 + i for i in range(8)]
-            found = builder.shuffle_vector(high, low, ir.Constant(lanes, chosen))
-        return found
+        word = ir.VectorType(ir.IntType(32), 8)
+        link = _load(builder, _pointer(context, builder, sig.args[2], args[2], args[3], word), sig.args[2])
+        key = builder.and_(builder.bitcast(args[1], word), ir.Constant(word, [0x7FFFFFF8] * 8))
+        key = builder.select(args[0], key, ir.Constant(word, [-(1 << 31)] * 8))
+        key = builder.or_(key, ir.Constant(word, list(range(8))))
+        for step, run in _NETWORK:
+            order = ir.Constant(word, [i ^ step for i in range(8)])
+            least = [(i & step == 0) != (i & run == 0) for i in range(8)]
+            other, other_link = builder.shuffle_vector(key, key, order), builder.shuffle_vector(link, link, order)
+            larger = builder.icmp_signed(">", key, other)
+            most, fewest = builder.select(larger, key, other), builder.select(larger, other, key)
+            key = builder.shuffle_vector(most, fewest, ir.Constant(word, [i + 8 * least[i] for i in range(8)]))
+            link = builder.select(builder.xor(larger, ir.Constant(_llvm(MASK8), least)), link, other_link)
+        key = builder.and_(key, ir.Constant(word, [~7] * 8))
+        pairs = ir.Constant(ir.VectorType(ir.IntType(32), 16), [i // 2 + 8 * (i % 2) for i in range(16)])
+        return builder.bitcast(builder.shuffle_vector(link, key, pairs), _llvm(I64X8))
 
-    return vector(mask, vector), codegen
+    return I64X8(mask, distances, links, types.intp), codegen

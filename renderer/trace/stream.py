@@ -11,12 +11,11 @@ import numpy as np
 
 from renderer.kernels.jit import inlined
 from renderer.kernels.simd import (
-    above,
     at,
     bits_float,
     count_bits,
+    farthest_first,
     get,
-    greatest_first,
     lowest_bit,
     movemask,
     prefetch,
@@ -183,7 +182,7 @@ def meet_nodes(tree, rays, lanes, count):
         node, top = get(rays.integers, CHILD + r), get(rays.integers, TOP + r)
         lower, upper = splat8(get(rays.floats, LOWER + r)), splat8(get(rays.floats, LIMIT + r))
         t0, meets = meet_boxes(tree.nodes, node, slabs_of(rays, r), lower, upper)
-        store(lanes.stacks, top, greatest_first(meets, above(t0, tree.links, node * NODE_WORDS + CHILDREN)))
+        store(lanes.stacks, top, farthest_first(meets, t0, tree.links, node * NODE_WORDS + CHILDREN))
         put(rays.integers, TOP + r, top + count_bits(movemask(meets)))
 
 

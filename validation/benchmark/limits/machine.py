@@ -11,10 +11,9 @@ import numpy as np
 
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import (
-    above,
     at,
     count_bits,
-    greatest_first,
+    farthest_first,
     movemask,
     pointer,
     splat8,
@@ -90,7 +89,7 @@ def _time_nodes(words, rays, out, nodes, rounds):
     for k in range(rounds):
         node = k % nodes
         t0, meets = meet_boxes(tree.nodes, node, slabs, lower, upper)
-        store(stack, top & 7, greatest_first(meets, above(t0, tree.links, node * NODE_WORDS + CHILDREN)))
+        store(stack, top & 7, farthest_first(meets, t0, tree.links, node * NODE_WORDS + CHILDREN))
         top += count_bits(movemask(meets))
     return top
 
