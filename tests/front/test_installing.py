@@ -138,8 +138,7 @@ def test_the_workflow_of_the_guide_installs_from_git_and_judges(checkout, projec
     run(["git", "add", "--all", "--", "renderer", "validation", "pyproject.toml", "README.md", "LICENSE"], checkout)
     run(["git", *own, "commit", "--quiet", "-m", "all"], checkout)
     commit = run(["git", "rev-parse", "HEAD"], checkout).strip()
-    (block,) = re.findall(r"```yaml\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
-    workflow = yaml.safe_load(block)
+    workflow = yaml.safe_load(re.findall(r"```yaml\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)[0])
     (job,) = workflow["jobs"].values()
     install, judge = (step["run"] for step in job["steps"] if "run" in step)
     address = workflow["env"]["OCTREE_RENDERER"].replace(

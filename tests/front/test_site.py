@@ -117,7 +117,7 @@ def test_sources_that_the_text_names_are_pages():
     }
     ((name, context, template),) = made["source_pages"](app)
     assert name == f"source/{here}" and template == "page.html"
-    assert context["body"].count('name="line-') == len(lines) and "test_twelve_examples" in context["body"]
+    assert f'id="line-{len(lines)}"' in context["body"] and "test_twelve_examples" in context["body"]
 
 
 def test_a_name_that_its_file_has_not_is_an_error_of_the_build():
