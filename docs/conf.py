@@ -101,7 +101,12 @@ def put_downloads(app, page, source):
     """The page of downloads has the files that are built now."""
     if page == "docs/downloads":
         files = downloads.build(Path(app.outdir, "downloads"))
-        source[0] = source[0].replace("FILES", downloads.listed(files)).replace("VERSION", version)
+        source[0] = (
+            source[0]
+            .replace("FILES", downloads.listed(files))
+            .replace("VERSION", version)
+            .replace("COMMIT", downloads.commit())
+        )
 
 
 def unpack_samples(app, failed):

@@ -45,7 +45,7 @@ class Target:
         return asdict(self) | {"met": self.reaches(self.measured, self.at_least), "aimed": aimed}
 
 
-_NEVER = "no mesh and no rays for which another library is the better choice"
+_NEVER = "the aim is that for no mesh and no rays another library is the better choice"
 # First hits as a ratio to a peer, on every row of the heat map: peer, at least, aim, and why.
 _FIRST_HITS = (
     ("embree", 1.0, 1.5, f"{_NEVER}; ours in float64, theirs in float32"),
