@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 
-from docutils import nodes
+from literal_links import free_literals, lead
 
 # Names in the text that are commands or words as well.
 _AMBIGUOUS = {"render", "view", "study"}
@@ -14,20 +14,10 @@ def link_api(app, doctree, page):
     without, by its whole name or its end. Titles and what is a link already stay as they are.
     """
     targets = _targets(app.env.get_domain("py").objects)
-    for literal in list(doctree.findall(nodes.literal)):
+    for literal in free_literals(doctree):
         target = targets.get(literal.astext().partition("(")[0])
-        if target is None or _within_link(literal):
-            continue
-        address = f"{app.builder.get_relative_uri(page, target.docname)}#{target.node_id}"
-        link = nodes.reference("", "", internal=True, refuri=address)
-        literal.replace_self(link)
-        link += literal
-
-
-def _within_link(node):
-    while node is not None and not isinstance(node, nodes.reference | nodes.title):
-        node = node.parent
-    return node is not None
+        if target is not None:
+            lead(literal, f"{app.builder.get_relative_uri(page, target.docname)}#{target.node_id}")
 
 
 def _targets(objects):

@@ -3,6 +3,7 @@
 import re
 
 from docutils import nodes
+from literal_links import is_free
 
 _CASE = re.compile(r"(\bcase \d+\b)")
 _REPORT = "samples/report.html"
@@ -13,9 +14,7 @@ def link_cases(app, doctree, page):
     up = "../" * page.count("/")
     for text in list(doctree.findall(nodes.Text)):
         parts = _CASE.split(text.astext())
-        if len(parts) > 1 and not isinstance(
-            text.parent, nodes.reference | nodes.title | nodes.literal | nodes.literal_block
-        ):
+        if len(parts) > 1 and is_free(text) and not isinstance(text.parent, nodes.literal | nodes.literal_block):
             text.parent.replace(text, [_linked(part, up) for part in parts if part])
 
 

@@ -23,6 +23,7 @@ from source_links import link_sources, source_pages  # noqa: E402
 from sphinx.util.logging import getLogger  # noqa: E402
 
 import renderer  # noqa: E402
+from validation.benchmark.page.record import commit  # noqa: E402
 
 project = "octree-renderer"
 author = copyright = "The octree-renderer authors"
@@ -105,7 +106,7 @@ def put_downloads(app, page, source):
             source[0]
             .replace("FILES", downloads.listed(files))
             .replace("VERSION", version)
-            .replace("COMMIT", downloads.commit())
+            .replace("COMMIT", commit() or "unknown")
         )
 
 

@@ -21,13 +21,6 @@ def build(folder: Path) -> list[Path]:
     return sorted(folder.iterdir())
 
 
-def commit() -> str:
-    """The commit that is checked out, with -dirty where files were changed; or that this is no checkout."""
-    command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return "that no checkout names" if done.returncode else done.stdout.strip()
-
-
 def listed(files: list[Path]) -> str:
     """HTML of a list of the files, which lie in the folder ``downloads`` of the site, with sizes and digests."""
     return "\n".join(["<ul>", *map(_item, files), "</ul>"])

@@ -2,10 +2,12 @@
 
 import ast
 import re
+from functools import cache
 from html import escape
 from pathlib import Path
 
 from docutils import nodes
+from literal_links import free_literals, lead
 from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import get_lexer_for_filename
@@ -17,15 +19,15 @@ _FOLDER = "source"
 
 
 def link_sources(app, doctree, page):
-    """Make links of the literals of ``doctree`` that name a file, or a name in one; what is a link already stays."""
-    for literal in list(doctree.findall(nodes.literal)):
-        if (named := _named(literal)) is None or isinstance(literal.parent, nodes.reference):
-            continue
-        path, name = named
-        address = app.builder.get_relative_uri(page, f"{_FOLDER}/{path}") + (f"#{_anchor(path, name)}" if name else "")
-        link = nodes.reference("", "", internal=True, refuri=address)
-        literal.replace_self(link)
-        link += literal
+    """Make links of the literals of ``doctree`` that name a file, or a name in one. Raises ``ValueError`` for a name
+    that its file has not.
+    """
+    for literal in free_literals(doctree):
+        if (named := _named(literal)) is not None:
+            path, name = named
+            lead(
+                literal, app.builder.get_relative_uri(page, f"{_FOLDER}/{path}") + (_anchor(path, name) if name else "")
+            )
 
 
 def source_pages(app):
@@ -49,9 +51,17 @@ def _named(literal):
 
 
 def _anchor(path, name):
-    """The anchor of the line where ``name`` is defined. Raises ``ValueError`` where it is not."""
+    if name not in (lines := _lines(path)):
+        raise ValueError(f"{path}: no {name}")
+    return f"#line-{lines[name]}"
+
+
+@cache
+def _lines(path):
+    """The line where each name of a file is defined first, the outermost before others."""
+    found = {}
     for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
         targets = getattr(node, "targets", [getattr(node, "target", None)])
-        if name in (getattr(node, "name", None), *(getattr(target, "id", None) for target in targets)):
-            return f"line-{node.lineno}"
-    raise ValueError(f"{path}: no {name}")
+        for name in (getattr(node, "name", None), *(getattr(target, "id", None) for target in targets)):
+            found.setdefault(name, getattr(node, "lineno", None))
+    return found

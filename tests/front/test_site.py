@@ -31,7 +31,10 @@ class Entry(NamedTuple):
 
 
 def module(name):
-    return runpy.run_path(str(ROOT / "docs" / f"{name}.py"))
+    """What a module of docs/ defines; it finds those beside it, as with Sphinx."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.syspath_prepend(ROOT / "docs")
+        return runpy.run_path(str(ROOT / "docs" / f"{name}.py"))
 
 
 @pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)
