@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, movemask, put, smaller
+from renderer.kernels.simd import at, get, put, smaller
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS, LEAF_BITS
 from renderer.trace.ray_lanes import CHILD, NUMBER, WIDTH, shear_of
@@ -83,7 +83,7 @@ def _see_leaves(tree, rays, lanes, count):
         r = get(lanes.at_leaf, k)
         block = ~get(rays.integers, CHILD + r) >> LEAF_BITS
         _, seen = see_triangles(tree, block * BLOCK_WORDS, shear_of(rays, r))
-        put(lanes.bits, k, movemask(seen))
+        put(lanes.bits, k, seen)
 
 
 @inlined

@@ -507,6 +507,18 @@ def movemask(typingctx, mask):
 
 
 @intrinsic
+def unlikely(typingctx, condition):
+    """The condition, which is false nearly always: what is done where it is true takes no register from the rest."""
+
+    def codegen(context, builder, sig, args):
+        bit = ir.IntType(1)
+        expect = cgutils.get_or_insert_function(builder.module, ir.FunctionType(bit, [bit, bit]), "llvm.expect.i1")
+        return builder.call(expect, [args[0], bit(0)])
+
+    return types.boolean(types.boolean), codegen
+
+
+@intrinsic
 def lowest_bit(typingctx, bits):
     """Index of the lowest set bit of a non-zero int64."""
 

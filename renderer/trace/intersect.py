@@ -20,6 +20,7 @@ from renderer.kernels.simd import (
     smaller,
     splat4,
     splat8,
+    unlikely,
     widen,
 )
 from renderer.trace.layout import NODE_WORDS
@@ -262,7 +263,10 @@ def _chosen(on_z, on_y, if_x, if_y, if_z):
 
 
 class Edges(NamedTuple):
-    """Four triangles as a ray sees them: sheared corners, edge functions, and their sum, the determinant."""
+    """Four triangles as a ray sees them: sheared corners, edge functions, the least, the most and the sum of these.
+
+    The sum is the determinant.
+    """
 
     x0: Any
     x1: Any
@@ -276,6 +280,8 @@ class Edges(NamedTuple):
     e0: Any
     e1: Any
     e2: Any
+    least: Any
+    most: Any
     determinant: Any
 
 
@@ -297,7 +303,7 @@ def _load_rows(blocks, base, rows):
 
 @inlined
 def see_triangles(tree, base, ray):
-    """The ``Edges`` of a block's four triangles, and the mask of those whose edges a ray passes on the same side.
+    """The ``Edges`` of a block's four triangles, and the bits of those whose edges a ray passes on the same side.
 
     Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
     ab - cd or is 0. 0 counts as inside here. Where rounding may have made it the hit is in doubt, and ``sides`` decides
@@ -313,19 +319,19 @@ def see_triangles(tree, base, ray):
     e0 = x2 * y1 - y2 * x1
     e1 = x0 * y2 - y0 * x2
     e2 = x1 * y0 - y1 * x0
-    not_negative = (e0 >= zero) & (e1 >= zero) & (e2 >= zero)
-    not_positive = (e0 <= zero) & (e1 <= zero) & (e2 <= zero)
-    return Edges(x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, e0 + e1 + e2), not_negative | not_positive
+    least, most = smaller(e0, smaller(e1, e2)), larger(e0, larger(e1, e2))
+    seen = movemask((least >= zero) | (most <= zero))
+    return Edges(x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, least, most, e0 + e1 + e2), seen
 
 
 @inlined
-def meet_planes(edges, ray, t_min, t_max):
-    """t of four triangles, and three masks: doubt, blurred and due.
+def meet_planes(edges, seen, ray, t_min, t_max):
+    """t of four triangles, and of those ``seen`` the bits of three kinds: in doubt, blurred and due.
 
     In doubt is a triangle whose t rounding may have made, or an edge of which the ray may pass; blurred, one whose
     determinant rounding may have made. Due is one in doubt that may be hit from t_min to t_max once that is settled.
     """
-    x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, determinant = edges
+    x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, least, most, determinant = edges
     zero, wide = splat4(0.0), magnitude(x0) + magnitude(x1) + magnitude(x2)
     high = magnitude(y0) + magnitude(y1) + magnitude(y2)
     across = wide + high
@@ -333,25 +339,44 @@ def meet_planes(edges, ray, t_min, t_max):
     numerator, product = e0 * z0 + e1 * z1 + e2 * z2, across * (across + along)
     denominator = determinant * splat4(ray.direction_z)
     t, height, base = numerator / denominator, magnitude(numerator), magnitude(denominator)
-    limit, error = product * along * splat4(DOUBT), product * along * splat4(ERROR)
+    limit = product * along * splat4(DOUBT)
     slant = product * (magnitude(z1 - z0) + magnitude(z2 - z0)) * splat4(SLANT)
-    blurred = magnitude(determinant) * along <= select(slant > limit, slant, limit)
-    on_edge = (e0 == zero) | (e1 == zero) | (e2 == zero)
-    # Rarely; a closer look at each would cost 5 % of all rays' time.
-    if movemask(on_edge) != 0:
-        on_edge = _may_be_on_edge(edges)
-    doubt = blurred | on_edge | (height <= limit)
+    blurred = magnitude(determinant) * along <= larger(limit, slant)
+    # Of those seen, an edge function is 0 where the least or the most is.
+    doubts = seen & movemask(blurred | (height <= limit) | (least == zero) | (most == zero))
+    blurs, dues = np.int64(0), np.int64(0)
+    # What only this needs is computed here: doubts are rare, and one branch costs less than they would in each block.
+    if unlikely(doubts != 0):
+        doubt = blurred | (height <= limit) | _may_be_on_edge(edges)
+        t_within = t, t_min, t_max
+        due = _are_due(edges, (wide, high), (height, base, product * along * splat4(ERROR)), doubt, blurred, t_within)
+        doubts, blurs, dues = seen & movemask(doubt), seen & movemask(blurred), seen & movemask(due)
+    return t, doubts, blurs, dues
+
+
+@inlined
+def _are_due(edges, sizes, fraction, doubt, blurred, t_within):
+    """The mask of triangles that are due, see ``meet_planes``.
+
+    sizes     the sums of the corners' |x| and of their |y|
+    fraction  the magnitudes of t's numerator and denominator, and the numerator's error where it is in doubt
+    t_within  t, t_min and t_max
+    """
+    x0, x1, x2, y0, y1, y2, _, _, _, _, _, _, _, _, _ = edges
+    height, base, error = fraction
+    t, t_min, t_max = t_within
+    zero = splat4(0.0)
     # No ray meets a triangle that it sees as a point or as a piece of an axis. These are told here, because rays along
     # walls would all be in doubt.
-    seen = ((x0 != x1) | (x1 != x2) | (y0 != y1) | (y1 != y2)) & (wide > zero) & (high > zero)
+    extended = ((x0 != x1) | (x1 != x2) | (y0 != y1) | (y1 != y2)) & (sizes[0] > zero) & (sizes[1] > zero)
     within = (height + error >= splat4(t_min) * base) & (height - error <= splat4(t_max) * base)
-    return t, doubt, blurred, (blurred | (doubt & (t >= zero) & within)) & seen
+    return (blurred | (doubt & (t >= zero) & within)) & extended
 
 
 @inlined
 def _may_be_on_edge(edges):
     """The mask of triangles with an edge function that is 0 as rounded, though its products are not."""
-    x0, x1, x2, y0, y1, y2, _, _, _, e0, e1, e2, _ = edges
+    x0, x1, x2, y0, y1, y2, _, _, _, e0, e1, e2, _, _, _ = edges
     zero = splat4(0.0)
     x0, x1, x2, y0, y1, y2 = x0 != zero, x1 != zero, x2 != zero, y0 != zero, y1 != zero, y2 != zero
     on0 = (e0 == zero) & ((x2 & y1) | (y2 & x1))
@@ -363,13 +388,12 @@ def _may_be_on_edge(edges):
 def hit_triangles(tree, base, ray, t_min, t_max):
     """Watertight test of one ray and the four triangles of a block.
 
-    Returns the bits of those hit, those of the three masks of ``meet_planes``, t, the numerators of u and v, and their
+    Returns the bits of those hit, those of the three kinds of ``meet_planes``, t, the numerators of u and v, and their
     denominator. ``doubt.settled`` decides about a hit in doubt.
     """
-    edges, seen = see_triangles(tree, base, ray)
-    bits, zero = movemask(seen), splat4(0.0)
+    edges, bits = see_triangles(tree, base, ray)
     if bits == 0:
+        zero = splat4(0.0)
         return bits, bits, bits, bits, zero, zero, zero, zero
-    t, doubt, blurred, due = meet_planes(edges, ray, t_min, t_max)
-    doubts, blurs, dues = bits & movemask(doubt), bits & movemask(blurred), bits & movemask(due)
+    t, doubts, blurs, dues = meet_planes(edges, bits, ray, t_min, t_max)
     return bits, doubts, blurs, dues, t, edges.e1, edges.e2, edges.determinant

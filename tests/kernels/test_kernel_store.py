@@ -60,7 +60,7 @@ print(brute.any_hit([[0.25, 0.25, 1]], [[0, 0, -1]])[0])
     assert run(folder, script) == ["True"]
     path = folder / "trace" / "intersect.py"
     source = path.read_text(encoding="utf-8")
-    edited = source.replace("not_negative | not_positive", "not_negative & not_positive")
+    edited = source.replace("(least >= zero) | (most <= zero)", "(least >= zero) & (most <= zero)")
     assert edited != source
     path.write_text(edited)
     assert run(folder, script) == ["False"]

@@ -33,6 +33,7 @@ from renderer.kernels.simd import (
     splat8,
     square_root,
     store,
+    unlikely,
     widen,
 )
 
@@ -160,6 +161,15 @@ def test_bits():
     for k in range(63):
         assert bit_operations(np.float32(0), 1 << k)[2] == k
         assert bit_operations(np.float32(0), (1 << k) | (1 << 62))[2] == k
+
+
+@njit
+def _said(a, b):
+    return unlikely(a > b)
+
+
+def test_what_is_unlikely_may_still_be_true():
+    assert _said(2.0, 1.0) is True and _said(1.0, 2.0) is False and _said(np.nan, 2.0) is False
 
 
 @njit

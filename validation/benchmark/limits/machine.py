@@ -102,8 +102,8 @@ def _time_blocks(words, rays, blocks, rounds):
     shear, found = make_shear(ray), np.int64(0)
     for k in range(rounds):
         edges, seen = see_triangles(tree, (k % blocks) * BLOCK_WORDS, shear)
-        t, doubt, _, due = meet_planes(edges, shear, 0.0, 1e9)
-        found += movemask(seen & (t >= edges.e1)) + movemask(doubt) + movemask(seen & due)
+        t, doubts, _, dues = meet_planes(edges, seen, shear, 0.0, 1e9)
+        found += (seen & movemask(t >= edges.e1)) + doubts + dues
     return found
 
 
