@@ -96,6 +96,15 @@ def test_names_of_the_api_in_the_text_are_links():
     }
 
 
+def test_a_literal_in_a_link_or_a_title_is_not_free_however_deep_it_stands():
+    nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
+    free, linked, titled = (nodes.literal("", text) for text in ("free", "linked", "titled"))
+    link = nodes.reference("", "", nodes.strong("", "", linked), refuri="elsewhere")
+    title = nodes.title("", "", nodes.emphasis("", "", titled))
+    page = nodes.section("", title, nodes.paragraph("", "", nodes.strong("", "", free), link))
+    assert module("literal_links")["free_literals"](page) == [free]
+
+
 def test_sources_that_the_text_names_are_pages():
     """Files and names in them; not a file that is not there, nor one that a folder does not tell apart."""
     nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
@@ -151,9 +160,15 @@ def test_wheel_and_source_are_built_for_the_site_without_a_network(tmp_path):
     name = f"octree_renderer-{renderer.__version__}"
     assert [file.name for file in files] == [f"{name}-py3-none-any.whl", f"{name}.tar.gz"]
     assert sorted(tmp_path.iterdir()) == files
-    html = made["listed"](files)
-    for file in files:
-        assert f'href="../downloads/{file.name}"' in html and hashlib.sha256(file.read_bytes()).hexdigest() in html
+    shown = re.findall(
+        r'<li><a href="../downloads/(.*?)">\1</a>: the (\w+).*?; ([\d.]+) MB, SHA-256 <code>(.*?)</code></li>',
+        made["listed"](files),
+    )
+    assert shown == [
+        (file.name, what, f"{file.stat().st_size / 1e6:.1f}", hashlib.sha256(file.read_bytes()).hexdigest())
+        for file, what in zip(files, ("wheel", "source"), strict=True)
+    ]
+    assert made["listed"](files).count("<li>") == 2
 
 
 @pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)
@@ -270,6 +285,7 @@ def test_links_that_lead_nowhere_are_found(tmp_path, capsys):
     )
     (tmp_path / "b.html").write_text('<p id="there"><a href="https://elsewhere.example">x</a>')
     (tmp_path / "c.svg").touch()
+    assert main(tmp_path / "empty") == 1  # a site without links is none
     assert main(tmp_path) == 0
     for broken in ("d.html", "b.html#nowhere", "#nowhere", "folder/"):
         (tmp_path / "b.html").write_text(f'<p id="there"><a href="{broken}">x</a>')

@@ -74,6 +74,20 @@ def test_the_verdict_comes_first_and_names_what_fails(metrics: dict[str, Any], t
     assert "Mitsuba &lt;3&gt;" in page and "not named by --only" in page and "There is none." in page
 
 
+def test_an_extreme_case_is_found_by_its_number(
+    metrics: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The site links to it, see docs/case_links.py."""
+    monkeypatch.setitem(report.FIGURES, "figures", lambda record: [])
+    said = dict.fromkeys(
+        ("construct", "expected", "ours", "embree_default", "embree_robust", "mitsuba", "tolerance"), "x"
+    )
+    cases = [said | {"number": number, "judges": ["exact"], "holds": True} for number in (3, 12)]
+    none: dict[str, list[object]] = {"meshes": [], "places": [], "builds": []}
+    page = report.page(metrics | {"stability": {"cases": cases, "watertight": none, "curves": {}}}, tmp_path)
+    assert re.findall(r'<tr id="([^"]*)"><td>(\d+)</td>', page) == [("case-3", "3"), ("case-12", "12")]
+
+
 def test_a_missing_picture_or_key_is_an_error(metrics: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "b.png").unlink()
     with pytest.raises(FileNotFoundError, match=r"b\.png"):
