@@ -155,6 +155,22 @@ def test_three_media_around_the_eye() -> None:
         assert value == pytest.approx(expected, rel=2.0**-23)
 
 
+@pytest.mark.parametrize("count", [8, 9, 10])
+def test_eight_media_are_remembered(count: int) -> None:
+    """A ninth is left into the eighth, as it was entered. A tenth in it is entered from the eighth, not the ninth."""
+    indices = [1.0, *(1.1 + 0.15 * k for k in range(count))]
+    parts = [
+        (box((-k, -k, -k), (k, k, k)), Dielectric(type="dielectric", ior=ior, reflectance=0.0))
+        for k, ior in zip(range(count, 0, -1), indices[1:], strict=True)
+    ]
+    scene = scene_of(eye_at((-2 * count, 0.2, 0.3), (0, 0.2, 0.3)), *parts, background=1.0)
+    value = float(render(scene, resolution=(1, 1), max_depth=2 * count + 1, threads=1).radiance[0, 0, 0])
+    # Each surface is passed on the way in and on the way out.
+    crossed = [(indices[min(k, 8)], indices[k + 1]) for k in range(count)]
+    expected = math.prod((1 - ((a - b) / (a + b)) ** 2) ** 2 for a, b in crossed)
+    assert value == pytest.approx(expected, rel=2.0**-23)
+
+
 def test_nested_radiance_depends_on_the_media() -> None:
     """The seven nestings of row 40 are told apart by their analytic values."""
     values = [nested_radiance(*media, False)[1] for media in ((1.5, 1.0), (1.5, 1.33), (1.33, 1.5), (1.5, 2.4))]
