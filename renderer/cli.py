@@ -112,7 +112,7 @@ def make_parser() -> argparse.ArgumentParser:
     render = commands.add_parser("render", help="render a scene file to a picture")
     render.add_argument("scene", type=Path, help=_SCENE)
     render.add_argument("--write-scene", type=Path, metavar="FILE", help=_WRITE_SCENE)
-    formats = ".png, or .exr or .npy for linear radiance"
+    formats = "default: out.png; or .exr or .npy for linear radiance"
     render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=formats)
     render.add_argument("--resolution", type=_resolution, metavar="WxH", help="pixels, such as 512x512")
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")

@@ -34,7 +34,7 @@ def expect(condition: bool, argument: str, expected: str, got: object) -> None:
 
 def extra_hint(name: str) -> str:
     """The command that installs what an optional part needs; there is no package on an index yet."""
-    return f"in a checkout of octree-renderer: pip install '.[{name}]'"
+    return f"in a checkout of octree-renderer: pip install '.[{name}]'; with a wheel: pip install 'FILE.whl[{name}]'"
 
 
 def is_count(value: object) -> bool:

@@ -54,7 +54,7 @@ def test_a_suite_that_is_not_there_is_an_error(tmp_path, other):
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert line.startswith(f"octree-validate: expected the validation suite in {tmp_path / 'validation'}, got ")
-    assert line.endswith("pip install '.[validate]'")
+    assert line.endswith("pip install '.[validate]'; with a wheel: pip install 'FILE.whl[validate]'")
 
 
 @pytest.mark.parametrize("module", ["validation", "validation.benchmark"])

@@ -725,7 +725,7 @@ def test_without_the_extra_one_line_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, package, None)
     assert main(["view", str(folder / "blocks.toml")]) == 2
     out, err = capsys.readouterr()
-    hint = "in a checkout of octree-renderer: pip install '.[viewer]'"
+    hint = "in a checkout of octree-renderer: pip install '.[viewer]'; with a wheel: pip install 'FILE.whl[viewer]'"
     line = f"octree-render: the viewer needs the package {package}; {hint}\n"
     assert (out, err) == ("", line)
 
