@@ -45,7 +45,8 @@ conformance: $(STAMP)
 
 # A warning is an error. Sources are read from here, so that pages outside docs/ and links to them are the site's too.
 docs: $(STAMP)
-	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir build/doctrees . build/site
+	rm -rf build/site
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --fresh-env --conf-dir docs --doctree-dir build/doctrees . build/site
 	$(BIN)/python docs/links.py build/site
 
 lint: $(STAMP)

@@ -13,8 +13,9 @@ from pygments.formatters import HtmlFormatter
 from pygments.lexers import get_lexer_for_filename
 
 ROOT = Path(__file__).resolve().parents[1]
-# A file, as the text names it, and a function, class or constant in it.
-_NAMED = re.compile(r"([\w./-]+\.(?:py|toml|yml|json))(?:::(\w+))?")
+# A file, as the text names it, and a function, class or constant in it, with those that it stands in before it and what
+# a test is called with behind it.
+_NAMED = re.compile(r"(\.?\w[\w./-]*\.(?:py|toml|yml|json))(?:::([\w.:]+)(?:\[.*\])?)?")
 _FOLDER = "source"
 
 
@@ -25,9 +26,11 @@ def link_sources(app, doctree, page):
     for literal in free_literals(doctree):
         if (named := _named(literal)) is not None:
             path, name = named
-            lead(
-                literal, app.builder.get_relative_uri(page, f"{_FOLDER}/{path}") + (_anchor(path, name) if name else "")
-            )
+            try:
+                anchor = _anchor(path, name) if name else ""
+            except ValueError as error:
+                raise ValueError(f"{page}: {error}") from error
+            lead(literal, app.builder.get_relative_uri(page, f"{_FOLDER}/{path}") + anchor)
 
 
 def source_pages(app):
@@ -47,21 +50,43 @@ def source_pages(app):
 def _named(literal):
     """The path and the name that a literal has, or None where it names no file of this project."""
     match = _NAMED.fullmatch(literal.astext())
-    return match.groups() if match and "/" in match[1] and (ROOT / match[1]).is_file() else None
+    if not match or "/" not in match[1] or ".." in match[1]:
+        return None
+    if not (ROOT / match[1]).is_file():
+        if match[2]:
+            raise ValueError(f"{literal.astext()}: no such file")
+        return None
+    return match.groups()
 
 
 def _anchor(path, name):
-    if name not in (lines := _lines(path)):
+    lines = _lines(path) if path.endswith(".py") else {}
+    if (line := lines.get(name.replace("::", "."))) is None:
         raise ValueError(f"{path}: no {name}")
-    return f"#line-{lines[name]}"
+    return f"#line-{line}"
 
 
 @cache
 def _lines(path):
-    """The line where each name of a file is defined first, the outermost before others."""
+    """The line where each function, class and constant of a file is defined first, those in a class by its name too."""
     found = {}
-    for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
-        targets = getattr(node, "targets", [getattr(node, "target", None)])
-        for name in (getattr(node, "name", None), *(getattr(target, "id", None) for target in targets)):
-            found.setdefault(name, getattr(node, "lineno", None))
+
+    def walk(body, *outer):
+        for node in body:
+            names = []
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+                names = [node.name]
+            elif isinstance(node, ast.Assign | ast.AnnAssign):
+                targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+                names = [part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)]
+            for name in names:
+                found.setdefault(name, node.lineno)
+                found.setdefault(".".join((*outer, name)), node.lineno)
+            if isinstance(node, ast.ClassDef):
+                walk(node.body, *outer, node.name)
+            for block in ("body", "orelse", "handlers", "finalbody"):
+                if isinstance(node, ast.If | ast.Try | ast.With | ast.ExceptHandler):
+                    walk(getattr(node, block, []), *outer)
+
+    walk(ast.parse((ROOT / path).read_text(encoding="utf-8")).body)
     return found

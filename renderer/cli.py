@@ -15,7 +15,7 @@ from typing import Any
 from renderer import __version__
 from renderer.cluster_command import add_cluster, render_on_cluster
 from renderer.errors import expect
-from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS
+from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS, lacking
 from renderer.process.interrupt import interruptible
 from renderer.process.terminal import flush_output, give_up_output, on_terminal, one_line, say, spell_everything
 from renderer.study_command import add_study
@@ -156,7 +156,9 @@ def _add_compile(commands: Any) -> None:
         ("all", "the same, and what the viewer calls; the default"),
     ):
         what.add_argument(f"--{name}", dest="what", action="store_const", const=name, help=does)
-    ahead.add_argument("--level", choices=LEVELS, help="for any processor of a level, not this machine's; needs -o")
+    ahead.add_argument(
+        "--level", choices=LEVELS, help="for any processor of a level, which this machine must run too; needs -o"
+    )
     ahead.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="keep them there and not in the usual cache")
     ahead.add_argument("--quiet", action="store_true", help="no progress bar and no word at the end")
     ahead.set_defaults(command=_compile, what="all")
@@ -276,6 +278,9 @@ def _choose_processor(level: str, output: Path | None) -> None:
     expect(output is not None, "--output", "a folder, as kernels for a level are not this machine's", "none")
     own = platform.machine().lower()
     expect((own in ("aarch64", "arm64")) == (level == "aarch64"), "--level", f"one of this processor's, {own}", level)
+    lacks = ", ".join(lacking(level))
+    # Each kernel is compiled by a call.
+    expect(not lacks, "--level", "one that this machine runs too", f"{level}, of which it lacks {lacks}")
     expect("numba" not in sys.modules, "--level", "a process that has not imported Numba yet", "one that has")
     os.environ["NUMBA_CPU_NAME"] = LEVELS[level]
     os.environ["NUMBA_CPU_FEATURES"] = ""

@@ -117,6 +117,7 @@ def _check_output(options: argparse.Namespace) -> None:
             given = options.kind != kind and getattr(options, name) is not None
             expect(not given, f"--{name}", f"none, as it is the kind {kind}'s", f"one for {options.kind}")
     expect(options.kind != "sun" or options.suns is not None, "--suns", "a file for the kind sun", "none")
+    expect(min(options.resolution) > 0, "--resolution", "at least 1x1", "{}x{}".format(*options.resolution))
     for output in options.output:
         check_writable(output)
 

@@ -57,6 +57,8 @@ def read_whole(path: Path) -> bytes:
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raise the ``OSError`` of ``write_atomically``, as far as can be told before there is anything to write."""
     with _temporary_beside(path) as (temporary, target):
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
         if not _is_special(target):
             temporary.touch(exist_ok=False)
             temporary.unlink()

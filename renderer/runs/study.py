@@ -96,11 +96,13 @@ def folder_of(output: Path) -> Path:
 def parts_of(octree: Octree, study: Study, points: Points, folder: Path, size: int | None = None) -> Parts:
     """The parts of a study in a folder, new ones or those that a killed run left: points that lie together are one.
 
-    Raises ``ValueError`` for points, normals or faces that no study takes, naming argument and row, and for the folder
-    of another study.
+    Raises ``ValueError`` for points, normals or faces that no study takes, naming argument and row, for options that
+    its kind refuses, and for the folder of another study.
     """
     # Here, as an error of a part would name its own row.
     check_asked(octree, points.points, points.normals, points.leaving, None, False)
+    # Of no point, so that options that the kind refuses leave no folder, which would stand in the way of right ones.
+    study.answer(octree, points.part(slice(0)))
     order = points.order()
     plan = study.plan(octree.mesh, points, order, *(() if size is None else (size,)))
     return Parts(folder, plan, order)

@@ -303,6 +303,16 @@ def test_kernels_for_another_architecture_are_refused(tmp_path: Path, capsys: py
     assert not (tmp_path / "kernels").exists()
 
 
+def test_a_level_that_this_machine_cannot_run_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = "aarch64" if platform.machine() in ("aarch64", "arm64") else "x86-64-v2"
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", dict)
+    said = fails(capsys, "compile", "--level", own, "-o", tmp_path / "kernels")
+    assert said.startswith(f"--level: expected one that this machine runs too, got {own}, of which it lacks ")
+    assert not (tmp_path / "kernels").exists()
+
+
 def test_a_level_is_what_numba_will_compile_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     level, name = ("aarch64", "generic") if platform.machine().lower() in ("aarch64", "arm64") else ("x86-64-v2",) * 2
     monkeypatch.delitem(sys.modules, "numba", raising=False)

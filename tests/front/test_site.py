@@ -132,12 +132,56 @@ def test_sources_that_the_text_names_are_pages():
     assert f'id="line-{len(lines)}"' in context["body"] and "test_twelve_examples" in context["body"]
 
 
-def test_a_name_that_its_file_has_not_is_an_error_of_the_build():
+def linked(text):
+    """The address that a literal leads to, or None where it stays one."""
     nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
-    page = nodes.paragraph("", "", nodes.literal("", "tests/front/test_site.py::test_of_yesterday"))
+    page = nodes.paragraph("", "", nodes.literal("", text))
     app = SimpleNamespace(builder=SimpleNamespace(get_relative_uri=lambda page, to: to))
-    with pytest.raises(ValueError, match="test_of_yesterday"):
-        module("source_links")["link_sources"](app, page, "docs/page")
+    module("source_links")["link_sources"](app, page, "docs/page")
+    return next((link["refuri"] for link in page.findall(nodes.reference)), None)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "tests/front/test_site.py::test_of_yesterday",
+        "tests/front/test_site.py::test_of_yesterday[x]",
+        "tests/front/test_site.py::json",  # imported
+        "tests/front/test_site.py::page",  # local
+        "renderer/octree.py::Octree::gone",
+        "renderer/octree.py::Octree.gone",
+        "renderer/gone.py::Octree",
+        ".github/workflows/ci.yml::test",
+    ],
+)
+def test_a_name_that_its_file_has_not_is_an_error_of_the_build(text):
+    with pytest.raises(ValueError, match=re.escape(text.split("::")[0])):
+        linked(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("renderer/limits.py::SHORTEST", "SHORTEST"),  # one of two that a line defines
+        ("renderer/octree.py::Octree.from_mesh", "    def from_mesh("),
+        ("renderer/octree.py::Octree::from_mesh", "    def from_mesh("),
+        (
+            "tests/front/test_site.py::test_a_name_within_a_class_or_a_pair_is_found[x]",
+            "def test_a_name_within_a_class_or",
+        ),
+        (".github/workflows/ci.yml", None),
+    ],
+)
+def test_a_name_within_a_class_or_a_pair_is_found(text, line):
+    path, _, anchor = linked(text).removeprefix("source/").partition("#line-")
+    assert path == text.split("::")[0]
+    assert line is None or line in (ROOT / path).read_text(encoding="utf-8").splitlines()[int(anchor) - 1]
+
+
+@pytest.mark.parametrize("text", ["/etc/adduser.conf/x.json", "../outside.json", "docs/../../outside.json"])
+def test_a_file_outside_the_project_is_no_page(text, tmp_path, monkeypatch):
+    monkeypatch.setattr(Path, "is_file", lambda path: True)
+    assert linked(text) is None
 
 
 def test_cases_that_the_text_names_are_links_to_their_rows():

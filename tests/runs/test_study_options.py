@@ -223,3 +223,19 @@ def test_a_file_that_cannot_be_read_is_told_with_its_option(
         assert main(["study", kind, str(city), option, str(missing), "-o", str(tmp_path / "a.npy"), "--quiet"]) == 2
         said = f"octree-render: {option}: expected a file that can be read, got {missing}: {why}\n"
         assert capsys.readouterr().err == said
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [["--distance", "-1"], ["--samples", "0"], ["-o", "{folder}"], ["-o", "{folder}.png", "--resolution", "0x9"]],
+)
+def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wrong: list[str]) -> None:
+    (tmp_path / "s.npy").mkdir()
+    wrong = [word.format(folder=tmp_path / "s.npy") for word in wrong]
+    command = ["study", "ao", str(city), "-o", str(tmp_path / "right.npy"), "--quiet"]
+    try:
+        assert main([*command, *wrong]) == 2
+    except SystemExit as end:  # of the parser
+        assert end.code == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["s.npy"]
+    assert main(command) == 0

@@ -49,14 +49,15 @@ def make_parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here, so that --help does not wait for it.
-    from renderer.process.files import write_atomically
+    from renderer.process.files import check_writable, write_atomically
     from validation.benchmark.page import history, page, record
     from validation.progress import steps
 
     options.output.mkdir(parents=True, exist_ok=True)
-    # Read first, so that a fault in it is not told after an hour of measuring.
-    ideas = history.read()
     stored, drawn = options.output / "benchmark.json", options.output / "benchmark.html"
+    # Tried and read first, so that a fault is not told after an hour of measuring.
+    check_writable(stored)
+    ideas = history.read()
     if not options.page_only:
         missing = [path for path in options.mesh if not path.is_file()]
         if missing:

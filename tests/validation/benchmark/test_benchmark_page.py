@@ -2,6 +2,9 @@
 
 import json
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -274,3 +277,30 @@ def test_memory_grows_with_the_mesh_and_not_with_the_library() -> None:
     ours = row["systems"][OURS]
     # Each of the tree's three arrays may end in a huge page of 2 MB that it does not fill.
     assert ours["rest"] == pytest.approx(ours["own"], abs=3 * 2**21)
+
+
+def test_a_copy_in_the_repository_of_something_else_has_no_commit(tmp_path: Path) -> None:
+    copy = tmp_path / "else" / "copy" / "validation" / "benchmark" / "page" / "record.py"
+    copy.parent.mkdir(parents=True)
+    shutil.copy(record.__file__, copy)
+    for words in (["init", "-q"], ["add", "."], ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-qm", "x"]):
+        subprocess.run(["git", *words], cwd=tmp_path / "else", check=True)
+    commit = "import runpy, sys; print(runpy.run_path(sys.argv[1])['commit']())"
+    words = [sys.executable, "-c", commit, str(copy)]
+    said = subprocess.run(words, cwd=Path(__file__).parents[3], capture_output=True, text=True, check=True).stdout
+    assert said.strip() == "None"
+
+
+def test_a_damaged_record_is_named(tmp_path: Path) -> None:
+    (tmp_path / "benchmark.json").write_text("{")
+    with pytest.raises(ValueError, match=r"benchmark\.json: expected JSON"):
+        record.read(tmp_path / "benchmark.json")
+
+
+def test_a_folder_that_takes_no_file_is_told_before_anything_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "benchmark.json").mkdir()
+    monkeypatch.setattr("validation.benchmark.__main__.measure", lambda *_: pytest.fail("measured"))
+    assert command.main(["--quick", "--output", str(tmp_path)]) == 2
+    assert "benchmark.json" in capsys.readouterr().err

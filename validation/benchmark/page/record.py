@@ -90,11 +90,14 @@ def commit() -> str | None:
     """The checkout's commit, with a + where files differ from it; None without git or a checkout."""
     folder = Path(__file__).parent
     try:
-        head, changed = (
+        top, head, changed = (
             subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
-            for arguments in (["rev-parse", "HEAD"], ["status", "--porcelain"])
+            for arguments in (["rev-parse", "--show-toplevel"], ["rev-parse", "HEAD"], ["status", "--porcelain"])
         )
     except (OSError, subprocess.CalledProcessError):
+        return None
+    # A copy without git may lie in a repository of something else.
+    if Path(top).resolve() != Path(__file__).resolve().parents[3]:
         return None
     return head + ("+" if changed else "")
 
@@ -108,7 +111,10 @@ def write(record: Mapping[str, Any], path: Path) -> None:
 
 def read(path: Path) -> dict[str, Any]:
     """A stored record. Raises ``ValueError`` for another schema or missing parts."""
-    record = json.loads(path.read_text(encoding="utf-8"))
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path}: expected JSON, got none: {error}") from error
     got = record.get("schema") if isinstance(record, dict) else type(record).__name__
     if got != SCHEMA:
         raise ValueError(f"{path}: expected a benchmark of schema {SCHEMA}, got {got!r}")
