@@ -16,7 +16,7 @@ FEATURES = {"x86-64-v4": _V4, "x86-64-v3": _V3, "x86-64-v2": _V2, "aarch64": ("n
 def lacking(level: str) -> list[str]:
     """The features of a level that this machine has not."""
     # Of the compiler's parts only that which knows the processor.
-    from llvmlite import binding
+    from llvmlite import binding  # type: ignore[import-untyped]
 
     has = binding.get_host_cpu_features()
     return [feature for feature in FEATURES[level] if not has.get(feature, False)]

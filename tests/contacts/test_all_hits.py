@@ -272,3 +272,19 @@ def test_the_nearest_contacts_are_kept(accelerator):
 def test_normals_are_those_of_the_faces_windings():
     found = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3.0]], [[0, 0, -1]])
     assert found.normals.tolist() == [[0, 0, 1], [0, 0, -1]]
+
+
+@BOTH
+def test_the_interval_is_closed_at_both_ends(accelerator):
+    """A ray that enters a box at t = 7 and leaves it at 11, to rounding."""
+    octree = accelerator.from_mesh(box((-2, -2, -2), (2, 2, 2)))
+    ray = [[-9, 0.1, 0.2]], [[1, 0, 0]]
+    near, far = octree.all_hits(*ray).t
+    assert (near, far) == pytest.approx((7, 11), rel=2.0**-50)
+    before, after = np.nextafter([near, far], 0), np.nextafter([near, far], np.inf)
+    for t_min, t_max, found in (
+        (near, far, [near, far]), (0, near, [near]), (0, before[0], []), (after[0], far, [far]),
+        (after[0], before[1], []), (far, far, [far]), (after[1], 99, []),
+    ):  # fmt: skip
+        assert octree.all_hits(*ray, t_min, t_max).t.tolist() == found
+        assert octree.count_hits(*ray, t_min, t_max).tolist() == [len(found)]
