@@ -112,7 +112,7 @@ def make_parser() -> argparse.ArgumentParser:
     render = commands.add_parser("render", help="render a scene file to a picture")
     render.add_argument("scene", type=Path, help=_SCENE)
     render.add_argument("--write-scene", type=Path, metavar="FILE", help=_WRITE_SCENE)
-    formats = "default: out.png; or .exr or .npy for linear radiance"
+    formats = ".png, or .exr or .npy for linear radiance"
     render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=formats)
     render.add_argument("--resolution", type=_resolution, metavar="WxH", help="pixels, such as 512x512")
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
@@ -156,9 +156,7 @@ def _add_compile(commands: Any) -> None:
         ("all", "the same, and what the viewer calls; the default"),
     ):
         what.add_argument(f"--{name}", dest="what", action="store_const", const=name, help=does)
-    ahead.add_argument(
-        "--level", choices=LEVELS, help="for any processor of a level, which this machine must run too; needs -o"
-    )
+    ahead.add_argument("--level", choices=LEVELS, help="for any processor of a level, not this machine's; needs -o")
     ahead.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="keep them there and not in the usual cache")
     ahead.add_argument("--quiet", action="store_true", help="no progress bar and no word at the end")
     ahead.set_defaults(command=_compile, what="all")
