@@ -70,23 +70,29 @@ def _anchor(path, name):
 def _lines(path):
     """The line where each function, class and constant of a file is defined first, those in a class by its name too."""
     found = {}
-
-    def walk(body, *outer):
-        for node in body:
-            names = []
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-                names = [node.name]
-            elif isinstance(node, ast.Assign | ast.AnnAssign):
-                targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-                names = [part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)]
-            for name in names:
-                found.setdefault(name, node.lineno)
-                found.setdefault(".".join((*outer, name)), node.lineno)
-            if isinstance(node, ast.ClassDef):
-                walk(node.body, *outer, node.name)
-            for block in ("body", "orelse", "handlers", "finalbody"):
-                if isinstance(node, ast.If | ast.Try | ast.With | ast.ExceptHandler):
-                    walk(getattr(node, block, []), *outer)
-
-    walk(ast.parse((ROOT / path).read_text(encoding="utf-8")).body)
+    for name, line in _definitions(ast.parse((ROOT / path).read_text(encoding="utf-8")).body):
+        found.setdefault(name.rpartition(".")[2], line)
+        found.setdefault(name, line)
     return found
+
+
+def _definitions(body, *outer):
+    """Each name that statements define, behind those of the classes ``outer`` that they stand in, and its line."""
+    for node in body:
+        for name in _defined_by(node):
+            yield ".".join((*outer, name)), node.lineno
+        if isinstance(node, ast.ClassDef):
+            yield from _definitions(node.body, *outer, node.name)
+        elif isinstance(node, ast.If | ast.Try | ast.With | ast.ExceptHandler):
+            for block in ("body", "orelse", "handlers", "finalbody"):
+                yield from _definitions(getattr(node, block, []), *outer)
+
+
+def _defined_by(node):
+    """The names that one statement defines: of a function or class its own, of an assignment its targets."""
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        return [node.name]
+    if isinstance(node, ast.Assign | ast.AnnAssign):
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        return [part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)]
+    return []

@@ -28,7 +28,7 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from renderer.kernels.digest import PACKAGE, is_ours, source_digest
-from renderer.kernels.levels import AHEAD_VARIABLE, FEATURES, LEVELS
+from renderer.kernels.levels import AHEAD_VARIABLE, LEVELS, lacking
 from renderer.lazy import lazy
 from renderer.process.files import write_atomically
 
@@ -183,11 +183,8 @@ def _named_folders() -> tuple[Path, ...]:
 @cache
 def runnable_levels() -> tuple[str, ...]:
     """The levels whose kernels this machine can run, best first."""
-    has = llvm.get_host_cpu_features()
     arm = llvm.get_process_triple().startswith(("aarch64", "arm64"))
-    return tuple(
-        name for name, needs in FEATURES.items() if (name == "aarch64") == arm and all(has.get(f, False) for f in needs)
-    )
+    return tuple(name for name in LEVELS if (name == "aarch64") == arm and not lacking(name))
 
 
 def stored_in(folder: Path) -> int:
