@@ -1,6 +1,7 @@
 """``octree-render study``: arguments in, a study's result as an array, a coloured mesh, or a picture."""
 
 import argparse
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
@@ -107,7 +108,8 @@ def _check_output(options: argparse.Namespace) -> None:
     for output, suffix in zip(options.output, suffixes, strict=True):
         expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
         for file in (options.mesh, options.points):
-            other = file is None or output.resolve() != file.resolve()
+            # Not Path.resolve, which raises a RuntimeError for links in a circle.
+            other = file is None or os.path.realpath(output) != os.path.realpath(file)
             expect(other, "--output", "another file than those that are read", str(output))
         expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply for points that are not a mesh's", str(output))
     seen = options.camera is None or ".png" in suffixes

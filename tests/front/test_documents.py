@@ -426,6 +426,13 @@ def test_make_passes_on_what_a_page_gives_it(page, line):
         assert shlex.split(passed) == quick + options
 
 
+def test_a_site_has_nothing_of_the_last_one():
+    """Pages of files that are gone stayed, and links to them were found."""
+    rules = (ROOT / "Makefile").read_text(encoding="utf-8").split("\ndocs: ")[1].splitlines()
+    assert rules[1] == "\trm -rf build/site"
+    assert "-m sphinx" in rules[2] and " --fresh-env " in rules[2]
+
+
 def test_no_page_promises_a_package_on_an_index():
     for page in PAGES:
         assert "pip install octree-renderer" not in page.read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ import llvmlite.binding as llvm
 import pytest
 from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, copy_package, run, start, write_package
 
-from renderer.kernels.levels import FEATURES, LEVELS
+from renderer.kernels.levels import FEATURES, LEVELS, lacking
 from renderer.kernels.store import _user_cache, _versions, runnable_levels
 
 TELL = """
@@ -240,6 +240,20 @@ def test_a_machine_runs_the_levels_whose_features_it_has(monkeypatch, lacks, tri
     monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: features)
     monkeypatch.setattr(llvm, "get_process_triple", lambda: triple)
     assert runnable_levels.__wrapped__() == levels
+
+
+@pytest.mark.parametrize(
+    ("has", "level", "lacks"),
+    [
+        ("x86-64-v2", "x86-64-v2", []),
+        ("x86-64-v2", "x86-64-v3", ["avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"]),
+        ("x86-64-v3", "x86-64-v4", ["avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"]),
+        ("x86-64-v4", "aarch64", ["neon"]),
+    ],
+)
+def test_a_level_lacks_what_the_psabi_has_in_it_beyond_the_machine(monkeypatch, has, level, lacks):
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: dict.fromkeys(FEATURES[has], True))
+    assert lacking(level) == lacks
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,11 @@ from renderer.scene.scene import write_scene
 STAIRS = Path(__file__).parents[2] / "scenes" / "stairs.toml"
 
 
+def test_a_folder_is_no_place_for_a_file(tmp_path: Path) -> None:
+    with pytest.raises(IsADirectoryError, match=re.escape(str(tmp_path))):
+        check_writable(tmp_path)
+
+
 def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     target, link = tmp_path / "there" / "a.bin", tmp_path / "link.bin"

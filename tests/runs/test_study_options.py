@@ -227,7 +227,13 @@ def test_a_file_that_cannot_be_read_is_told_with_its_option(
 
 @pytest.mark.parametrize(
     "wrong",
-    [["--distance", "-1"], ["--samples", "0"], ["-o", "{folder}"], ["-o", "{folder}.png", "--resolution", "0x9"]],
+    [
+        ["--distance", "-1"],
+        ["--samples", "0"],
+        ["-o", "{folder}"],
+        ["-o", "{folder}.png", "--resolution", "0x9"],
+        ["--resolution", "9x0"],
+    ],
 )
 def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wrong: list[str]) -> None:
     (tmp_path / "s.npy").mkdir()
@@ -239,3 +245,16 @@ def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wro
         assert end.code == 2
     assert [path.name for path in tmp_path.iterdir()] == ["s.npy"]
     assert main(command) == 0
+
+
+@pytest.mark.parametrize("option", ["-o", "--points", "mesh"])
+def test_a_link_to_itself_is_told_in_one_line(
+    city: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    loop = tmp_path / "loop.npy"
+    loop.symlink_to(loop)
+    given = {"mesh": [str(loop)]}.get(option, [str(city), option, str(loop)])
+    output = [] if option == "-o" else ["-o", str(tmp_path / "a.npy")]
+    assert main(["study", "sky", *given, *output, "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and said.startswith("octree-render: ") and str(loop) in said

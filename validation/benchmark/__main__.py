@@ -56,7 +56,8 @@ def _run(options: argparse.Namespace, command: str) -> int:
     options.output.mkdir(parents=True, exist_ok=True)
     stored, drawn = options.output / "benchmark.json", options.output / "benchmark.html"
     # Tried and read first, so that a fault is not told after an hour of measuring.
-    check_writable(stored)
+    for output in (drawn,) if options.page_only else (stored, drawn):
+        check_writable(output)
     ideas = history.read()
     if not options.page_only:
         missing = [path for path in options.mesh if not path.is_file()]

@@ -279,16 +279,34 @@ def test_memory_grows_with_the_mesh_and_not_with_the_library() -> None:
     assert ours["rest"] == pytest.approx(ours["own"], abs=3 * 2**21)
 
 
-def test_a_copy_in_the_repository_of_something_else_has_no_commit(tmp_path: Path) -> None:
-    copy = tmp_path / "else" / "copy" / "validation" / "benchmark" / "page" / "record.py"
-    copy.parent.mkdir(parents=True)
-    shutil.copy(record.__file__, copy)
+def commit_told_in(repository: Path, copy: Path, edit: bool = False) -> tuple[str, str]:
+    """What a copy of the project in ``repository`` tells as its commit, and the commit of the repository."""
+    code = copy / "validation" / "benchmark" / "page" / "record.py"
+    code.parent.mkdir(parents=True)
+    shutil.copy(record.__file__, code)
     for words in (["init", "-q"], ["add", "."], ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-qm", "x"]):
-        subprocess.run(["git", *words], cwd=tmp_path / "else", check=True)
-    commit = "import runpy, sys; print(runpy.run_path(sys.argv[1])['commit']())"
-    words = [sys.executable, "-c", commit, str(copy)]
-    said = subprocess.run(words, cwd=Path(__file__).parents[3], capture_output=True, text=True, check=True).stdout
-    assert said.strip() == "None"
+        subprocess.run(["git", *words], cwd=repository, check=True)
+    if edit:
+        (copy / "new").touch()
+    told = "import runpy, sys; print(runpy.run_path(sys.argv[1])['commit']())"
+    words, root = [sys.executable, "-B", "-c", told, str(code)], Path(__file__).parents[3]
+    said = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True).stdout.strip()
+    head = ["git", "rev-parse", "HEAD"]
+    return said, subprocess.run(head, cwd=repository, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_a_copy_in_the_repository_of_something_else_has_no_commit(tmp_path: Path) -> None:
+    assert commit_told_in(tmp_path, tmp_path / "else" / "copy")[0] == "None"
+
+
+def test_a_checkout_tells_its_commit(tmp_path: Path) -> None:
+    told, head = commit_told_in(tmp_path, tmp_path)
+    assert told == head
+
+
+def test_a_checkout_whose_files_differ_tells_it(tmp_path: Path) -> None:
+    told, head = commit_told_in(tmp_path, tmp_path, edit=True)
+    assert told == f"{head}+"
 
 
 def test_a_damaged_record_is_named(tmp_path: Path) -> None:
@@ -297,10 +315,23 @@ def test_a_damaged_record_is_named(tmp_path: Path) -> None:
         record.read(tmp_path / "benchmark.json")
 
 
+@pytest.mark.parametrize("output", ["benchmark.json", "benchmark.html"])
 def test_a_folder_that_takes_no_file_is_told_before_anything_is_measured(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], output: str
 ) -> None:
-    (tmp_path / "benchmark.json").mkdir()
+    (tmp_path / output).mkdir()
     monkeypatch.setattr("validation.benchmark.__main__.measure", lambda *_: pytest.fail("measured"))
     assert command.main(["--quick", "--output", str(tmp_path)]) == 2
-    assert "benchmark.json" in capsys.readouterr().err
+    assert output in capsys.readouterr().err
+
+
+def test_a_fault_in_the_history_is_told_before_anything_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def read() -> None:
+        raise ValueError("history.toml: a fault")
+
+    monkeypatch.setattr("validation.benchmark.page.history.read", read)
+    monkeypatch.setattr("validation.benchmark.__main__.measure", lambda *_: pytest.fail("measured"))
+    assert command.main(["--quick", "--output", str(tmp_path)]) == 2
+    assert "history.toml: a fault" in capsys.readouterr().err
