@@ -222,6 +222,35 @@ def test_a_double_click_turns_about_what_is_there(viewer: Viewer) -> None:
     assert math.dist(viewer.camera["m"][12:15], point) == pytest.approx(distance)
 
 
+def test_a_double_click_is_one_though_a_card_has_come_between(viewer: Viewer) -> None:
+    """Its second click fell on the card: nothing was turned, and what it met there was pressed."""
+    x, y = viewer.centre()[0] + 40, viewer.centre()[1] + 30
+    viewer.page.mouse.click(x, y)
+    viewer.page.wait_for_selector("#card")
+    close = viewer.page.locator("#card .close").bounding_box()
+    by = [x - close["x"] - close["width"] / 2, y - close["y"] - close["height"] / 2]
+    place_card = "(by) => (document.querySelector('#card').style.translate = by.map((d) => `${d}px`).join(' '))"
+    viewer.page.evaluate(place_card, by)
+    try:
+        met = viewer.page.evaluate("([x, y]) => document.elementFromPoint(x, y).className", [x, y])
+        viewer.page.mouse.down(click_count=2)
+        viewer.page.mouse.up(click_count=2)
+    finally:
+        viewer.page.evaluate(place_card, [])
+    assert met == "close"
+    assert viewer.page.locator("#card").is_visible()
+    pivot, point = viewer.page.evaluate("() => [viewer.camera.pivot, viewer.rays.pick.point]")
+    assert pivot == point
+
+
+def test_two_clicks_on_the_card_turn_about_nothing(viewer: Viewer) -> None:
+    viewer.page.mouse.click(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
+    viewer.page.wait_for_selector("#card")
+    pivot = viewer.page.evaluate("() => viewer.camera.pivot")
+    viewer.page.locator("#card h2").dblclick()
+    assert viewer.page.evaluate("() => [viewer.camera.pivot, String(getSelection()) !== '']") == [pivot, True]
+
+
 def test_a_ray_is_seen_from_the_side_beside_its_card(viewer: Viewer) -> None:
     """Its middle was the picture's, beneath the card."""
     viewer.page.mouse.click(viewer.centre()[0] + 40, viewer.centre()[1] + 30)

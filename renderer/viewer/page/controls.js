@@ -42,20 +42,37 @@ export class Controls {
     this.pointers = new Map();
     this.held = new Map();
     this.travelled = 0;
+    this.pressed = null;
     stage.addEventListener("pointerdown", (event) => this.press(event));
     stage.addEventListener("pointermove", (event) => this.drag(event));
     for (const name of ["pointerup", "pointercancel"])
       stage.addEventListener(name, (event) => this.release(event));
     stage.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    stage.addEventListener("dblclick", (event) => event.target.closest(OWN) ?? focused());
+    // Between two clicks a card may have come, which covers the picture or shifts it: the first press tells what they
+    // are meant for.
+    for (const name of ["mousedown", "click"]) document.addEventListener(name, (event) => this.follow(event), true);
+    document.addEventListener("dblclick", () => this.isOnPicture(this.pressed) && focused());
     stage.addEventListener("contextmenu", (event) => event.preventDefault());
     document.addEventListener("keydown", (event) => this.keyDown(event));
     document.addEventListener("keyup", (event) => this.held.delete(event.code));
     for (const left of [stage, window]) left.addEventListener("blur", () => this.held.clear());
   }
 
+  isOnPicture(target) {
+    return this.stage.contains(target) && !target.closest(OWN);
+  }
+
+  // The clicks after the first on the picture mean nothing to what has come there since: they would press a button, or
+  // select a word.
+  follow(event) {
+    if (event.detail <= 1 && event.type === "mousedown") this.pressed = event.target;
+    if (event.detail <= 1 || !this.isOnPicture(this.pressed) || this.isOnPicture(event.target)) return;
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
   press(event) {
-    if (event.target.closest(OWN)) return;
+    if (!this.isOnPicture(event.target)) return;
     this.stage.focus({ preventScroll: true });
     this.stage.setPointerCapture(event.pointerId);
     if (!this.pointers.size) this.travelled = 0;
