@@ -11,15 +11,22 @@ pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 
 _DRAGS = 12
+_LOOKS = 5
 _WIDTH, _HEIGHT = 640, 400
 
 
 def held(page: Viewer, connection: Any) -> float:
-    """Bytes of what scripts hold, buffers of pictures and meshes with it, once what is left over is collected."""
-    page.page.wait_for_timeout(100)
-    connection.send("HeapProfiler.collectGarbage")
-    heap = connection.send("Runtime.getHeapUsage")
-    return heap["usedSize"] + heap["backingStorageSize"] + heap["embedderHeapUsedSize"]
+    """Bytes of what scripts hold, buffers of pictures and meshes with it, once what is left over is collected: the least
+    of some looks, because what the engine lays out and paints between a collection and a look is gone at the next.
+    """
+
+    def look() -> float:
+        page.page.wait_for_timeout(50)
+        connection.send("HeapProfiler.collectGarbage")
+        heap = connection.send("Runtime.getHeapUsage")
+        return heap["usedSize"] + heap["backingStorageSize"] + heap["embedderHeapUsedSize"]
+
+    return min(look() for _ in range(_LOOKS))
 
 
 def test_drags_and_clicks_leave_nothing_behind(browser: Any, url: str) -> None:
@@ -36,6 +43,7 @@ def test_drags_and_clicks_leave_nothing_behind(browser: Any, url: str) -> None:
                 page.drag((-1) ** number * 40, 10)
                 page.settled("octree")
                 page.page.mouse.click(*page.centre())
+                page.page.wait_for_function("() => viewer.rays.pick?.seq === viewer.rays.seq")
             return held(page, connection)
 
         drags()
