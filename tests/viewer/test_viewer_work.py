@@ -349,6 +349,18 @@ def test_an_address_hides_objects_once(viewer: Viewer, hidden: str) -> None:
     assert viewer.page.evaluate("() => { delete viewer.connection.send; return window.hides; }") == 1
 
 
+def test_an_address_counts_though_the_page_writes_its_own(viewer: Viewer) -> None:
+    """Before it was read, the view that was to be written soon took its place."""
+    samples = viewer.page.evaluate(
+        """() => new Promise((told) => {
+            addEventListener("hashchange", () => setTimeout(() => told(viewer.panel.settings.samples)), { once: true });
+            location.hash = "#samples=16";
+            viewer.writeAddress();
+        })"""
+    )
+    assert samples == 16
+
+
 WRONG = [
     {"mode": "none", "camera": "1,2,3"},
     {"camera": "0,0,NaN,,0.5,0,0,0", "max_depth": "many", "samples": "7", "aov": "<b>"},

@@ -87,7 +87,8 @@ class Viewer {
     });
     this.connection.open();
     addEventListener("pagehide", () => this.scene && remember({ ...this.kept, hash: location.hash }));
-    addEventListener("hashchange", () => this.scene && this.goTo(read(location.hash)));
+    // The address in the bar may be the page's own again by now.
+    addEventListener("hashchange", ({ newURL }) => this.scene && this.goTo(read(new URL(newURL).hash)));
     // A page that is loaded again goes on from where it was; another address says where to begin.
     const before = remembered();
     const [{ type }] = performance.getEntriesByType("navigation");
