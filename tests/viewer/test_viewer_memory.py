@@ -16,8 +16,8 @@ _WIDTH, _HEIGHT = 640, 400
 
 
 def held(page: Viewer, connection: Any) -> float:
-    """Bytes of what scripts hold, buffers of pictures and meshes with it, once what is left over is collected: the least
-    of some looks, because what the engine lays out and paints between a collection and a look is gone at the next.
+    """Bytes of what scripts hold, buffers of pictures and meshes with it, once what is left over is collected: the
+    least of some looks, because what the engine paints between a collection and a look is gone at the next.
     """
 
     def look() -> float:
