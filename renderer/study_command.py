@@ -102,6 +102,8 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
 def _check_output(options: argparse.Namespace) -> None:
     """What can be told before any work."""
     from renderer.process.files import check_writable
+    from renderer.runs.drawing import FINER
+    from renderer.scene.scene import MOST_PIXELS
 
     on_mesh = options.grid is None and options.points is None
     suffixes = [output.suffix.lower() for output in options.output]
@@ -119,7 +121,11 @@ def _check_output(options: argparse.Namespace) -> None:
             given = options.kind != kind and getattr(options, name) is not None
             expect(not given, f"--{name}", f"none, as it is the kind {kind}'s", f"one for {options.kind}")
     expect(options.kind != "sun" or options.suns is not None, "--suns", "a file for the kind sun", "none")
-    expect(min(options.resolution) > 0, "--resolution", "at least 1x1", "{}x{}".format(*options.resolution))
+    widest = MOST_PIXELS // FINER
+    right = 1 <= min(options.resolution) and max(options.resolution) <= widest
+    expect(right, "--resolution", f"1x1 to {widest}x{widest}", "{}x{}".format(*options.resolution))
+    named = [os.path.realpath(output) for output in options.output]
+    expect(len({*named}) == len(named), "--output", "each file once", ", ".join(map(str, options.output)))
     for output in options.output:
         check_writable(output)
 
@@ -173,6 +179,7 @@ def _write(output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, an
 def _picture(mesh: Any, camera: Any, options: argparse.Namespace) -> Any:
     """The faces and normals that a camera sees; without one, from the south-west and above."""
     from renderer.picture.render import render
+    from renderer.runs.drawing import FINER
     from renderer.runs.views import from_above
     from renderer.scene.material import Phong
     from renderer.scene.scene import Scene, SceneObject
@@ -180,7 +187,6 @@ def _picture(mesh: Any, camera: Any, options: argparse.Namespace) -> Any:
     thing = SceneObject(mesh=mesh, material="grey", normals="flat")
     eye = from_above(mesh, options.resolution) if camera is None else camera
     scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[thing], ambient=1)
-    # Four places a pixel, whose colours are averaged.
-    twice = (2 * options.resolution[0], 2 * options.resolution[1])
-    return render(scene, resolution=twice, samples=1, max_depth=0, planes=("face", "normal"),
+    width, height = options.resolution
+    return render(scene, resolution=(FINER * width, FINER * height), samples=1, max_depth=0, planes=("face", "normal"),
                   threads=options.threads, progress=not options.quiet)  # fmt: skip

@@ -77,9 +77,11 @@ def on_grid(octree: Octree, spacing: float) -> Chosen:
     """
     expect(bool(0.0 < spacing < np.inf), "--grid", "a number > 0, in the mesh's units", f"{spacing:g}")
     lower, upper = octree.mesh.bounds
-    counts = np.ceil((upper - lower)[:2] / spacing)
-    expect(counts.prod() <= _MOST, "--grid", f"a spacing with at most {_MOST:,} points", f"{counts.prod():,.0f}")
-    x, y = (lower[a] + spacing * (np.arange(max(1, int(counts[a]))) + 0.5) for a in (0, 1))
+    with np.errstate(over="ignore"):
+        counts = np.maximum(1.0, np.ceil((upper - lower)[:2] / spacing))
+        number = counts.prod()
+    expect(number <= _MOST, "--grid", f"a spacing with at most {_MOST:,} points", f"{number:,.0f}")
+    x, y = (lower[a] + spacing * (np.arange(int(counts[a])) + 0.5) for a in (0, 1))
     start = float(upper[2]) + float(np.abs(octree.mesh.bounds).max()) * 2.0**-20 + float(octree.mesh.extent.max())
     origins = np.stack([*(g.ravel() for g in np.meshgrid(x, y)), np.full(len(x) * len(y), start)], axis=1)
     hits = octree.closest_hit(origins, (0.0, 0.0, -1.0))

@@ -16,6 +16,8 @@ from renderer.process.files import write_atomically
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
+# So many times finer than a picture is the image that it is drawn from, along each side.
+FINER = 2
 # What has no value.
 _GREY = 128
 # Of a legend: its share of the picture's height, its least and greatest height in pixels, and the height of a letter's
@@ -66,8 +68,8 @@ def _color(rows: NDArray[np.void], values: Floats, colors: Bytes) -> None:
 
 
 def draw(image: Image, mesh: Mesh, values: Floats, title: str) -> Bytes:
-    """A picture of the mesh (h, w, 3) from an image of twice its size: each place in the colour of its face's value,
-    walls darker, white where nothing is, and a pixel the mean of its four; below it a legend.
+    """A picture of the mesh (h, w, 3) from an image ``FINER`` times its size: each place in the colour of its face's
+    value, walls darker, white where nothing is, and a pixel the mean of its places; below it a legend.
     """
     expect(len(values) == len(mesh.faces), "values", f"{len(mesh.faces)} values", str(len(values)))
     hit, scale = image.face >= 0, scale_of(values)
@@ -76,8 +78,8 @@ def draw(image: Image, mesh: Mesh, values: Floats, title: str) -> Bytes:
     # By the normal's height: walls and ground of the same value are told apart, and the hue stays.
     light = 0.8 + 0.2 * np.abs(image.normal[hit][:, 2:3])
     canvas[hit] = (colors * light + 0.5).astype(np.uint8)
-    tall, wide = canvas.shape[0] // 2, canvas.shape[1] // 2
-    canvas = (canvas.reshape(tall, 2, wide, 2, 3).mean(axis=(1, 3)) + 0.5).astype(np.uint8)
+    tall, wide = canvas.shape[0] // FINER, canvas.shape[1] // FINER
+    canvas = (canvas.reshape(tall, FINER, wide, FINER, 3).mean(axis=(1, 3)) + 0.5).astype(np.uint8)
     return np.concatenate([canvas, legend(canvas.shape[1], canvas.shape[0], scale, title)])
 
 

@@ -40,7 +40,9 @@ AnyCamera = Annotated[
 ]
 AnyMaterial = Annotated[Annotated[Phong | Mirror | Dielectric, Field(discriminator="type")], _typed("phong")]
 AnyLight = Annotated[DirectionalLight | PointLight, Field(discriminator="type")]
-_Pixels = Annotated[int, Field(ge=1, le=16384, strict=True)]
+# A side of the largest picture.
+MOST_PIXELS = 16384
+_Pixels = Annotated[int, Field(ge=1, le=MOST_PIXELS, strict=True)]
 _Squares = Annotated[int, Field(ge=1, le=1000, strict=True)]
 _Finite = Annotated[float, Field(strict=True)]
 

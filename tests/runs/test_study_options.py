@@ -233,6 +233,9 @@ def test_a_file_that_cannot_be_read_is_told_with_its_option(
         ["-o", "{folder}"],
         ["-o", "{folder}.png", "--resolution", "0x9"],
         ["--resolution", "9x0"],
+        ["-o", "{folder}.png", "--resolution", "8193x9"],
+        ["-o", "{folder}.ply", "-o", "{folder}/../s.npy.ply"],
+        ["--grid", "1e-300"],
     ],
 )
 def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wrong: list[str]) -> None:
@@ -245,6 +248,13 @@ def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wro
         assert end.code == 2
     assert [path.name for path in tmp_path.iterdir()] == ["s.npy"]
     assert main(command) == 0
+
+
+def test_a_picture_may_be_a_single_pixel(city: Path, tmp_path: Path) -> None:
+    output = tmp_path / "a.png"
+    assert main(["study", "sky", str(city), "-o", str(output), "--resolution", "1x1", "--quiet"]) == 0
+    with Pillow.open(output) as picture:
+        assert picture.width == 1
 
 
 @pytest.mark.parametrize("option", ["-o", "--points", "mesh"])
