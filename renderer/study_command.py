@@ -122,7 +122,7 @@ def _check_output(options: argparse.Namespace) -> None:
             expect(not given, f"--{name}", f"none, as it is the kind {kind}'s", f"one for {options.kind}")
     expect(options.kind != "sun" or options.suns is not None, "--suns", "a file for the kind sun", "none")
     widest = MOST_PIXELS // FINER
-    right = 1 <= min(options.resolution) and max(options.resolution) <= widest
+    right = min(options.resolution) >= 1 and max(options.resolution) <= widest
     expect(right, "--resolution", f"1x1 to {widest}x{widest}", "{}x{}".format(*options.resolution))
     named = [os.path.realpath(output) for output in options.output]
     expect(len({*named}) == len(named), "--output", "each file once", ", ".join(map(str, options.output)))

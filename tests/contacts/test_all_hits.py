@@ -297,7 +297,7 @@ def test_the_interval_is_closed_for_a_ray_that_meets_more_than_is_listed(acceler
     """
     sheet = grid(8, 8)
     sheets = 3 * LISTED
-    vertices = np.concatenate([sheet.vertices + [0, y, 0] for y in range(sheets)])
+    vertices = np.concatenate([sheet.vertices + np.array([0.0, y, 0.0]) for y in range(sheets)])
     faces = np.concatenate([sheet.faces + y * len(sheet.vertices) for y in range(sheets)])
     octree = accelerator(vertices, faces)
     ray = [[0.3, sheets + 0.7, 0.2]], [[0, -1, 0]]

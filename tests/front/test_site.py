@@ -155,8 +155,10 @@ def linked(text):
     ],
 )
 def test_a_name_that_its_file_has_not_is_an_error_of_the_build(text):
-    with pytest.raises(ValueError, match=re.escape(text.split("::")[0])):
+    with pytest.raises(ValueError, match=re.escape(text.split("::")[0])) as error:
         linked(text)
+    if (ROOT / text.split("::")[0]).is_file():
+        assert str(error.value).startswith("docs/page: ")  # which names it
 
 
 @pytest.mark.parametrize(
@@ -176,6 +178,38 @@ def test_a_name_within_a_class_or_a_pair_is_found(text, line):
     path, _, anchor = linked(text).removeprefix("source/").partition("#line-")
     assert path == text.split("::")[0]
     assert line is None or line in (ROOT / path).read_text(encoding="utf-8").splitlines()[int(anchor) - 1]
+
+
+DEFINITIONS = """\
+if True:
+    def either(): inner = 1
+else:
+    def otherwise(): ...
+try:
+    tried: int = 1
+except ValueError:
+    failed = 2
+finally:
+    ended = 3
+with open("x"):
+    async def waits(): ...
+def either(): ...
+class Kind:
+    value: int
+    a, (b, c) = d = 1, (2, 3)
+"""
+
+
+def test_the_lines_of_names_are_those_of_their_first_definitions(tmp_path, monkeypatch):
+    pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
+    made = module("source_links")
+    (tmp_path / "x.py").write_text(DEFINITIONS)
+    monkeypatch.setitem(made["_lines"].__wrapped__.__globals__, "ROOT", tmp_path)
+    of_kind = {"value": 15, **dict.fromkeys("abcd", 16)}
+    assert made["_lines"]("x.py") == {
+        "either": 2, "otherwise": 4, "tried": 6, "failed": 8, "ended": 10, "waits": 12, "Kind": 14,
+        **of_kind, **{f"Kind.{name}": line for name, line in of_kind.items()},
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("text", ["/etc/adduser.conf/x.json", "../outside.json", "docs/../../outside.json"])
