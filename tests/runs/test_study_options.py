@@ -250,6 +250,18 @@ def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wro
     assert main(command) == 0
 
 
+@pytest.mark.parametrize(
+    ("kind", "wrong"),
+    [("sky", ["--patches", "0"]), ("sky", ["--samples", "4"]), ("sun", ["--suns", "{file}"]), ("sun", [])],
+)
+def test_kinds_refuse_their_options_before_any_part(city: Path, tmp_path: Path, kind: str, wrong: list[str]) -> None:
+    suns = tmp_path / "suns.txt"
+    suns.write_text("0 0 1 -1")
+    wrong = [word.format(file=suns) for word in wrong]
+    assert main(["study", kind, str(city), "-o", str(tmp_path / "a.npy"), "--quiet", *wrong]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["suns.txt"]
+
+
 def test_a_picture_may_be_a_single_pixel(city: Path, tmp_path: Path) -> None:
     output = tmp_path / "a.png"
     assert main(["study", "sky", str(city), "-o", str(output), "--resolution", "1x1", "--quiet"]) == 0
