@@ -80,8 +80,10 @@ def on_grid(octree: Octree, spacing: float) -> Chosen:
     with np.errstate(over="ignore"):
         counts = np.maximum(1.0, np.ceil((upper - lower)[:2] / spacing))
         number = counts.prod()
-    expect(number <= _MOST, "--grid", f"a spacing with at most {_MOST:,} points", f"{number:,.0f}")
+    expect(number <= _MOST, "--grid", f"a spacing with at most {_MOST:,} points", f"{number:.4g}")
     x, y = (lower[a] + spacing * (np.arange(int(counts[a])) + 0.5) for a in (0, 1))
+    # The last may stand beside the mesh, and too far away for any ray.
+    x, y = x[x <= upper[0]], y[y <= upper[1]]
     start = float(upper[2]) + float(np.abs(octree.mesh.bounds).max()) * 2.0**-20 + float(octree.mesh.extent.max())
     origins = np.stack([*(g.ravel() for g in np.meshgrid(x, y)), np.full(len(x) * len(y), start)], axis=1)
     hits = octree.closest_hit(origins, (0.0, 0.0, -1.0))

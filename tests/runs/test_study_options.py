@@ -11,7 +11,7 @@ import pytest
 from PIL import Image as Pillow
 from plyfile import PlyData
 
-from renderer import Octree, load_mesh, load_scene, render
+from renderer import Mesh, Octree, load_mesh, load_scene, render
 from renderer.cli import main
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
@@ -234,12 +234,15 @@ def test_a_file_that_cannot_be_read_is_told_with_its_option(
         ["-o", "{folder}.png", "--resolution", "0x9"],
         ["--resolution", "9x0"],
         ["-o", "{folder}.png", "--resolution", "8193x9"],
+        ["-o", "{folder}.png", "--resolution", "9x8193"],
         ["-o", "{folder}.ply", "-o", "{folder}/../s.npy.ply"],
+        ["-o", "{folder}/link.npy"],  # to the other output
         ["--grid", "1e-300"],
     ],
 )
 def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wrong: list[str]) -> None:
     (tmp_path / "s.npy").mkdir()
+    (tmp_path / "s.npy" / "link.npy").symlink_to(tmp_path / "right.npy")
     wrong = [word.format(folder=tmp_path / "s.npy") for word in wrong]
     command = ["study", "ao", str(city), "-o", str(tmp_path / "right.npy"), "--quiet"]
     try:
@@ -262,11 +265,29 @@ def test_kinds_refuse_their_options_before_any_part(city: Path, tmp_path: Path, 
     assert [path.name for path in tmp_path.iterdir()] == ["suns.txt"]
 
 
-def test_a_picture_may_be_a_single_pixel(city: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("size", ["1x1", "8192x1"])
+def test_the_smallest_picture_and_the_widest(city: Path, tmp_path: Path, size: str) -> None:
     output = tmp_path / "a.png"
-    assert main(["study", "sky", str(city), "-o", str(output), "--resolution", "1x1", "--quiet"]) == 0
-    with Pillow.open(output) as picture:
-        assert picture.width == 1
+    assert main(["study", "sky", str(city), "-o", str(output), "--resolution", size, "--quiet"]) == 0
+    with Pillow.open(output) as picture:  # below it stands a legend
+        assert picture.width == int(size.partition("x")[0])
+
+
+@pytest.mark.parametrize(
+    ("spacing", "got"), [(1e-300, "4e+300"), (1e300, "none"), (float(np.finfo(np.float64).max), "none"), (9.0, "none")]
+)
+def test_a_grid_over_a_wall_and_one_without_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], spacing: float, got: str
+) -> None:
+    """No ray from above meets a wall; of a fine grid it had rows without end, and a coarse one stood too far away."""
+    wall = Mesh([[0, 0, 0], [4, 0, 0], [4, 0, 2], [0, 0, 2]], [[0, 1, 2], [0, 2, 3]])
+    save_ply(wall, tmp_path / "wall.ply")
+    output = tmp_path / "a.npy"
+    command = ["study", "sky", str(tmp_path / "wall.ply"), "-o", str(output), "--quiet", "--grid", repr(spacing)]
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("octree-render: --grid: ") and said.endswith(f"got {got}\n") and len(said) < 120
+    assert not output.exists()
 
 
 @pytest.mark.parametrize("option", ["-o", "--points", "mesh"])

@@ -222,25 +222,72 @@ def test_a_double_click_turns_about_what_is_there(viewer: Viewer) -> None:
     assert math.dist(viewer.camera["m"][12:15], point) == pytest.approx(distance)
 
 
-def test_a_double_click_is_one_though_a_card_has_come_between(viewer: Viewer) -> None:
-    """Its second click fell on the card: nothing was turned, and what it met there was pressed."""
+# Take the card to where the middle of that part of it is at a point, and away with null.
+PLACE_CARD = """([part, x, y]) => {
+    const card = document.querySelector("#card");
+    card.style.translate = "none";
+    if (!part) return;
+    const { left, top, width, height } = card.querySelector(part).getBoundingClientRect();
+    card.style.translate = `${x - left - width / 2}px ${y - top - height / 2}px`;
+    return document.elementFromPoint(x, y).matches(part);
+}"""
+
+
+def second_click(viewer: Viewer) -> None:
+    viewer.page.mouse.down(click_count=2)
+    viewer.page.mouse.up(click_count=2)
+
+
+@pytest.mark.parametrize("part", [".close", "h2"])
+def test_a_double_click_is_one_though_a_card_has_come_between(viewer: Viewer, part: str) -> None:
+    """Its second click fell on the card: nothing was turned, and what it met there was pressed or selected."""
     x, y = viewer.centre()[0] + 40, viewer.centre()[1] + 30
     viewer.page.mouse.click(x, y)
     viewer.page.wait_for_selector("#card")
-    close = viewer.page.locator("#card .close").bounding_box()
-    by = [x - close["x"] - close["width"] / 2, y - close["y"] - close["height"] / 2]
-    place_card = "(by) => (document.querySelector('#card').style.translate = by.map((d) => `${d}px`).join(' '))"
-    viewer.page.evaluate(place_card, by)
-    try:
-        met = viewer.page.evaluate("([x, y]) => document.elementFromPoint(x, y).className", [x, y])
-        viewer.page.mouse.down(click_count=2)
-        viewer.page.mouse.up(click_count=2)
-    finally:
-        viewer.page.evaluate(place_card, [])
-    assert met == "close"
+    met = viewer.page.evaluate(PLACE_CARD, [part, x, y])
+    second_click(viewer)
+    viewer.page.evaluate(PLACE_CARD, [None, 0, 0])
+    assert met
     assert viewer.page.locator("#card").is_visible()
-    pivot, point = viewer.page.evaluate("() => [viewer.camera.pivot, viewer.rays.pick.point]")
-    assert pivot == point
+    pivot, point, selected = viewer.page.evaluate(
+        "() => [viewer.camera.pivot, viewer.rays.pick.point, String(getSelection())]"
+    )
+    assert (pivot, selected) == (point, "")
+
+
+def test_the_second_click_on_what_closes_the_card_picks_nothing(viewer: Viewer) -> None:
+    """It fell on the picture that the card had covered, and a card came again."""
+    x, y = viewer.centre()[0] + 40, viewer.centre()[1] + 30
+    viewer.page.mouse.click(x - 80, y)
+    viewer.page.wait_for_selector("#card")
+    assert viewer.page.evaluate(PLACE_CARD, [".close", x, y])
+    asked, pivot = viewer.page.evaluate("() => [viewer.rays.seq, viewer.camera.pivot]")
+    viewer.page.mouse.dblclick(x, y)
+    viewer.page.evaluate(PLACE_CARD, [None, 0, 0])
+    closed = viewer.page.evaluate("() => [viewer.rays.seq, viewer.camera.pivot, viewer.rays.asked]")
+    assert closed == [asked + 1, pivot, None]
+    # Another means the picture again, also a finger's, whose mouse events come when it has left.
+    connection = viewer.context.new_cdp_session(viewer.page)
+    for kind, points in (("touchStart", [{"x": x - 80, "y": y}]), ("touchEnd", [])):
+        connection.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    viewer.page.wait_for_selector("#card")
+
+
+def test_a_double_click_beside_the_picture_or_on_a_control_turns_about_nothing(viewer: Viewer) -> None:
+    """Beside it the camera turned about what was clicked before."""
+    viewer.page.select_option("[name=size]", "scene")
+    viewer.choose("proof")
+    viewer.page.mouse.click(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
+    viewer.page.wait_for_selector("#card")
+    state = "() => [viewer.camera.pivot, viewer.rays.seq]"
+    before = viewer.page.evaluate(state)
+    stage, frame = (viewer.page.locator(name).bounding_box() for name in ("#stage", "#frame"))
+    assert frame["x"] + frame["width"] + 8 < stage["x"] + stage["width"]
+    viewer.page.mouse.dblclick(stage["x"] + stage["width"] - 4, stage["y"] + stage["height"] / 2)
+    assert viewer.page.evaluate(state) == before
+    viewer.page.locator("#divider").press("End")  # from under the card
+    viewer.page.locator("#divider").dblclick(position={"x": 8, "y": 30})
+    assert viewer.page.evaluate(state) == before
 
 
 def test_two_clicks_on_the_card_turn_about_nothing(viewer: Viewer) -> None:

@@ -35,44 +35,50 @@ export const isShortcut = (event) =>
   event.key.length === 1 && event.key !== " " && event.target.matches(MAKES_NOTHING_OF_THEM);
 
 export class Controls {
-  // `moved()` is called after each movement, `clicked(clientX, clientY)` for a press that did not move, `focused()` for
-  // two of them. `frame` is the picture's element on the stage.
+  // `moved()` is called after each movement, `clicked(clientX, clientY)` for a press that did not move,
+  // `focused(clientX, clientY)` for two of them. `frame` is the picture's element on the stage.
   constructor(stage, frame, { camera, moved, clicked, focused }) {
     Object.assign(this, { stage, frame, camera, moved, clicked, walking: false });
     this.pointers = new Map();
     this.held = new Map();
     this.travelled = 0;
-    this.pressed = null;
+    // Where the first press of some at one place fell, and whether the last of them fell on something else.
+    Object.assign(this, { pressed: null, stray: false });
     stage.addEventListener("pointerdown", (event) => this.press(event));
     stage.addEventListener("pointermove", (event) => this.drag(event));
     for (const name of ["pointerup", "pointercancel"])
       stage.addEventListener(name, (event) => this.release(event));
     stage.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    // Between two clicks a card may have come, which covers the picture or shifts it: the first press tells what they
-    // are meant for.
+    // Between two clicks a card may have come over the picture, or gone: the first press tells what they are meant for.
     for (const name of ["mousedown", "click"]) document.addEventListener(name, (event) => this.follow(event), true);
-    document.addEventListener("dblclick", () => this.isOnPicture(this.pressed) && focused());
+    document.addEventListener("dblclick", (event) => {
+      if (this.isBareStage(this.pressed)) focused(event.clientX, event.clientY);
+    });
     stage.addEventListener("contextmenu", (event) => event.preventDefault());
     document.addEventListener("keydown", (event) => this.keyDown(event));
     document.addEventListener("keyup", (event) => this.held.delete(event.code));
     for (const left of [stage, window]) left.addEventListener("blur", () => this.held.clear());
   }
 
-  isOnPicture(target) {
+  // Whether it is the stage without the controls that stand there.
+  isBareStage(target) {
     return this.stage.contains(target) && !target.closest(OWN);
   }
 
-  // The clicks after the first on the picture mean nothing to what has come there since: they would press a button, or
-  // select a word.
+  // Clicks after the first mean nothing to what has come there since: they would press a button, select a word, or pick
+  // what a card has covered.
   follow(event) {
-    if (event.detail <= 1 && event.type === "mousedown") this.pressed = event.target;
-    if (event.detail <= 1 || !this.isOnPicture(this.pressed) || this.isOnPicture(event.target)) return;
+    const { detail, type, target } = event;
+    if (type === "mousedown" && detail <= 1) this.pressed = target;
+    this.stray = detail > 1 && this.isBareStage(this.pressed) !== this.isBareStage(target);
+    if (!this.stray) return;
     event.preventDefault();
     event.stopPropagation();
   }
 
   press(event) {
-    if (!this.isOnPicture(event.target)) return;
+    if (!this.isBareStage(event.target)) return;
+    this.stray = false;
     this.stage.focus({ preventScroll: true });
     this.stage.setPointerCapture(event.pointerId);
     if (!this.pointers.size) this.travelled = 0;
@@ -96,7 +102,7 @@ export class Controls {
 
   release(event) {
     if (!this.pointers.delete(event.pointerId)) return;
-    const click = event.type === "pointerup" && event.button === 0 && this.travelled < STILL;
+    const click = event.type === "pointerup" && event.button === 0 && this.travelled < STILL && !this.stray;
     if (click && !this.pointers.size) this.clicked(event.clientX, event.clientY);
   }
 

@@ -102,7 +102,7 @@ class Viewer {
       camera: () => this.camera,
       moved: () => this.moved(),
       clicked: (x, y) => this.pickAt(x, y),
-      focused: () => this.focus(),
+      focused: (x, y) => this.focus(x, y),
     });
     bindKeys(this);
     returnKeys(this.stage);
@@ -647,7 +647,8 @@ class Viewer {
   }
 
   // Turn about what was clicked last, once it is known what that is.
-  focus() {
+  focus(clientX, clientY) {
+    if (!this.rays.pixel(this.view(), clientX, clientY)) return; // beside the picture nothing was clicked
     if (this.rays.pick?.seq === this.rays.seq) this.focusOn(this.rays.pick);
     else this.focusing = this.rays.seq;
   }
