@@ -222,11 +222,12 @@ def _render(options: argparse.Namespace) -> None:
 
 def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
     """Refuse to write the picture over a file that it is made of, whatever links lead there."""
+    from renderer.process.files import are_apart
+
     read = [options.scene, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
     written = [options.write_scene] if options.write_scene else []
-    output = os.path.realpath(options.output)
-    for path in [*read, *written]:
-        expect(os.path.realpath(path) != output, "--output", "another file than the scene's own", f"{output} by a link")
+    apart, output = are_apart([options.output], [*read, *written]), os.path.realpath(options.output)
+    expect(apart, "--output", "another file than the scene's own", f"{output} by a link")
 
 
 def _save(image: Any, path: Path) -> None:

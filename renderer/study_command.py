@@ -1,7 +1,6 @@
 """``octree-render study``: arguments in, a study's result as an array, a coloured mesh, or a picture."""
 
 import argparse
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
@@ -59,6 +58,7 @@ def _study(options: argparse.Namespace) -> None:
     from renderer.octree import Octree
     from renderer.runs.study import Study
 
+    _check_options(options)
     _check_output(options)
     made = _options_of(options)
     camera = _camera(options)
@@ -100,22 +100,29 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
 
 
 def _check_output(options: argparse.Namespace) -> None:
-    """What can be told before any work."""
-    from renderer.process.files import check_writable
+    """What can be told of the outputs before any work."""
+    from renderer.process.files import are_apart, check_writable
+
+    on_mesh = options.grid is None and options.points is None
+    read = [file for file in (options.mesh, options.points) if file is not None]
+    for output in options.output:
+        suffix = output.suffix.lower()
+        expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
+        expect(are_apart([output], read), "--output", "another file than those that are read", str(output))
+        expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply for points that are not a mesh's", str(output))
+    named = ", ".join(map(str, options.output))
+    expect(are_apart(options.output), "--output", "each file once", named)
+    seen = options.camera is None or any(output.suffix.lower() == ".png" for output in options.output)
+    expect(seen, "--camera", "a .png to be seen by it", named)
+    for output in options.output:
+        check_writable(output)
+
+
+def _check_options(options: argparse.Namespace) -> None:
+    """What can be told of the other options before any work."""
     from renderer.runs.drawing import FINER
     from renderer.scene.scene import MOST_PIXELS
 
-    on_mesh = options.grid is None and options.points is None
-    suffixes = [output.suffix.lower() for output in options.output]
-    for output, suffix in zip(options.output, suffixes, strict=True):
-        expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
-        for file in (options.mesh, options.points):
-            # Not Path.resolve, which raises a RuntimeError for links in a circle.
-            other = file is None or os.path.realpath(output) != os.path.realpath(file)
-            expect(other, "--output", "another file than those that are read", str(output))
-        expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply for points that are not a mesh's", str(output))
-    seen = options.camera is None or ".png" in suffixes
-    expect(seen, "--camera", "a .png to be seen by it", ", ".join(map(str, options.output)))
     for kind, names in _OWN.items():
         for name in names:
             given = options.kind != kind and getattr(options, name) is not None
@@ -124,10 +131,6 @@ def _check_output(options: argparse.Namespace) -> None:
     widest = MOST_PIXELS // FINER
     right = min(options.resolution) >= 1 and max(options.resolution) <= widest
     expect(right, "--resolution", f"1x1 to {widest}x{widest}", "{}x{}".format(*options.resolution))
-    named = [os.path.realpath(output) for output in options.output]
-    expect(len({*named}) == len(named), "--output", "each file once", ", ".join(map(str, options.output)))
-    for output in options.output:
-        check_writable(output)
 
 
 def _options_of(options: argparse.Namespace) -> dict[str, Any]:

@@ -219,6 +219,11 @@ class Viewer:
         box = self.page.locator("#frame").bounding_box()
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
+    def pick(self, x: float, y: float) -> None:
+        """Click on the picture, and wait for the card."""
+        self.page.mouse.click(x, y)
+        self.page.wait_for_function("() => viewer.rays.pick?.seq === viewer.rays.seq")
+
     def drag(self, x: float, y: float, button: str = "left") -> None:
         start = self.centre()
         self.page.mouse.move(*start)

@@ -15,7 +15,7 @@ from renderer.cluster.workers import SentScene, render_rows
 from renderer.errors import expect
 from renderer.picture.image import PLANES, check_picture_path
 from renderer.picture.render import check_tree, checked_view
-from renderer.process.files import as_path, write_atomically
+from renderer.process.files import are_apart, as_path, write_atomically
 from renderer.process.terminal import progress_bar
 from renderer.runs.pictures import Picture, PictureRun, checked_band, digest_of_scene
 from renderer.scene.camera import Camera
@@ -156,8 +156,7 @@ class _Frames:
 
     def __init__(self, folder: Path, outputs: Sequence[str | Path], band: int | None, options: dict[str, Any]) -> None:
         self.outputs = [as_path("outputs", output) for output in outputs]
-        names = {output.resolve() for output in self.outputs}
-        expect(len(names) == len(self.outputs), "outputs", "a file for each frame", "one of them twice")
+        expect(are_apart(self.outputs), "outputs", "a file for each frame", "one of them twice")
         for output in self.outputs:
             check_picture_path(output)
         self._folder, self._band = folder, None if band is None else checked_band(band)

@@ -2,7 +2,7 @@
 
 import errno
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from stat import S_IMODE, S_ISBLK, S_ISCHR
@@ -62,6 +62,15 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         if not _is_special(target):
             temporary.touch(exist_ok=False)
             temporary.unlink()
+
+
+def are_apart(written: Iterable[str | os.PathLike[str]], read: Iterable[str | os.PathLike[str]] = ()) -> bool:
+    """Whether the files behind ``written`` are all different and none is one of those behind ``read``, whatever links
+    lead there.
+    """
+    # Not Path.resolve, which raises a RuntimeError for links in a circle.
+    outputs = [os.path.realpath(path) for path in written]
+    return len({*outputs}) == len(outputs) and {*outputs}.isdisjoint(map(os.path.realpath, read))
 
 
 def _is_special(target: Path) -> bool:

@@ -1,5 +1,6 @@
 """Pictures and animations on a cluster have the bits of those on this machine, also when a run goes on."""
 
+import re
 import time
 from importlib import import_module
 from pathlib import Path
@@ -150,3 +151,12 @@ def test_frames_have_a_file_each(
     outputs = [f"{tmp_path}/{name}" for name in names]
     with pytest.raises(ValueError, match=said):
         frames_on(client, [glass] * count, outputs, tmp_path / "frames", resolution=(8, 8))
+
+
+def test_a_link_to_itself_is_told_before_any_work(client: Any, glass: Scene, tmp_path: Path) -> None:
+    """It ended in the RuntimeError of Path.resolve."""
+    loop = tmp_path / "loop.npy"
+    loop.symlink_to(loop)
+    with pytest.raises(OSError, match=re.escape(str(loop))):
+        frames_on(client, [glass], [loop], tmp_path / "frames", resolution=(8, 8))
+    assert list(tmp_path.iterdir()) == [loop]

@@ -17,7 +17,7 @@ from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import icosphere
 from renderer.picture.image import PLANES, Image
 from renderer.process import files
-from renderer.process.files import check_writable, write_atomically
+from renderer.process.files import are_apart, check_writable, write_atomically
 from renderer.scene.scene import write_scene
 
 STAIRS = Path(__file__).parents[2] / "scenes" / "stairs.toml"
@@ -26,6 +26,15 @@ STAIRS = Path(__file__).parents[2] / "scenes" / "stairs.toml"
 def test_a_folder_is_no_place_for_a_file(tmp_path: Path) -> None:
     with pytest.raises(IsADirectoryError, match=re.escape(str(tmp_path))):
         check_writable(tmp_path)
+
+
+def test_files_are_apart_unless_links_lead_to_one(tmp_path: Path) -> None:
+    a, b, link, loop = (tmp_path / name for name in ("a", "b", "link", "loop"))
+    link.symlink_to(a)
+    loop.symlink_to(loop)
+    assert are_apart([a, b, loop]) and are_apart([a], [b, b, loop]) and are_apart([])
+    assert not are_apart([a, f"{tmp_path}/./a"]) and not are_apart([a, link])
+    assert not are_apart([b, a], [link]) and not are_apart([loop], [loop])
 
 
 def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:

@@ -233,19 +233,14 @@ PLACE_CARD = """([part, x, y]) => {
 }"""
 
 
-def second_click(viewer: Viewer) -> None:
-    viewer.page.mouse.down(click_count=2)
-    viewer.page.mouse.up(click_count=2)
-
-
 @pytest.mark.parametrize("part", [".close", "h2"])
 def test_a_double_click_is_one_though_a_card_has_come_between(viewer: Viewer, part: str) -> None:
     """Its second click fell on the card: nothing was turned, and what it met there was pressed or selected."""
     x, y = viewer.centre()[0] + 40, viewer.centre()[1] + 30
-    viewer.page.mouse.click(x, y)
-    viewer.page.wait_for_selector("#card")
+    viewer.pick(x, y)
     met = viewer.page.evaluate(PLACE_CARD, [part, x, y])
-    second_click(viewer)
+    viewer.page.mouse.down(click_count=2)
+    viewer.page.mouse.up(click_count=2)
     viewer.page.evaluate(PLACE_CARD, [None, 0, 0])
     assert met
     assert viewer.page.locator("#card").is_visible()
@@ -258,8 +253,7 @@ def test_a_double_click_is_one_though_a_card_has_come_between(viewer: Viewer, pa
 def test_the_second_click_on_what_closes_the_card_picks_nothing(viewer: Viewer) -> None:
     """It fell on the picture that the card had covered, and a card came again."""
     x, y = viewer.centre()[0] + 40, viewer.centre()[1] + 30
-    viewer.page.mouse.click(x - 80, y)
-    viewer.page.wait_for_selector("#card")
+    viewer.pick(x - 80, y)
     assert viewer.page.evaluate(PLACE_CARD, [".close", x, y])
     asked, pivot = viewer.page.evaluate("() => [viewer.rays.seq, viewer.camera.pivot]")
     viewer.page.mouse.dblclick(x, y)
@@ -277,8 +271,7 @@ def test_a_double_click_beside_the_picture_or_on_a_control_turns_about_nothing(v
     """Beside it the camera turned about what was clicked before."""
     viewer.page.select_option("[name=size]", "scene")
     viewer.choose("proof")
-    viewer.page.mouse.click(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
-    viewer.page.wait_for_selector("#card")
+    viewer.pick(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
     state = "() => [viewer.camera.pivot, viewer.rays.seq]"
     before = viewer.page.evaluate(state)
     stage, frame = (viewer.page.locator(name).bounding_box() for name in ("#stage", "#frame"))
@@ -291,8 +284,7 @@ def test_a_double_click_beside_the_picture_or_on_a_control_turns_about_nothing(v
 
 
 def test_two_clicks_on_the_card_turn_about_nothing(viewer: Viewer) -> None:
-    viewer.page.mouse.click(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
-    viewer.page.wait_for_selector("#card")
+    viewer.pick(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
     pivot = viewer.page.evaluate("() => viewer.camera.pivot")
     viewer.page.locator("#card h2").dblclick()
     assert viewer.page.evaluate("() => [viewer.camera.pivot, String(getSelection()) !== '']") == [pivot, True]

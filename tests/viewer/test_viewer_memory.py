@@ -42,8 +42,7 @@ def test_drags_and_clicks_leave_nothing_behind(browser: Any, url: str) -> None:
             for number in range(_DRAGS):
                 page.drag((-1) ** number * 40, 10)
                 page.settled("octree")
-                page.page.mouse.click(*page.centre())
-                page.page.wait_for_function("() => viewer.rays.pick?.seq === viewer.rays.seq")
+                page.pick(*page.centre())
             return held(page, connection)
 
         drags()

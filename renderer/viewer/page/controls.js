@@ -43,7 +43,8 @@ export class Controls {
     this.held = new Map();
     this.travelled = 0;
     // Where the first press of some at one place fell, and whether the last of them fell on something else.
-    Object.assign(this, { pressed: null, stray: false });
+    this.pressed = null;
+    this.stray = false;
     stage.addEventListener("pointerdown", (event) => this.press(event));
     stage.addEventListener("pointermove", (event) => this.drag(event));
     for (const name of ["pointerup", "pointercancel"])
