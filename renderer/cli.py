@@ -179,12 +179,12 @@ def _render(options: argparse.Namespace) -> None:
 
     check_picture_path(options.output)
     scene = load_scene(options.scene)
+    _check_output_is_no_input(options, scene)  # nor one of an object that a change hides
     for text in options.change:
         try:
             scene = changed(scene, text)
         except ValueError as error:
             raise ValueError(f"--change: {error}") from None
-    _check_output_is_no_input(options, scene)
     _scene_to_write(options)
     asked: dict[str, Any] = {
         "resolution": options.resolution,

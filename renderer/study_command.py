@@ -104,7 +104,7 @@ def _check_output(options: argparse.Namespace) -> None:
     from renderer.process.files import are_apart, check_writable
 
     on_mesh = options.grid is None and options.points is None
-    read = [file for file in (options.mesh, options.points) if file is not None]
+    read = [file for file in (options.mesh, options.points, options.suns, options.camera) if file is not None]
     for output in options.output:
         suffix = output.suffix.lower()
         expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))

@@ -17,6 +17,7 @@ from renderer.picture.image import PLANES, check_picture_path
 from renderer.picture.render import check_tree, checked_view
 from renderer.process.files import are_apart, as_path, write_atomically
 from renderer.process.terminal import progress_bar
+from renderer.runs.parts import remove_parts
 from renderer.runs.pictures import Picture, PictureRun, checked_band, digest_of_scene
 from renderer.scene.camera import Camera
 from renderer.scene.needs import needs_of
@@ -173,9 +174,10 @@ class _Frames:
             expect(count <= len(self.outputs), "scenes", f"{len(self.outputs)}, as outputs are", "more")
             sent, picture = self._sender.picture(scene)
             if self._is_done(number, picture):
+                remove_parts(self._parts(number))  # a run may have been killed before
                 self.done += 1
                 continue
-            run = PictureRun(self._folder / f"{number:06d}.parts", picture, self._band)
+            run = PictureRun(self._parts(number), picture, self._band)
             missing = run.parts.missing()
             self._under_way[number] = run, set(missing)
             if not missing:
@@ -215,6 +217,9 @@ class _Frames:
             return bool(same and said["sha256"] == _digest(self.outputs[number]))
         except (OSError, ValueError, KeyError, TypeError):
             return False
+
+    def _parts(self, number: int) -> Path:
+        return self._folder / f"{number:06d}.parts"
 
     def _said(self, number: int) -> Path:
         return self._folder / f"{number:06d}.done"

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -156,17 +156,11 @@ class Image:
         suffix = as_path("path", path).suffix.lower()
         check_picture_path(path)
         if suffix == ".npy":
-            write_atomically(path, self._write_npy)
+            write_atomically(path, lambda file: write_array(file, self.radiance))
         elif suffix == ".exr":
             write_exr(path, self.radiance, self._layers())
         else:
             write_atomically(path, self._write_png)
-
-    def _write_npy(self, file: BinaryIO) -> None:
-        """As ``numpy.save``, which writes to no pipe, and leaks its file where a signal's handler raises."""
-        radiance = np.ascontiguousarray(self.radiance)
-        np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(radiance))
-        file.write(radiance.data)
 
     def _layers(self) -> dict[str, NDArray[np.float32]]:
         """Depth and normal as an EXR file has them, where they were kept."""
@@ -214,6 +208,13 @@ def check_picture_path(path: str | Path) -> None:
     check_writable(path)
     if path.suffix.lower() == ".exr":
         check_exr()
+
+
+def write_array(file: BinaryIO, values: NDArray[Any]) -> None:
+    """As ``numpy.save``, which writes to no pipe, and leaks its file where a signal's handler raises."""
+    values = np.ascontiguousarray(values)
+    np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(values))
+    file.write(values.data)
 
 
 def write_exr(path: str | Path, radiance: ArrayLike, layers: Mapping[str, NDArray[np.float32]] | None = None) -> None:

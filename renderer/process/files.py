@@ -57,6 +57,8 @@ def read_whole(path: Path) -> bytes:
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raise the ``OSError`` of ``write_atomically``, as far as can be told before there is anything to write."""
     with _temporary_beside(path) as (temporary, target):
+        with suppress(FileNotFoundError):
+            target.lstat()  # a name too long, which some versions of Python take for no folder
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
         if not _is_special(target):
@@ -92,7 +94,8 @@ def _temporary_beside(path: str | os.PathLike[str]) -> Iterator[tuple[Path, Path
     if target.is_file() and not os.access(target, os.W_OK):  # renaming would not ask
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
     # Created by open(), so that it gets the permissions that any new file would.
-    temporary = target.with_name(f".{target.name[:100]}.{uuid4().hex[:12]}")
+    # A name has at most 255 bytes, and a character of it up to four.
+    temporary = target.with_name(f".{target.name[:60]}.{uuid4().hex[:12]}")
     try:
         yield temporary, target
     except BaseException as error:

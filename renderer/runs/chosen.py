@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,8 @@ from renderer.runs.study import Points
 from renderer.studies.places import face_points
 
 Floats = NDArray[np.float64]
+# What NumPy raises for files that it cannot read: a header is parsed as Python, and PK begins an archive.
+_BROKEN = (ValueError, EOFError, TypeError, OverflowError, SyntaxError, TokenError, BadZipFile)
 # More would not fit into memory with their normals and results: 7 numbers of 8 bytes each.
 _MOST = 1 << 28
 
@@ -134,10 +138,11 @@ def _face_points(mesh: Mesh) -> tuple[Points, NDArray[np.int64]]:
 
 def _read_array(argument: str, path: Path) -> NDArray[Any]:
     try:
-        array = np.load(path, allow_pickle=False)
+        with open(path, "rb") as file:  # which NumPy leaves open where it is broken
+            array = np.load(file, allow_pickle=False)
     except OSError as error:
         raise _unreadable(argument, path, error) from None
-    except (ValueError, EOFError) as error:
+    except _BROKEN as error:
         raise ValueError(f"{argument}: expected an .npy file, got {path}: {error}") from None
     expect(isinstance(array, np.ndarray), argument, "one array in an .npy file", str(path))
     real = np.issubdtype(array.dtype, np.floating) or np.issubdtype(array.dtype, np.integer)

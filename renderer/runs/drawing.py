@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from renderer.errors import expect
 from renderer.inspect.false_color import shades_of
 from renderer.mesh.mesh import Mesh
-from renderer.picture.image import Image
+from renderer.picture.image import Image, write_array
 from renderer.process.files import write_atomically
 
 Floats = NDArray[np.float64]
@@ -107,7 +107,7 @@ def legend(width: int, height: int, scale: tuple[float, float], title: str) -> B
 
 def write_npy(path: Path, values: Floats) -> None:
     """Write an array."""
-    write_atomically(path, lambda file: np.lib.format.write_array(file, values, allow_pickle=False))
+    write_atomically(path, lambda file: write_array(file, values))
 
 
 def write_png(path: Path, picture: Bytes) -> None:

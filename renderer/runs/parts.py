@@ -1,8 +1,9 @@
 """The parts of a long run on disk: what is done stays done when the run is killed, and is not done again.
 
 A folder beside the result has ``manifest.json``, which says what is computed of what, and a file for each part that is
-done: its rows as they are in memory, and behind them their SHA-256. Each file is written beside and renamed, so a part
-is whole or absent; one that a disk has spoilt counts as absent. The result is made of all parts, and the
+done: its rows as they are in memory, and behind them the SHA-256 of the manifest, the part's number and the rows. Each
+file is written beside and renamed, so a part is whole or absent; one that a disk has spoilt counts as absent, and so
+does one of another run, left where the removal of its folder was cut short. The result is made of all parts, and the
 folder removed.
 
 A part's rows need not follow each other in the result: an order says which row each place of the parts is.
@@ -73,14 +74,13 @@ class Parts:
         Raises ``ValueError`` where the folder is of another plan, and says what differs.
         """
         self.folder, self.plan, self.order = folder, plan, order
-        wanted = json.loads(json.dumps(asdict(plan)))
+        self._manifest = json.dumps(asdict(plan), indent=1, sort_keys=True).encode()
         path = folder / _MANIFEST
         if not path.exists():
             folder.mkdir(parents=True, exist_ok=True)
-            text = json.dumps(wanted, indent=1)
-            write_atomically(path, lambda file: file.write(text.encode()))
+            write_atomically(path, lambda file: file.write(self._manifest))
             return
-        differing = _differing(_read_manifest(path), wanted)
+        differing = _differing(_read_manifest(path), json.loads(self._manifest))
         if differing:
             raise ValueError(
                 f"{folder}: expected the parts of this run, got those of another, whose {', '.join(differing)} "
@@ -101,8 +101,7 @@ class Parts:
         begin, end = self.plan.span(part)
         assert values.shape == self.plan.shape(end - begin) and values.dtype == self.plan.dtype
         content = np.ascontiguousarray(values).tobytes()
-        digest = hashlib.sha256(content).digest()
-        write_atomically(self._path(part), lambda file: file.write(content + digest))
+        write_atomically(self._path(part), lambda file: file.write(content + self._digest(part, content)))
 
     def read(self, part: int) -> NDArray[Any]:
         """The values of a part. Raises ``OSError`` where it is absent."""
@@ -126,8 +125,7 @@ class Parts:
 
     def remove(self) -> None:
         """Remove the folder."""
-        with suppress(FileNotFoundError):
-            shutil.rmtree(self.folder)
+        remove_parts(self.folder)
 
     def _join(self, file: BinaryIO) -> None:
         header = {"descr": np.dtype(self.plan.dtype).str, "fortran_order": False,
@@ -165,10 +163,22 @@ class Parts:
         begin, end = self.plan.span(part)
         values, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
         size = (end - begin) * max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
-        return values if len(values) == size and hashlib.sha256(values).digest() == digest else None
+        return values if len(values) == size and self._digest(part, values) == digest else None
+
+    def _digest(self, part: int, values: bytes) -> bytes:
+        found = hashlib.sha256(self._manifest)
+        found.update(f"{part};".encode())
+        found.update(values)
+        return found.digest()
 
     def _path(self, part: int) -> Path:
         return self.folder / f"{part:08d}.part"
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove the folder of a run, or what is left of it."""
+    with suppress(FileNotFoundError):
+        shutil.rmtree(folder)
 
 
 def digest_of(*arrays: NDArray[Any]) -> str:

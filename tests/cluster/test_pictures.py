@@ -125,6 +125,25 @@ def test_frames_go_on_where_they_were_stopped(client: Any, glass: Scene, tmp_pat
         assert output.read_bytes() == (tmp_path / "expected.png").read_bytes()
 
 
+def test_frames_go_on_where_the_parts_of_one_that_is_done_were_left(
+    client: Any, glass: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They stayed: the folder could not be removed, and all frames were rendered again."""
+    scenes = [glass.altered(camera=camera_at(x)) for x in range(3)]
+    outputs, folder = [tmp_path / f"{number}.png" for number in range(3)], tmp_path / "frames"
+
+    def stop(run: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr("renderer.runs.pictures.PictureRun.remove", stop)
+        frames_on(client, scenes, outputs, folder, **OPTIONS)
+    (done,) = (path for path in outputs if path.exists())
+    before = done.stat().st_mtime_ns
+    frames_on(client, scenes, outputs, folder, **OPTIONS)
+    assert done.stat().st_mtime_ns == before and not folder.exists()
+
+
 @pytest.mark.parametrize(
     "bad, said",
     [({"scene": "glass.toml"}, "scene: expected a Scene, got str"), ({"camera": 3}, "camera: expected a camera"),

@@ -1,6 +1,7 @@
 """Commands never write over what they read, nor over a scene that may have been changed since."""
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from renderer import cli
 
 SCENES = Path(__file__).parents[2] / "scenes"
+MATERIAL = re.compile(r"^material = (.*)$", re.MULTILINE)
 SMALL = ["--resolution", "4x4", "--quiet"]
 
 
@@ -37,6 +39,18 @@ def test_a_picture_is_not_written_over_its_scene(folder, capsys, scene, lost, ou
     assert cli.main(["render", scene, "-o", output, *SMALL]) == 2
     assert "--output: expected another file than the scene's own" in capsys.readouterr().err
     assert (folder / lost).read_bytes() == before
+
+
+@pytest.mark.parametrize("change", [[], ["--change", 'hide = ["objects.1"]']])
+def test_nor_over_a_second_mesh_whether_it_is_seen_or_not(folder, capsys, change):
+    """A picture in which it was hidden took its place, and the scene could not be loaded any more."""
+    scene = (folder / "stairs.toml").read_text(encoding="utf-8")
+    (folder / "two.toml").write_text(f'{scene}\n[[objects]]\nmesh = "m.ply"\nmaterial = {MATERIAL.search(scene)[1]}\n')
+    (folder / "link.png").symlink_to("m.ply")
+    before = (folder / "m.ply").read_bytes()
+    assert cli.main(["render", "two.toml", "-o", "link.png", *change, *SMALL]) == 2
+    assert f"got {folder.resolve() / 'm.ply'} by a link" in capsys.readouterr().err
+    assert (folder / "m.ply").read_bytes() == before
 
 
 def test_nor_over_the_scene_that_is_written_with_it(folder, capsys):

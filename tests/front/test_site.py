@@ -197,6 +197,10 @@ def either(): ...
 class Kind:
     value: int
     a, (b, c) = d = 1, (2, 3)
+    class Inner:
+        deep = 1
+    if True:
+        late = 1
 """
 
 
@@ -205,10 +209,11 @@ def test_the_lines_of_names_are_those_of_their_first_definitions(tmp_path, monke
     made = module("source_links")
     (tmp_path / "x.py").write_text(DEFINITIONS)
     monkeypatch.setitem(made["_lines"].__wrapped__.__globals__, "ROOT", tmp_path)
-    of_kind = {"value": 15, **dict.fromkeys("abcd", 16)}
+    of_kind = {"value": 15, **dict.fromkeys("abcd", 16), "Inner": 17, "late": 20}
     assert made["_lines"]("x.py") == {
         "either": 2, "otherwise": 4, "tried": 6, "failed": 8, "ended": 10, "waits": 12, "Kind": 14,
         **of_kind, **{f"Kind.{name}": line for name, line in of_kind.items()},
+        "deep": 18, "Kind.Inner.deep": 18,
     }  # fmt: skip
 
 

@@ -28,6 +28,17 @@ def test_a_folder_is_no_place_for_a_file(tmp_path: Path) -> None:
         check_writable(tmp_path)
 
 
+@pytest.mark.parametrize("letter", ["a", "\u65e5", "\U0001f600"])
+def test_a_name_may_be_as_long_as_the_file_system_has_it(tmp_path: Path, letter: str) -> None:
+    """The temporary name beside one of many letters of three or four bytes was too long."""
+    path = tmp_path / (letter * (255 // len(letter.encode())))
+    check_writable(path)
+    write_atomically(path, lambda file: file.write(b"1"))
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+    with pytest.raises(OSError, match="name too long"):
+        check_writable(path.with_name(path.name + letter))
+
+
 def test_files_are_apart_unless_links_lead_to_one(tmp_path: Path) -> None:
     a, b, link, loop = (tmp_path / name for name in ("a", "b", "link", "loop"))
     link.symlink_to(a)

@@ -60,6 +60,22 @@ def test_parts_of_another_study_are_refused_and_kept(tmp_path: Path, other: Plan
     assert Parts(tmp_path / "parts", PLAN).missing() == [1, 2]
 
 
+@pytest.mark.parametrize(
+    "other", [PLAN, replace(PLAN, made_of={"kind": "sun"}), replace(PLAN, rows=11), replace(PLAN, dtype="<i8")]
+)
+def test_parts_that_a_removal_cut_short_left_are_those_of_their_run_alone(tmp_path: Path, other: Plan) -> None:
+    """Its manifest went first: a run of another plan took its parts for its own, and its result was wrong."""
+    _write(Parts(tmp_path / "parts", PLAN), 0)
+    (tmp_path / "parts" / "manifest.json").unlink()
+    assert Parts(tmp_path / "parts", other).missing() == ([1, 2] if other is PLAN else [0, 1, 2])
+
+
+def test_a_part_is_none_under_another_number(tmp_path: Path) -> None:
+    _write(Parts(tmp_path / "parts", PLAN), 0)
+    (tmp_path / "parts" / "00000000.part").rename(tmp_path / "parts" / "00000001.part")
+    assert Parts(tmp_path / "parts", PLAN).missing() == [0, 1, 2]
+
+
 @pytest.mark.parametrize("text", ["", "[]", "{", "\x00"])
 def test_a_manifest_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "manifest.json").write_text(text)

@@ -134,6 +134,12 @@ def test_files_that_are_no_points_or_suns_are_refused(
     for name in ("flat", "words", "text"):
         assert _run("sky", city, "--points", tmp_path / f"{name}.npy", "-o", tmp_path / "a.npy") == 2
         assert "--points: expected" in capsys.readouterr().err
+    vast = f"{{'descr':'<f8','fortran_order':False,'shape':({10**20},3)}}"
+    for header in ("", "{", "'''", "  x\n y", "{[]:1}", vast):
+        magic = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") if header else b"PK\x03\x04"
+        (tmp_path / "broken.npy").write_bytes(magic + header.encode())
+        assert _run("sky", city, "--points", tmp_path / "broken.npy", "-o", tmp_path / "a.npy") == 2
+        assert "--points: expected an .npy file" in capsys.readouterr().err
     for text in ("", "1 2\n", "1 2 x\n", "1 2 3\n1 2 3 4\n"):
         (tmp_path / "suns.txt").write_text(text)
         assert _run("sun", city, "--suns", tmp_path / "suns.txt", "-o", tmp_path / "a.npy") == 2

@@ -1,5 +1,6 @@
 """Each option of ``octree-render study``: what it takes, its default, and what it changes."""
 
+import os
 import subprocess
 import sys
 from importlib import import_module
@@ -16,6 +17,7 @@ from renderer.cli import main
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
 from renderer.process.parallel import available_threads
+from renderer.runs.chosen import on_grid
 from renderer.studies import ambient_occlusion, face_points, sky_view_factor, sun_hours
 from validation.benchmark.measures.meshes import named
 
@@ -288,6 +290,47 @@ def test_a_grid_over_a_wall_and_one_without_end(
     said = capsys.readouterr().err
     assert said.startswith("octree-render: --grid: ") and said.endswith(f"got {got}\n") and len(said) < 120
     assert not output.exists()
+
+
+def test_a_grids_points_at_the_meshs_edge_are_on_it(tmp_path: Path) -> None:
+    corners = [[0, 0, 0], [1.5, 0, 0], [1.5, 1.5, 0], [0, 1.5, 0]]
+    found = on_grid(Octree(corners, [[0, 1, 2], [0, 2, 3]]), 1.0).points.points
+    assert sorted(map(tuple, found[:, :2].tolist())) == [(0.5, 0.5), (0.5, 1.5), (1.5, 0.5), (1.5, 1.5)]
+
+
+def test_one_of_several_outputs_may_be_a_picture_by_a_camera(city: Path, tmp_path: Path) -> None:
+    scene = city.with_name("above.toml")
+    scene.write_text(SCENE.format(eye=[0, 0, 500], target=[0, 0, 0]).replace("fov = 40", "fov = 40\nup = [0, 1, 0]"))
+    outputs = "-o", tmp_path / "a.npy", "-o", tmp_path / "b.PNG"
+    study("ao", city, *outputs, "--camera", scene, "--resolution", "9x9", "--samples", 4, "--quiet")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npy", "b.PNG"]
+
+
+@pytest.mark.parametrize("read", ["mesh", "--points", "--suns", "--camera"])
+def test_no_output_is_a_file_that_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str], read: str) -> None:
+    """A table of suns and a scene were written over where a link led there."""
+    given = {name: tmp_path / f"{name.strip('-')}.ply" for name in ("mesh", "--points", "--suns", "--camera")}
+    for file in given.values():
+        file.write_text("whole")
+    (tmp_path / "link.png").symlink_to(given[read])
+    options = [str(word) for item in given.items() if item[0] != "mesh" for word in item]
+    if read != "--points":  # which go into no picture
+        del options[:2]
+    command = ["study", "sun", str(given["mesh"]), *options, "-o", str(tmp_path / "link.png")]
+    assert main(command) == 2
+    assert "--output: expected another file than those that are read" in capsys.readouterr().err
+    assert [file.read_text() for file in given.values()] == ["whole"] * 4
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+def test_a_pipe_gets_the_whole_array(city: Path, tmp_path: Path) -> None:
+    """It got the header, and the message blamed the disk."""
+    study("ao", city, "-o", tmp_path / "file.npy", "--samples", 4, "--quiet")
+    os.mkfifo(tmp_path / "pipe.npy")
+    reader = os.open(tmp_path / "pipe.npy", os.O_RDONLY | os.O_NONBLOCK)
+    study("ao", city, "-o", tmp_path / "pipe.npy", "--samples", 4, "--quiet")
+    assert os.read(reader, 1 << 16) == (tmp_path / "file.npy").read_bytes()
+    os.close(reader)
 
 
 @pytest.mark.parametrize("option", ["-o", "--points", "mesh"])

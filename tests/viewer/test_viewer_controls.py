@@ -283,6 +283,24 @@ def test_a_double_click_beside_the_picture_or_on_a_control_turns_about_nothing(v
     assert viewer.page.evaluate(state) == before
 
 
+def test_a_double_click_may_be_at_the_pictures_right(viewer: Viewer) -> None:
+    """Further right than the picture is high, where it is known for beside the picture if its sides are mistaken."""
+    frame = viewer.page.locator("#frame").bounding_box()
+    x, y = frame["x"] + frame["width"] - 60, frame["y"] + frame["height"] - 40
+    assert x > frame["y"] + frame["height"]
+    viewer.pick(x, y)
+    assert viewer.page.evaluate("() => viewer.rays.pick.hit")
+    viewer.page.mouse.dblclick(x, y)
+    viewer.page.wait_for_function("() => String(viewer.camera.pivot) === String(viewer.rays.pick.point)")
+
+
+def test_a_control_is_pressed_by_keyboard_after_a_click_on_the_picture(viewer: Viewer) -> None:
+    viewer.pick(*viewer.centre())
+    viewer.page.focus("[name=shadows]")
+    viewer.page.keyboard.press("Space")
+    assert not viewer.page.is_checked("[name=shadows]")
+
+
 def test_two_clicks_on_the_card_turn_about_nothing(viewer: Viewer) -> None:
     viewer.pick(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
     pivot = viewer.page.evaluate("() => viewer.camera.pivot")
