@@ -24,8 +24,8 @@ from renderer.kernels.simd import (
     splat4,
     splat8,
 )
-from renderer.points.expansions import PARTS
-from renderer.points.signs import UNDECIDED, area_sign, differ, lies_within, volume_sign
+from renderer.kernels.expansions import PARTS
+from renderer.kernels.signs import UNDECIDED, area_sign, differ, lies_within, volume_sign
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers

@@ -9,6 +9,7 @@ import numpy as np
 
 from renderer.kernels.jit import inlined
 from renderer.kernels.simd import (
+    get,
     is_negative,
     larger,
     load4,
@@ -23,7 +24,7 @@ from renderer.kernels.simd import (
     unlikely,
     widen,
 )
-from renderer.trace.layout import NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).
@@ -107,7 +108,11 @@ def box_limit(t, largest):
 
 
 class Ray(NamedTuple):
-    """One ray as it came, or eight as vectors: origin, direction, and the least t that counts."""
+    """One ray, or eight as vectors: origin, direction, the least t that counts, and how it starts on the surface.
+
+    slack    how far the origin may be from the start on the surface, with room; 0 where it starts on none
+    leaving  the face that it starts on, as float64; -1 for none
+    """
 
     ox: Any
     oy: Any
@@ -116,6 +121,8 @@ class Ray(NamedTuple):
     dy: Any
     dz: Any
     t_min: Any
+    slack: Any = 0.0
+    leaving: Any = -1.0
 
 
 @inlined
@@ -220,6 +227,7 @@ class Shear(NamedTuple):
     origin_x to origin_z      the origin
     shear_x, shear_y          Woop's shear: the direction's x and y over its z
     direction_z               the direction's z
+    slack, leaving            as of ``Ray``
     """
 
     row_x: Any
@@ -231,6 +239,8 @@ class Shear(NamedTuple):
     shear_x: Any
     shear_y: Any
     direction_z: Any
+    slack: Any
+    leaving: Any
 
 
 @inlined
@@ -240,7 +250,7 @@ def make_shear(ray):
     row_x, row_y, row_z = turned(axis, np.int64(0), np.int64(4), np.int64(8))
     ox, oy, oz = turned(axis, ray.ox, ray.oy, ray.oz)
     dx, dy, dz = turned(axis, ray.dx, ray.dy, ray.dz)
-    return Shear(row_x, row_y, row_z, ox, oy, oz, dx / dz, dy / dz, dz)
+    return Shear(row_x, row_y, row_z, ox, oy, oz, dx / dz, dy / dz, dz, ray.slack, ray.leaving)
 
 
 @inlined
@@ -325,11 +335,12 @@ def see_triangles(tree, base, ray):
 
 
 @inlined
-def meet_planes(edges, seen, ray, t_min, t_max):
-    """t of four triangles, and of those ``seen`` the bits of three kinds: in doubt, blurred and due.
+def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
+    """t of the four triangles of a block, and of those ``seen`` the bits of three kinds: in doubt, blurred and due.
 
     In doubt is a triangle whose t rounding may have made, or an edge of which the ray may pass; blurred, one whose
-    determinant rounding may have made. Due is one in doubt that may be hit from t_min to t_max once that is settled.
+    determinant rounding may have made. Due is one in doubt that may be hit from t_min to t_max once that is resolved:
+    also one that is near the start of a ray that leaves a surface. The face that it leaves is never due.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, least, most, determinant = edges
     zero, wide = splat4(0.0), magnitude(x0) + magnitude(x1) + magnitude(x2)
@@ -338,20 +349,43 @@ def meet_planes(edges, seen, ray, t_min, t_max):
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
     numerator, product = e0 * z0 + e1 * z1 + e2 * z2, across * (across + along)
     denominator = determinant * splat4(ray.direction_z)
-    t, height, base = numerator / denominator, magnitude(numerator), magnitude(denominator)
-    limit = product * along * splat4(DOUBT)
+    t, height, base_t = numerator / denominator, magnitude(numerator), magnitude(denominator)
+    limit, reach = product * along * splat4(DOUBT), product * splat4(ray.slack)
     slant = product * (magnitude(z1 - z0) + magnitude(z2 - z0)) * splat4(SLANT)
     blurred = magnitude(determinant) * along <= larger(limit, slant)
+    low = height <= limit + reach
     # Of those seen, an edge function is 0 where the least or the most is.
-    doubts = seen & movemask(blurred | (height <= limit) | (least == zero) | (most == zero))
+    doubts = seen & movemask(blurred | low | (least == zero) | (most == zero))
     blurs, dues = np.int64(0), np.int64(0)
     # What only this needs is computed here: doubts are rare, and one branch costs less than they would in each block.
     if unlikely(doubts != 0):
-        doubt = blurred | (height <= limit) | _may_be_on_edge(edges)
-        t_within = t, t_min, t_max
-        due = _are_due(edges, (wide, high), (height, base, product * along * splat4(ERROR)), doubt, blurred, t_within)
-        doubts, blurs, dues = seen & movemask(doubt), seen & movemask(blurred), seen & movemask(due)
+        doubt = blurred | low | _may_be_on_edge(edges)
+        t_within, error = (t, t_min, t_max), product * along * splat4(ERROR)
+        due = _are_due(edges, (wide, high), (height, base_t, error), doubt, blurred, t_within)
+        due = due | (height < reach)
+        doubts, blurs = seen & movemask(doubt), seen & movemask(blurred)
+        dues = seen & movemask(due) & ~_left(tree, base, ray.leaving)
     return t, doubts, blurs, dues
+
+
+@inlined
+def _left(tree, base, leaving):
+    """The bit of the face that a ray leaves, if it is in the block at ``base``."""
+    place, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
+    for i in range(BLOCK_FACES):
+        bits |= np.int64(np.float64(get(tree.faces, place + i)) == leaving) << i
+    return bits
+
+
+@inlined
+def near_planes(edges, slack):
+    """The bits of the triangles whose planes are within a ray's ``slack`` of its origin, with those of room."""
+    x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, _, _, _ = edges
+    wide = magnitude(x0) + magnitude(x1) + magnitude(x2)
+    across = wide + (magnitude(y0) + magnitude(y1) + magnitude(y2))
+    along = magnitude(z0) + magnitude(z1) + magnitude(z2)
+    height = magnitude(e0 * z0 + e1 * z1 + e2 * z2)
+    return movemask(height < across * (across + along) * splat4(slack))
 
 
 @inlined
@@ -370,7 +404,9 @@ def _are_due(edges, sizes, fraction, doubt, blurred, t_within):
     # walls would all be in doubt.
     extended = ((x0 != x1) | (x1 != x2) | (y0 != y1) | (y1 != y2)) & (sizes[0] > zero) & (sizes[1] > zero)
     within = (height + error >= splat4(t_min) * base) & (height - error <= splat4(t_max) * base)
-    return (blurred | (doubt & (t >= zero) & within)) & extended
+    # A t that rounding made negative may be 0.
+    ahead = (t >= zero) | (height <= error)
+    return (blurred | (doubt & ahead & within)) & extended
 
 
 @inlined
@@ -395,5 +431,5 @@ def hit_triangles(tree, base, ray, t_min, t_max):
     if bits == 0:
         zero = splat4(0.0)
         return bits, bits, bits, bits, zero, zero, zero, zero
-    t, doubts, blurs, dues = meet_planes(edges, bits, ray, t_min, t_max)
+    t, doubts, blurs, dues = meet_planes(tree, base, edges, bits, ray, t_min, t_max)
     return bits, doubts, blurs, dues, t, edges.e1, edges.e2, edges.determinant

@@ -209,7 +209,7 @@ def meet_leaves(tree, rays, lanes, count):
         block, shear = ~get(rays.integers, CHILD + r) >> LEAF_BITS, shear_of(rays, r)
         edges, seen = see_triangles(tree, block * BLOCK_WORDS, shear)
         t_min, t_max = get(rays.doubles, T_MIN + r), get(rays.doubles, T + r)
-        t, doubts, _, dues = meet_planes(edges, seen, shear, t_min, t_max)
+        t, doubts, _, dues = meet_planes(tree, block * BLOCK_WORDS, edges, seen, shear, t_min, t_max)
         put(lanes.bits, k, seen & ~doubts & movemask((t >= splat4(t_min)) & (t <= splat4(t_max))))
         put(lanes.doubts, k, dues)
         hits = 4 * BLOCK_FACES * k

@@ -51,7 +51,7 @@ EQUIVALENT: dict[str, str] = {
     "renderer.inside.crossings._cross_exactly #0: s0 != 0 or s1 != 0 or s2 != 0 -> "
     "(s0 != 0) and (s1 != 0) and (s2 != 0)":
         "a point in the plane of a face, within its outline as seen along an axis along which it has an area, is on it",
-    "renderer.points.signs.volume_sign #2: 0 -> 1":
+    "renderer.kernels.signs.volume_sign #2: 0 -> 1":
         "any power of two turns no sign, and what leaves the range then is answered in rational arithmetic",
     "renderer.inside.crossings._moved_sign #0: a[1] > b[1] -> (a[1]) >= (b[1])": "there the two are not equal",
     "renderer.inside.crossings._moved_sign #0: b[0] > a[0] -> (b[0]) >= (a[0])": "there the two are not equal",
@@ -70,7 +70,7 @@ EQUIVALENT: dict[str, str] = {
         "the bound from below is so loose that it leaves out no face: more work, the same answers",
     "renderer.trace.error_bounds._plane_error #0: least > 0.0 -> (least) >= (0.0)":
         "a number above 0 divided by 0 is infinite, as the bound without a quotient is",
-    "renderer.points.signs.volume_sign #0: balance(a[0], b[0], c[0], p[0]) -> balance(b[0], a[0], c[0], p[0])":
+    "renderer.kernels.signs.volume_sign #0: balance(a[0], b[0], c[0], p[0]) -> balance(b[0], a[0], c[0], p[0])":
         "the least and the largest of four numbers are the same in any order",
     "renderer.inside.careful_angle._normal #1: 1 -> 2":
         "any power of two turns no sign, and what leaves the range then is answered in rational arithmetic",
@@ -102,7 +102,7 @@ EQUIVALENT: dict[str, str] = {
     "renderer.tree.emit.emit_nodes #0: share > 1 -> (share) >= (1)":
         "of a part that has one place or none the number is not used again",
     "renderer.trace.steps._count #1: 0.0 -> 1.0": "the barycentrics of no hit are not read",
-    "renderer.points.signs.lies_within #0: informed or s0 != 0 or s1 != 0 or (s2 != 0) -> "
+    "renderer.kernels.signs.lies_within #0: informed or s0 != 0 or s1 != 0 or (s2 != 0) -> "
     "(informed) and (s0 != 0) and (s1 != 0) and (s2 != 0)":
         "a point within the outline of a face along every axis is within its box too, which is asked then",
     "renderer.trace.query._run.trace #0: bad[0] < begin -> (bad[0]) <= (begin)":
@@ -110,7 +110,7 @@ EQUIVALENT: dict[str, str] = {
     "renderer.mesh.polygons._cut_notched #0: 1 -> 2": "polygons are cut in other portions: the same triangles",
     "renderer.tree.sah._best_plane #0: range(bins - 1, 0, -1) -> range(bins - 1, 0 - 1, -1)":
         "what lies beyond the first bin's lower side is not read",
-    "renderer.points.expansions #0: -900 -> (900)":
+    "renderer.kernels.expansions #0: -900 -> (900)":
         "every volume is out of range then, and is answered in rational arithmetic: more work, the same answers",
     "renderer.contacts.gather.gather_chunk #4: 1 -> 2": "any row below 0 says that no ray is out of range",
 }  # fmt: skip

@@ -5,7 +5,7 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import power_below
 from renderer.kernels.simd import larger, smaller
-from renderer.points.expansions import OUT_OF_RANGE, expand_area, expand_volume, sign_of
+from renderer.kernels.expansions import OUT_OF_RANGE, expand_area, expand_volume, sign_of
 
 # What all functions here say where products would vanish or overflow.
 UNDECIDED = 2

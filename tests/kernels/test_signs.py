@@ -6,8 +6,8 @@ import numpy as np
 
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import pointer
-from renderer.points.expansions import PARTS
-from renderer.points.signs import UNDECIDED, lies_within
+from renderer.kernels.expansions import PARTS
+from renderer.kernels.signs import UNDECIDED, lies_within
 
 
 @kernel
