@@ -11,15 +11,17 @@ from renderer.arrays import flag_argument
 from renderer.contacts.all_hits import all_hits, count_hits
 from renderer.distance.closest import ClosestPoints, closest_point
 from renderer.distance.signed import signed_distance
+from renderer.errors import expect
 from renderer.inside.contains import contains
 from renderer.inside.winding import winding_number
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.points.visible import visible
 from renderer.process.parallel import checked_threads
-from renderer.trace.batch import RayBatch, check_faces, check_rays, moved_off
+from renderer.trace.batch import RayBatch, check_rays, moved_off
 from renderer.trace.error import add_errors
-from renderer.trace.hits import AllHits, Hits
+from renderer.trace.hits import AllHits, Hits, Passage
 from renderer.trace.layout import Tree
+from renderer.trace.leaving import check_leaving
 from renderer.trace.query import any_hits, closest_hits
 from renderer.trace.steps import Steps, count_steps
 
@@ -65,8 +67,9 @@ class Queries:
         directions: ArrayLike,
         t_min: ArrayLike = 0.0,
         t_max: ArrayLike = np.inf,
-        leaving: ArrayLike | None = None,
+        leaving: ArrayLike | Hits | Passage | None = None,
         *,
+        side: ArrayLike | None = None,
         t_error: bool = False,
     ) -> Hits:
         """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
@@ -74,9 +77,14 @@ class Queries:
         origins, directions  (..., 3), finite; their leading dimensions are broadcast, and the answers have these;
                              directions are not zero, from 2^-300 to 2^700 long
         t_min, t_max         >= 0, one number or (...), in units of |direction|
-        leaving              faces that the rays start on, one or (...), -1 for none: each start is moved off its face
-                             by more than rounding errors, to the side that the direction points to, so that the ray
-                             meets neither that face nor another in its plane. No epsilon is needed
+        leaving              where the rays start on the surface: faces, one or (...), -1 for none; or the ``Hits`` at
+                             whose ``points`` they start, or these hits' ``through()``. No epsilon is needed. A ray
+                             starts exactly at the hit, or at the point of the face that is nearest to its origin. The
+                             faces that hold this point, those at an edge or corner too, do not stop it by rounding
+        side                 which side of the named faces the rays start on, one or (...): 1 that of the normal by
+                             winding, -1 the other one, 0 unknown. ``Hits`` know their own. A ray whose direction leads
+                             through the surface to another side is then stopped at once: t = 0. Where no side is known
+                             nothing stops it at its start
         t_error              whether the hits have bounds of the errors of t: how far it may be from where the ray, as
                              it was started, meets the face, or passes it, if only rounding makes it hit
 
@@ -92,7 +100,7 @@ class Queries:
         array([False])
         """
         mesh, tree = built = self._built
-        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         hits = closest_hits(tree, rays, mesh, self.threads)
         if flag_argument("t_error", t_error):
             add_errors(hits, rays, None, tree.scale, self.threads)
@@ -104,7 +112,9 @@ class Queries:
         directions: ArrayLike,
         t_min: ArrayLike = 0.0,
         t_max: ArrayLike = np.inf,
-        leaving: ArrayLike | None = None,
+        leaving: ArrayLike | Hits | Passage | None = None,
+        *,
+        side: ArrayLike | None = None,
     ) -> NDArray[np.bool_]:
         """Whether each ray hits anything in the closed interval [t_min, t_max], (...) bool.
 
@@ -116,7 +126,7 @@ class Queries:
         array([False])
         """
         built = self._built
-        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         return any_hits(built[1], rays, self.threads).reshape(shape)
 
     def all_hits(
@@ -125,8 +135,9 @@ class Queries:
         directions: ArrayLike,
         t_min: ArrayLike = 0.0,
         t_max: ArrayLike = np.inf,
-        leaving: ArrayLike | None = None,
+        leaving: ArrayLike | Hits | Passage | None = None,
         *,
+        side: ArrayLike | None = None,
         contacts: bool = True,
         max_hits: int | None = None,
         t_error: bool = False,
@@ -154,7 +165,7 @@ class Queries:
         array([2., 2., 3., 3.])
         """
         mesh, tree = built = self._built
-        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         hits = all_hits(tree, rays, mesh, (contacts, max_hits), shape, self.threads)
         if flag_argument("t_error", t_error):
             add_errors(hits, rays, hits.ray, tree.scale, self.threads)
@@ -166,8 +177,9 @@ class Queries:
         directions: ArrayLike,
         t_min: ArrayLike = 0.0,
         t_max: ArrayLike = np.inf,
-        leaving: ArrayLike | None = None,
+        leaving: ArrayLike | Hits | Passage | None = None,
         *,
+        side: ArrayLike | None = None,
         contacts: bool = True,
     ) -> NDArray[np.int64]:
         """The number of rows that ``all_hits`` has for each ray, (...) int64.
@@ -178,7 +190,7 @@ class Queries:
         array([2, 0])
         """
         built = self._built
-        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         return count_hits(built[1], rays, contacts, self.threads).reshape(shape)
 
     def count_steps(
@@ -187,7 +199,9 @@ class Queries:
         directions: ArrayLike,
         t_min: ArrayLike = 0.0,
         t_max: ArrayLike = np.inf,
-        leaving: ArrayLike | None = None,
+        leaving: ArrayLike | Hits | Passage | None = None,
+        *,
+        side: ArrayLike | None = None,
     ) -> Steps:
         """The nodes and triangles that the search for each ray's closest hit tests, for heat maps.
 
@@ -201,7 +215,7 @@ class Queries:
         (array([ True, False]), array([ True, False]))
         """
         built = self._built
-        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving)
+        rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         return count_steps(built[1], rays, shape, self.threads)
 
     def _rays(
@@ -211,15 +225,17 @@ class Queries:
         directions: ArrayLike,
         t_min: ArrayLike,
         t_max: ArrayLike,
-        leaving: ArrayLike | None,
+        leaving: ArrayLike | Hits | Passage | None,
+        side: ArrayLike | None,
     ) -> tuple[RayBatch, tuple[int, ...]]:
         """The arguments of a query, checked, and moved off the faces that the rays leave; and their dimensions."""
         mesh, tree = built
         rays, shape = check_rays(origins, directions, t_min, t_max)
         if leaving is None:
+            expect(side is None, "side", "None without leaving", "an array")
             return rays, shape
-        faces = check_faces("leaving", leaving, shape, len(mesh.faces))
-        return moved_off(rays, faces, mesh, tree.scale, self.threads), shape
+        left = check_leaving(leaving, side, shape, len(mesh.faces))
+        return moved_off(rays, left, mesh, tree.scale, self.threads), shape
 
     def contains(
         self,

@@ -14,6 +14,7 @@ from renderer.contacts.gather import (
     DOUBLE_ROWS,
     INTEGER_ROWS,
     OUT_FACE,
+    OUT_SIDE,
     OUT_T,
     OUT_U,
     OUT_V,
@@ -42,10 +43,10 @@ class Choice(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """Hits of rays that follow each other: t, u and v, (3, k) float64, and the faces, (k,) int64."""
+    """Hits of rays that follow each other: t, u and v, (3, k) float64, and face and side, (2, k) int64."""
 
     doubles: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    integers: NDArray[np.int64]
 
 
 def all_hits(
@@ -57,8 +58,8 @@ def all_hits(
     offsets = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])
     t, u, v = np.concatenate([np.empty((3, 0)), *(part.doubles for part in parts)], axis=1)
-    face = np.concatenate([np.empty(0, np.int64), *(part.faces for part in parts)])
-    return AllHits(offsets, t, face, u, v, mesh, shape)
+    face, side = np.concatenate([np.empty((2, 0), np.int64), *(part.integers for part in parts)], axis=1)
+    return AllHits(offsets, t, face, u, v, mesh, shape, None, side)
 
 
 def count_hits(tree: Tree, rays: RayBatch, contacts: bool, threads: int) -> NDArray[np.int64]:
@@ -108,4 +109,4 @@ def _memory(capacity: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 
 def _taken(doubles: NDArray[np.float64], integers: NDArray[np.int64], count: int) -> _Part:
-    return _Part(doubles[[OUT_T, OUT_U, OUT_V], :count], integers[OUT_FACE, :count].copy())
+    return _Part(doubles[[OUT_T, OUT_U, OUT_V], :count], integers[[OUT_FACE, OUT_SIDE], :count])

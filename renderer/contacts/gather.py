@@ -22,16 +22,17 @@ from renderer.trace.intersect import (
     round_down,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+from renderer.trace.leaf import NO_FACE, blocks_of, push_children, tree_pointers
 from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.sides import coordinate, exact_sides
+from renderer.trace.starts.search import depart, meet_near, near_bits
 from renderer.trace.traverse import make_scratch
 
 # Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
 # place of the face in its block, the edges passed as bits, and the order as int64. Of the hits of the rays before it:
-# t, u, v, and face.
+# t, u, v, face, and the side of the face that the ray came from.
 _T, _U, _V, _W, OUT_T, OUT_U, OUT_V, DOUBLE_ROWS = range(8)
-_FACE, _AT, _EDGES, _ORDER, OUT_FACE, INTEGER_ROWS = range(6)
+_FACE, _AT, _EDGES, _ORDER, OUT_FACE, OUT_SIDE, INTEGER_ROWS = range(7)
 _MERGED = -1
 # The hits and rounds of rays in a call, some 10 ms, so that Ctrl-C need not wait for long.
 _WORK = 1 << 16
@@ -78,28 +79,30 @@ def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, memory)
             end, taken = find_blocks(tree, source, begin, end, scratch, candidates)
         rounds += taken
         for i in range(begin, end):
-            count = _list_all(tree, source, i, candidates, i - begin, found, scratch.packet_stack)
+            count = _list_all(tree, source, i, candidates, i - begin, found, scratch)
             if kept + count > found.capacity or hits > _WORK:
                 return i, -1
             hits += count
             counts[i] = smaller(_ordered(tree, found, count, merge, keep), most)
             if keep:
-                _keep(found, kept, counts[i], tree.scale)
+                _keep(found, kept, counts[i], tree.scale, make_shear(ray_at(source, i)[0]).direction_z)
                 kept += counts[i]
         begin = end
     return begin, -1
 
 
 @kernel
-def _list_all(tree, rays, i, candidates, k, found, stack):
+def _list_all(tree, rays, i, candidates, k, found, scratch):
     """List all hits of ray ``i``, the k-th candidate; returns their number, of which the capacity is listed."""
     ray, t_max = ray_at(rays, i)
+    if ray.leaving >= 0.0:
+        return _list_from(tree, rays, i, ray, t_max, found, scratch)
     shear, count = make_shear(ray), np.int64(0)
     if not tree.has_nodes:
         return _list_hits(tree, (0, tree.count), ray, shear, t_max, found, count)
     listed = get(candidates.counts, k)
     if listed > LISTED:
-        return _search(tree, ray, shear, t_max, found, stack)
+        return _search(tree, ray, shear, t_max, found, scratch.packet_stack)
     for place in range(k * LISTED, k * LISTED + listed):
         count = _list_hits(tree, (get(candidates.blocks, place), 1), ray, shear, t_max, found, count)
     return count
@@ -134,15 +137,75 @@ def _list_hits(tree, blocks, ray, shear, t_max, found, count):
             i = lowest_bit(bits)
             bits &= bits - 1
             hit, edges = (extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)), np.int64(0)
-            doubtful = (doubts >> i) & 1 != 0
-            if doubtful or hit[1] == 0.0 or hit[2] == 0.0 or hit[1] + hit[2] == hit[3]:
+            if (doubts >> i) & 1 != 0 or hit[1] == 0.0 or hit[2] == 0.0 or hit[1] + hit[2] == hit[3]:
                 edges = _edges_passed(exact_sides(tree, base + i, shear))
-            if doubtful:
+            if (doubts >> i) & 1 != 0:
                 hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-            if ray.t_min <= hit[0] <= t_max:
-                if count < found.capacity:
-                    _list_hit(found, count, hit, get(tree.faces, block * BLOCK_FACES + i), base + i, edges)
-                count += 1
+            count = _add_hit(tree, found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
+    return count
+
+
+@inlined
+def _add_hit(tree, found, count, ray, t_max, hit, number, place, edges):
+    """Add a hit to the list if it is in the ray's interval; returns the number of hits."""
+    if not ray.t_min <= hit[0] <= t_max:
+        return count
+    if count < found.capacity:
+        _list_hit(found, count, hit, get(tree.faces, number), place, edges)
+    return count + 1
+
+
+@kernel
+def _list_from(tree, rays, i, ray, t_max, found, scratch):
+    """``_list_all`` for a ray that leaves the surface. What stops it at its start is its first hit."""
+    stack = scratch.packet_stack
+    departure, stopped = depart(tree, rays.starts, i, ray, stack, scratch.holders)
+    ray, count = departure.ray, np.int64(0)
+    if stopped[1] != NO_FACE and t_max >= 0.0:
+        if found.capacity > 0:
+            hit = stopped[0], stopped[2], stopped[3], stopped[4]
+            _list_hit(found, 0, hit, stopped[1], 0, np.int64(0))
+        count = np.int64(1)
+    shear, largest = make_shear(ray), largest_of(ray)
+    if not tree.has_nodes:
+        return _list_hits_from(tree, (0, tree.count), departure, shear, t_max, found, count)
+    slabs, top = make_slabs(ray, largest), 1
+    lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
+    put(stack, 0, 0)
+    while top > 0:
+        top -= 1
+        child = get(stack, top)
+        if child < 0:
+            count = _list_hits_from(tree, blocks_of(child), departure, shear, t_max, found, count)
+            continue
+        _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
+        top = push_children(tree, child, bits, stack, top)
+    return count
+
+
+@kernel
+def _list_hits_from(tree, blocks, departure, shear, t_max, found, count):
+    """``_list_hits`` for a ray that leaves the surface."""
+    ray = departure.ray
+    for block in range(blocks[0], blocks[0] + blocks[1]):
+        base = block * BLOCK_WORDS
+        bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, t_max)
+        near = near_bits(tree, block, departure, shear, bits)
+        bits |= near
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            if np.float64(get(tree.faces, block * BLOCK_FACES + i)) == ray.leaving:
+                continue
+            hit, edges = (extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)), np.int64(0)
+            if (near >> i) & 1 != 0:
+                hit, edges = meet_near(tree, base + i, departure, shear.direction_z)
+            else:
+                if (doubts >> i) & 1 != 0 or hit[1] == 0.0 or hit[2] == 0.0 or hit[1] + hit[2] == hit[3]:
+                    edges = _edges_passed(exact_sides(tree, base + i, shear))
+                if (doubts >> i) & 1 != 0:
+                    hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
+            count = _add_hit(tree, found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
     return count
 
 
@@ -266,11 +329,11 @@ def _compare_corners(tree, a, b):
 
 
 @kernel
-def _keep(found, kept, count, scale):
-    """Append the first ``count`` hits in order to those kept, as a closest hit would be written."""
+def _keep(found, kept, count, scale, dz):
+    """Append the first ``count`` hits in order to those kept, as ``write_hit`` writes a closest hit."""
     t, u, v = (at(found.doubles, _row(found, OUT_T, kept)), at(found.doubles, _row(found, OUT_U, kept)),
                at(found.doubles, _row(found, OUT_V, kept)))  # fmt: skip
-    face = at(found.integers, _row(found, OUT_FACE, kept))
+    face, side = at(found.integers, _row(found, OUT_FACE, kept)), at(found.integers, _row(found, OUT_SIDE, kept))
     for k in range(count):
         i = get(found.integers, _row(found, _ORDER, k))
         hit = (
@@ -280,4 +343,4 @@ def _keep(found, kept, count, scale):
             get(found.doubles, _row(found, _V, i)),
             get(found.doubles, _row(found, _W, i)),
         )
-        write_hit(HitPointers(t, face, u, v, t), k, scale, hit, False)
+        write_hit(HitPointers(t, face, u, v, side, t), k, scale, hit, dz, False)

@@ -11,7 +11,8 @@ from renderer.errors import expect
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh.mesh import Mesh
 from renderer.process.parallel import for_chunks
-from renderer.trace.spawn import leave_faces
+from renderer.trace.spawn import FARTHEST_START, leave_faces
+from renderer.trace.starts.record import FACE, FACES, HEAD, ROW, ROW_STEP, VERTICES
 
 # The most rays of a chunk: small enough to share 1e5 rays between many threads and to stop within milliseconds on
 # Ctrl-C, large enough that taking a chunk costs nothing beside its 1 to 10 ms of tracing.
@@ -51,16 +52,28 @@ def _bound(argument: str, value: ArrayLike, shape: tuple[int, ...], largest: flo
     return array
 
 
+def _no_starts() -> NDArray[np.int64]:
+    starts = np.zeros(HEAD + ROW, np.int64)
+    starts[HEAD:].view(np.float64)[FACE] = -1.0
+    return starts
+
+
+# The starts of rays that start on no surface.
+NO_STARTS = _no_starts()
+
+
 class RayBatch(NamedTuple):
     """n rays whose shapes and bounds passed the checks; build them with ``check_rays``.
 
-    origins and directions (n, 3) or (1, 3) for all, t_min and t_max (n,) or (1,) for all, all float64.
+    origins and directions (n, 3) or (1, 3) for all, t_min and t_max (n,) or (1,) for all, all float64; starts as in
+    ``starts.record``, int64.
     """
 
     origins: NDArray[np.float64]
     directions: NDArray[np.float64]
     t_min: NDArray[np.float64]
     t_max: NDArray[np.float64]
+    starts: NDArray[np.int64] = NO_STARTS
 
     @property
     def number(self) -> int:
@@ -140,25 +153,51 @@ def check_faces(argument: str, faces: ArrayLike, shape: tuple[int, ...], most: i
     return rows
 
 
-def moved_off(rays: RayBatch, faces: NDArray[np.int64], mesh: Mesh, scale: float, threads: int) -> RayBatch:
-    """The rays with their starts moved off ``faces``, see ``spawn.leave_faces``; ``scale`` is the tree's.
+class Leaving(NamedTuple):
+    """The faces that rays leave, and how: checked arrays of one row a ray.
 
-    Raises ``ValueError`` naming the argument and the row for an origin out of bounds.
+    faces    (n,) int64, -1 for none
+    code     (n,) or (1,) int64, the bits of ``starts.record``
+    anchors  (n, 3) float64: u, v and 0; or no row, where the origins say where the rays start
+    """
+
+    faces: NDArray[np.int64]
+    code: NDArray[np.int64]
+    anchors: NDArray[np.float64]
+
+
+def by_faces(faces: NDArray[np.int64]) -> Leaving:
+    """Rays that leave faces of which no side is known."""
+    return Leaving(faces, np.zeros(1, np.int64), np.empty((0, 3)))
+
+
+def moved_off(rays: RayBatch, leaving: Leaving, mesh: Mesh, scale: float, threads: int) -> RayBatch:
+    """The rays with their starts moved off the faces that they leave, see ``spawn.leave_faces``, and with their
+    ``starts``; ``scale`` is the tree's.
+
+    Raises ``ValueError`` naming the argument and the row for an origin out of bounds or not on its face.
     """
     count = rays.number
-    # Not by broadcasting, whose arrays cannot be written: Numba would compile the kernel again for these.
-    directions = rays.directions if len(rays.directions) == count else np.tile(rays.directions, (count, 1))
-    sound = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(directions).all(axis=1)
+    sound = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(rays.directions).all(axis=1)
     if not sound.all():
         # Rejected before it is moved, so that the message names the numbers as given.
         reject(rays, int((~sound).argmax()), scale)
-    starts = np.empty((count, 3))
+    origins, starts, bad = np.empty((count, 3)), np.empty(HEAD + ROW * count, np.int64), list[int]()
+    starts[ROW_STEP], starts[VERTICES], starts[FACES] = ROW, mesh.vertices.ctypes.data, mesh.faces.ctypes.data
+    rows, ways = starts[HEAD:].view(np.float64).reshape(count, ROW), (rays.origins, rays.directions)
 
     def leave(begin: int, end: int) -> None:
-        leave_faces(mesh.vertices, mesh.faces, rays.origins, directions, faces, starts, (begin, end, scale))
+        row = leave_faces(mesh.vertices, mesh.faces, ways, *leaving, origins, rows, (begin, end, scale))
+        if row >= 0:
+            bad.append(row)
 
     for_chunks(leave, count, CHUNK, threads)
-    return rays._replace(origins=starts)
+    if bad:
+        row = min(bad)
+        face, origin = leaving.faces[row], rays.origins[row if len(rays.origins) > 1 else 0]
+        expected = f"a point of face {face} that it leaves, within {FARTHEST_START:.1g} of the largest coordinate"
+        expect(False, "origins", expected, f"{origin.tolist()} in row {row}")
+    return rays._replace(origins=origins, starts=starts)
 
 
 def reject(rays: RayBatch, row: int, scale: float) -> None:

@@ -19,9 +19,11 @@ from renderer.kernels.pairs import (
     minus,
     power_below,
     product,
+    quotient,
     scaled_difference,
 )
-from renderer.kernels.simd import larger, smaller
+from renderer.kernels.signs import UNDECIDED, lies_within, volume_sign
+from renderer.kernels.simd import larger, local_doubles, smaller
 from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, scale, sub
 from renderer.trace.intersect import (
     FAR_PADDING,
@@ -34,7 +36,7 @@ from renderer.trace.intersect import (
     round_down,
     turned,
 )
-from renderer.trace.sides import coordinate, exact_sides, passes_within
+from renderer.trace.sides import coordinate, corner, exact_sides, passes_within
 
 # How near a ray must come to a face to hit it, in units of the power of two below L, the largest component of a corner
 # relative to the origin. A sheared coordinate errs by 5 u L (``spawn`` derives it), so a ray that passes a face on the
@@ -46,6 +48,11 @@ _BEFORE = (1.0 + 2.0**-30) / np.float64(FAR_PADDING)
 # A face thinner than this share of its length is a line: its normal errs by 2^-100, its product with a corner by 2^-97,
 # and so the distance from the plane of any other face by 2^-49, a sixteenth of ROUNDING.
 LINE = 2.0**-48
+# A product of three vectors is wrong in sign only where it is less than this share of its terms: 16 roundings.
+_NEAR = 2.0**-48
+# What ``_height_sign`` says of an origin that is not near.
+_FAR = 3
+_LEAST_NORMAL = 2.0**-1022
 # What a place along the longest side errs by at most, as a share of it and of the distance: eight roundings.
 _SLACK = 2.0**-50
 
@@ -54,10 +61,15 @@ _SLACK = 2.0**-50
 def settled(tree, at, ray, shear, hit, blurred):
     """The hit (t, u, v, w) that a hit in doubt of the face at ``at`` counts as. t is NaN where it counts as none.
 
-    ``blurred`` says that the determinant is in doubt, not t or an edge alone. t lies where the ray is within the face's
-    own box, in the arithmetic of ``enter_boxes``. That is monotone: the ray enters no box around this one later, and
-    leaves none earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
+    A ray that begins exactly on the face hits it at t = 0. ``blurred`` says that the determinant is in doubt, not t or
+    an edge alone. t lies where the ray is within the face's own box, in the arithmetic of ``enter_boxes``. That is
+    monotone: the ray enters no box around this one later, and leaves none earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
     """
+    height = _height_sign(tree, at, ray)
+    if height == 0:
+        begun = _met_at_start(tree, at, ray, shear)
+        if begun[0] == 0.0:
+            return begun
     if not passes_within(exact_sides(tree, at, shear)):
         return np.nan, 0.0, 0.0, 1.0
     # From the ray itself: to keep its ``Slabs`` for this would cost every ray.
@@ -67,7 +79,15 @@ def settled(tree, at, ray, shear, hit, blurred):
     t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
     t0, t1 = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
     first, last = np.float64(t0) * _BEFORE, np.float32(t1 * FAR_PADDING)
-    t, u, v, w = _meet_face(tree, at, ray, first / largest, np.float64(last) / largest) if blurred else hit
+    t, u, v, w = hit
+    if blurred:
+        t, u, v, w = _meet_face(tree, at, ray, first / largest, np.float64(last) / largest)
+        w = -1.0 if _slope(tree, at, ray) * shear.direction_z > 0.0 else 1.0
+        u, v = u * w, v * w
+    elif height != _FAR and height != 0:
+        # Rounding may have made this t and its sign.
+        slope = _slope(tree, at, ray)
+        t = height * abs(_exact_t(tree, at, ray)) * (1.0 if slope > 0.0 else -1.0)
     if not (t0 <= last and t0 <= LARGEST_FLOAT and t >= 0.0):
         return np.nan, u, v, w
     if round_down(t * largest) > last:
@@ -75,6 +95,71 @@ def settled(tree, at, ray, shear, hit, blurred):
     if t0 > box_limit(t, largest):
         t = first / largest
     return t, u, v, w
+
+
+@inlined
+def _corners(tree, at):
+    return corner(tree, at), corner(tree, at + 12), corner(tree, at + 24)
+
+
+@kernel
+def _height_sign(tree, at, ray):
+    """The exact sign of normal . (p0 - origin) where the origin is near the plane of a face, 0 in it; else _FAR."""
+    (p0, p1, p2), o = _corners(tree, at), (ray.ox, ray.oy, ray.oz)
+    one, other, way = sub(p1, p0), sub(p2, p0), sub(p0, o)
+    normal = cross(one, other)
+    size = largest_component(one) * largest_component(other) * largest_component(way)
+    if abs(dot(normal, way)) > size * _NEAR or largest_component(normal) == 0.0:
+        return _FAR
+    sign = volume_sign(p0, p1, p2, o, local_doubles())
+    # Negative is the volume of (p0 - o), (p1 - o), (p2 - o) where the normal looks away from o.
+    return _FAR if sign == UNDECIDED else sign
+
+
+@kernel
+def _scaled_normal(tree, at, ray):
+    """The normal of a face as pairs, its sides scaled by a power of two."""
+    p0, p1, p2 = _corners(tree, at)
+    side = larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
+    unit = 1.0 / power_below(side)
+    return cross_pairs(scaled_difference(p1, p0, unit), scaled_difference(p2, p0, unit))
+
+
+@inlined
+def _direction(ray):
+    """A ray's direction, scaled by a power of two, and that."""
+    d = ray.dx, ray.dy, ray.dz
+    unit = power_below(largest_component(d))
+    return scale(d, 1.0 / unit), unit
+
+
+@kernel
+def _slope(tree, at, ray):
+    """normal . direction of a face and a ray, with twice the digits, in some unit."""
+    return dot_pairs(_scaled_normal(tree, at, ray), as_pairs(_direction(ray)[0]))[0]
+
+
+@kernel
+def _exact_t(tree, at, ray):
+    """Where a ray meets the plane of a face, with twice the digits."""
+    (p0, _, _), o, (d, d_unit) = _corners(tree, at), (ray.ox, ray.oy, ray.oz), _direction(ray)
+    way = sub(p0, o)
+    unit = power_below(larger(largest_component(way), _LEAST_NORMAL))
+    normal = _scaled_normal(tree, at, ray)
+    height = dot_pairs(normal, scaled_difference(p0, o, 1.0 / unit))
+    return quotient(height, dot_pairs(normal, as_pairs(d)))[0] * unit / d_unit
+
+
+@kernel
+def _met_at_start(tree, at, ray, shear):
+    """The hit of a face in whose plane a ray begins: at t = 0 where it begins on the face and leaves the plane."""
+    (p0, p1, p2), o, slope = _corners(tree, at), (ray.ox, ray.oy, ray.oz), _slope(tree, at, ray)
+    if slope == 0.0 or lies_within(p0, p1, p2, o, local_doubles()) != 1:
+        return np.nan, 0.0, 0.0, 1.0
+    a, b, c = sub(p0, o), sub(p1, o), sub(p2, o)
+    e0, e1, e2 = length(cross(b, c)), length(cross(c, a)), length(cross(a, b))
+    turn, whole = (-1.0 if slope * shear.direction_z > 0.0 else 1.0), e0 + e1 + e2
+    return 0.0, turn * (e1 / whole), turn * (e2 / whole), turn
 
 
 @kernel

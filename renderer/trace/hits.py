@@ -1,11 +1,26 @@
 """The answers of queries: closest hits, a row per ray, and all hits, in compressed rows."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh, face_normals
+
+
+class Passage(NamedTuple):
+    """Where rays have gone through faces: ``Hits.through`` makes it, ``leaving`` takes it.
+
+    face  (...) int64
+    u, v  (...) float64, the place on the face
+    side  (...) int64, the side that the rays are on now; None where it is not known
+    """
+
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    side: NDArray[np.int64] | None
 
 
 # Slots and not frozen: a call with one ray spends a third of its time on making objects.
@@ -16,6 +31,9 @@ class Hits:
     t     (...) float64, in units of |direction|; inf on a miss
     face  (...) int64; -1 on a miss
     u, v  (...) float64, P = (1 - u - v) p0 + u p1 + v p2; nan on a miss
+
+    side  (...) int64, the side of the face that the ray came from: 1 that of its normal by winding, -1 the other one; 0
+          on a miss; None for hits that no query made
 
     t_error  (...) float64, how far rounding may have moved t, nan on a miss; None unless it was asked for
 
@@ -32,6 +50,21 @@ class Hits:
     v: NDArray[np.float64]
     _mesh: Mesh = field(repr=False)
     t_error: NDArray[np.float64] | None = None
+    side: NDArray[np.int64] | None = None
+
+    def through(self) -> "Passage":
+        """The same places, for rays that go on through the faces: ``leaving=hits.through()``.
+
+        A ray with ``leaving=hits`` starts on the side that the hit ray came from, as a reflected one does.
+
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree, down = Octree.from_mesh(box()), [[0.0, 0.0, -1.0]]
+        >>> hits = octree.closest_hit([[0.5, 0.25, 3.0]], down)
+        >>> octree.closest_hit(hits.points, down, leaving=hits.through()).t
+        array([1.])
+        """
+        return Passage(self.face, self.u, self.v, None if self.side is None else -self.side)
 
     def shaped(self, shape: tuple[int, ...]) -> "Hits":
         """The same hits in other dimensions.
@@ -46,7 +79,8 @@ class Hits:
             return self
         t, u, v = (values.reshape(shape) for values in (self.t, self.u, self.v))
         t_error = None if self.t_error is None else self.t_error.reshape(shape)
-        return Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error)
+        side = None if self.side is None else self.side.reshape(shape)
+        return Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error, side)
 
     @property
     def hit(self) -> NDArray[np.bool_]:
@@ -104,6 +138,7 @@ class AllHits:
     face     (m,) int64
     u, v     (m,) float64, P = (1 - u - v) p0 + u p1 + v p2
     t_error  (m,) float64, how far rounding may have moved t; None unless it was asked for
+    side     (m,) int64, the side of the face that the ray came from, as of ``Hits``
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
@@ -121,6 +156,7 @@ class AllHits:
     _mesh: Mesh = field(repr=False)
     _shape: tuple[int, ...] = field(repr=False)
     t_error: NDArray[np.float64] | None = None
+    side: NDArray[np.int64] | None = None
 
     @property
     def counts(self) -> NDArray[np.int64]:

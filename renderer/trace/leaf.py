@@ -137,7 +137,9 @@ def nearest_carefully(tree, first, count, ray, shear, best):
 
 @kernel
 def search_all_blocks(tree, ray, t_max, any_hit):
-    """The best hit (t, face, u, v, w) over all blocks; with ``any_hit`` it may be any hit."""
+    """The best hit (t, face, u, v, w) over all blocks, and whether one was in doubt; with ``any_hit`` it may be any
+    hit.
+    """
     shear, best, doubtful = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(0)
     for first in range(0, tree.count, _BLOCKS_AT_ONCE):
         count = smaller(_BLOCKS_AT_ONCE, tree.count - first)
@@ -145,7 +147,5 @@ def search_all_blocks(tree, ray, t_max, any_hit):
         best = t, face, u, v, w
         doubtful |= doubts
         if any_hit and face != NO_FACE:
-            return best
-    if doubtful != 0:
-        return nearest_carefully(tree, 0, tree.count, ray, shear, (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0))
-    return best
+            return best, False
+    return best, doubtful != 0

@@ -28,7 +28,7 @@ from renderer.kernels.simd import (
     splat8,
     store,
 )
-from renderer.trace.intersect import Shear, round_both
+from renderer.trace.intersect import Shear, box_limit, largest_of, round_both
 from renderer.trace.layout import CACHE_LINE, CHILDREN, NODE_WORDS, UNUSED, cache_aligned
 from renderer.trace.leaf import NO_FACE, blocks_of, nearest_in_blocks
 from renderer.trace.packet import Beam, enter_beam, highest_origin, lowest_origin, make_beam, meet_box
@@ -37,11 +37,13 @@ from renderer.trace.ray_lanes import (
     CHILD,
     FACE,
     FAR_ORIGIN,
+    LEAVING,
     LIMIT,
     NEAR_INVERSE,
     NEAR_ORIGIN,
     NUMBER,
     ORIGIN,
+    SLACK,
     WIDTH,
     T,
     nearest_in_leaf,
@@ -49,7 +51,10 @@ from renderer.trace.ray_lanes import (
     shear_of,
 )
 from renderer.trace.rays import ray_at
-from renderer.trace.singly import search_singly, stack_size
+from renderer.trace.singly import search_carefully, stack_size
+from renderer.trace.starts.record import EDGE
+from renderer.trace.starts.record import FACE as START_FACE
+from renderer.trace.starts.record import SLACK as START_SLACK
 
 # The leaves of a list: 128 kB with the rays. Half as many take as long, twice as many 5 % longer.
 LISTED = 256
@@ -126,6 +131,9 @@ def _prepare_origins(rays, prepared, sixteen, limits):
             store(floats, NEAR_ORIGIN + axis * WIDTH + half, near)
             store(floats, FAR_ORIGIN + axis * WIDTH + half, far)
             store(doubles, ORIGIN + (axis + 2 - w) % 3 * WIDTH + half, o)
+        rows, step = rays.starts.rows, rays.starts.step
+        store(doubles, SLACK + half, gather8(rows, at(integers, NUMBER + half), step, START_SLACK))
+        store(doubles, LEAVING + half, gather8(rows, at(integers, NUMBER + half), step, START_FACE))
         store(doubles, T + half, alike(limits[0], o))
         store(floats, LIMIT + half, splat8(limits[1]))
         store(integers, FACE + half, alike(np.int64(NO_FACE), o))
@@ -260,8 +268,7 @@ def _keep_live(tree, rays, found, scratch, parallel, state, doubtful):
         if hidden:
             put(parallel.hiders, i, get(integers, CHILD + r))
         elif (doubtful >> r) & 1 != 0:
-            ray, t_max = ray_at(rays, i)
-            best, _ = search_singly(tree, ray, t_max, scratch.packet_stack)
+            best, _ = search_carefully(tree, rays, i, scratch.packet_stack, scratch.holders, True)
             hidden, sure = best[1] != NO_FACE, True
         put(found.hit, i, hidden)
         put(parallel.live, kept, i)
@@ -282,18 +289,26 @@ def _test_rays(tree, rays, found, scratch, parallel, counts, beam, limits):
 
 
 @kernel
-def _try_hiders(tree, rays, found, prepared, parallel, count):
-    """Test each ray against the leaf that hid one like it; returns how many are not hidden."""
-    shear, t_max, kept = shear_of(prepared, 0), get(prepared.doubles, T), np.int64(0)
+def _try_hiders(tree, rays, found, scratch, parallel, count, t_max):
+    """Test each ray against the leaf that hid one like it, and search for what hides those that start on an edge of the
+    surface; returns how many are not hidden.
+    """
+    shear, kept = shear_of(scratch.prepared, 0), np.int64(0)
     w = shear.row_z >> 2
     x, y = (w + 1) % 3, (w + 2) % 3
     for i in range(count):
         leaf, face = get(parallel.hiders, i), np.int32(NO_FACE)
+        row = at(rays.starts.rows, i * rays.starts.step)
+        slack, leaving = get(row, START_SLACK), get(row, START_FACE)
+        if slack == EDGE:
+            best, _ = search_carefully(tree, rays, i, scratch.packet_stack, scratch.holders, True)
+            put(found.hit, i, best[1] != NO_FACE)
+            continue
         if leaf < 0:
             o = at(rays.origins, i * rays.origin_step)
             own = Shear(
                 shear.row_x, shear.row_y, shear.row_z, get(o, x) * rays.scale, get(o, y) * rays.scale,
-                get(o, w) * rays.scale, shear.shear_x, shear.shear_y, shear.direction_z,
+                get(o, w) * rays.scale, shear.shear_x, shear.shear_y, shear.direction_z, slack, leaving,
             )  # fmt: skip
             first, blocks = blocks_of(leaf)
             none = t_max, face, 0.0, 0.0, 1.0
@@ -317,8 +332,9 @@ def trace_parallel(tree, rays, found, count, scratch, parallel):
     """
     prepared = scratch.prepared
     beam = _prepare_direction(rays, prepared)
-    limits = get(prepared.doubles, T), get(prepared.floats, LIMIT)
-    left = _try_hiders(tree, rays, found, prepared, parallel, count)
+    ray, t_max = ray_at(rays, 0)
+    limits = t_max, box_limit(t_max, largest_of(ray))
+    left = _try_hiders(tree, rays, found, scratch, parallel, count, t_max)
     put(parallel.waiting, 0, 0)
     top, entered = np.int64(1), np.int64(0)
     while top > 0 and left > 0:

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.process.parallel import for_chunks
-from renderer.trace.batch import CHUNK, RayBatch, reject
+from renderer.trace.batch import CHUNK, NO_STARTS, RayBatch, reject
 from renderer.trace.hits import Hits
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HIT_ROWS
 from renderer.trace.singly import FEW_DEPTH, stack_size, trace_few
+from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.traverse import Memory, make_memory, search_chunk, trace_chunk
 
 # Few rays go in smaller chunks, sixteen per thread, so that no thread has much more to do than another.
@@ -22,6 +23,7 @@ _LEAST_CHUNK = 1024
 _BLOCK_TESTS = 1 << 22
 # Fewer rays than a packet holds go one by one, by a kernel that compiles in a fraction of the time.
 FEW = WIDTH - 1
+_NO_ROOM = np.empty(1, np.int64)
 
 
 def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
@@ -31,8 +33,8 @@ def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     else:
         out = np.empty((HIT_ROWS, rays.number))
         _run(tree, rays, out, threads, any_hit=False)
-    t, u, v, face = out
-    return Hits(t, face.view(np.int64), u, v, mesh)
+    t, u, v, face, side = out
+    return Hits(t, face.view(np.int64), u, v, mesh, None, side.view(np.int64))
 
 
 def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
@@ -53,10 +55,15 @@ def _are_few(tree: Tree, rays: RayBatch) -> bool:
 def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
     """Closest hits of a few rays on the caller's thread, as ``singly.trace_few`` writes them."""
     out = np.empty((HIT_ROWS, rays.number))
-    row = trace_few(tree.words, rays, out)
+    row = trace_few(tree.words, rays, out, _room(rays))
     if row >= 0:
         reject(rays, row, tree.scale)
     return out
+
+
+def _room(rays: RayBatch) -> NDArray[np.int64]:
+    """Room for the faces that hold a start; none is needed where no ray starts on the surface."""
+    return _NO_ROOM if rays.starts is NO_STARTS else np.empty(HOLDERS_WORDS, np.int64)
 
 
 def rays_against_blocks(tree: Tree) -> int:
@@ -78,7 +85,7 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
         if bad and bad[0] < begin:
             return
         if not tree.has_nodes:
-            row = search_chunk(tree.words, rays, out, begin, end, any_hit)
+            row = search_chunk(tree.words, rays, out, begin, end, any_hit, _room(rays))
             if row >= 0:
                 bad.append(row)
             return

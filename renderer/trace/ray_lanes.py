@@ -10,6 +10,7 @@ from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_s
 from renderer.trace.layout import LEAF_BITS, MAX_LEAF_BLOCKS
 from renderer.trace.leaf import NO_FACE, nearest_in_blocks
 from renderer.trace.rays import eight_rays_at
+from renderer.trace.starts.record import EDGE
 
 WIDTH = 16
 
@@ -19,9 +20,11 @@ WIDTH = 16
 NEAR_ORIGIN, FAR_ORIGIN, NEAR_INVERSE, FAR_INVERSE = 0, 3 * WIDTH, 6 * WIDTH, 9 * WIDTH
 LOWER, LIMIT, SLOPE_U, SLOPE_V = 12 * WIDTH, 13 * WIDTH, 14 * WIDTH, 15 * WIDTH
 # Rows of float64: origin, shear and direction of ``Shear``; t_min, and the t of the best hit, at first t_max; the
-# largest component of the direction; and that hit's barycentric numerators and their denominator.
+# largest component of the direction; that hit's barycentric numerators and their denominator; and for a ray that leaves
+# the surface its slack and its face.
 ORIGIN, SHEAR, DIRECTION_Z, T_MIN, T = 0, 3 * WIDTH, 5 * WIDTH, 6 * WIDTH, 7 * WIDTH
 LARGEST, U, V, W = 8 * WIDTH, 9 * WIDTH, 10 * WIDTH, 11 * WIDTH
+SLACK, LEAVING = 12 * WIDTH, 13 * WIDTH
 # Rows of int64: the near rows of a node and the rows of a block, three axes each; the best hit's face; for a stream the
 # ray's next child, the top of its stack, its number, and whether a hit was in doubt.
 NEAR_ROW, BLOCK_ROW, FACE = 0, 3 * WIDTH, 6 * WIDTH
@@ -60,6 +63,8 @@ def prepare_ray(rays, r, ray, t_max):
     store(doubles, DIRECTION_Z + r, shear.direction_z)
     store(doubles, T_MIN + r, ray.t_min)
     store(doubles, LARGEST + r, largest)
+    store(doubles, SLACK + r, ray.slack)
+    store(doubles, LEAVING + r, ray.leaving)
     _put_axes(integers, NEAR_ROW + r, slabs.near_x, slabs.near_y, slabs.near_z)
     _put_axes(integers, BLOCK_ROW + r, shear.row_x, shear.row_y, shear.row_z)
     store(doubles, T + r, t_max)
@@ -70,6 +75,8 @@ def prepare_ray(rays, r, ray, t_max):
 def prepare_eight(rays, prepared, r, numbers):
     """Write the eight rays whose numbers stand at ``numbers`` to the lanes from ``r`` on."""
     ray, t_max = eight_rays_at(rays, numbers)
+    # A ray from an edge goes through no box here.
+    t_max = select(ray.slack == EDGE, -1.0, t_max)
     prepare_ray(prepared, r, ray, t_max)
 
 
@@ -102,6 +109,7 @@ def shear_of(rays, r):
         get(integers, BLOCK_ROW + r), get(integers, BLOCK_ROW + WIDTH + r), get(integers, BLOCK_ROW + 2 * WIDTH + r),
         get(doubles, ORIGIN + r), get(doubles, ORIGIN + WIDTH + r), get(doubles, ORIGIN + 2 * WIDTH + r),
         get(doubles, SHEAR + r), get(doubles, SHEAR + WIDTH + r), get(doubles, DIRECTION_Z + r),
+        get(doubles, SLACK + r), get(doubles, LEAVING + r),
     )  # fmt: skip
 
 

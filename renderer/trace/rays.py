@@ -25,18 +25,19 @@ from renderer.kernels.simd import (
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.trace.intersect import Ray
 from renderer.trace.leaf import NO_FACE
+from renderer.trace.starts.record import FACE, SLACK, StartPointers, start_pointers
 
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
 _BYTES = 8
 # Rows of the array that closest hits are written to.
-HIT_ROWS = 4
+HIT_ROWS = 5
 
 
 class RayPointers(NamedTuple):
     """Pointers to rows of origins and directions, and to t_min and t_max.
 
     Each has a step from one ray to the next, 0 where all share one. ``scale`` is the tree's, a power
-    of two, so t goes in and out of its units exactly.
+    of two, so t goes in and out of its units exactly. ``starts`` says which rays start on the surface.
     """
 
     origins: Any
@@ -48,36 +49,38 @@ class RayPointers(NamedTuple):
     min_step: int
     max_step: int
     scale: float
+    starts: StartPointers
 
 
 class HitPointers(NamedTuple):
-    """Pointers to the results: t, face, u and v as in ``Hits``, or for any hits only ``hit``, a bool."""
+    """Pointers to the results: t, face, u, v and side as in ``Hits``, or for any hits only ``hit``, a bool."""
 
     t: Any
     face: Any
     u: Any
     v: Any
+    side: Any
     hit: Any
 
 
 @inlined
 def ray_pointers(rays, scale):
-    """``RayPointers`` of a batch (origins, directions, t_min, t_max), each of which may have one row for all."""
-    origins, directions, t_min, t_max = rays
+    """``RayPointers`` of a ``RayBatch``."""
+    origins, directions, t_min, t_max, starts = rays
     return RayPointers(
         pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
         3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1), np.int64(len(t_min) > 1),
-        np.int64(len(t_max) > 1), scale,
+        np.int64(len(t_max) > 1), scale, start_pointers(starts),
     )  # fmt: skip
 
 
 @inlined
 def hit_pointers(out, count):
-    """``HitPointers`` into the memory of ``out``: rows t, u, v and face of ``count`` values, or ``count`` bools."""
+    """``HitPointers`` into the memory of ``out``: rows t, u, v, face and side of ``count`` values, or ``count`` bools."""
     first, row = address(out), _BYTES * count
     return HitPointers(
         float64_pointer(first), int64_pointer(first + 3 * row), float64_pointer(first + row),
-        float64_pointer(first + 2 * row), bool_pointer(first),
+        float64_pointer(first + 2 * row), int64_pointer(first + 4 * row), bool_pointer(first),
     )  # fmt: skip
 
 
@@ -130,9 +133,11 @@ def ray_at(rays, i):
     """Ray ``i`` in the tree's units, and its t_max."""
     o, d = at(rays.origins, i * rays.origin_step), at(rays.directions, i * rays.direction_step)
     origin, direction = (get(o, 0), get(o, 1), get(o, 2)), (get(d, 0), get(d, 1), get(d, 2))
+    row = at(rays.starts.rows, i * rays.starts.step)
     return _scaled(
-        origin, direction, get(rays.t_min, i * rays.min_step), get(rays.t_max, i * rays.max_step), rays.scale
-    )
+        origin, direction, get(rays.t_min, i * rays.min_step), get(rays.t_max, i * rays.max_step), rays.scale,
+        get(row, SLACK), get(row, FACE),
+    )  # fmt: skip
 
 
 @inlined
@@ -142,22 +147,27 @@ def eight_rays_at(rays, numbers):
     origin = gather8(o, numbers, s, 0), gather8(o, numbers, s, 1), gather8(o, numbers, s, 2)
     direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
     t_min, t_max = gather8(rays.t_min, numbers, rays.min_step, 0), gather8(rays.t_max, numbers, rays.max_step, 0)
-    return _scaled(origin, direction, t_min, t_max, rays.scale)
+    rows, step = rays.starts.rows, rays.starts.step
+    slack, face = gather8(rows, numbers, step, SLACK), gather8(rows, numbers, step, FACE)
+    return _scaled(origin, direction, t_min, t_max, rays.scale, slack, face)
 
 
 @inlined
-def _scaled(origin, direction, t_min, t_max, scale):
+def _scaled(origin, direction, t_min, t_max, scale, slack, leaving):
     """Rays in the tree's units, whose ``scale`` is given, and their t_max."""
     # A t_min above 0 stays above 0 in the tree's units too, so that a hit at the origin is still too near.
     t_min = select(t_min > 0.0, larger(t_min * scale, _TINIEST), t_min)
-    ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, *direction, t_min)
+    ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, *direction, t_min, slack, leaving)
     # A hit whose t is beyond the largest float64, in either unit, is none.
     return ray, smaller(smaller(t_max, _MOST) * scale, _MOST)
 
 
 @inlined
-def write_hit(found, i, scale, best, any_hit):
-    """Write the best hit (t, face, u, v, w) of ray ``i``, or with ``any_hit`` only whether there is one."""
+def write_hit(found, i, scale, best, dz, any_hit):
+    """Write the best hit (t, face, u, v, w) of ray ``i``, or with ``any_hit`` only whether there is one.
+
+    ``dz`` is the ray's ``Shear.direction_z``: with the sign of w it tells the side of the face that the ray came from.
+    """
     t, face, u, v, w = best
     hit = face != NO_FACE
     if any_hit:
@@ -168,3 +178,4 @@ def write_hit(found, i, scale, best, any_hit):
     put(found.face, i, np.int64(face if hit else -1))
     put(found.u, i, u / w + 0.0 if hit else np.nan)
     put(found.v, i, v / w + 0.0 if hit else np.nan)
+    put(found.side, i, np.int64((1 if (w > 0.0) == (dz > 0.0) else -1) if hit else 0))

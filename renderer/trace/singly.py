@@ -3,10 +3,11 @@
 import numpy as np
 
 from renderer.kernels.jit import kernel
-from renderer.kernels.simd import LOCAL_WORDS, get, local_words, put, splat8
+from renderer.kernels.simd import LOCAL_WORDS, get, local_words, pointer, put, splat8
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_children, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
+from renderer.trace.starts.search import search_from
 
 
 def stack_size(depth: int) -> int:
@@ -30,6 +31,8 @@ def search_singly(tree, ray, t_max, stack):
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
     lower = splat8(round_down(ray.t_min * largest))
     best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
+    if not tree.has_nodes:
+        return nearest_carefully(tree, 0, tree.count, ray, shear, best), tree.count
     top, steps = 1, np.int64(0)
     put(stack, 0, 0)
     while top > 0:
@@ -47,8 +50,17 @@ def search_singly(tree, ray, t_max, stack):
 
 
 @kernel
-def trace_few(words, rays, out):
-    """Closest hits of a few rays, one by one, into the rows t, u, v and face of ``out``.
+def search_carefully(tree, rays, i, stack, holders, any_hit):
+    """``search_singly`` for ray ``i``, or ``search_from`` where it starts on the surface; with ``any_hit`` any hit."""
+    ray, t_max = ray_at(rays, i)
+    if ray.leaving >= 0.0:
+        return search_from(tree, rays.starts, i, ray, t_max, stack, holders, any_hit)
+    return search_singly(tree, ray, t_max, stack)
+
+
+@kernel
+def trace_few(words, rays, out, holders):
+    """Closest hits of a few rays, one by one, into the rows t, u, v, face and side of ``out``.
 
     Bounds and return value are those of ``trace_chunk``. The tree has at most FEW_DEPTH levels.
     """
@@ -59,7 +71,6 @@ def trace_few(words, rays, out):
         return bad
     stack = local_words()
     for i in range(count):
-        ray, limit = ray_at(source, i)
-        best, _ = search_singly(tree, ray, limit, stack)
-        write_hit(found, i, source.scale, best, False)
+        best, _ = search_carefully(tree, source, i, stack, pointer(holders), False)
+        write_hit(found, i, source.scale, best, make_shear(ray_at(source, i)[0]).direction_z, False)
     return -1

@@ -11,9 +11,11 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, power_below, scaled_difference
 from renderer.kernels.simd import at, larger, pointer, put, smaller
-from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, row3, scale, sub, three
+from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_component, length, normalized, row3, scale, sub, three
 from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import DOUBT, SLANT
+from renderer.trace.starts.anchor import anchor_of, far_from
+from renderer.trace.starts.record import ABOVE, ANCHOR, CODE, EDGE, FACE, KNOWN, SLACK, Start, corners_of
 
 _ROUNDOFF = 2.0**-53
 # gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).
@@ -37,6 +39,14 @@ _LEAST = 2.0 * ROUNDING
 # Of a face thinner than this the distance from the plane errs by more than matters, so it takes twice the digits.
 _SHARP = 2.0**-10
 _SMALLEST = 2.0**-1074
+# A start is inside its face where it is farther from the edges than so often its slack: a face beside it, at more than
+# a 64th of a right angle, is farther from it than where it is moved to.
+_INSIDE = 8.0
+# A ray along its face: of normal . direction this much may be rounding, 2^-46 of a face that is not thinner than _SHARP.
+_LEVEL = 2.0**-40
+# A point that went through float32 is off by 2^-24 of its largest coordinate: eight times that is taken, as the same
+# may hold for the mesh and for what the point was computed from.
+FARTHEST_START = 2.0**-21
 # Mitsuba 3's RayEpsilon: 1500 times the unit roundoff of float32.
 MITSUBA_EPSILON = 1500.0 * 2.0**-24
 
@@ -176,62 +186,130 @@ def _plane_below(p0, p1, p2, o, w):
 
 
 @inlined
-def _leave(o, plane, away):
-    """The point o near a face, moved along its normal until it is off for certain; to the other side by away = -1."""
-    n_g, height, needed = plane
-    missing = needed - away * height
-    if missing <= 0.0:
-        return o
-    step = scale(n_g, away * missing)
+def _moved(o, n_g, height, needed, away):
+    """The point o near a face, moved along its normal to where it is off for certain; to the other side by away = -1."""
+    step = scale(n_g, away * (needed - away * height))
     return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
 
 
 @inlined
-def corners_of(vertices, faces, face, unit):
-    """The corners of a face, as tuples, in units in which no product overflows or vanishes."""
-    a, b, c = row3(faces, face)
-    return scale(row3(vertices, a), unit), scale(row3(vertices, b), unit), scale(row3(vertices, c), unit)
+def slack_of(o, distance):
+    """The slack of a ray that starts at o, some distance from the surface: ``intersect.near_planes`` compares heights
+    with a product that may be an eighth of what it stands for.
+    """
+    return 8.0 * (distance + 2.0**-51 * largest_component(o))
+
+
+@inlined
+def _is_inside(p0, p1, p2, o, slack):
+    """Whether a point near a face is far from all its edges, as seen from a start with this slack."""
+    one, other, q = sub(p1, p0), sub(p2, p0), sub(o, p0)
+    n = cross(one, other)
+    u, v, whole = dot(cross(q, other), n), dot(cross(one, q), n), dot(n, n)
+    side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
+    # A weight is the distance from its edge times the edge's length times the double area.
+    least = smaller(u, smaller(v, whole - u - v))
+    return least > _INSIDE * slack * side * math.sqrt(whole)
+
+
+@inlined
+def _side_of(n, w, code):
+    """The side of its face that a ray of direction w leaves to, 0 where rounding may have made it or where the code
+    says that it starts on the other one.
+    """
+    slope = dot(n, w)
+    side = 1.0 if slope >= 0.0 else -1.0
+    if code & KNOWN != 0:
+        known = 1.0 if code & ABOVE != 0 else -1.0
+        if side != known or abs(slope) <= _LEVEL * largest_component(w):
+            return 0.0
+    return side
 
 
 @kernel
-def leave_face(corners, o, w, unit):
-    """Where a ray from the point o near a face starts in direction w: off the face, see ``leave_faces``.
+def leave_face(corners, o, w, unit, code):
+    """Where a ray from the point o near a face starts in direction w: off the face, see ``leave_faces``; and its slack,
+    EDGE where the start is near an edge or the face stops the ray.
 
-    ``corners`` are ``corners_of`` the face; o comes and goes in the mesh's own units.
+    ``corners`` are ``corners_of`` the face; o comes and goes in the mesh's own units, the slack is in those of corners.
     """
     p0, p1, p2 = corners
     o = scale(o, unit)
-    plane = _plane_below(p0, p1, p2, o, w)
-    return scale(_leave(o, plane, 1.0 if dot(plane[0], w) >= 0.0 else -1.0), 1.0 / unit)
+    n_g, height, needed = _plane_below(p0, p1, p2, o, w)
+    slack = slack_of(o, needed)
+    side = _side_of(n_g, w, code)
+    start = _moved(o, n_g, height, needed, 1.0 if dot(n_g, w) >= 0.0 else -1.0)
+    inside = side != 0.0 and has_normal(p0, p1, p2) and _is_inside(p0, p1, p2, o, slack)
+    return scale(start, 1.0 / unit), slack if inside else EDGE
 
 
 @kernel
 def leave_to_both_sides(corners, o, unit):
     """``leave_face`` for all directions w at once, of a face that ``has_normal``.
 
-    Returns that normal, the start for each w with normal . w >= 0, and the start for all others.
+    Returns that normal, the start for each w with normal . w >= 0, and the start for all others, and the slack of both.
     """
     p0, p1, p2 = corners
     o = scale(o, unit)
-    plane = _plane_below(p0, p1, p2, o, o)
-    return plane[0], scale(_leave(o, plane, 1.0), 1.0 / unit), scale(_leave(o, plane, -1.0), 1.0 / unit)
+    n_g, height, needed = _plane_below(p0, p1, p2, o, o)
+    slack = slack_of(o, needed)
+    above, below = _moved(o, n_g, height, needed, 1.0), _moved(o, n_g, height, needed, -1.0)
+    slack = slack if _is_inside(p0, p1, p2, o, slack) else EDGE
+    return n_g, scale(above, 1.0 / unit), scale(below, 1.0 / unit), slack
+
+
+@inlined
+def lies_far(corners, o, unit):
+    """Whether a point is farther from a face than points that went through float32 are."""
+    p0, p1, p2 = corners
+    o = scale(o, unit)
+    # Most are near the plane and inside.
+    n = cross(sub(p1, p0), sub(p2, p0))
+    most = larger(largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2))))
+    if abs(dot(n, sub(o, p0))) <= FARTHEST_START * most * length(n) and _is_inside(p0, p1, p2, o, 0.0):
+        return False
+    anchor = anchor_of(Start(corners, o, 0, 0))
+    return far_from(anchor, o) > FARTHEST_START * most
+
+
+@inlined
+def _lies_at(corners, weights, o, unit):
+    """Whether a point is where the barycentrics of a face say, as near as ``lies_far`` wants it."""
+    p0, p1, p2 = corners
+    most = larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    place = barycentric(p0, p1, p2, weights[0], weights[1])
+    return largest_component(sub(place, scale(o, unit))) <= FARTHEST_START * most
 
 
 @kernel
-def leave_faces(vertices, faces, origins, directions, leaving, starts, bounds):
+def leave_faces(vertices, faces, rays, leaving, code, anchors, starts, rows, bounds):
     """Write to ``starts`` (n, 3) where the rays begin:end start that leave the faces ``leaving``, -1 for none.
 
-    ``bounds`` are begin, end, and the tree's scale, in whose units no product overflows or vanishes.
+    rays     origins and directions, each with one row a ray or one for all
+    code     (n,) or (1,) int64, the bits of ``starts.record``
+    anchors  (n, 3) float64 of barycentrics, or no row where origins are the anchors
+    rows     (n, starts.record.ROW) float64, which is written too
+    bounds   begin, end, and the tree's scale, in whose units no product overflows or vanishes
 
     A start moves along its face's normal only, by no more than its distance from the plane and some roundings, so that
-    the ray meets neither that face nor another in its plane. Origins have one row a ray or one for all.
+    the ray meets neither that face nor another in its plane. Returns the row of the first origin that is too far from
+    its face, or -1.
     """
-    corners, points, step = pointer(vertices), pointer(origins), 3 * np.int64(len(origins) > 1)
+    corners, points, step = pointer(vertices), pointer(rays[0]), 3 * np.int64(len(rays[0]) > 1)
+    ways, way_step, code_step = pointer(rays[1]), 3 * np.int64(len(rays[1]) > 1), np.int64(len(code) > 1)
     begin, end, unit = bounds
     for i in range(begin, end):
-        face, o, w = leaving[i], three(points, i * step), row3(pointer(directions), i)
+        face, o, w = leaving[i], three(points, i * step), three(ways, i * way_step)
+        own, slack, bits = o, 0.0, code[i * code_step]
         if face >= 0:
-            o = leave_face(corners_of(corners, pointer(faces), face, unit), o, w, unit)
+            around = corners_of(corners, pointer(faces), face, unit)
+            if lies_far(around, o, unit) or (len(anchors) > 0 and not _lies_at(around, row3(pointer(anchors), i), o, unit)):
+                return i
+            own, slack = leave_face(around, o, w, unit, bits)
+        anchor = o if len(anchors) == 0 else row3(pointer(anchors), i)
         row = at(pointer(starts), 3 * i)
         for k in range(3):
-            put(row, k, o[k])
+            put(row, k, own[k])
+            rows[i, ANCHOR + k] = anchor[k]
+        rows[i, SLACK], rows[i, FACE], rows[i, CODE] = slack, np.float64(face), np.float64(bits)
+    return -1

@@ -7,12 +7,25 @@ from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, get, lowest_bit, pointer, put, smaller
+from renderer.trace.intersect import make_shear
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import NO_FACE, search_all_blocks, tree_pointers
 from renderer.trace.packet import child_of, meet_octant, trace_packet
-from renderer.trace.ray_lanes import DOUBTFUL, NUMBER, SIXTEEN, WIDTH, Prepared, best_of, prepare_eight
+from renderer.trace.ray_lanes import (
+    DIRECTION_Z,
+    DOUBTFUL,
+    NUMBER,
+    SIXTEEN,
+    SLACK,
+    WIDTH,
+    Prepared,
+    best_of,
+    prepare_eight,
+)
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
-from renderer.trace.singly import search_singly, stack_size
+from renderer.trace.singly import search_carefully, stack_size
+from renderer.trace.starts.cone import HOLDERS_WORDS
+from renderer.trace.starts.record import EDGE
 from renderer.trace.stream import (
     END,
     ENOUGH,
@@ -45,13 +58,14 @@ _WORK = 1 << 14
 
 class Scratch(NamedTuple):
     """Memory of one thread, as pointers: prepared rays, of which a packet takes the first sixteen; a stream's lanes; a
-    packet's stack; and the numbers of the rays that wait for a stream.
+    packet's stack; the numbers of the rays that wait for a stream; and room for the faces that hold a start.
     """
 
     prepared: Prepared
     lanes: Lanes
     packet_stack: Any
     waiting: Any
+    holders: Any
 
 
 class Memory(NamedTuple):
@@ -60,6 +74,7 @@ class Memory(NamedTuple):
     floats: NDArray[np.float32]
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
+    holders: NDArray[np.int64]
     stack_size: int
 
 
@@ -71,6 +86,7 @@ def make_memory(depth: int, rays: int) -> Memory:
         cache_aligned(prepared, np.float32),
         cache_aligned(prepared + LANE_DOUBLES, np.float64),
         cache_aligned(integers, np.int64),
+        np.empty(HOLDERS_WORDS, np.int64),
         size,
     )
 
@@ -82,7 +98,9 @@ def make_scratch(memory):
     size, lane_integers = memory.stack_size, at(integers, SIXTEENS * SIXTEEN)
     lanes = make_lanes(lane_integers, at(doubles, SIXTEENS * SIXTEEN), size)
     packet_stack = at(lane_integers, LANE_INTEGERS + SIXTEENS * WIDTH * size)
-    return Scratch(Prepared(floats, doubles, integers), lanes, packet_stack, at(packet_stack, size))
+    return Scratch(
+        Prepared(floats, doubles, integers), lanes, packet_stack, at(packet_stack, size), pointer(memory.holders)
+    )
 
 
 @kernel
@@ -111,12 +129,13 @@ def _finish(tree, rays, found, scratch, r, any_hit):
 
     Returns the rounds of lanes that take as long as that search.
     """
-    best, integers, steps = best_of(scratch.prepared, r), scratch.prepared.integers, np.int64(0)
+    best, (_, doubles, integers), steps = best_of(scratch.prepared, r), scratch.prepared, np.int64(0)
     i = get(integers, NUMBER + r)
-    if get(integers, DOUBTFUL + r) != 0:
-        ray, t_max = ray_at(rays, i)
-        best, steps = search_singly(tree, ray, t_max, at(scratch.lanes.stacks, stack_of(scratch.lanes, r)))
-    write_hit(found, i, rays.scale, best, any_hit)
+    if get(integers, DOUBTFUL + r) != 0 or get(doubles, SLACK + r) == EDGE:
+        best, steps = search_carefully(
+            tree, rays, i, at(scratch.lanes.stacks, stack_of(scratch.lanes, r)), scratch.holders, any_hit
+        )
+    write_hit(found, i, rays.scale, best, get(doubles, DIRECTION_Z + r), any_hit)
     return steps // ENOUGH
 
 
@@ -210,11 +229,16 @@ def _trace_sixteen(tree, rays, found, first, scratch, any_hit):
 
 
 @kernel
-def search_blocks(tree, rays, found, begin, end, any_hit):
-    """``trace`` for a tree without nodes: every ray against every block."""
+def search_blocks(tree, rays, found, begin, end, holders, any_hit):
+    """``trace`` for a tree without nodes: every ray against every block; ``holders`` is ``Scratch.holders``."""
     for i in range(begin, end):
         ray, t_max = ray_at(rays, i)
-        write_hit(found, i, rays.scale, search_all_blocks(tree, ray, t_max, any_hit), any_hit)
+        best, doubtful = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), True
+        if ray.slack != EDGE:
+            best, doubtful = search_all_blocks(tree, ray, t_max, any_hit)
+        if doubtful:
+            best, _ = search_carefully(tree, rays, i, holders, holders, any_hit)
+        write_hit(found, i, rays.scale, best, make_shear(ray).direction_z, any_hit)
 
 
 @kernel
@@ -254,7 +278,7 @@ def _trace_on(tree, rays, found, state, end, scratch, any_hit):
 
 @kernel
 def trace_chunk(words, rays, out, state, end, any_hit, memory):
-    """Hits of rays up to ``end`` into ``out``: rows t, u, v and face, or with ``any_hit`` bools.
+    """Hits of rays up to ``end`` into ``out``: rows t, u, v, face and side, or with ``any_hit`` bools.
 
     ``words`` are the tree's, which must have nodes. ``state`` is (begin, 0, 0) in the first call for a chunk, and later
     what the last one returned first, with the same memory: it ends early where much was to do, and all is done at
@@ -269,11 +293,11 @@ def trace_chunk(words, rays, out, state, end, any_hit, memory):
 
 
 @kernel
-def search_chunk(words, rays, out, begin, end, any_hit):
+def search_chunk(words, rays, out, begin, end, any_hit, holders):
     """Hits of the rays begin:end, as ``trace_chunk`` writes them, for a tree without nodes; returns the row or -1."""
     tree = tree_pointers(words)
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])
     bad = first_bad_ray(source, begin, end)
     if bad < 0:
-        search_blocks(tree, source, found, begin, end, any_hit)
+        search_blocks(tree, source, found, begin, end, pointer(holders), any_hit)
     return bad

@@ -1,0 +1,140 @@
+"""The exact start of a ray: a corner of its face, and the way from there as pairs of float64.
+
+So the start is known to 2^-100 of the face's size, however far the face is from the origin of coordinates.
+"""
+
+from typing import Any, NamedTuple
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import (
+    cross_pairs,
+    dot_pairs,
+    exact_sum,
+    heads,
+    minus,
+    plus,
+    power_below,
+    product,
+    quotient,
+    scaled_difference,
+)
+from renderer.kernels.simd import larger
+from renderer.kernels.vec3 import add, largest_component, scale, sub
+from renderer.trace.starts.record import BARYCENTRIC
+
+_LEAST_NORMAL = 2.0**-1022
+_ZERO = (0.0, 0.0)
+
+
+class Anchor(NamedTuple):
+    """A point of a face: ``base`` + ``unit`` ``way``, where ``way`` is a vector of pairs and ``unit`` a power of two."""
+
+    base: Any
+    way: Any
+    unit: float
+
+
+@kernel
+def anchor_of(start):
+    """The exact start: the point of the barycentrics given, or the point of the face that is nearest to the one given.
+
+    Barycentrics below 0, by rounding, count as 0.
+    """
+    p0, p1, p2 = start.corners
+    side = larger(largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2))))
+    unit = power_below(larger(side, _LEAST_NORMAL))
+    if start.code & BARYCENTRIC != 0:
+        return _at_weights(p0, p1, p2, start.anchor[0], start.anchor[1], unit)
+    return _nearest(p0, p1, p2, start.anchor, unit)
+
+
+@inlined
+def rounded(anchor):
+    """The anchor as float64."""
+    return add(anchor.base, scale(heads(anchor.way), anchor.unit))
+
+
+@kernel
+def from_anchor(anchor, p, factor):
+    """The way from an anchor to a point, times a power of two, as pairs."""
+    a, share = scaled_difference(p, anchor.base, factor), anchor.unit * factor
+    (x, y, z), (a0, a1, a2) = anchor.way, a
+    return (
+        minus(a0, (x[0] * share, x[1] * share)),
+        minus(a1, (y[0] * share, y[1] * share)),
+        minus(a2, (z[0] * share, z[1] * share)),
+    )
+
+
+@inlined
+def _times(a, s):
+    """A vector of pairs times a pair."""
+    return product(a[0], s), product(a[1], s), product(a[2], s)
+
+
+@inlined
+def _sum(a, b):
+    return plus(a[0], b[0]), plus(a[1], b[1]), plus(a[2], b[2])
+
+
+@kernel
+def _along(a, b, share, unit):
+    """The point of the side from a to b, ``share`` of it from a; at its ends the corner itself."""
+    if share[0] <= 0.0:
+        return Anchor(a, (_ZERO, _ZERO, _ZERO), unit)
+    if minus((1.0, 0.0), share)[0] <= 0.0:
+        return Anchor(b, (_ZERO, _ZERO, _ZERO), unit)
+    return Anchor(a, _times(scaled_difference(b, a, 1.0 / unit), share), unit)
+
+
+@kernel
+def _at_weights(p0, p1, p2, u, v, unit):
+    """The point (1 - u - v) p0 + u p1 + v p2."""
+    u, v = larger(u, 0.0), larger(v, 0.0)
+    w = minus(exact_sum(1.0, -u), (v, 0.0))
+    if w[0] <= 0.0:
+        return _along(p1, p2, (v, 0.0), unit)
+    if u == 0.0:
+        return _along(p0, p2, (v, 0.0), unit)
+    if v == 0.0:
+        return _along(p0, p1, (u, 0.0), unit)
+    one, other = scaled_difference(p1, p0, 1.0 / unit), scaled_difference(p2, p0, 1.0 / unit)
+    return Anchor(p0, _sum(_times(one, (u, 0.0)), _times(other, (v, 0.0))), unit)
+
+
+@kernel
+def _nearest(p0, p1, p2, o, unit):
+    """The point of a face that is nearest to o. Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.5."""
+    one, other = scaled_difference(p1, p0, 1.0 / unit), scaled_difference(p2, p0, 1.0 / unit)
+    q = scaled_difference(o, p0, 1.0 / unit)
+    d1, d2 = dot_pairs(one, q), dot_pairs(other, q)
+    if d1[0] <= 0.0 and d2[0] <= 0.0:
+        return Anchor(p0, (_ZERO, _ZERO, _ZERO), unit)
+    aa, ab, bb = dot_pairs(one, one), dot_pairs(one, other), dot_pairs(other, other)
+    d3, d4 = minus(d1, aa), minus(d2, ab)
+    if d3[0] >= 0.0 and minus(d4, d3)[0] <= 0.0:
+        return Anchor(p1, (_ZERO, _ZERO, _ZERO), unit)
+    vc = minus(product(d1, d4), product(d3, d2))
+    if vc[0] <= 0.0 and d1[0] >= 0.0 and d3[0] <= 0.0:
+        return _along(p0, p1, quotient(d1, aa), unit)
+    d5, d6 = minus(d1, ab), minus(d2, bb)
+    if d6[0] >= 0.0 and minus(d5, d6)[0] <= 0.0:
+        return Anchor(p2, (_ZERO, _ZERO, _ZERO), unit)
+    vb = minus(product(d5, d2), product(d1, d6))
+    if vb[0] <= 0.0 and d2[0] >= 0.0 and d6[0] <= 0.0:
+        return _along(p0, p2, quotient(d2, bb), unit)
+    va = minus(product(d3, d6), product(d5, d4))
+    rise, fall = minus(d4, d3), minus(d5, d6)
+    if va[0] <= 0.0 and rise[0] >= 0.0 and fall[0] >= 0.0:
+        return _along(p1, p2, quotient(rise, plus(rise, fall)), unit)
+    n = cross_pairs(one, other)
+    height = quotient(dot_pairs(n, q), dot_pairs(n, n))
+    back = _times(n, (-height[0], -height[1]))
+    return Anchor(p0, _sum(q, back), unit)
+
+
+@kernel
+def far_from(anchor, o):
+    """How far a point is from an anchor along the axis where it is farthest."""
+    way = heads(from_anchor(anchor, o, 1.0))
+    return largest_component(way)

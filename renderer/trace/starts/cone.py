@@ -1,0 +1,258 @@
+"""The faces that hold a start, as cones of directions around it, and the parities of the paths that cross them.
+
+Near the start a face is a plane, a half-plane or a sector, as the start is inside it, on an edge or on a corner. On the
+sphere of directions its cone is an arc of a great circle. A path is two such arcs of our own: from a reference to a
+direction in general position, the hub, and from there on.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, plus, power_below
+from renderer.kernels.simd import at, get, put
+from renderer.kernels.vec3 import largest_component
+from renderer.trace.sides import corner
+from renderer.trace.starts.anchor import from_anchor
+from renderer.trace.starts.meeting import seen_from, slope_sign, turn_sign
+
+# The most faces that may hold a start; of more, those beyond are left out.
+MOST_HOLDERS = 4096
+# The words of a holder: its place in the blocks, its face, the bits of the corners of weight 0, its two nodes, and the
+# parities of two paths.
+PLACE, NUMBER, ZEROS, FIRST_NODE, SECOND_NODE, PATH, OTHER_PATH, HOLDER = range(8)
+_HOLDER_WORDS = 8
+# Then for each node: the place of a corner in that direction, its parent in the forest, and the parity to it.
+NODE_PLACE, PARENT, PARITY, _NODE_WORDS = 0, 1, 2, 3
+HOLDERS_WORDS = MOST_HOLDERS * (_HOLDER_WORDS + 2 * _NODE_WORDS)
+NO_NODE = -1
+# Parities: crossed or not; FREE where the path ends on the cone itself; and no answer.
+FREE, UNKNOWN = 2, -1
+
+
+class Holders(NamedTuple):
+    """Pointers to the words of holders and nodes."""
+
+    holders: Any
+    nodes: Any
+
+
+@inlined
+def make_holders(words):
+    """``Holders`` in HOLDERS_WORDS int64."""
+    return Holders(words, at(words, MOST_HOLDERS * _HOLDER_WORDS))
+
+
+@inlined
+def holder(holders, k, word):
+    return get(holders.holders, k * _HOLDER_WORDS + word)
+
+
+@inlined
+def put_holder(holders, k, word, value):
+    put(holders.holders, k * _HOLDER_WORDS + word, np.int64(value))
+
+
+@inlined
+def node(holders, k, word):
+    return get(holders.nodes, k * _NODE_WORDS + word)
+
+
+@inlined
+def put_node(holders, k, word, value):
+    put(holders.nodes, k * _NODE_WORDS + word, np.int64(value))
+
+
+@kernel
+def add_holder(tree, holders, count, place, face, zeros):
+    """Add a face to the holders, unless there is no room; returns their number."""
+    if count >= MOST_HOLDERS:
+        return count
+    put_holder(holders, count, PLACE, place)
+    put_holder(holders, count, NUMBER, face)
+    put_holder(holders, count, ZEROS, zeros)
+    return count + 1
+
+
+@inlined
+def _corner_of(zeros):
+    """Of a start on a corner, that corner: the one whose weight is not 0."""
+    return 0 if zeros & 1 == 0 else (1 if zeros & 2 == 0 else 2)
+
+
+@inlined
+def _opposite(zeros):
+    """Of a start on an edge, the corner opposite to it: the one whose weight is 0."""
+    return 0 if zeros & 1 != 0 else (1 if zeros & 2 != 0 else 2)
+
+
+@inlined
+def count_zeros(zeros):
+    return (zeros & 1) + ((zeros >> 1) & 1) + ((zeros >> 2) & 1)
+
+
+@inlined
+def _after(k):
+    return k + 1 if k < 2 else 0
+
+
+@kernel
+def name_nodes(tree, anchor, holders, count):
+    """Name the ends of all cones: two ends are one node where they lie in one direction. Returns the number of nodes."""
+    nodes = 0
+    for k in range(count):
+        zeros, place = holder(holders, k, ZEROS), holder(holders, k, PLACE)
+        put_holder(holders, k, FIRST_NODE, NO_NODE)
+        put_holder(holders, k, SECOND_NODE, NO_NODE)
+        if zeros != 0:
+            own = _corner_of(zeros) if count_zeros(zeros) == 2 else _opposite(zeros)
+            first, second = _after(own), _after(_after(own))
+            one, nodes = _named(tree, anchor, holders, nodes, place + 12 * first)
+            put_holder(holders, k, FIRST_NODE, one)
+            other, nodes = _named(tree, anchor, holders, nodes, place + 12 * second)
+            put_holder(holders, k, SECOND_NODE, other)
+    return nodes
+
+
+@kernel
+def _named(tree, anchor, holders, nodes, place):
+    """The node in the direction of a corner, a new one if there is none; and the number of nodes."""
+    p = corner(tree, place)
+    for k in range(nodes):
+        if _one_direction(tree, anchor, p, corner(tree, node(holders, k, NODE_PLACE))):
+            return k, nodes
+    put_node(holders, nodes, NODE_PLACE, place)
+    return nodes, nodes + 1
+
+
+@kernel
+def _one_direction(tree, anchor, p, q):
+    """Whether two points are in one direction from the anchor."""
+    if p[0] == q[0] and p[1] == q[1] and p[2] == q[2]:
+        return True
+    a, b = _unit_way(anchor, p), _unit_way(anchor, q)
+    across = cross_pairs(a, b)
+    error = 2.0**-86 + 2.0**-94 * anchor.unit * (1.0 / _size(anchor, p) + 1.0 / _size(anchor, q))
+    return largest_component(heads(across)) <= error and dot_pairs(a, b)[0] > 0.0
+
+
+@inlined
+def _size(anchor, p):
+    return power_below(largest_component(heads(from_anchor(anchor, p, 1.0))))
+
+
+@inlined
+def _unit_way(anchor, p):
+    """The way to a point that is not the anchor, its largest component from 1 to 2."""
+    return from_anchor(anchor, p, 1.0 / _size(anchor, p))
+
+
+class Cone(NamedTuple):
+    """A holder as a cone: its face from the anchor, and two vectors of pairs. x in the face's plane is in the cone
+    where normal . (first x x) and normal . (x x second) are not negative; of a half-plane the second is the first
+    turned back, of a plane nothing is asked.
+
+    kind  the number of corners of weight 0: 0 a plane, 1 a half-plane, 2 a sector
+    """
+
+    face: Any
+    first: Any
+    second: Any
+    kind: int
+
+
+@kernel
+def cone_of(tree, anchor, holders, k):
+    """The cone of the k-th holder."""
+    place, zeros = holder(holders, k, PLACE), holder(holders, k, ZEROS)
+    kind = count_zeros(zeros)
+    own = _corner_of(zeros) if kind == 2 else _opposite(zeros)
+    p = corner(tree, place + 12 * _after(own))
+    q = corner(tree, place + 12 * _after(_after(own)))
+    if kind == 0:
+        # Two ways within the plane.
+        p, q = corner(tree, place + 12), corner(tree, place + 24)
+    elif kind == 1:
+        # Along the edge with the face to the left, and back.
+        p, q = q, p
+    return Cone(seen_from(tree, place, anchor), _unit_way(anchor, p), _unit_way(anchor, q), kind)
+
+
+@kernel
+def middle_of(tree, anchor, holders, k, attempt):
+    """A direction within the k-th cone, as pairs; another one with each attempt."""
+    place, zeros = holder(holders, k, PLACE), holder(holders, k, ZEROS)
+    cone = cone_of(tree, anchor, holders, k)
+    share, other = 1.0 + (attempt & 3), 1.0 + (attempt >> 2)
+    if cone.kind == 1:
+        # The way to the opposite corner, and some way along the edge.
+        top = _unit_way(anchor, corner(tree, place + 12 * _opposite(zeros)))
+        return _mixed(top, cone.first, 1.0, 0.25 * (share - 1.0))
+    return _mixed(cone.first, cone.second, share, other)
+
+
+@inlined
+def _mixed(a, b, s, t):
+    return (
+        plus((a[0][0] * s, a[0][1] * s), (b[0][0] * t, b[0][1] * t)),
+        plus((a[1][0] * s, a[1][1] * s), (b[1][0] * t, b[1][1] * t)),
+        plus((a[2][0] * s, a[2][1] * s), (b[2][0] * t, b[2][1] * t)),
+    )
+
+
+@kernel
+def within_cone(cone, x):
+    """Where a direction of pairs in the plane of a cone is: 1 inside, 0 on its outline, -1 outside."""
+    if cone.kind == 0:
+        return 1
+    s = turn_sign(cone.face, cone.first, x)[0]
+    if cone.kind == 1:
+        return s
+    e = turn_sign(cone.face, x, cone.second)[0]
+    if s < 0 or e < 0:
+        return -1
+    return 0 if s == 0 or e == 0 else 1
+
+
+@kernel
+def crosses(cone, x, y):
+    """The parity of the path from x to y, both pairs and off the cone's plane, UNKNOWN where it meets the outline;
+    FREE where y is on the cone.
+    """
+    g, h = dot_pairs(cone.face.normal, x)[0], dot_pairs(cone.face.normal, y)[0]
+    sx, sy = slope_sign(cone.face, x), slope_sign(cone.face, y)
+    if sx == 0:
+        return UNKNOWN
+    if sy == 0:
+        return FREE if within_cone(cone, y) >= 0 else 0
+    if sx == sy:
+        return 0
+    inside = _passes(cone, x, y, abs(g), abs(h))
+    return UNKNOWN if inside == 0 else int(inside > 0)
+
+
+@kernel
+def _passes(cone, x, y, g, h):
+    """``within_cone`` of h x + g y, where the path meets the plane."""
+    if cone.kind == 0:
+        return 1
+    s = _mixed_sign(cone.face, cone.first, x, y, g, h)
+    if cone.kind == 1:
+        return s
+    e = -_mixed_sign(cone.face, cone.second, x, y, g, h)
+    if s < 0 or e < 0:
+        return -1
+    return 0 if s == 0 or e == 0 else 1
+
+
+@kernel
+def _mixed_sign(face, a, x, y, g, h):
+    """The sign of normal . (a x (h x + g y)), 0 where it is within rounding."""
+    one, other = dot_pairs(face.normal, cross_pairs(a, x))[0], dot_pairs(face.normal, cross_pairs(a, y))[0]
+    value = h * one + g * other
+    size = (h * largest_component(heads(x)) + g * largest_component(heads(y))) * face.sides
+    size *= largest_component(heads(a))
+    # g and h are exact to 2^-53 of themselves, and so is each term.
+    rounding = 2.0**-50 * (abs(h * one) + abs(g * other)) + size * face.error
+    return 0 if abs(value) <= rounding else (1 if value > 0.0 else -1)

@@ -1,0 +1,164 @@
+"""A face as a ray meets it from its exact start: it holds the start, is hit further on, or is not met.
+
+All signs are those of sums of pairs. What is less than their error, 2^-88 of its terms, counts as 0.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, power_below, quotient, scaled_difference
+from renderer.kernels.simd import larger
+from renderer.kernels.vec3 import largest_component, scale, sub
+from renderer.trace.sides import corner
+from renderer.trace.starts.anchor import from_anchor
+
+MISSES, IS_HIT, HOLDS = 0, 1, 2
+# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the anchor by
+# 2^-100 of its own unit.
+_ERROR, _ANCHOR_ERROR = 2.0**-88, 2.0**-96
+_LEAST_NORMAL = 2.0**-1022
+
+
+class SeenFace(NamedTuple):
+    """A face from an anchor, scaled by a power of two: the ways to its corners and its normal, as pairs; how much in
+    that unit is one of the tree's; the largest side product, of which a normal errs by a share; and the relative error.
+    """
+
+    a0: Any
+    a1: Any
+    a2: Any
+    normal: Any
+    factor: float
+    sides: float
+    error: float
+
+
+class Meeting(NamedTuple):
+    """How a ray meets a face: the kind, t, u, v and their denominator, whose sign is that of the determinant.
+
+    zeros  the bits of the corners whose weights are 0
+    """
+
+    kind: int
+    t: float
+    u: float
+    v: float
+    w: float
+    zeros: int
+
+
+@kernel
+def seen_from(tree, place, anchor):
+    """The face at a place of a block, as ``SeenFace``."""
+    p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
+    o = anchor.base
+    reach = larger(largest_component(sub(p0, o)), larger(largest_component(sub(p1, o)), largest_component(sub(p2, o))))
+    factor = 1.0 / power_below(larger(reach, _LEAST_NORMAL))
+    one, other = scaled_difference(p1, p0, factor), scaled_difference(p2, p0, factor)
+    sides = largest_component(heads(one)) * largest_component(heads(other))
+    return SeenFace(
+        from_anchor(anchor, p0, factor), from_anchor(anchor, p1, factor), from_anchor(anchor, p2, factor),
+        cross_pairs(one, other), factor, sides, _ERROR + _ANCHOR_ERROR * (anchor.unit * factor),
+    )  # fmt: skip
+
+
+@kernel
+def triple_sign(a, b, c, error):
+    """The sign of a . (b x c) of vectors of pairs, 0 where rounding may have made it, and the value."""
+    value = dot_pairs(a, cross_pairs(b, c))[0]
+    size = largest_component(heads(a)) * largest_component(heads(b)) * largest_component(heads(c))
+    return (0 if abs(value) <= size * error else (1 if value > 0.0 else -1)), value
+
+
+@inlined
+def has_area(face):
+    """Whether the corners do not lie on a line."""
+    return largest_component(heads(face.normal)) > face.sides * face.error
+
+
+@kernel
+def turn_sign(face, a, b):
+    """The sign of normal . (a x b) of vectors of pairs, 0 where rounding may have made it, and the value."""
+    value = dot_pairs(face.normal, cross_pairs(a, b))[0]
+    size = face.sides * largest_component(heads(a)) * largest_component(heads(b))
+    return (0 if abs(value) <= size * face.error else (1 if value > 0.0 else -1)), value
+
+
+@kernel
+def slope_sign(face, d):
+    """The sign of normal . d of a direction of pairs, 0 where it is in the face's plane."""
+    value = dot_pairs(face.normal, d)[0]
+    size = face.sides * largest_component(heads(d))
+    return 0 if abs(value) <= size * face.error else (1 if value > 0.0 else -1)
+
+
+@kernel
+def height_sign(face):
+    """The sign of normal . (p0 - start), 0 where the start is in the face's plane."""
+    value = dot_pairs(face.normal, face.a0)[0]
+    size = face.sides * largest_component(heads(face.a0))
+    return 0 if abs(value) <= size * face.error else (1 if value > 0.0 else -1)
+
+
+@inlined
+def _none():
+    return Meeting(MISSES, 0.0, 0.0, 0.0, 1.0, 0)
+
+
+@kernel
+def meet_face(face, d, dz):
+    """How a ray in direction d, scaled to about 1, meets a face; ``dz`` is the direction's largest component."""
+    if not has_area(face):
+        return _none()
+    if height_sign(face) == 0:
+        return _held(face, d, dz)
+    slope, way = slope_sign(face, as_pairs(d)), as_pairs(d)
+    if slope == 0:
+        return _none()
+    s0, e0 = triple_sign(way, face.a1, face.a2, face.error)
+    s1, e1 = triple_sign(way, face.a2, face.a0, face.error)
+    s2, e2 = triple_sign(way, face.a0, face.a1, face.error)
+    if s0 * slope < 0 or s1 * slope < 0 or s2 * slope < 0 or (s0 == 0 and s1 == 0 and s2 == 0):
+        return _none()
+    t = quotient(dot_pairs(face.normal, face.a0), dot_pairs(face.normal, way))
+    if t[0] <= 0.0:
+        return _none()
+    u, v, w = _weights(e0, e1, e2, slope, dz)
+    return Meeting(IS_HIT, t[0] / face.factor, u, v, w, _zeros(s0, s1, s2))
+
+
+@kernel
+def _held(face, d, dz):
+    """The meeting of a face with a start in its plane: it holds the start, or is not met."""
+    s0, e0 = turn_sign(face, face.a1, face.a2)
+    s1, e1 = turn_sign(face, face.a2, face.a0)
+    s2, e2 = turn_sign(face, face.a0, face.a1)
+    if s0 < 0 or s1 < 0 or s2 < 0 or (s0 == 0 and s1 == 0 and s2 == 0):
+        return _none()
+    u, v, w = _weights(e0, e1, e2, slope_sign(face, as_pairs(d)), dz)
+    return Meeting(HOLDS, 0.0, u, v, w, _zeros(s0, s1, s2))
+
+
+@inlined
+def _zeros(s0, s1, s2):
+    return np.int64(s0 == 0) | (np.int64(s1 == 0) << 1) | (np.int64(s2 == 0) << 2)
+
+
+@inlined
+def _weights(e0, e1, e2, slope, dz):
+    """Barycentrics u and v, of edge functions of one sign, as numerators over a denominator of the sign that
+    ``intersect`` gives the determinant of a face with normal . direction of the sign ``slope``.
+    """
+    e0, e1, e2 = abs(e0), abs(e1), abs(e2)
+    turn = -1.0 if (slope > 0) == (dz > 0.0) else 1.0
+    whole = e0 + e1 + e2
+    return turn * (e1 / whole), turn * (e2 / whole), turn
+
+
+@inlined
+def unit_direction(d):
+    """A direction scaled by a power of two, so that its largest component is from 1 to 2, and that power."""
+    unit = power_below(largest_component(d))
+    return scale(d, 1.0 / unit), unit

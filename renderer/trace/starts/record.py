@@ -1,0 +1,73 @@
+"""The starts of a batch of rays on the surface, as kernels read them: one row a ray."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined
+from renderer.kernels.simd import address, at, float64_pointer, get, int32_pointer, pointer
+from renderer.kernels.vec3 import row3, scale
+
+# The head of an array of starts, int64: the float64 of a row that each ray is after the one before, 0 where no ray
+# starts on the surface; and the addresses of the mesh's vertices and faces.
+ROW_STEP, VERTICES, FACES, HEAD = 0, 1, 2, 8
+# The columns of a row, float64: the slack of ``intersect.Ray``, EDGE where the start is on an edge, or stopped at once;
+# the face, -1 for none; the code; and the anchor: the point as given, or the barycentrics u and v.
+SLACK, FACE, CODE, ANCHOR, ROW = 0, 1, 2, 3, 6
+# The slack of a ray that no search takes as it is: ``search.search_from`` decides.
+EDGE = np.inf
+# The bits of a code: the side of the face that the ray starts on is known, and is that of its normal; the ray came
+# through the face; the anchor has barycentrics.
+KNOWN, ABOVE, THROUGH, BARYCENTRIC = 1, 2, 4, 8
+
+
+class StartPointers(NamedTuple):
+    """Pointers to the rows of starts and to the mesh, and the step of ``ROW_STEP``."""
+
+    rows: Any
+    step: int
+    vertices: Any
+    faces: Any
+
+
+class Start(NamedTuple):
+    """How one ray starts on the surface.
+
+    corners  those of the face, in the tree's units
+    anchor   the point as given, in the tree's units, or (u, v, 0)
+    """
+
+    corners: Any
+    anchor: Any
+    face: int
+    code: int
+
+
+@inlined
+def start_pointers(starts):
+    """``StartPointers`` of an array of starts: HEAD int64, and rows of ROW float64."""
+    head = pointer(starts)
+    return StartPointers(
+        float64_pointer(address(starts) + 8 * HEAD),
+        get(head, ROW_STEP),
+        float64_pointer(get(head, VERTICES)),
+        int32_pointer(get(head, FACES)),
+    )
+
+
+@inlined
+def start_at(starts, i, unit):
+    """The ``Start`` of ray ``i``, whose face is not -1, in units of which ``unit`` are one of the mesh."""
+    row = at(starts.rows, i * starts.step)
+    face, code = np.int64(get(row, FACE)), np.int64(get(row, CODE))
+    anchor = (get(row, ANCHOR), get(row, ANCHOR + 1), get(row, ANCHOR + 2))
+    if code & BARYCENTRIC == 0:
+        anchor = scale(anchor, unit)
+    return Start(corners_of(starts.vertices, starts.faces, face, unit), anchor, face, code)
+
+
+@inlined
+def corners_of(vertices, faces, face, unit):
+    """The corners of a face, as tuples, in units in which no product overflows or vanishes."""
+    a, b, c = row3(faces, face)
+    return scale(row3(vertices, a), unit), scale(row3(vertices, b), unit), scale(row3(vertices, c), unit)

@@ -1,0 +1,198 @@
+"""Whether a ray from the surface stays in the region that it starts in, and else the face that stops it.
+
+The cones of the faces that hold a start divide the sphere of directions into regions. Two directions are in one region
+where no closed curve of arcs separates them. A path between them crosses every closed curve an even number of times
+then; that is so where the parities of its crossings are differences of one bit a node (the cohomology of the arcs, by
+Alexander's duality). A forest of the nodes with the parities to their parents tells in one pass over the arcs.
+"""
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import as_pairs, dot_pairs
+from renderer.trace.starts.cone import (
+    FIRST_NODE,
+    FREE,
+    NO_NODE,
+    NUMBER,
+    OTHER_PATH,
+    PARENT,
+    PARITY,
+    PATH,
+    SECOND_NODE,
+    UNKNOWN,
+    cone_of,
+    crosses,
+    holder,
+    middle_of,
+    node,
+    put_holder,
+    put_node,
+    within_cone,
+)
+from renderer.trace.starts.meeting import slope_sign
+
+NOT_STOPPED = -1
+# Hubs that are tried until none of the paths meets an outline.
+_ATTEMPTS = 16
+# The order in which coincident faces are passed: all at once, or by their numbers, seen from the face that was passed
+# or from the one ahead.
+AT_ONCE, PASSED, AHEAD = range(3)
+
+
+@inlined
+def _hub(attempt):
+    """A direction in general position, as pairs."""
+    turn = 2.399963229728653 * (attempt + 1)
+    height = 0.9428090415820634 - 0.1178511301977579 * attempt
+    level = np.sqrt(1.0 - height * height)
+    return as_pairs((level * np.cos(turn), height, level * np.sin(turn)))
+
+
+@kernel
+def _path_to_cone(tree, anchor, holders, count, k, side, order, attempt, word):
+    """Write the parities of the path from the hub to the k-th cone, on one side of its face; returns whether it meets
+    no outline.
+    """
+    hub, middle, own = _hub(attempt), middle_of(tree, anchor, holders, k, attempt), cone_of(tree, anchor, holders, k)
+    if slope_sign(own.face, hub) == 0:
+        return False
+    for j in range(count):
+        cone = cone_of(tree, anchor, holders, j)
+        if j == k:
+            parity = int(slope_sign(own.face, hub) != side)
+        elif slope_sign(cone.face, middle) != 0:
+            parity = crosses(cone, hub, middle)
+        else:
+            ahead = order == PASSED and holder(holders, j, NUMBER) > holder(holders, k, NUMBER)
+            behind = order == AHEAD and holder(holders, j, NUMBER) < holder(holders, k, NUMBER)
+            parity = _parity_beside(cone, own, hub, middle, -side if ahead or behind else side)
+        if parity == UNKNOWN:
+            return False
+        put_holder(holders, j, word, parity)
+    return True
+
+
+@kernel
+def _parity_beside(cone, own, hub, middle, side):
+    """The parity of the path from the hub to a direction in the plane of a cone, which another cone has too."""
+    where = within_cone(cone, middle)
+    if where < 0:
+        return 0
+    coincides = slope_sign(cone.face, own.first) == 0 and slope_sign(cone.face, own.second) == 0
+    # Of half-planes the second is as the first.
+    coincides = coincides and (own.kind != 1 or where > 0)
+    faced = slope_sign(cone.face, hub)
+    if where == 0 or not coincides or faced == 0:
+        return UNKNOWN
+    turned = dot_pairs(cone.face.normal, own.face.normal)[0] < 0.0
+    return int(faced != (-side if turned else side))
+
+
+@kernel
+def _path_to_direction(tree, anchor, holders, count, d, attempt, word):
+    """Write the parities of the path from the hub to a direction; returns whether it meets no outline."""
+    for j in range(count):
+        parity = crosses(cone_of(tree, anchor, holders, j), _hub(attempt), d)
+        if parity == UNKNOWN:
+            return False
+        put_holder(holders, j, word, parity)
+    return True
+
+
+@kernel
+def _root(holders, k):
+    """The root of a node, and the parity to it."""
+    parity = np.int64(0)
+    while node(holders, k, PARENT) != k:
+        parity ^= node(holders, k, PARITY)
+        k = node(holders, k, PARENT)
+    return k, parity
+
+
+@kernel
+def _are_even(holders, count, nodes, turned):
+    """Whether the two paths together cross every closed curve of arcs an even number of times.
+
+    A path that ends on an arc crosses it or not, as it comes from one side or the other: only the arc ``turned`` does.
+    """
+    for k in range(nodes):
+        put_node(holders, k, PARENT, k)
+        put_node(holders, k, PARITY, 0)
+    for j in range(count):
+        end = holder(holders, j, OTHER_PATH)
+        parity = holder(holders, j, PATH) ^ (np.int64(j == turned) if end == FREE else end)
+        if holder(holders, j, FIRST_NODE) == NO_NODE:
+            # A great circle.
+            if parity != 0:
+                return False
+            continue
+        one, first = _root(holders, holder(holders, j, FIRST_NODE))
+        other, second = _root(holders, holder(holders, j, SECOND_NODE))
+        odd = parity ^ first ^ second
+        if one != other:
+            put_node(holders, one, PARENT, other)
+            put_node(holders, one, PARITY, odd)
+        elif odd != 0:
+            return False
+    return True
+
+
+@kernel
+def _is_connected(holders, count, nodes):
+    """Whether the ends of both paths are in one region, or the second end is on its outline."""
+    if _are_even(holders, count, nodes, -1):
+        return True
+    for j in range(count):
+        if holder(holders, j, OTHER_PATH) == FREE and _are_even(holders, count, nodes, j):
+            return True
+    return False
+
+
+@kernel
+def _is_open(tree, anchor, holders, count, nodes, k, side, order, d):
+    """Whether a direction is in the region beside the k-th cone."""
+    for attempt in range(_ATTEMPTS):
+        if _path_to_cone(tree, anchor, holders, count, k, side, order, attempt, PATH) and _path_to_direction(
+            tree, anchor, holders, count, d, attempt, OTHER_PATH
+        ):
+            return _is_connected(holders, count, nodes)
+    # No path avoids all outlines: nothing is known to separate the two.
+    return True
+
+
+@kernel
+def _bounds_region(tree, anchor, holders, count, nodes, k, side, order, j, facing):
+    """Whether the region beside the k-th cone touches the j-th one on the side ``facing``."""
+    for attempt in range(_ATTEMPTS):
+        if _path_to_cone(tree, anchor, holders, count, k, side, order, attempt, PATH) and _path_to_cone(
+            tree, anchor, holders, count, j, facing, AHEAD, attempt, OTHER_PATH
+        ):
+            return _is_connected(holders, count, nodes)
+    return False
+
+
+@kernel
+def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d):
+    """The holder that stops a ray at its start, or NOT_STOPPED.
+
+    The ray starts in the region beside the cone of ``face``, on one side of it. It is stopped where its direction d, as
+    pairs, leads out of that region: by the lowest face that bounds the region and has d behind it. ``through`` says
+    that it has just passed the face: of those that coincide with it the lower ones are passed too, the higher ones lie
+    ahead.
+    """
+    own = -1
+    for k in range(count):
+        if holder(holders, k, NUMBER) == face:
+            own = k
+    order = PASSED if through else AT_ONCE
+    if own < 0 or _is_open(tree, anchor, holders, count, nodes, own, side, order, d):
+        return NOT_STOPPED
+    best = NOT_STOPPED
+    for j in range(count):
+        if best != NOT_STOPPED and holder(holders, j, NUMBER) > holder(holders, best, NUMBER):
+            continue
+        behind = slope_sign(cone_of(tree, anchor, holders, j).face, d)
+        if behind != 0 and _bounds_region(tree, anchor, holders, count, nodes, own, side, order, j, -behind):
+            best = j
+    return best

@@ -1,0 +1,228 @@
+"""The closest hit of a ray from its exact start on the surface.
+
+The faces that hold the start do not stop the ray by rounding: ``region`` says whether one stops it at t = 0. Those near
+the start are met from the exact start, all others from its coordinates.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import as_pairs
+from renderer.kernels.simd import extract, get, larger, load8, lowest_bit, movemask, put, smaller, splat8
+from renderer.trace.doubt import settled
+from renderer.trace.intersect import (
+    Ray,
+    box_limit,
+    enter_boxes,
+    hit_triangles,
+    largest_of,
+    make_shear,
+    make_slabs,
+    near_planes,
+    round_both,
+    round_down,
+    see_triangles,
+)
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
+from renderer.trace.leaf import NO_FACE, blocks_of, push_children
+from renderer.trace.sides import corner
+from renderer.trace.starts.anchor import anchor_of, rounded
+from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
+from renderer.trace.starts.meeting import HOLDS, IS_HIT, meet_face, seen_from, unit_direction
+from renderer.trace.starts.record import ABOVE, EDGE, KNOWN, THROUGH, start_at
+from renderer.trace.starts.region import NOT_STOPPED, stopping_holder
+
+# The coordinates of a start err by 2^-53 of themselves: a box that holds it holds them with so much room.
+_ROOM = 2.0**-50
+_NOTHING = (np.inf, np.int32(NO_FACE), 0.0, 0.0, 1.0)
+
+
+@inlined
+def _box_holds(tree, place, o):
+    """Whether the box of a face holds a point, with _ROOM."""
+    p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
+    holds = True
+    for k in range(3):
+        room = abs(o[k]) * _ROOM
+        low, high = smaller(p0[k], smaller(p1[k], p2[k])), larger(p0[k], larger(p1[k], p2[k]))
+        holds = holds and low - room <= o[k] and o[k] <= high + room
+    return holds
+
+
+@inlined
+def _holding_octants(tree, child, o):
+    """The bits of the octants of a node whose boxes hold a point."""
+    base, bits = child * NODE_WORDS, 0xFF
+    for k in range(3):
+        low, high = round_both(o[k])
+        bits &= movemask(
+            (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
+        )
+    return bits
+
+
+@kernel
+def list_holders(tree, anchor, d, dz, stack, holders):
+    """List the faces that hold an anchor; returns their number."""
+    o, count, top = rounded(anchor), 0, 1
+    if not tree.has_nodes:
+        return _add_holders(tree, 0, tree.count, anchor, o, d, dz, holders, count)
+    put(stack, 0, 0)
+    while top > 0:
+        top -= 1
+        child = get(stack, top)
+        if child < 0:
+            first, blocks = blocks_of(child)
+            count = _add_holders(tree, first, blocks, anchor, o, d, dz, holders, count)
+            continue
+        top = push_children(tree, child, _holding_octants(tree, child, o), stack, top)
+    return count
+
+
+@kernel
+def _add_holders(tree, first, blocks, anchor, o, d, dz, holders, count):
+    """List those faces of some blocks that hold an anchor."""
+    for block in range(first, first + blocks):
+        for i in range(BLOCK_FACES):
+            face, place = get(tree.faces, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
+            if face >= 0 and _box_holds(tree, place, o):
+                met = meet_face(seen_from(tree, place, anchor), d, dz)
+                if met.kind == HOLDS:
+                    count = add_holder(tree, holders, count, place, face, met.zeros)
+    return count
+
+
+@kernel
+def _stopped(tree, start, anchor, d, dz, stack, memory):
+    """The hit (t, face, u, v, w) that stops a ray at its start, NO_FACE for none."""
+    holders = make_holders(memory)
+    count = list_holders(tree, anchor, d, dz, stack, holders)
+    nodes = name_nodes(tree, anchor, holders, count)
+    side = 1 if start.code & ABOVE != 0 else -1
+    k = stopping_holder(
+        tree, anchor, holders, count, nodes, start.face, side, start.code & THROUGH != 0, as_pairs(d)
+    )
+    if k == NOT_STOPPED:
+        return _NOTHING
+    met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), d, dz)
+    return 0.0, np.int32(holder(holders, k, NUMBER)), met.u, met.v, met.w
+
+
+class Departure(NamedTuple):
+    """A ray as it leaves its start: as ``intersect.Ray``, its anchor, the anchor rounded, and its direction scaled by a
+    power of two, and that.
+    """
+
+    ray: Any
+    anchor: Any
+    o: Any
+    d: Any
+    unit: float
+
+
+@kernel
+def depart(tree, starts, i, ray, stack, memory):
+    """The ``Departure`` of ray ``i``, and the hit that stops it at its start, of NO_FACE for none.
+
+    ``ray`` is as ``rays.ray_at`` has it. ``stack`` is memory for ``singly.stack_size`` int64, and ``memory`` for
+    ``cone.HOLDERS_WORDS``.
+    """
+    start = start_at(starts, i, tree.scale)
+    anchor = anchor_of(start)
+    o, (d, unit) = rounded(anchor), unit_direction((ray.dx, ray.dy, ray.dz))
+    if ray.slack == EDGE:
+        ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, ray.slack, ray.leaving)
+    stopped = _NOTHING
+    if start.code & KNOWN != 0 and ray.t_min == 0.0:
+        stopped = _stopped(tree, start, anchor, d, make_shear(ray).direction_z, stack, memory)
+    return Departure(ray, anchor, o, d, unit), stopped
+
+
+@inlined
+def near_bits(tree, block, departure, shear, seen):
+    """The bits of the faces of a block that are met from the exact start. The face that the ray leaves is one of them
+    at an edge; inside it is left out.
+    """
+    near, ray, places = np.int64(0), departure.ray, block * BLOCK_FACES
+    if ray.slack == EDGE:
+        for i in range(BLOCK_FACES):
+            if get(tree.faces, places + i) >= 0 and _box_holds(tree, block * BLOCK_WORDS + i, departure.o):
+                near |= 1 << i
+    elif seen != 0:
+        edges, _ = see_triangles(tree, block * BLOCK_WORDS, shear)
+        near = seen & near_planes(edges, ray.slack)
+    return near
+
+
+@inlined
+def meet_near(tree, place, departure, dz):
+    """The hit (t, u, v, w) of a face that is met from the exact start, t = NaN for none, and its ``Meeting.zeros``."""
+    met = meet_face(seen_from(tree, place, departure.anchor), departure.d, dz)
+    t = met.t / departure.unit if met.kind == IS_HIT else np.nan
+    return (t, met.u, met.v, met.w), met.zeros
+
+
+@inlined
+def _is_better(t, face, ray, best):
+    return t >= ray.t_min and (t < best[0] or (t == best[0] and face < best[1]))
+
+
+@kernel
+def _nearest_from(tree, first, count, departure, shear, best):
+    """``leaf.nearest_carefully`` for a ray that leaves the surface."""
+    ray = departure.ray
+    for block in range(first, first + count):
+        base = block * BLOCK_WORDS
+        bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, best[0])
+        near = near_bits(tree, block, departure, shear, bits)
+        bits |= near
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            face = get(tree.faces, block * BLOCK_FACES + i)
+            if np.float64(face) == ray.leaving:
+                continue
+            if (near >> i) & 1 != 0:
+                hit, _ = meet_near(tree, base + i, departure, shear.direction_z)
+            else:
+                hit = extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)
+                if (doubts >> i) & 1 != 0:
+                    hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
+            if _is_better(hit[0], face, ray, best):
+                best = hit[0], face, hit[1], hit[2], hit[3]
+    return best
+
+
+@kernel
+def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
+    """The closest hit (t, face, u, v, w) of ray ``i`` from its start, NO_FACE for none; with ``any_hit`` any one.
+
+    Arguments as for ``depart``; ``t_max`` is the ray's own. Also returns the number of nodes and blocks that it took.
+    """
+    departure, stopped = depart(tree, starts, i, ray, stack, memory)
+    best, steps = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(1)
+    if stopped[1] != NO_FACE:
+        return stopped, steps
+    ray = departure.ray
+    largest = largest_of(ray)
+    slabs, shear = make_slabs(ray, largest), make_shear(ray)
+    if not tree.has_nodes:
+        return _nearest_from(tree, 0, tree.count, departure, shear, best), steps
+    lower, top = splat8(round_down(ray.t_min * largest)), 1
+    put(stack, 0, 0)
+    while top > 0:
+        top -= 1
+        child = get(stack, top)
+        if child < 0:
+            first, count = blocks_of(child)
+            best = _nearest_from(tree, first, count, departure, shear, best)
+            steps += count
+            if any_hit and best[1] != NO_FACE:
+                break
+            continue
+        _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
+        top = push_children(tree, child, bits, stack, top)
+        steps += 1
+    return best, steps
