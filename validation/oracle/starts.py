@@ -55,17 +55,15 @@ _MISS = First(None, -1, ())
 
 
 def start_on(corners: ArrayLike, u: float, v: float) -> Place:
-    """(1 - u - v) p0 + u p1 + v p2, exactly.
+    """(1 - u - v) p0 + u p1 + v p2, exactly; the face's point nearest to it where rounding has put it outside.
 
     >>> [float(x) for x in start_on([[0, 0, 0], [4, 0, 0], [0, 4, 0]], 0.25, 0.5)]
     [1.0, 2.0, 0.0]
     """
     p0, p1, p2 = rational(np.asarray(corners, np.float64).tolist())
     b, c = Fraction(float(u)), Fraction(float(v))
-    if min(b, c, 1 - b - c) < 0:
-        raise ValueError(f"u, v: expected a point of the face, got {u}, {v}")
     x, y, z = ((1 - b - c) * k0 + b * k1 + c * k2 for k0, k1, k2 in zip(p0, p1, p2, strict=True))
-    return x, y, z
+    return (x, y, z) if min(b, c, 1 - b - c) >= 0 else _nearest_on((p0, p1, p2), (x, y, z))
 
 
 def start_near(corners: ArrayLike, point: ArrayLike) -> Place:
@@ -74,8 +72,12 @@ def start_near(corners: ArrayLike, point: ArrayLike) -> Place:
     >>> [float(x) for x in start_near([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [1, -2, 3])]
     [1.0, 0.0, 0.0]
     """
-    a, b, c = rational(np.asarray(corners, np.float64).tolist())
     (given,) = rational([np.asarray(point, np.float64).tolist()])
+    return _nearest_on(rational(np.asarray(corners, np.float64).tolist()), given)
+
+
+def _nearest_on(corners: Sequence[Sequence[Fraction]], given: Sequence[Fraction]) -> Place:
+    a, b, c = corners
     normal, sides = cross(difference(b, a), difference(c, a)), ((a, b), (b, c), (c, a))
     if any(normal) and all(dot(cross(normal, difference(q, p)), difference(given, p)) >= 0 for p, q in sides):
         share = dot(normal, difference(given, a)) / dot(normal, normal)
@@ -109,11 +111,15 @@ def first_hit(
 
 
 class Surface:
-    """A mesh as whole numbers, and the regions at those of its points that have been asked for."""
+    """A mesh as whole numbers, and the regions at those of its points that have been asked for.
+
+    ``largest`` is the largest size of a coordinate.
+    """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         points, self.faces = np.asarray(vertices, np.float64), np.asarray(faces, np.int64).reshape(-1, 3)
         self._corners = points[self.faces]
+        self.largest = float(np.abs(self._corners).max(initial=0.0))
         self._low, self._high = self._corners.min(axis=1), self._corners.max(axis=1)
         self._whole, self._unit = _whole(points.tolist())
         self._triangles = [(self._whole[i], self._whole[j], self._whole[k]) for i, j, k in self.faces.tolist()]
@@ -127,6 +133,10 @@ class Surface:
     def start_near(self, face: int, point: ArrayLike) -> Start:
         """A start at a face's point nearest to another, see ``start_near``."""
         return Start(start_near(self._corners[face], point), face)
+
+    def normal(self, face: int) -> list[int]:
+        """A face's normal by its winding, not of length 1."""
+        return self._normals[face]
 
     def holding(self, place: Place) -> list[tuple[int, tuple[bool, ...]]]:
         """The faces, ascending, that hold a point, and on which of their sides 01, 12, 20 it lies."""
@@ -164,7 +174,7 @@ class Surface:
         found = []
         for begin in range(0, len(starts), _RAYS_AT_ONCE):
             rows = range(begin, min(begin + _RAYS_AT_ONCE, len(starts)))
-            kept = self._possible([starts[row].place for row in rows], directions[begin : rows.stop])
+            kept = self.possible([starts[row].place for row in rows], directions[begin : rows.stop])
             for row, possible in zip(rows, kept, strict=True):
                 (way,), unit = _whole([directions[row].tolist()])
                 found.append(self._first(starts[row], (way, unit), possible, (int(sides[row]), bool(through[row]))))
@@ -218,7 +228,7 @@ class Surface:
             return _MISS
         return First(Fraction(*best) * Fraction(d_unit, bottom * self._unit), tied[0], tuple(tied))
 
-    def _possible(self, places: Sequence[Place], directions: Floats) -> list[NDArray[np.int64]]:
+    def possible(self, places: Sequence[Place], directions: Floats) -> list[NDArray[np.int64]]:
         """For each ray the faces that float64 cannot prove to be missed.
 
         As ``exact`` does it, with what the rounding of the origin adds: |d|_inf |e|_1 (|b|_1 + |c|_1 + |e|_1) for an
