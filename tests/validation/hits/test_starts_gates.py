@@ -8,7 +8,7 @@ from lawful import Lawful
 
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box
-from validation.hits import bodies, mirrors, starts
+from validation.hits import bodies, mirrors, starts, walks
 from validation.hits.bodies import Body
 from validation.job import Job
 from validation.thresholds import Thresholds
@@ -165,3 +165,17 @@ def test_a_ray_that_is_lost_or_stays_is_counted(monkeypatch):
 
     assert mirrors.reflected(Stuck(mesh.vertices, mesh.faces), rays.origins, rays.directions) == (0, 1)
     assert mirrors.reflected(Leaky(mesh.vertices, mesh.faces), rays.origins, rays.directions)[0] == 8
+
+
+@pytest.mark.parametrize("name", ["tetrahedron", "stack", "boxes", "notched", "soup"])
+def test_a_ray_meets_all_on_its_way_once(name):
+    assert walks.walk(SAMPLES[name], 30, np.random.default_rng(4), Lawful) == 0
+    assert walks.walk(SAMPLES[name], 30, np.random.default_rng(4), Leaky) > 0
+
+
+def test_coinciding_faces_are_not_passed_together(monkeypatch):
+    assert walks.walk(SAMPLES["stack"], 30, np.random.default_rng(4), NoSides) > 0
+    monkeypatch.setattr(walks, "bodies", lambda: iter([SAMPLES["stack"]]))
+    (record,), (gate,) = walks.check_walks(job(), 10, Lawful)
+    assert record["rays"] == 10 and gate.passed
+    assert not walks.check_walks(job(), 10, NoSides)[1][0].passed
