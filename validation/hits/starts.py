@@ -44,7 +44,7 @@ class StartEffort:
 
 
 QUICK = StartEffort(rays=30_000, exact=3_000)
-FULL = StartEffort(rays=1_000_000, exact=40_000)
+FULL = StartEffort(rays=1_300_000, exact=40_000)
 
 
 class Batch(NamedTuple):
@@ -63,11 +63,14 @@ class Batch(NamedTuple):
 
 
 class Wrong(NamedTuple):
-    """Counts of rays: all, those judged to their end; stopped or not against the law, lost, wrong in the sample."""
+    """Counts of rays: all, those judged to their end; stopped or not against the law where a face is named and where
+    none is; lost, wrong in the sample.
+    """
 
     rays: int
     exact: int
     at_once: int
+    unnamed: int
     lost: int
     sample: int
 
@@ -96,6 +99,7 @@ def _gates(record: dict[str, Any]) -> list[Gate]:
     subject = f"{record['family']}, {record['rays']:,} rays that start on them"
     quantities = [
         ("rays stopped at once, or not, against the law", "at_once", _REASON),
+        ("rays that name no face, stopped against the law", "unnamed", _REASON),
         ("rays from inside that are lost", "lost", "a closed body has no holes"),
         ("of the exact sample, rays from a surface with a wrong hit", "sample", _REASON),
     ]
@@ -105,7 +109,7 @@ def _gates(record: dict[str, Any]) -> list[Gate]:
 def check_body(body: Body, effort: StartEffort, rng: Generator, make: Callable[..., Any] = Octree) -> Wrong:
     """Ask one body in all ways to start."""
     tracer, surface = make(body.mesh.vertices, body.mesh.faces), Surface(body.mesh.vertices, body.mesh.faces)
-    total = Wrong(0, 0, 0, 0, 0)
+    total = Wrong(0, 0, 0, 0, 0, 0)
     batches = list(_batches(body, tracer, surface, effort.rays, rng))
     for batch in batches:
         found = judge(body, surface, batch, -(-effort.exact // len(batches)), rng)
@@ -206,7 +210,9 @@ def judge(body: Body, surface: Surface, batch: Batch, exact: int, rng: Generator
         not is_right(surface, start, batch.directions[row], (batch.t[row], int(batch.face[row])), found)
         for row, start, found in zip(sample.tolist(), starts, firsts, strict=True)
     ]
-    return Wrong(len(batch.t), len(sample), int(at_once.sum()), int(lost.sum()), sum(wrong))
+    named = batch.starts[0].face >= 0
+    stopped_wrong = int(at_once.sum()) * named, int(at_once.sum()) * (not named)
+    return Wrong(len(batch.t), len(sample), *stopped_wrong, int(lost.sum()), sum(wrong))
 
 
 def judged_at_once(surface: Surface, batch: Batch) -> tuple[Bools, Bools]:
