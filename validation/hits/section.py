@@ -43,8 +43,8 @@ def meshes() -> dict[str, Mesh]:
 
 
 def steps(job: Job) -> int:
-    """Number of calls of ``job.step``: one a family and mesh, two a closed mesh of the leaks, one for refits, and those of
-    starts.
+    """Number of calls of ``job.step``: one a family and mesh, two a closed mesh of the leaks, one for refits, and those
+    of starts.
     """
     triangle = np.eye(3), np.array([[0, 1, 2]])
     a_mesh = len(families(*triangle, 1, SEED)) + 1
