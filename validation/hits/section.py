@@ -9,12 +9,14 @@ from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from validation.gates import Gate
+from validation.hits import mirrors, starts
 from validation.hits.check import SEED, HitEffort, check_mesh
 from validation.hits.errors import EXPONENTS
 from validation.hits.leaks import check_leaks, leak_meshes
 from validation.hits.rays import families, float32_exact
 from validation.hits.refit import check_refit
 from validation.hits.verdicts import LISTED
+from validation.hits.walks import check_walks
 from validation.job import Job
 from validation.scenes import SCENES
 
@@ -41,10 +43,14 @@ def meshes() -> dict[str, Mesh]:
 
 
 def steps(job: Job) -> int:
-    """Number of calls of ``job.step``: one a family and mesh, two a closed mesh of the leaks, one for refits."""
+    """Number of calls of ``job.step``: one a family and mesh, two a closed mesh of the leaks, one for refits, and those
+    of starts.
+    """
     triangle = np.eye(3), np.array([[0, 1, 2]])
     a_mesh = len(families(*triangle, 1, SEED)) + 1
-    return len(meshes()) * a_mesh + 2 * len(leak_meshes()) + 1 if job.own else len(job.meshes) * a_mesh
+    if not job.own:
+        return len(job.meshes) * a_mesh
+    return len(meshes()) * a_mesh + 2 * len(leak_meshes()) + 1 + starts.steps() + 1 + mirrors.steps()
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
@@ -64,6 +70,13 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
         gates += found
         result["refit"], found = check_refit(job)
         gates += found
+        for key, check in (
+            ("starts", starts.check_starts),
+            ("walks", check_walks),
+            ("mirrors", mirrors.check_mirrors),
+        ):
+            result[key], found = check(job)
+            gates += found
     else:
         reason = "they need a closed mesh and a place within that sees all of it, as the suite's own have"
         result["leaks_left_out"] = reason
