@@ -42,11 +42,12 @@ _SMALLEST = 2.0**-1074
 # A start is inside its face where it is farther from the edges than so often its slack: a face beside it, at more than
 # a 64th of a right angle, is farther from it than where it is moved to.
 _INSIDE = 8.0
-# A ray along its face: of normal . direction this much may be rounding, 2^-46 of a face that is not thinner than _SHARP.
-_LEVEL = 2.0**-40
-# A point that went through float32 is off by 2^-24 of its largest coordinate: eight times that is taken, as the same
+# A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that is
+# not thinner than _SHARP.
+_LEVEL = 2.0**-20
+# A point that went through float32 is off by 2^-24 of its largest coordinate: 64 times that is taken, as the same
 # may hold for the mesh and for what the point was computed from.
-FARTHEST_START = 2.0**-21
+FARTHEST_START = 2.0**-18
 # Mitsuba 3's RayEpsilon: 1500 times the unit roundoff of float32.
 MITSUBA_EPSILON = 1500.0 * 2.0**-24
 

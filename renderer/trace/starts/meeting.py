@@ -10,7 +10,7 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, power_below, quotient, scaled_difference
 from renderer.kernels.simd import larger
-from renderer.kernels.vec3 import largest_component, scale, sub
+from renderer.kernels.vec3 import dot, largest_component, scale, sub
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
 
@@ -19,6 +19,9 @@ MISSES, IS_HIT, HOLDS = 0, 1, 2
 # 2^-100 of its own unit.
 _ERROR, _ANCHOR_ERROR = 2.0**-88, 2.0**-96
 _LEAST_NORMAL = 2.0**-1022
+# A ray at a smaller angle to a face, about 1e-6, may meet it, as rounded, anywhere along it; and a start is as good as in
+# its plane nearer than 2^-40 of its corners' distance.
+_GRAZING, _NEAR = 2.0**-20, 2.0**-40
 
 
 class SeenFace(NamedTuple):
@@ -100,6 +103,14 @@ def height_sign(face):
     value = dot_pairs(face.normal, face.a0)[0]
     size = face.sides * largest_component(heads(face.a0))
     return 0 if abs(value) <= size * face.error else (1 if value > 0.0 else -1)
+
+
+@inlined
+def is_grazed(face, d):
+    """Whether a ray in direction d, scaled to about 1, runs along a face in whose plane the start is, or nearly so."""
+    n, way = heads(face.normal), heads(face.a0)
+    near = abs(dot(n, way)) <= _NEAR * face.sides * largest_component(way)
+    return near and abs(dot(n, d)) <= _GRAZING * largest_component(n)
 
 
 @inlined

@@ -30,7 +30,7 @@ from renderer.trace.leaf import NO_FACE, blocks_of, push_children
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, rounded
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
-from renderer.trace.starts.meeting import HOLDS, IS_HIT, meet_face, seen_from, unit_direction
+from renderer.trace.starts.meeting import HOLDS, IS_HIT, is_grazed, meet_face, seen_from, unit_direction
 from renderer.trace.starts.record import ABOVE, EDGE, KNOWN, THROUGH, start_at
 from renderer.trace.starts.region import NOT_STOPPED, stopping_holder
 
@@ -63,42 +63,50 @@ def _holding_octants(tree, child, o):
     return bits
 
 
+class Listed(NamedTuple):
+    """The number of faces that hold an anchor, and whether a ray grazes one of those near it."""
+
+    count: int
+    grazes: bool
+
+
 @kernel
 def list_holders(tree, anchor, d, dz, stack, holders):
-    """List the faces that hold an anchor; returns their number."""
-    o, count, top = rounded(anchor), 0, 1
+    """List the faces that hold an anchor; returns ``Listed`` of a ray in direction d."""
+    o, listed, top = rounded(anchor), Listed(0, False), 1
     if not tree.has_nodes:
-        return _add_holders(tree, 0, tree.count, anchor, o, d, dz, holders, count)
+        return _add_holders(tree, 0, tree.count, anchor, o, d, dz, holders, listed)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, blocks = blocks_of(child)
-            count = _add_holders(tree, first, blocks, anchor, o, d, dz, holders, count)
+            listed = _add_holders(tree, first, blocks, anchor, o, d, dz, holders, listed)
             continue
         top = push_children(tree, child, _holding_octants(tree, child, o), stack, top)
-    return count
+    return listed
 
 
 @kernel
-def _add_holders(tree, first, blocks, anchor, o, d, dz, holders, count):
+def _add_holders(tree, first, blocks, anchor, o, d, dz, holders, listed):
     """List those faces of some blocks that hold an anchor."""
+    count, grazes = listed
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
             face, place = get(tree.faces, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
             if face >= 0 and _box_holds(tree, place, o):
-                met = meet_face(seen_from(tree, place, anchor), d, dz)
+                seen = seen_from(tree, place, anchor)
+                grazes = grazes or is_grazed(seen, d)
+                met = meet_face(seen, d, dz)
                 if met.kind == HOLDS:
                     count = add_holder(tree, holders, count, place, face, met.zeros)
-    return count
+    return Listed(count, grazes)
 
 
 @kernel
-def _stopped(tree, start, anchor, d, dz, stack, memory):
-    """The hit (t, face, u, v, w) that stops a ray at its start, NO_FACE for none."""
-    holders = make_holders(memory)
-    count = list_holders(tree, anchor, d, dz, stack, holders)
+def _stopped(tree, start, anchor, count, d, dz, holders):
+    """The hit (t, face, u, v, w) that stops a ray at its start, which ``count`` faces hold; NO_FACE for none."""
     nodes = name_nodes(tree, anchor, holders, count)
     side = 1 if start.code & ABOVE != 0 else -1
     k = stopping_holder(
@@ -111,8 +119,9 @@ def _stopped(tree, start, anchor, d, dz, stack, memory):
 
 
 class Departure(NamedTuple):
-    """A ray as it leaves its start: as ``intersect.Ray``, its anchor, the anchor rounded, and its direction scaled by a
-    power of two, and that.
+    """A ray as it leaves its start: as ``intersect.Ray``, its anchor, the anchor rounded, its direction scaled by a
+    power of two, and that; and whether all faces are met from the exact start. They are where the ray grazes a face
+    near the start, whose neighbours it may meet anywhere along it.
     """
 
     ray: Any
@@ -120,6 +129,7 @@ class Departure(NamedTuple):
     o: Any
     d: Any
     unit: float
+    exactly: bool
 
 
 @kernel
@@ -134,10 +144,14 @@ def depart(tree, starts, i, ray, stack, memory):
     o, (d, unit) = rounded(anchor), unit_direction((ray.dx, ray.dy, ray.dz))
     if ray.slack == EDGE:
         ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, ray.slack, ray.leaving)
-    stopped = _NOTHING
-    if start.code & KNOWN != 0 and ray.t_min == 0.0:
-        stopped = _stopped(tree, start, anchor, d, make_shear(ray).direction_z, stack, memory)
-    return Departure(ray, anchor, o, d, unit), stopped
+    stopped, exactly, dz = _NOTHING, False, make_shear(ray).direction_z
+    if ray.slack == EDGE or start.code & KNOWN != 0:
+        holders = make_holders(memory)
+        count, grazes = list_holders(tree, anchor, d, dz, stack, holders)
+        exactly = grazes and ray.slack == EDGE
+        if start.code & KNOWN != 0 and ray.t_min == 0.0:
+            stopped = _stopped(tree, start, anchor, count, d, dz, holders)
+    return Departure(ray, anchor, o, d, unit, exactly), stopped
 
 
 @inlined
@@ -148,8 +162,8 @@ def near_bits(tree, block, departure, shear, seen):
     near, ray, places = np.int64(0), departure.ray, block * BLOCK_FACES
     if ray.slack == EDGE:
         for i in range(BLOCK_FACES):
-            if get(tree.faces, places + i) >= 0 and _box_holds(tree, block * BLOCK_WORDS + i, departure.o):
-                near |= 1 << i
+            near_it = departure.exactly or _box_holds(tree, block * BLOCK_WORDS + i, departure.o)
+            near |= np.int64(near_it and get(tree.faces, places + i) >= 0) << i
     elif seen != 0:
         edges, _ = see_triangles(tree, block * BLOCK_WORDS, shear)
         near = seen & near_planes(edges, ray.slack)
