@@ -31,9 +31,13 @@ def expand_area(a, b, p, parts):
 @kernel
 def expand_volume(a, b, c, p, parts):
     """(a - p) . ((b - p) x (c - p)) of points (x, y, z), as of ``expand_area``."""
-    ax, ay, az = difference(a[0], p[0]), difference(a[1], p[1]), difference(a[2], p[2])
-    bx, by, bz = difference(b[0], p[0]), difference(b[1], p[1]), difference(b[2], p[2])
-    cx, cy, cz = difference(c[0], p[0]), difference(c[1], p[1]), difference(c[2], p[2])
+    return _expand_triple(_differences(a, p), _differences(b, p), _differences(c, p), parts)
+
+
+@kernel
+def _expand_triple(a, b, c, parts):
+    """a . (b x c) of vectors of pairs."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = a, b, c
     least = smaller(_least(ax, bx), _least(cx, cx)) * smaller(_least(ay, by), _least(cy, cy))
     most = larger(_most(ax, bx), _most(cx, cx)) * larger(_most(ay, by), _most(cy, cy))
     least *= smaller(_least(az, bz), _least(cz, cz))
@@ -46,6 +50,17 @@ def expand_volume(a, b, c, p, parts):
     count = _add_volume(parts, count, az, by, cx, -1.0)
     count = _add_volume(parts, count, ax, bz, cy, -1.0)
     return _add_volume(parts, count, ay, bx, cz, -1.0)
+
+
+@kernel
+def expand_slope(a, b, c, d, parts):
+    """((b - a) x (c - a)) . d of points and a direction (x, y, z), as of ``expand_area``."""
+    return _expand_triple(_differences(b, a), _differences(c, a), ((d[0], 0.0), (d[1], 0.0), (d[2], 0.0)), parts)
+
+
+@kernel
+def _differences(a, b):
+    return difference(a[0], b[0]), difference(a[1], b[1]), difference(a[2], b[2])
 
 
 @kernel

@@ -5,7 +5,7 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import power_below
 from renderer.kernels.simd import larger, smaller
-from renderer.kernels.expansions import OUT_OF_RANGE, expand_area, expand_volume, sign_of
+from renderer.kernels.expansions import OUT_OF_RANGE, expand_area, expand_slope, expand_volume, sign_of
 
 # What all functions here say where products would vanish or overflow.
 UNDECIDED = 2
@@ -30,6 +30,16 @@ def volume_sign(a, b, c, p, parts):
     if count == OUT_OF_RANGE:
         s = balance(a[0], b[0], c[0], p[0]), balance(a[1], b[1], c[1], p[1]), balance(a[2], b[2], c[2], p[2])
         count = expand_volume(stretched(a, s), stretched(b, s), stretched(c, s), stretched(p, s), parts)
+    return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
+
+
+@kernel
+def slope_sign(a, b, c, d, parts):
+    """The sign of ((b - a) x (c - a)) . d, as of ``area_sign``."""
+    count = expand_slope(a, b, c, d, parts)
+    if count == OUT_OF_RANGE:
+        s = balance(a[0], b[0], c[0], d[0]), balance(a[1], b[1], c[1], d[1]), balance(a[2], b[2], c[2], d[2])
+        count = expand_slope(stretched(a, s), stretched(b, s), stretched(c, s), stretched(d, s), parts)
     return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
 
 

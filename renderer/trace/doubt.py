@@ -22,7 +22,7 @@ from renderer.kernels.pairs import (
     quotient,
     scaled_difference,
 )
-from renderer.kernels.signs import UNDECIDED, lies_within, volume_sign
+from renderer.kernels.signs import UNDECIDED, lies_within, slope_sign, volume_sign
 from renderer.kernels.simd import larger, local_doubles, smaller
 from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, scale, sub
 from renderer.trace.intersect import (
@@ -87,7 +87,7 @@ def settled(tree, at, ray, shear, hit, blurred):
     elif height != _FAR and height != 0:
         # Rounding may have made this t and its sign.
         slope = _slope(tree, at, ray)
-        t = height * abs(_exact_t(tree, at, ray)) * (1.0 if slope > 0.0 else -1.0)
+        t = height * abs(_exact_t(tree, at, ray)) * (1.0 if slope > 0 else -1.0)
     if not (t0 <= last and t0 <= LARGEST_FLOAT and t >= 0.0):
         return np.nan, u, v, w
     if round_down(t * largest) > last:
@@ -135,8 +135,9 @@ def _direction(ray):
 
 @kernel
 def _slope(tree, at, ray):
-    """normal . direction of a face and a ray, with twice the digits, in some unit."""
-    return dot_pairs(_scaled_normal(tree, at, ray), as_pairs(_direction(ray)[0]))[0]
+    """The sign of normal . direction of a face and a ray."""
+    (p0, p1, p2), (d, _) = _corners(tree, at), _direction(ray)
+    return slope_sign(p0, p1, p2, d, local_doubles())
 
 
 @kernel
@@ -154,7 +155,7 @@ def _exact_t(tree, at, ray):
 def _met_at_start(tree, at, ray, shear):
     """The hit of a face in whose plane a ray begins: at t = 0 where it begins on the face and leaves the plane."""
     (p0, p1, p2), o, slope = _corners(tree, at), (ray.ox, ray.oy, ray.oz), _slope(tree, at, ray)
-    if slope == 0.0 or lies_within(p0, p1, p2, o, local_doubles()) != 1:
+    if slope == 0 or lies_within(p0, p1, p2, o, local_doubles()) != 1:
         return np.nan, 0.0, 0.0, 1.0
     a, b, c = sub(p0, o), sub(p1, o), sub(p2, o)
     e0, e1, e2 = length(cross(b, c)), length(cross(c, a)), length(cross(a, b))

@@ -220,11 +220,10 @@ def _side_of(n, w, code):
     """
     slope = dot(n, w)
     side = 1.0 if slope >= 0.0 else -1.0
-    if code & KNOWN != 0:
-        known = 1.0 if code & ABOVE != 0 else -1.0
-        if side != known or abs(slope) <= _LEVEL * largest_component(w):
-            return 0.0
-    return side
+    if abs(slope) <= _LEVEL * largest_component(w):
+        return 0.0
+    known = 1.0 if code & ABOVE != 0 else -1.0
+    return side if code & KNOWN == 0 or side == known else 0.0
 
 
 @kernel

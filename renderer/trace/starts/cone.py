@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, plus, power_below
+from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, plus, power_below, scaled_difference
 from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import largest_component
+from renderer.kernels.vec3 import largest_component, sub
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
-from renderer.trace.starts.meeting import seen_from, slope_sign, turn_sign
+from renderer.trace.starts.meeting import lean_sign, seen_from, turn_sign
 
 # The most faces that may hold a start; of more, those beyond are left out.
 MOST_HOLDERS = 4096
@@ -149,9 +149,10 @@ def _unit_way(anchor, p):
 
 
 class Cone(NamedTuple):
-    """A holder as a cone: its face from the anchor, and two vectors of pairs. x in the face's plane is in the cone
-    where normal . (first x x) and normal . (x x second) are not negative; of a half-plane the second is the first
-    turned back, of a plane nothing is asked.
+    """A holder as a cone: its face from the anchor, and two vectors of pairs in its plane, exact differences of corners.
+
+    A plane holds all directions x of its own, a half-plane those with normal . (first x x) >= 0, and a sector those with
+    normal . (x x second) >= 0 as well.
 
     kind  the number of corners of weight 0: 0 a plane, 1 a half-plane, 2 a sector
     """
@@ -168,27 +169,26 @@ def cone_of(tree, anchor, holders, k):
     place, zeros = holder(holders, k, PLACE), holder(holders, k, ZEROS)
     kind = count_zeros(zeros)
     own = _corner_of(zeros) if kind == 2 else _opposite(zeros)
-    p = corner(tree, place + 12 * _after(own))
-    q = corner(tree, place + 12 * _after(_after(own)))
-    if kind == 0:
-        # Two ways within the plane.
-        p, q = corner(tree, place + 12), corner(tree, place + 24)
-    elif kind == 1:
-        # Along the edge with the face to the left, and back.
-        p, q = q, p
-    return Cone(seen_from(tree, place, anchor), _unit_way(anchor, p), _unit_way(anchor, q), kind)
+    p, q = corner(tree, place + 12 * own), corner(tree, place + 12 * _after(own))
+    r = corner(tree, place + 12 * _after(_after(own)))
+    if kind == 1:
+        # Along the edge with the face to the left, and the way to the opposite corner.
+        return Cone(seen_from(tree, place, anchor), _unit(r, q), _unit(p, q), kind)
+    return Cone(seen_from(tree, place, anchor), _unit(q, p), _unit(r, p), kind)
+
+
+@inlined
+def _unit(a, b):
+    """a - b of two corners as pairs, scaled by a power of two."""
+    return scaled_difference(a, b, 1.0 / power_below(largest_component(sub(a, b))))
 
 
 @kernel
-def middle_of(tree, anchor, holders, k, attempt):
-    """A direction within the k-th cone, as pairs; another one with each attempt."""
-    place, zeros = holder(holders, k, PLACE), holder(holders, k, ZEROS)
-    cone = cone_of(tree, anchor, holders, k)
+def middle_of(cone, attempt):
+    """A direction within a cone, as pairs; another one with each attempt."""
     share, other = 1.0 + (attempt & 3), 1.0 + (attempt >> 2)
     if cone.kind == 1:
-        # The way to the opposite corner, and some way along the edge.
-        top = _unit_way(anchor, corner(tree, place + 12 * _opposite(zeros)))
-        return _mixed(top, cone.first, 1.0, 0.25 * (share - 1.0))
+        return _mixed(cone.first, cone.second, share - 2.5, other)
     return _mixed(cone.first, cone.second, share, other)
 
 
@@ -206,28 +206,28 @@ def within_cone(cone, x):
     """Where a direction of pairs in the plane of a cone is: 1 inside, 0 on its outline, -1 outside."""
     if cone.kind == 0:
         return 1
-    s = turn_sign(cone.face, cone.first, x)[0]
+    s = turn_sign(cone.face, cone.first, x)
     if cone.kind == 1:
         return s
-    e = turn_sign(cone.face, x, cone.second)[0]
+    e = turn_sign(cone.face, x, cone.second)
     if s < 0 or e < 0:
         return -1
     return 0 if s == 0 or e == 0 else 1
 
 
 @kernel
-def crosses(cone, x, y):
-    """The parity of the path from x to y, both pairs and off the cone's plane, UNKNOWN where it meets the outline;
-    FREE where y is on the cone.
+def crosses(cone, x, y, side):
+    """The parity of the path from x to y, both pairs: UNKNOWN where it meets the outline or x is in the cone's plane;
+    FREE where y is on the cone. ``side`` is the sign of normal . y.
     """
-    g, h = dot_pairs(cone.face.normal, x)[0], dot_pairs(cone.face.normal, y)[0]
-    sx, sy = slope_sign(cone.face, x), slope_sign(cone.face, y)
-    if sx == 0:
+    start = lean_sign(cone.face, x)
+    if start == 0:
         return UNKNOWN
-    if sy == 0:
+    if side == 0:
         return FREE if within_cone(cone, y) >= 0 else 0
-    if sx == sy:
+    if start == side:
         return 0
+    g, h = dot_pairs(cone.face.normal, x)[0], dot_pairs(cone.face.normal, y)[0]
     inside = _passes(cone, x, y, abs(g), abs(h))
     return UNKNOWN if inside == 0 else int(inside > 0)
 
@@ -254,5 +254,5 @@ def _mixed_sign(face, a, x, y, g, h):
     size = (h * largest_component(heads(x)) + g * largest_component(heads(y))) * face.sides
     size *= largest_component(heads(a))
     # g and h are exact to 2^-53 of themselves, and so is each term.
-    rounding = 2.0**-50 * (abs(h * one) + abs(g * other)) + size * face.error
+    rounding = 2.0**-50 * (abs(h * one) + abs(g * other)) + size * 2.0**-90
     return 0 if abs(value) <= rounding else (1 if value > 0.0 else -1)

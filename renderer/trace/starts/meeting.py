@@ -1,6 +1,7 @@
 """A face as a ray meets it from its exact start: it holds the start, is hit further on, or is not met.
 
-All signs are those of sums of pairs. What is less than their error, 2^-88 of its terms, counts as 0.
+All signs are those of sums of pairs, and exact where the start is not one of their terms. What is less than their error
+counts as 0: what is nearer than 2^-88 of the size of both faces together.
 """
 
 from typing import Any, NamedTuple
@@ -9,15 +10,16 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, power_below, quotient, scaled_difference
-from renderer.kernels.simd import larger
+from renderer.kernels.signs import UNDECIDED, slope_sign
+from renderer.kernels.simd import larger, local_doubles
 from renderer.kernels.vec3 import dot, largest_component, scale, sub
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
-# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the anchor by
-# 2^-100 of its own unit.
-_ERROR, _ANCHOR_ERROR = 2.0**-88, 2.0**-96
+# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a corner
+# by 2^-100 of what it is the difference of.
+_ERROR, _WAY_ERROR = 2.0**-90, 2.0**-94
 _LEAST_NORMAL = 2.0**-1022
 # A ray at a smaller angle to a face, about 1e-6, may meet it, as rounded, anywhere along it; and a start is as good as in
 # its plane nearer than 2^-40 of its corners' distance.
@@ -25,14 +27,16 @@ _GRAZING, _NEAR = 2.0**-20, 2.0**-40
 
 
 class SeenFace(NamedTuple):
-    """A face from an anchor, scaled by a power of two: the ways to its corners and its normal, as pairs; how much in
-    that unit is one of the tree's; the largest side product, of which a normal errs by a share; and the relative error.
+    """A face from an anchor, scaled by a power of two: the ways to its corners and its normal, as pairs; the corners in
+    the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by a
+    share; and the error of the ways.
     """
 
     a0: Any
     a1: Any
     a2: Any
     normal: Any
+    corners: Any
     factor: float
     sides: float
     error: float
@@ -63,46 +67,72 @@ def seen_from(tree, place, anchor):
     sides = largest_component(heads(one)) * largest_component(heads(other))
     return SeenFace(
         from_anchor(anchor, p0, factor), from_anchor(anchor, p1, factor), from_anchor(anchor, p2, factor),
-        cross_pairs(one, other), factor, sides, _ERROR + _ANCHOR_ERROR * (anchor.unit * factor),
+        cross_pairs(one, other), (p0, p1, p2), factor, sides, _WAY_ERROR * (1.0 + anchor.unit * factor),
     )  # fmt: skip
 
 
+@inlined
+def _sign_beyond(value, error):
+    return 0 if abs(value) <= error else (1 if value > 0.0 else -1)
+
+
+@inlined
+def _size(a):
+    return largest_component(heads(a))
+
+
 @kernel
-def triple_sign(a, b, c, error):
-    """The sign of a . (b x c) of vectors of pairs, 0 where rounding may have made it, and the value."""
-    value = dot_pairs(a, cross_pairs(b, c))[0]
-    size = largest_component(heads(a)) * largest_component(heads(b)) * largest_component(heads(c))
-    return (0 if abs(value) <= size * error else (1 if value > 0.0 else -1)), value
+def _way_sign(face, d, a, b):
+    """The sign of d . (a x b) of a direction and two ways to corners, 0 where rounding may have made it; the value."""
+    value = dot_pairs(d, cross_pairs(a, b))[0]
+    return _sign_beyond(value, _size(d) * _error_of(face, a, b)), value
+
+
+@inlined
+def _error_of(face, a, b):
+    """The error of a x b, two ways to corners."""
+    return _size(a) * _size(b) * _ERROR + (_size(a) + _size(b)) * face.error
+
+
+@kernel
+def _corner_sign(face, a, b):
+    """The sign of normal . (a x b) of two ways to corners, 0 where rounding may have made it; and the value."""
+    value = dot_pairs(face.normal, cross_pairs(a, b))[0]
+    return _sign_beyond(value, face.sides * _error_of(face, a, b)), value
+
+
+@kernel
+def turn_sign(face, a, b):
+    """The sign of normal . (a x b) of vectors of pairs, 0 where rounding may have made it."""
+    value = dot_pairs(face.normal, cross_pairs(a, b))[0]
+    return _sign_beyond(value, face.sides * _size(a) * _size(b) * _ERROR)
 
 
 @inlined
 def has_area(face):
     """Whether the corners do not lie on a line."""
-    return largest_component(heads(face.normal)) > face.sides * face.error
+    return _size(face.normal) > face.sides * _ERROR
 
 
 @kernel
-def turn_sign(face, a, b):
-    """The sign of normal . (a x b) of vectors of pairs, 0 where rounding may have made it, and the value."""
-    value = dot_pairs(face.normal, cross_pairs(a, b))[0]
-    size = face.sides * largest_component(heads(a)) * largest_component(heads(b))
-    return (0 if abs(value) <= size * face.error else (1 if value > 0.0 else -1)), value
+def lean_sign(face, x):
+    """The sign of normal . x of a vector of pairs, 0 where rounding may have made it."""
+    return _sign_beyond(dot_pairs(face.normal, x)[0], face.sides * _size(x) * _ERROR)
 
 
 @kernel
-def slope_sign(face, d):
-    """The sign of normal . d of a direction of pairs, 0 where it is in the face's plane."""
-    value = dot_pairs(face.normal, d)[0]
-    size = face.sides * largest_component(heads(d))
-    return 0 if abs(value) <= size * face.error else (1 if value > 0.0 else -1)
+def slope_of(face, d):
+    """The sign of normal . d of a direction of float64, 0 where it is in the face's plane."""
+    p0, p1, p2 = face.corners
+    sign = slope_sign(p0, p1, p2, d, local_doubles())
+    return lean_sign(face, as_pairs(d)) if sign == UNDECIDED else sign
 
 
 @kernel
 def height_sign(face):
     """The sign of normal . (p0 - start), 0 where the start is in the face's plane."""
-    value = dot_pairs(face.normal, face.a0)[0]
-    size = face.sides * largest_component(heads(face.a0))
-    return 0 if abs(value) <= size * face.error else (1 if value > 0.0 else -1)
+    error = face.sides * (_size(face.a0) * _ERROR + face.error)
+    return _sign_beyond(dot_pairs(face.normal, face.a0)[0], error)
 
 
 @inlined
@@ -125,12 +155,12 @@ def meet_face(face, d, dz):
         return _none()
     if height_sign(face) == 0:
         return _held(face, d, dz)
-    slope, way = slope_sign(face, as_pairs(d)), as_pairs(d)
+    slope, way = slope_of(face, d), as_pairs(d)
     if slope == 0:
         return _none()
-    s0, e0 = triple_sign(way, face.a1, face.a2, face.error)
-    s1, e1 = triple_sign(way, face.a2, face.a0, face.error)
-    s2, e2 = triple_sign(way, face.a0, face.a1, face.error)
+    s0, e0 = _way_sign(face, way, face.a1, face.a2)
+    s1, e1 = _way_sign(face, way, face.a2, face.a0)
+    s2, e2 = _way_sign(face, way, face.a0, face.a1)
     if s0 * slope < 0 or s1 * slope < 0 or s2 * slope < 0 or (s0 == 0 and s1 == 0 and s2 == 0):
         return _none()
     t = quotient(dot_pairs(face.normal, face.a0), dot_pairs(face.normal, way))
@@ -143,12 +173,12 @@ def meet_face(face, d, dz):
 @kernel
 def _held(face, d, dz):
     """The meeting of a face with a start in its plane: it holds the start, or is not met."""
-    s0, e0 = turn_sign(face, face.a1, face.a2)
-    s1, e1 = turn_sign(face, face.a2, face.a0)
-    s2, e2 = turn_sign(face, face.a0, face.a1)
+    s0, e0 = _corner_sign(face, face.a1, face.a2)
+    s1, e1 = _corner_sign(face, face.a2, face.a0)
+    s2, e2 = _corner_sign(face, face.a0, face.a1)
     if s0 < 0 or s1 < 0 or s2 < 0 or (s0 == 0 and s1 == 0 and s2 == 0):
         return _none()
-    u, v, w = _weights(e0, e1, e2, slope_sign(face, as_pairs(d)), dz)
+    u, v, w = _weights(e0, e1, e2, slope_of(face, d), dz)
     return Meeting(HOLDS, 0.0, u, v, w, _zeros(s0, s1, s2))
 
 

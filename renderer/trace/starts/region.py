@@ -30,7 +30,7 @@ from renderer.trace.starts.cone import (
     put_node,
     within_cone,
 )
-from renderer.trace.starts.meeting import slope_sign
+from renderer.trace.starts.meeting import lean_sign, slope_of
 
 NOT_STOPPED = -1
 # Hubs that are tried until none of the paths meets an outline.
@@ -54,15 +54,16 @@ def _path_to_cone(tree, anchor, holders, count, k, side, order, attempt, word):
     """Write the parities of the path from the hub to the k-th cone, on one side of its face; returns whether it meets
     no outline.
     """
-    hub, middle, own = _hub(attempt), middle_of(tree, anchor, holders, k, attempt), cone_of(tree, anchor, holders, k)
-    if slope_sign(own.face, hub) == 0:
+    hub, own = _hub(attempt), cone_of(tree, anchor, holders, k)
+    middle = middle_of(own, attempt)
+    if lean_sign(own.face, hub) == 0:
         return False
     for j in range(count):
         cone = cone_of(tree, anchor, holders, j)
         if j == k:
-            parity = int(slope_sign(own.face, hub) != side)
-        elif slope_sign(cone.face, middle) != 0:
-            parity = crosses(cone, hub, middle)
+            parity = int(lean_sign(own.face, hub) != side)
+        elif lean_sign(cone.face, middle) != 0:
+            parity = crosses(cone, hub, middle, lean_sign(cone.face, middle))
         else:
             ahead = order == PASSED and holder(holders, j, NUMBER) > holder(holders, k, NUMBER)
             behind = order == AHEAD and holder(holders, j, NUMBER) < holder(holders, k, NUMBER)
@@ -79,10 +80,8 @@ def _parity_beside(cone, own, hub, middle, side):
     where = within_cone(cone, middle)
     if where < 0:
         return 0
-    coincides = slope_sign(cone.face, own.first) == 0 and slope_sign(cone.face, own.second) == 0
-    # Of half-planes the second is as the first.
-    coincides = coincides and (own.kind != 1 or where > 0)
-    faced = slope_sign(cone.face, hub)
+    coincides = lean_sign(cone.face, own.first) == 0 and lean_sign(cone.face, own.second) == 0
+    faced = lean_sign(cone.face, hub)
     if where == 0 or not coincides or faced == 0:
         return UNKNOWN
     turned = dot_pairs(cone.face.normal, own.face.normal)[0] < 0.0
@@ -93,7 +92,8 @@ def _parity_beside(cone, own, hub, middle, side):
 def _path_to_direction(tree, anchor, holders, count, d, attempt, word):
     """Write the parities of the path from the hub to a direction; returns whether it meets no outline."""
     for j in range(count):
-        parity = crosses(cone_of(tree, anchor, holders, j), _hub(attempt), d)
+        cone = cone_of(tree, anchor, holders, j)
+        parity = crosses(cone, _hub(attempt), as_pairs(d), slope_of(cone.face, d))
         if parity == UNKNOWN:
             return False
         put_holder(holders, j, word, parity)
@@ -176,8 +176,8 @@ def _bounds_region(tree, anchor, holders, count, nodes, k, side, order, j, facin
 def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d):
     """The holder that stops a ray at its start, or NOT_STOPPED.
 
-    The ray starts in the region beside the cone of ``face``, on one side of it. It is stopped where its direction d, as
-    pairs, leads out of that region: by the lowest face that bounds the region and has d behind it. ``through`` says
+    The ray starts in the region beside the cone of ``face``, on one side of it. It is stopped where its direction d
+    leads out of that region: by the lowest face that bounds the region and has d behind it. ``through`` says
     that it has just passed the face: of those that coincide with it the lower ones are passed too, the higher ones lie
     ahead.
     """
@@ -192,7 +192,7 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
     for j in range(count):
         if best != NOT_STOPPED and holder(holders, j, NUMBER) > holder(holders, best, NUMBER):
             continue
-        behind = slope_sign(cone_of(tree, anchor, holders, j).face, d)
+        behind = slope_of(cone_of(tree, anchor, holders, j).face, d)
         if behind != 0 and _bounds_region(tree, anchor, holders, count, nodes, own, side, order, j, -behind):
             best = j
     return best

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs
 from renderer.kernels.simd import extract, get, larger, load8, lowest_bit, movemask, put, smaller, splat8
+from renderer.kernels.vec3 import largest_component
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import (
     Ray,
@@ -34,18 +34,18 @@ from renderer.trace.starts.meeting import HOLDS, IS_HIT, is_grazed, meet_face, s
 from renderer.trace.starts.record import ABOVE, EDGE, KNOWN, THROUGH, start_at
 from renderer.trace.starts.region import NOT_STOPPED, stopping_holder
 
-# The coordinates of a start err by 2^-53 of themselves: a box that holds it holds them with so much room.
-_ROOM = 2.0**-50
+# Faces whose boxes are within this share of the largest coordinate of a start are met from the exact start: what others
+# are off by, 2^-53 of the coordinates, is a small part of their distance.
+_ROOM = 2.0**-40
 _NOTHING = (np.inf, np.int32(NO_FACE), 0.0, 0.0, 1.0)
 
 
 @inlined
 def _box_holds(tree, place, o):
-    """Whether the box of a face holds a point, with _ROOM."""
+    """Whether the box of a face, with _ROOM, holds a point."""
     p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
-    holds = True
+    holds, room = True, largest_component(o) * _ROOM
     for k in range(3):
-        room = abs(o[k]) * _ROOM
         low, high = smaller(p0[k], smaller(p1[k], p2[k])), larger(p0[k], larger(p1[k], p2[k]))
         holds = holds and low - room <= o[k] and o[k] <= high + room
     return holds
@@ -53,10 +53,10 @@ def _box_holds(tree, place, o):
 
 @inlined
 def _holding_octants(tree, child, o):
-    """The bits of the octants of a node whose boxes hold a point."""
-    base, bits = child * NODE_WORDS, 0xFF
+    """The bits of the octants of a node whose boxes, with _ROOM, hold a point."""
+    base, bits, room = child * NODE_WORDS, 0xFF, largest_component(o) * _ROOM
     for k in range(3):
-        low, high = round_both(o[k])
+        low, high = round_both(o[k] - room)[0], round_both(o[k] + room)[1]
         bits &= movemask(
             (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
         )
@@ -109,9 +109,7 @@ def _stopped(tree, start, anchor, count, d, dz, holders):
     """The hit (t, face, u, v, w) that stops a ray at its start, which ``count`` faces hold; NO_FACE for none."""
     nodes = name_nodes(tree, anchor, holders, count)
     side = 1 if start.code & ABOVE != 0 else -1
-    k = stopping_holder(
-        tree, anchor, holders, count, nodes, start.face, side, start.code & THROUGH != 0, as_pairs(d)
-    )
+    k = stopping_holder(tree, anchor, holders, count, nodes, start.face, side, start.code & THROUGH != 0, d)
     if k == NOT_STOPPED:
         return _NOTHING
     met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), d, dz)
