@@ -59,12 +59,13 @@ def test_the_points_of_a_cut_face_are_the_centroids_of_equal_parts(cuts):
     np.testing.assert_allclose(places.mean(axis=0), 1.0 / 3.0, rtol=1e-14)
 
 
+@pytest.mark.parametrize("samples", [1, 4, 9])
 @pytest.mark.parametrize("camera", CAMERAS, ids=["perspective", "orthographic"])
-def test_depths_have_the_bits_of_pictures(camera):
+def test_depths_have_the_bits_of_pictures(camera, samples):
     body = torus()
     scene = Scene(camera=camera, materials={"m": Phong()}, objects=[SceneObject(mesh=body, material="m")], ambient=1.0)
     depth = depth_map(Octree.from_mesh(body), camera, 61, 47)
-    np.testing.assert_array_equal(depth, render(scene, resolution=(61, 47), samples=1).depth)
+    np.testing.assert_array_equal(depth, render(scene, resolution=(61, 47), samples=samples).depth)
     assert depth.shape == (47, 61) and 0.1 < np.isfinite(depth).mean() < 0.9
 
 
