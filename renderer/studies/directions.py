@@ -6,7 +6,7 @@ where x is east and y is north.
 
 from __future__ import annotations
 
-from typing import NamedTuple, SupportsInt
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +145,7 @@ def turned(directions: Floats, pole: Floats) -> Floats:
     return directions[:, :1] * x + directions[:, 1:2] * y + directions[:, 2:] * z
 
 
-def check_count(argument: str, count: SupportsInt) -> int:
+def check_count(argument: str, count: Any) -> int:
     """``count``, a number of directions. Raises ``ValueError`` that names the argument for what is none."""
     expect(is_count(count) and 1 <= count <= MOST, argument, f"an integer from 1 to {MOST}", repr(count))
     return int(count)
