@@ -3,6 +3,8 @@
 All of them are ``ValueError``s, so a caller can catch them as one; the command line turns each into one line.
 """
 
+from numbers import Integral
+
 
 class MeshError(ValueError):
     """A mesh file or mesh arrays that cannot be used; names the file or argument and the fault.
@@ -38,5 +40,5 @@ def extra_hint(name: str) -> str:
 
 
 def is_count(value: object) -> bool:
-    """Whether it is an int >= 0, and not True or False."""
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+    """Whether it is an integer >= 0, of Python or NumPy, and not True or False."""
+    return isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= 0

@@ -36,6 +36,7 @@ from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene, SceneObject
 from renderer.shade.tile import render_tile
 from renderer.studies.hidden import occlusion
+from renderer.studies.views import visible_faces
 
 _TRIANGLE = Mesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 # An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.
@@ -105,7 +106,10 @@ def _wind() -> None:
 
 
 def _study() -> None:
-    occlusion(Octree.from_mesh(_TRIANGLE), [0.1, 0.1, 1.0], None, [[0.0, 0.0, -1.0]])
+    octree = Octree.from_mesh(_TRIANGLE)
+    occlusion(octree, [0.1, 0.1, 1.0], None, [[0.0, 0.0, -1.0]])
+    # The face is seen edge-on.
+    visible_faces(octree, [9.0, 0.1, 0.0])
 
 
 def _search() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing
+from collections.abc import Iterable, Iterator, Sequence, Sized
+from contextlib import closing, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal
@@ -84,7 +84,8 @@ def frames_on(
     """Render the frames of an animation, each to its own of the files ``outputs``, as ``render_on`` does one picture.
 
     scenes   one for each output, read when their turn comes; those that differ in the camera alone, as
-             ``scene.altered(camera=...)`` makes them, are sent once
+             ``scene.altered(camera=...)`` makes them, are sent once. A list of more or fewer is refused before anything
+             is written
     outputs  .png, .exr or .npy, as ``Image.save`` writes them
     folder   for parts of frames under way, and what frames are done: the same call goes on where one was killed, and
              renders no frame again whose file is what it wrote. It is removed when all are done
@@ -103,6 +104,8 @@ def frames_on(
     ['1.png', '2.png']
     """
     frames = _Frames(as_path("folder", folder), outputs, band, options)
+    if isinstance(scenes, Sized):
+        frames.expect_scenes(len(scenes))
     with (
         progress_bar(len(frames.outputs), "frame", progress) as update,
         closing(results(client, render_rows, frames.tasks(scenes))) as found,
@@ -164,7 +167,10 @@ class _Frames:
         self._sender = _Sender(options)
         self._under_way: dict[int, tuple[PictureRun, set[int]]] = {}
         self.done = 0
-        folder.mkdir(parents=True, exist_ok=True)
+
+    def expect_scenes(self, count: int) -> None:
+        """Raise ``ValueError`` unless there are as many outputs."""
+        expect(count == len(self.outputs), "scenes", f"{len(self.outputs)}, as outputs are", str(count))
 
     def tasks(self, scenes: Iterable[Scene]) -> Iterator[Task]:
         """The tasks of all frames that are not done, one after the other."""
@@ -173,6 +179,7 @@ class _Frames:
             count += 1
             expect(count <= len(self.outputs), "scenes", f"{len(self.outputs)}, as outputs are", "more")
             sent, picture = self._sender.picture(scene)
+            self._folder.mkdir(parents=True, exist_ok=True)
             if self._is_done(number, picture):
                 remove_parts(self._parts(number))  # a run may have been killed before
                 self.done += 1
@@ -183,7 +190,7 @@ class _Frames:
             if not missing:
                 self._end(number)
             yield from _tasks(number, sent, run, missing)
-        expect(count == len(self.outputs), "scenes", f"{len(self.outputs)}, as outputs are", str(count))
+        self.expect_scenes(count)
 
     def write(self, number: int, part: int, rows: Any) -> None:
         """Keep a part, and save its frame if it was the last one."""
@@ -197,7 +204,8 @@ class _Frames:
         """Remove the folder, which has no more than what was said to be done."""
         for number in range(len(self.outputs)):
             self._said(number).unlink(missing_ok=True)
-        self._folder.rmdir()
+        with suppress(FileNotFoundError):  # of no frames
+            self._folder.rmdir()
 
     def _end(self, number: int) -> None:
         run, _ = self._under_way.pop(number)

@@ -100,7 +100,9 @@ class Image:
     face      (h, w) int32, face of the merged mesh; -1 where nothing was hit
     rays      (h, w) int32, rays traced for the pixel, shadow rays included
 
-    Of those that ``render`` was not asked to keep, h and w are 0.
+    Of those that ``render`` was not asked to keep, h and w are 0. Radiance is the mean of a pixel's samples; depth,
+    normal and face are those of the ray through its centre, whatever their number. Where no sample is there, as with 4
+    or 16, ``rays`` does not count that ray.
     cut       the number of pixels that miss rays because of ``max_rays``, 0 in most pictures
     build_seconds, render_seconds  the time that it took, without compiling; the first is the prepared scene's
 

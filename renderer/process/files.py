@@ -2,12 +2,21 @@
 
 import errno
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from stat import S_IMODE, S_ISBLK, S_ISCHR
+from stat import S_IMODE, S_ISBLK, S_ISCHR, S_ISREG
 from typing import BinaryIO
 from uuid import uuid4
+
+try:
+    import fcntl
+except ImportError:  # on Windows
+    fcntl = None  # type: ignore[assignment]
+
+# The last letters of a temporary file's name.
+_RANDOM = 12
 
 
 def as_path(argument: str, value: object) -> Path:
@@ -30,18 +39,21 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], o
     """Let ``write`` fill a temporary file beside ``path``, then rename it: never a half-written file.
 
     A symbolic link is followed, and a device or pipe is written to. An ``OSError`` names ``path``, whatever failed.
+    Temporary files that killed processes left of the same file are removed.
     """
     with _temporary_beside(path) as (temporary, target):
         if _is_special(target):
             with open(target, "wb") as file:
                 write(file)
             return
-        with open(temporary, "xb") as file:
+        with _created(temporary) as file:
             # Before anything is in it, so that a private file stays private.
             with suppress(FileNotFoundError):
                 temporary.chmod(S_IMODE(target.stat().st_mode))
             write(file)
-        os.replace(temporary, target)
+            file.close()
+            os.replace(temporary, target)
+        _remove_left(target)
 
 
 def read_whole(path: Path) -> bytes:
@@ -63,7 +75,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
         if not _is_special(target):
             temporary.touch(exist_ok=False)
-            temporary.unlink()
+            temporary.unlink(missing_ok=True)  # who finds it left may have been faster
 
 
 def are_apart(written: Iterable[str | os.PathLike[str]], read: Iterable[str | os.PathLike[str]] = ()) -> bool:
@@ -73,6 +85,64 @@ def are_apart(written: Iterable[str | os.PathLike[str]], read: Iterable[str | os
     # Not Path.resolve, which raises a RuntimeError for links in a circle.
     outputs = [os.path.realpath(path) for path in written]
     return len({*outputs}) == len(outputs) and {*outputs}.isdisjoint(map(os.path.realpath, read))
+
+
+@contextmanager
+def _created(temporary: Path) -> Iterator[BinaryIO]:
+    """A new file, locked until the context ends, also when it is closed before: so others see that its writer lives.
+
+    The lock of a process ends with it, however that ends.
+    """
+    while True:
+        with open(temporary, "xb") as file:
+            if fcntl is None:
+                yield file
+                return
+            lock = os.dup(file.fileno())
+            try:
+                with suppress(OSError):  # of a file system without locks, where none is found left either
+                    fcntl.flock(lock, fcntl.LOCK_EX)
+                if _is_at(temporary, lock):  # else it was found and removed before it was locked
+                    yield file
+                    return
+            finally:
+                os.close(lock)
+
+
+def _is_at(path: Path, descriptor: int) -> bool:
+    """Whether the path is that of an open file."""
+    try:
+        return os.path.samestat(os.lstat(path), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False
+
+
+def _remove_left(target: Path) -> None:
+    """Remove the temporary files of ``target`` whose writers are gone: those that nobody has locked."""
+    if fcntl is None:
+        return
+    name = re.compile(f"{re.escape(_beginning(target))}[0-9a-f]{{{_RANDOM}}}")
+    with suppress(OSError):
+        for found in filter(name.fullmatch, os.listdir(target.parent)):
+            with suppress(OSError):
+                _remove_unlocked(target.with_name(found))
+
+
+def _remove_unlocked(path: Path) -> None:
+    """Remove a file. Raises ``OSError`` where it is locked, or on a file system that has no locks."""
+    if S_ISREG(path.lstat().st_mode):
+        descriptor = os.open(path, os.O_RDWR)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if _is_at(path, descriptor):  # its writer may have renamed it meanwhile
+                path.unlink()
+        finally:
+            os.close(descriptor)
+
+
+def _beginning(target: Path) -> str:
+    """How the names of temporary files of ``target`` begin: a name has at most 255 bytes, a character up to four."""
+    return f".{target.name[:60]}."
 
 
 def _is_special(target: Path) -> bool:
@@ -94,8 +164,7 @@ def _temporary_beside(path: str | os.PathLike[str]) -> Iterator[tuple[Path, Path
     if target.is_file() and not os.access(target, os.W_OK):  # renaming would not ask
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
     # Created by open(), so that it gets the permissions that any new file would.
-    # A name has at most 255 bytes, and a character of it up to four.
-    temporary = target.with_name(f".{target.name[:60]}.{uuid4().hex[:12]}")
+    temporary = target.with_name(f"{_beginning(target)}{uuid4().hex[:_RANDOM]}")
     try:
         yield temporary, target
     except BaseException as error:

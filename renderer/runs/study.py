@@ -74,15 +74,20 @@ class Study:
 
     def plan(self, mesh: Mesh, points: Points, order: NDArray[np.int64], size: int = PART) -> Plan:
         """The study in parts of ``size`` points in an order, with all that the bits of each part depend on."""
-        options = {
-            name: digest_of(value) if isinstance(value, np.ndarray) else value for name, value in self.options.items()
-        }
+        options = {name: _written(value) for name, value in self.options.items()}
         made_of = {
             "kind": self.kind, "options": options, "mesh": digest_of(mesh.vertices, mesh.faces),
             "points": digest_of(points.points, points.normals, points.leaving), "order": digest_of(order),
             "version": sys.modules["renderer"].__version__,
         }  # fmt: skip
         return Plan(len(points), size, 0, "<f8", made_of)
+
+
+def _written(option: Any) -> Any:
+    """An option as a plan has it, in types that JSON has."""
+    if isinstance(option, np.ndarray):
+        return digest_of(option)
+    return option.item() if isinstance(option, np.generic) else option
 
 
 KINDS: dict[str, Callable[..., Floats]] = {"sky": sky_view_factor, "sun": sun_hours, "ao": ambient_occlusion}

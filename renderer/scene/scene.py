@@ -107,6 +107,8 @@ def checked_settings(defaults: RenderSettings, given: dict[str, Any]) -> RenderS
 class SceneObject(Fields):
     """A mesh in the world: scaled, then turned about x, y and z (degrees, in this order), then moved.
 
+    Its corners are float64 numbers, whatever those of its file are.
+
     >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject
     >>> from renderer.mesh.shapes import box
     >>> crate = SceneObject(mesh=box(), material="wood", scale=2, translate=(0, 1, 0))
@@ -340,22 +342,8 @@ def _loaded(mesh: Path | Mesh) -> Mesh:
 
 
 def _place(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
-    """Move ``mesh`` to the world, in float32 where that costs no more than the file's own rounding did.
-
-    A float32 file knows its vertices to 2^-24 of its extent. While the world position is within four extents of
-    the origin, rounding the result to float32 again adds at most 2^-22 of the extent: the same order, and every
-    reference then gets the identical triangles. Farther out the float64 positions are kept.
-    """
-    if np.array_equal(matrix, np.eye(4)):
-        return mesh
-    world = mesh.transformed(matrix)
-    if not mesh.is_float32 or not len(world.vertices):
-        return world
-    with np.errstate(over="ignore"):  # beyond float32 it is inf, which is farther than any bound
-        rounded = world.vertices.astype(np.float32).astype(np.float64)
-    if np.abs(rounded - world.vertices).max() > 2.0**-22 * np.max(world.extent):
-        return world
-    return Mesh(rounded, world.faces, world.normals, world.colors, world.texcoords, world.name)
+    """``mesh`` in the world, in float64 whatever its file holds; itself where it is not moved."""
+    return mesh if np.array_equal(matrix, np.eye(4)) else mesh.transformed(matrix)
 
 
 def _rotation(axis: int, degrees: float) -> NDArray[np.float64]:
@@ -370,8 +358,8 @@ def _rotation(axis: int, degrees: float) -> NDArray[np.float64]:
 def _floor_meshes(floor: Floor) -> list[tuple[Mesh, str]]:
     """The floor's squares as one mesh per material, facing up, with the squares' edges shared exactly."""
     nx, nz = floor.squares
-    x = np.linspace(floor.min[0], floor.max[0], nx + 1).astype(np.float32).astype(np.float64)
-    z = np.linspace(floor.min[1], floor.max[1], nz + 1).astype(np.float32).astype(np.float64)
+    x = np.linspace(floor.min[0], floor.max[0], nx + 1)
+    z = np.linspace(floor.min[1], floor.max[1], nz + 1)
     grid_z, grid_x = np.meshgrid(z, x, indexing="ij")
     vertices = np.stack([grid_x, np.zeros_like(grid_x), grid_z], axis=-1).reshape(-1, 3)
     row, column = (a.ravel() for a in np.meshgrid(np.arange(nz), np.arange(nx), indexing="ij"))

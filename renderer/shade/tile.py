@@ -1,4 +1,8 @@
-"""A tile of the picture: camera rays in blocks of 8 x 8 pixels, one bundle per sample, and the sums of their light."""
+"""A tile of the picture: camera rays in blocks of 8 x 8 pixels, one bundle per sample, and the sums of their light.
+
+Depth, normal and face are those of the rays through the pixels' centres. Where no sample is there, and one of them is
+kept, a bundle more is traced for them, which is not lit and not counted.
+"""
 
 from typing import Any, NamedTuple
 
@@ -11,7 +15,16 @@ from renderer.kernels.vec3 import add, normalized, row3, scale, three
 from renderer.shade.bundle import SIDE, SIZE, append, clear, count_of
 from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
 from renderer.shade.surface import scene_pointers
-from renderer.shade.whitted import Settings, begin_work, make_work, push_children, slot, trace_bundle, work_lengths
+from renderer.shade.whitted import (
+    Settings,
+    begin_work,
+    make_work,
+    meet,
+    push_children,
+    slot,
+    trace_bundle,
+    work_lengths,
+)
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.traverse import Memory, make_memory, make_scratch
@@ -50,15 +63,18 @@ def _place(k):
 
 
 @inlined
-def _shoot(camera, scene, bundle, sample, block):
-    """Fill a bundle with the camera rays of a block = (x0, y0, x1, y1); pixels count row by row, SIDE per row."""
+def _shoot(camera, scene, bundle, place, block):
+    """Fill a bundle with the camera rays of a block = (x0, y0, x1, y1), all through one ``place`` (x, y) in a pixel.
+
+    Pixels count row by row, SIDE per row.
+    """
     x0, y0, x1, y1 = block
     clear(bundle, 0)
     for k in range(SIZE):
         i, j = _place(k)
         x, y = x0 + i, y0 + j
         if x < x1 and y < y1:
-            px, py = x + get(camera.samples, 2 * sample), y + get(camera.samples, 2 * sample + 1)
+            px, py = x + place[0], y + place[1]
             rows = camera.rows
             o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))
             d = add(row3(rows, 3), add(scale(row3(rows, 4), px), scale(row3(rows, 5), py)))
@@ -83,9 +99,25 @@ def _write_first_hits(film, bundle, work, x0, y0):
 
 
 @inlined
-def _middle(count):
-    """The sample that depth, face and normal are taken from: at the pixel's centre, where a sample is there."""
-    return count // 2 if count % 2 == 1 else (count + int(np.sqrt(count))) // 2
+def _has_centre(count):
+    """Whether one of so many samples, the middle one, is at the pixel's centre: those of a grid with odd sides."""
+    return count % 2 == 1
+
+
+@kernel
+def _look(tree, scene, settings, camera, film, work, block):
+    """Write the first hits of rays through the pixels' centres, none of which is a sample. Colours, counts of rays and
+    surfaces in ``work`` are overwritten.
+    """
+    bundle = slot(work, settings, 0)
+    _shoot(camera, scene, bundle, (0.5, 0.5), block)
+    meet(tree, scene, bundle, work)
+    _write_first_hits(film, bundle, work, block[0], block[1])
+
+
+@inlined
+def _shows_first_hits(film):
+    return len(film.depth) > 0 or len(film.face) > 0 or len(film.normal) > 0
 
 
 @kernel
@@ -137,7 +169,7 @@ _BLOCK, _BEGUN, _WAITING, _FROM_CAMERA, CUT, _STATE = range(6)
 
 
 @kernel
-def _next_sample(scene, settings, camera, film, tile, work, total, state):
+def _next_sample(tree, scene, settings, camera, film, tile, work, total, state):
     """End the sample under way and begin the next one, in the next block after the last sample of a block. Returns
     whether there is one.
     """
@@ -152,10 +184,13 @@ def _next_sample(scene, settings, camera, film, tile, work, total, state):
         return False
     if begun == 0:
         _clear_block(work, total)
+        if _shows_first_hits(film) and not _has_centre(camera.count):
+            _look(tree, scene, settings, camera, film, work, block)
     for k in range(SIZE):
         put(work.traced, k, 0)
         put3(work.color, 3 * k, (0.0, 0.0, 0.0))
-    _shoot(camera, scene, slot(work, settings, 0), begun, block)
+    place = get(camera.samples, 2 * begun), get(camera.samples, 2 * begun + 1)
+    _shoot(camera, scene, slot(work, settings, 0), place, block)
     put(state, _BEGUN, begun + 1)
     put(state, _WAITING, 1)
     put(state, _FROM_CAMERA, 1)
@@ -194,7 +229,7 @@ def _trace_next(tree, scene, settings, camera, film, tile, work, state):
     trace_bundle(tree, scene, settings, bundle, work)
     if get(state, _FROM_CAMERA) != 0:
         put(state, _FROM_CAMERA, 0)
-        if get(state, _BEGUN) == _middle(camera.count) + 1:
+        if _has_centre(camera.count) and get(state, _BEGUN) == camera.count // 2 + 1:
             block = _block_of(tile, get(state, _BLOCK))
             _write_first_hits(film, bundle, work, block[0], block[1])
     put(state, _WAITING, push_children(scene, settings, work, bundle, top))
@@ -204,8 +239,8 @@ def _trace_next(tree, scene, settings, camera, film, tile, work, state):
 def render_tile(words, scene, settings, camera, samples, film, tile, memory):
     """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
 
-    ``words`` are the tree's. Depth, face and normal come from the middle sample (the pixel's centre for one sample),
-    radiance from the mean, rays are added up from 0. Returns whether the tile is done. If not, ``memory.bundles``
+    ``words`` are the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
+    samples, their rays are added up from 0. Returns whether the tile is done. If not, ``memory.bundles``
     bundles were traced, and the caller can react to Ctrl-C; called again with the same memory, it goes on.
     """
     doubles, integers, hits = pointer(memory.doubles), pointer(memory.integers), pointer(memory.hits)
@@ -216,7 +251,9 @@ def render_tile(words, scene, settings, camera, samples, film, tile, memory):
     if get(state, _BLOCK) == 0 and get(state, _BEGUN) == 0:
         begin_work(work, settings)
     for _ in range(memory.bundles):
-        if get(state, _WAITING) == 0 and not _next_sample(seen, settings, shooting, film, tile, work, total, state):
+        if get(state, _WAITING) == 0 and not _next_sample(
+            tree, seen, settings, shooting, film, tile, work, total, state
+        ):
             return True
         _trace_next(tree, seen, settings, shooting, film, tile, work, state)
     return False

@@ -297,12 +297,18 @@ def _collect_light(scene, bundle, work):
             put3(work.color, 3 * pixel, add(row3(work.color, pixel), own))
 
 
-@kernel
-def trace_bundle(tree, scene, settings, bundle, work):
-    """Trace the rays of a bundle and light the surfaces that they meet; ``push_children`` spawns further rays."""
+@inlined
+def meet(tree, scene, bundle, work):
+    """Trace the rays of a bundle and write the surfaces that they meet to ``work``, of which none is lit yet."""
     rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 3, 0, 0, 1.0)
     trace_rays(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
     _meet_surfaces(scene, bundle, work)
+
+
+@kernel
+def trace_bundle(tree, scene, settings, bundle, work):
+    """Trace the rays of a bundle and light the surfaces that they meet; ``push_children`` spawns further rays."""
+    meet(tree, scene, bundle, work)
     light_surfaces(tree, scene, bundle, work.surfaces, work.lit, settings, work)
     _collect_light(scene, bundle, work)
 

@@ -6,7 +6,7 @@ where x is east and y is north.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +71,7 @@ def reinhart(subdivision: int = 2) -> Pattern:
     [145, 577, 2305]
     """
     expect(is_count(subdivision) and 1 <= subdivision <= 64, "subdivision", "an integer from 1 to 64", subdivision)
+    subdivision = int(subdivision)
     counts = np.repeat(_TREGENZA, subdivision) * subdivision
     step = np.pi / 2.0 / (len(counts) + 0.5)
     below = np.sin(step * np.arange(len(counts) + 1))
@@ -93,7 +94,7 @@ def fibonacci_hemisphere(count: int) -> Pattern:
     >>> fibonacci_hemisphere(2).directions[:, 2]
     array([0.25, 0.75])
     """
-    check_count("count", count)
+    count = check_count("count", count)
     height = (np.arange(count) + 0.5) / count
     return Pattern(_spiral(height), np.full(count, 2.0 * np.pi / count))
 
@@ -107,7 +108,7 @@ def fibonacci_sphere(count: int) -> Pattern:
     >>> fibonacci_sphere(4).directions[:, 2]
     array([-0.75, -0.25,  0.25,  0.75])
     """
-    check_count("count", count)
+    count = check_count("count", count)
     height = (2.0 * np.arange(count) + 1.0 - count) / count
     return Pattern(_spiral(height), np.full(count, 4.0 * np.pi / count))
 
@@ -124,7 +125,7 @@ def cosine_hemisphere(count: int) -> Pattern:
     >>> (cosine_hemisphere(2).directions[:, 2] ** 2).round(12)
     array([0.25, 0.75])
     """
-    check_count("count", count)
+    count = check_count("count", count)
     height = np.sqrt((np.arange(count) + 0.5) / count)
     return Pattern(_spiral(height), np.full(count, np.pi / count))
 
@@ -144,9 +145,10 @@ def turned(directions: Floats, pole: Floats) -> Floats:
     return directions[:, :1] * x + directions[:, 1:2] * y + directions[:, 2:] * z
 
 
-def check_count(argument: str, count: int) -> None:
-    """Raise ``ValueError`` that names the argument unless it is a number of directions."""
+def check_count(argument: str, count: Any) -> int:
+    """``count``, a number of directions. Raises ``ValueError`` that names the argument for what is none."""
     expect(is_count(count) and 1 <= count <= MOST, argument, f"an integer from 1 to {MOST}", repr(count))
+    return int(count)
 
 
 def _spiral(height: Floats) -> Floats:

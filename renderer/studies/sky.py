@@ -142,4 +142,4 @@ def _patches(patches: int | Pattern) -> Pattern:
     expect(good, "patches", f"an integer from 1 to {MOST}, or a Pattern", repr(patches))
     if patches in (145, 577):
         return tregenza() if patches == 145 else reinhart(2)
-    return fibonacci_hemisphere(patches)
+    return fibonacci_hemisphere(int(patches))

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from numbers import Integral
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import flag_argument
+from renderer.arrays import flag_argument, real_array
 from renderer.errors import expect, is_count
 from renderer.mesh.mesh import face_normals
 from renderer.points.argument import check_points, farthest_of
 from renderer.process.terminal import progress_bar
 from renderer.queries import Queries
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
+from renderer.studies.edge_on import are_edge_on
 from renderer.studies.share import check_directions, lengths_of, limits_of
 from renderer.trace.hits import points_on
 
@@ -66,7 +68,8 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
     A face that is seen only between these points counts as hidden; one that counts as seen is seen there. Rays leave
     the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
     only what looks to the eye. An eye on the surface sees past what is nearer than 2^-40 of the largest coordinate; see
-    ``octree.visible``, which is asked. A face without area is not seen. Raises ``ValueError`` naming the argument.
+    ``octree.visible``, which is asked. A face without area is not seen, and neither is one whose plane the eye lies in,
+    which no rounding tells. Raises ``ValueError`` naming the argument.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
@@ -83,8 +86,8 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
     with progress_bar(len(seen), "face", flag_argument("progress", progress)) as update:
         for begin in range(0, len(seen), _ROWS):
             corners = mesh.vertices[mesh.faces[begin : begin + _ROWS]]
-            left = begin + np.flatnonzero(face_normals(corners).any(axis=1))
-            for u, v in _centroids(cuts):
+            left = begin + np.flatnonzero(face_normals(corners).any(axis=1) & ~are_edge_on(corners, place))
+            for u, v in _centroids(int(cuts)):
                 points = points_on(mesh, left, np.full(len(left), u), np.full(len(left), v))
                 reached = octree.visible(points, place, leaving=left)
                 seen[left[reached]] = True
@@ -99,7 +102,7 @@ def depth_map(octree: Queries, camera: Camera, width: int, height: int, *, progr
 
     Along the ray, as ``Image.depth`` of a picture has it, and with its bits; not along the camera's axis.
 
-    camera         a ``PerspectiveCamera``, an ``OrthographicCamera``, or anything with their ``rows``
+    camera         a ``PerspectiveCamera``, an ``OrthographicCamera``, or anything with their ``rows``, (6, 3)
     width, height  pixels, 1 to 2^16
 
     Raises ``ValueError`` naming the argument.
@@ -115,7 +118,8 @@ def depth_map(octree: Queries, camera: Camera, width: int, height: int, *, progr
     for argument, value in (("width", width), ("height", height)):
         expect(is_count(value) and 1 <= value <= 1 << 16, argument, "an integer from 1 to 65536", repr(value))
     expect(callable(getattr(camera, "rows", None)), "camera", "a camera", type(camera).__name__)
-    rows, depth = camera.rows(width, height), np.empty((height, width))
+    width, height = int(width), int(height)
+    rows, depth = _rows_of(camera, width, height), np.empty((height, width))
     lines, x = max(1, _ROWS // width), np.arange(width)[:, None] + 0.5
     with progress_bar(height, "line", flag_argument("progress", progress)) as update:
         for top in range(0, height, lines):
@@ -123,6 +127,9 @@ def depth_map(octree: Queries, camera: Camera, width: int, height: int, *, progr
             # In the order in which pictures add them up, so that bits are the same.
             origins = rows[0] + (rows[1] * x + rows[2] * y)
             directions = rows[3] + (rows[4] * x + rows[5] * y)
+            good = np.isfinite(directions).all(axis=-1) & directions.any(axis=-1)
+            if not good.all():
+                expect(False, "camera", "rows with finite, non-zero directions", f"{directions[~good][0].tolist()}")
             depth[top : top + lines] = octree.closest_hit(origins, _unit(directions)).t
             if update is not None:
                 update(len(y))
@@ -179,12 +186,28 @@ def _one_place(argument: str, place: ArrayLike, octree: Queries) -> Floats:
     return rows[0]
 
 
+def _rows_of(camera: Camera, width: int, height: int) -> Floats:
+    """A camera's affine map. Raises ``ValueError`` where it is none."""
+    expected = "rows(width, height) of shape (6, 3), finite"
+    try:
+        given = camera.rows(width, height)
+    except TypeError as error:  # of a class, or of one that takes other arguments
+        raise ValueError(f"camera: expected {expected}, got {error}") from error
+    try:
+        rows = real_array(given)
+    except ValueError as error:
+        raise ValueError(f"camera: expected {expected}, got {type(given).__name__}") from error
+    expect(rows.shape == (6, 3), "camera", expected, f"shape {rows.shape}")
+    bad = ~np.isfinite(rows).all(axis=1)
+    expect(not bad.any(), "camera", expected, f"{rows[int(bad.argmax())].tolist()} in row {int(bad.argmax())}")
+    return rows.astype(np.float64)
+
+
 def _ways(pattern: Pattern | ArrayLike | int) -> Floats:
     if isinstance(pattern, Pattern):
         return check_directions("pattern", pattern.directions)
-    if isinstance(pattern, int):
-        check_count("pattern", pattern)
-        return fibonacci_sphere(pattern).directions
+    if isinstance(pattern, Integral):  # of NumPy, too
+        return fibonacci_sphere(check_count("pattern", pattern)).directions
     return check_directions("pattern", pattern)
 
 

@@ -161,7 +161,8 @@ def test_bad_arguments_are_named(glass: Scene, tmp_path: Path, bad: dict[str, An
 
 @pytest.mark.parametrize(
     "count, names, said",
-    [(1, ("a.npy", "b.npy"), "scenes: expected 2, as outputs are, got 1"), (2, ("a.npy",), "scenes: .* got more"),
+    [(1, ("a.npy", "b.npy"), "scenes: expected 2, as outputs are, got 1"),
+     (2, ("a.npy",), "scenes: expected 1, as outputs are, got 2"),
      (2, ("a.npy", "./a.npy"), "outputs: expected a file for each frame"), (1, ("a.txt",), "output: expected a .png")],
 )  # fmt: skip
 def test_frames_have_a_file_each(
@@ -170,6 +171,18 @@ def test_frames_have_a_file_each(
     outputs = [f"{tmp_path}/{name}" for name in names]
     with pytest.raises(ValueError, match=said):
         frames_on(client, [glass] * count, outputs, tmp_path / "frames", resolution=(8, 8))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("count, said", [(3, "expected 2, as outputs are, got more"), (1, "expected 2, .* got 1")])
+def test_scenes_that_have_no_length_are_counted_as_they_come(
+    client: Any, glass: Scene, tmp_path: Path, count: int, said: str
+) -> None:
+    outputs = [tmp_path / "a.npy", tmp_path / "b.npy"]
+    with pytest.raises(ValueError, match=f"scenes: {said}"):
+        frames_on(client, iter([glass] * count), outputs, tmp_path / "frames", resolution=(8, 8))
+    frames_on(client, iter([]), [], tmp_path / "none")
+    assert not (tmp_path / "none").exists()
 
 
 def test_a_link_to_itself_is_told_before_any_work(client: Any, glass: Scene, tmp_path: Path) -> None:

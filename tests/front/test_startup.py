@@ -146,7 +146,7 @@ Octree.from_mesh(box(), threads=2).contains(np.asfortranarray(vertices.astype(np
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(SIGNATURES + script).splitlines()[-1].split(maxsplit=1)
-    assert int(count) == 46 and not new
+    assert int(count) == 47 and not new
 
 
 def test_kernels_of_queries_are_those_of_every_query_of_either_kind():
@@ -158,7 +158,7 @@ before = signatures()
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.queries import Queries
-from renderer.studies import ambient_occlusion, occlusion, sky_view_factor
+from renderer.studies import ambient_occlusion, occlusion, sky_view_factor, visible_faces
 ball, rng = icosphere(3), np.random.default_rng(1)
 # In float64 and in float32, of which the kernels of trees have two kinds.
 meshes = [ball, Mesh(ball.vertices.astype(np.float32), ball.faces), Mesh(ball.vertices * 1e-60, ball.faces)]
@@ -180,6 +180,7 @@ for tree in trees:
         for of in ({}, {"leaving": faces}):
             occlusion(tree, a, b, b, **of), occlusion(tree, a.astype(np.float32), None, b, packed=True, **of)
             sky_view_factor(tree, a, up=[1, 2, 3], **of), ambient_occlusion(tree, a, b[::-1], samples=9, **of)
+        visible_faces(tree, tree.mesh.vertices[0])  # in the planes of some faces
         asked |= {"visible", "contains", "winding_number", "closest_point", "signed_distance"}
     tree.refit(tree.mesh.vertices * 1.5)
 public = {name for name, value in vars(Queries).items() if callable(value) and not name.startswith("_")}

@@ -5,7 +5,7 @@ import io
 import sys
 import threading
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -55,6 +55,23 @@ def test_the_scenes_settings_hold_unless_others_are_given() -> None:
     same = render(scene, threads=1, resolution=None, max_depth=None, samples=None, min_weight=None)
     np.testing.assert_array_equal(same.radiance, render(scene, threads=1).radiance)
     assert scene.render.resolution == (3, 2)
+
+
+@pytest.mark.parametrize("accelerator", ["octree", "brute"])
+@pytest.mark.parametrize("samples", [4, 9, 16, 36])
+def test_depth_normal_and_face_are_those_of_the_pixels_centres(
+    samples: int, accelerator: Literal["octree", "brute"]
+) -> None:
+    scene = ball(resolution=(37, 21)).altered(camera=PerspectiveCamera(eye=(0.3, 0.2, 4), target=(0, 0, 0)))
+    one, more = (render(scene, accelerator=accelerator, samples=n, threads=2) for n in (1, samples))
+    for name in ("depth", "normal", "face"):
+        np.testing.assert_array_equal(getattr(more, name), getattr(one, name), err_msg=name)
+    # Which of them are kept changes nothing else, and a ray that is no sample is not counted.
+    for planes in ((), ("rays",), ("normal", "rays")):
+        other = render(scene, accelerator=accelerator, samples=samples, planes=planes)
+        np.testing.assert_array_equal(other.radiance, more.radiance)
+        assert "rays" not in planes or (other.rays == more.rays).all()
+    assert (more.rays.min(), one.rays.min()) == (samples, 1)
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,85 @@ def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:
     assert (tmp_path / "there" / "b.bin").read_bytes() == b"b"
 
 
+_WRITER = """
+import sys, time
+from renderer.process.files import write_atomically
+
+def write(file):
+    file.write(b"half")
+    file.flush()
+    print("writing", flush=True)
+    sys.stdin.readline()  # for ever, or until it is to go on
+
+write_atomically(sys.argv[1], write)
+"""
+
+
+def writing(path: Path) -> subprocess.Popen[bytes]:
+    """A process in the middle of a file."""
+    writer = subprocess.Popen([sys.executable, "-c", _WRITER, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert writer.stdout is not None and writer.stdout.readline() == b"writing\n"
+    return writer
+
+
+def test_what_killed_writers_left_goes_with_the_next_write_and_what_others_write_stays(tmp_path: Path) -> None:
+    path, other = tmp_path / "o.ply", tmp_path / "o.ply.npy"
+    with writing(path) as living, writing(path) as killed, writing(other) as also:
+        for writer in (killed, also):
+            writer.kill()
+            writer.wait()
+        before = {p.name for p in tmp_path.iterdir()}
+        assert len(before) == 3 and {name[:7] for name in before} == {".o.ply."}
+        keep = tmp_path / ".o.ply.notes"
+        keep.write_bytes(b"a user's")
+        write_atomically(path, lambda file: file.write(b"new"))
+        mine, theirs = ({p for p in tmp_path.glob(pattern)} for pattern in (".o.ply.*", ".o.ply.npy.*"))
+        assert len(theirs) == 1 and len(mine - theirs - {keep}) == 1 and path.read_bytes() == b"new"
+        assert living.stdin is not None
+        living.stdin.write(b"\n")
+        living.stdin.close()
+        assert living.wait() == 0 and path.read_bytes() == b"half"
+    write_atomically(other, lambda file: file.write(b"other"))
+    assert {p.name for p in tmp_path.iterdir()} == {path.name, other.name, keep.name}
+
+
+def test_a_file_that_is_taken_for_left_before_it_is_locked_is_begun_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process may look between the two."""
+    sound, locked = files.fcntl.flock, list[int]()
+
+    def look_first(descriptor: int, how: int) -> None:
+        locked.append(how)
+        if len(locked) == 1:
+            files._remove_left(tmp_path / "a.bin")
+            assert not list(tmp_path.iterdir())
+        sound(descriptor, how)
+
+    monkeypatch.setattr(files.fcntl, "flock", look_first)
+    write_atomically(tmp_path / "a.bin", lambda file: file.write(b"new"))
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"new"] and len(locked) == 3
+
+
+@pytest.mark.parametrize("locks", ["refused", "absent"])
+def test_without_locks_files_are_written_and_nothing_is_found_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, locks: str
+) -> None:
+    """On some network file systems, and on Windows."""
+
+    def refuse(*arguments: Any) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    if locks == "refused":
+        monkeypatch.setattr(files.fcntl, "flock", refuse)
+    else:
+        monkeypatch.setattr(files, "fcntl", None)
+    left = tmp_path / ".a.bin.0123456789ab"
+    left.write_bytes(b"half")
+    write_atomically(tmp_path / "a.bin", lambda file: file.write(b"new"))
+    assert left.exists() and (tmp_path / "a.bin").read_bytes() == b"new"
+
+
 @pytest.mark.parametrize("failing", ["write", "replace"])
 def test_an_error_names_the_file_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str

@@ -14,6 +14,7 @@ from renderer.mesh.load import save_ply
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from renderer.picture.pack import pack
+from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Mirror, Phong
@@ -530,29 +531,22 @@ class TestPlacing:
         objects = (SceneObject(mesh=mesh, material="a", **how),)
         return Scene(camera=camera, materials={"a": Phong()}, objects=objects).instances[0].mesh
 
-    def test_float32_meshes_stay_float32_near_the_origin(self) -> None:
-        mesh = Mesh(icosphere(2).vertices.astype(np.float32), icosphere(2).faces)
-        how = {"scale": 0.3, "rotate": (10, 20, 30), "translate": (0.1, 0.7, -0.2)}
-        near = self.place(mesh, **how)
-        exact = turned((10, 20, 30), mesh.vertices * 0.3) + np.array([0.1, 0.7, -0.2])
-        assert near.is_float32
-        # Nearest float32 of the exact position, itself computed with a few roundings.
-        np.testing.assert_allclose(near.vertices, exact.astype(np.float32), atol=2.0**-24)
-        assert np.abs(near.vertices - exact).max() <= 2.0**-22 * np.ptp(exact, axis=0).max()
+    @pytest.mark.parametrize("move", [0.7, 1000.1, 5e6])
+    @pytest.mark.parametrize("dtype", [np.float32, np.float64])
+    def test_placed_corners_are_float64_whatever_the_file_holds(self, dtype: Any, move: float) -> None:
+        mesh = Mesh(icosphere(2).vertices.astype(dtype), icosphere(2).faces)
+        placed = self.place(mesh, scale=0.3, rotate=(10, 20, 30), translate=(0.1, move, -0.2))
+        exact = turned((10, 20, 30), mesh.vertices * 0.3) + np.array([0.1, move, -0.2])
+        np.testing.assert_allclose(placed.vertices, exact, rtol=0, atol=2.0**-52 * (1.0 + move))
 
-    def test_far_out_they_become_float64(self) -> None:
-        mesh = Mesh(icosphere(2).vertices.astype(np.float32), icosphere(2).faces)
-        far = self.place(mesh, scale=0.3, rotate=(10, 20, 30), translate=(1000.1, 0, 0))
-        exact = turned((10, 20, 30), mesh.vertices * 0.3) + np.array([1000.1, 0, 0])
-        assert not far.is_float32
-        np.testing.assert_allclose(far.vertices, exact, atol=4 * 1024 * 2.0**-53)
-
-    def test_float64_meshes_are_never_rounded(self) -> None:
-        mesh = icosphere(2)
-        assert not mesh.is_float32
-        placed = self.place(mesh, rotate=(0, 0, 90))
-        np.testing.assert_allclose(placed.vertices, turned((0, 0, 90), mesh.vertices), atol=2.0**-52)
-        assert not placed.is_float32
+    def test_a_moved_box_is_where_it_was_moved_to(self) -> None:
+        """A box of whole numbers, whose corners float32 holds before it is moved and not after."""
+        assert box().is_float32
+        assert self.place(box(), translate=(0, 0, 0.3)).bounds[1].tolist() == [1.0, 1.0, 1.3]
+        crate = SceneObject(mesh=box(), material="a", translate=(0, 0, 0.3))
+        eye = PerspectiveCamera(eye=(0.5, 0.5, 10), target=(0.5, 0.5, 0))
+        scene = Scene(camera=eye, materials={"a": Phong()}, objects=(crate,))
+        assert render(scene, resolution=(1, 1)).depth.tolist() == [[10 - 1.3]]
 
     def test_a_mirroring_scale_keeps_outside_outside(self) -> None:
         placed = self.place(box((-1, -1, -1), (1, 1, 1)), scale=(-1, 1, 1))
@@ -600,7 +594,15 @@ class TestFloor:
     def test_squares_share_their_edges(self) -> None:
         parts = self.parts(min=(-0.1, -0.7), max=(0.3, 0.9), squares=(7, 5))
         assert set(map(tuple, parts["a"].vertices)) == set(map(tuple, parts["b"].vertices))
-        assert parts["a"].is_float32
+
+    def test_squares_stay_where_they_are_at_the_coordinates_of_a_map(self) -> None:
+        low, high = (500_000.3, 5_000_000.1), (500_010.3, 5_000_010.1)
+        parts = self.parts(min=low, max=high, squares=(10, 10))
+        for mesh in parts.values():
+            assert [corner.tolist() for corner in mesh.bounds] == [[low[0], 0.0, low[1]], [high[0], 0.0, high[1]]]
+            along, across = (np.unique(mesh.vertices[:, axis]) for axis in (0, 2))
+            np.testing.assert_allclose(along, low[0] + np.arange(11), rtol=0, atol=1e-9)
+            np.testing.assert_allclose(across, low[1] + np.arange(11), rtol=0, atol=1e-8)
 
     def test_one_square_of_two_materials_uses_the_first(self) -> None:
         assert list(self.parts()) == ["a"]

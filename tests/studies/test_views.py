@@ -1,11 +1,25 @@
 """Faces seen from an eye, depths from a camera, points from a scanner."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
 from renderer import Mesh, Octree, OrthographicCamera, PerspectiveCamera, Phong, Scene, SceneObject, render
 from renderer.mesh.shapes import box, grid, icosphere, torus
-from renderer.studies import depth_map, fibonacci_sphere, scan, views, visible_faces
+from renderer.studies import (
+    ambient_occlusion,
+    cosine_hemisphere,
+    depth_map,
+    fibonacci_hemisphere,
+    fibonacci_sphere,
+    reinhart,
+    scan,
+    sky_view_factor,
+    views,
+    visible_faces,
+)
+from renderer.studies.edge_on import are_edge_on
 
 CAMERAS = [
     PerspectiveCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), fov=40.0),
@@ -37,6 +51,39 @@ def test_more_points_a_face_find_what_is_seen_in_part():
     assert visible_faces(octree, [0.0, 0.0, 9.0], cuts=4).tolist() == [True, True]
 
 
+def test_an_edge_on_face_is_not_seen_however_the_body_is_turned():
+    """The eye in the planes of one, two and three walls of a box, which is then turned exactly and by any angle."""
+    corner, turns = (
+        Octree.from_mesh(box()),
+        [np.eye(3)[[1, 2, 0]], -np.eye(3), np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])],
+    )
+    for eye, walls in (([0.5, 3.0, 1.0], 1), ([0.5, 3.0, 0.0], 1), ([4.0, 3.0, 1.0], 2), ([0.25, 1.0, 0.5], 5)):
+        seen = visible_faces(corner, eye, cuts=2)
+        inside = np.einsum("ij,ij->i", box().face_normals(), np.array(eye) - box().triangles[:, 0])
+        assert seen.sum() == 2 * walls and not seen[inside == 0.0].any() and (inside == 0.0).any()
+        for turn in turns:
+            body = Mesh(box().vertices @ turn.T, box().faces)
+            np.testing.assert_array_equal(visible_faces(Octree.from_mesh(body), turn @ eye, cuts=2), seen)
+
+
+def test_whether_an_eye_lies_in_a_faces_plane_is_what_exact_arithmetic_says():
+    """The eye at the centroids of every third face, of which every other has a corner moved to the next number."""
+    rng = np.random.default_rng(3)
+    for size in (1.0, 2.0**-400, 2.0**300):  # the last two are beyond float64's products
+        corners, eye = rng.integers(-9, 10, (3000, 3, 3)) * size, np.array([1.0, 2.0, 3.0]) * size
+        corners[::3, 2] = 3.0 * eye - corners[::3, 0] - corners[::3, 1]
+        corners[::6, 0, 0] = np.nextafter(corners[::6, 0, 0], np.inf)
+        exact = np.array([_volume(face, eye) == 0 for face in corners])
+        np.testing.assert_array_equal(are_edge_on(corners, eye), exact)
+        assert 300 < exact.sum() < 700 and not exact[::6].all() and exact[3::6].all()
+
+
+def _volume(face, eye):
+    (a, b, c), p = ([[Fraction(x) for x in row] for row in face.tolist()]), [Fraction(x) for x in eye.tolist()]
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = ([x - y for x, y in zip(row, p, strict=True)] for row in (a, b, c))
+    return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+
+
 def test_faces_without_area_are_not_seen_and_blocks_change_nothing(monkeypatch):
     body = torus()
     flat = Mesh(np.concatenate([body.vertices, [[0, 9, 0]]]), np.concatenate([body.faces, [[len(body.vertices)] * 3]]))
@@ -59,12 +106,13 @@ def test_the_points_of_a_cut_face_are_the_centroids_of_equal_parts(cuts):
     np.testing.assert_allclose(places.mean(axis=0), 1.0 / 3.0, rtol=1e-14)
 
 
+@pytest.mark.parametrize("samples", [1, 4, 9])
 @pytest.mark.parametrize("camera", CAMERAS, ids=["perspective", "orthographic"])
-def test_depths_have_the_bits_of_pictures(camera):
+def test_depths_have_the_bits_of_pictures(camera, samples):
     body = torus()
     scene = Scene(camera=camera, materials={"m": Phong()}, objects=[SceneObject(mesh=body, material="m")], ambient=1.0)
     depth = depth_map(Octree.from_mesh(body), camera, 61, 47)
-    np.testing.assert_array_equal(depth, render(scene, resolution=(61, 47), samples=1).depth)
+    np.testing.assert_array_equal(depth, render(scene, resolution=(61, 47), samples=samples).depth)
     assert depth.shape == (47, 61) and 0.1 < np.isfinite(depth).mean() < 0.9
 
 
@@ -88,6 +136,37 @@ def test_a_scan_has_the_hits_of_its_rays():
     assert len(scan(octree, [0.0, 2.0, 0.5], [[0, 1, 0]]).points) == 0
 
 
+@pytest.mark.parametrize("integer", [np.int64, np.int16, np.uint16, np.uint64])
+def test_counts_may_be_integers_of_numpy(integer):
+    octree, flat = Octree.from_mesh(torus()), Octree.from_mesh(box())
+    np.testing.assert_array_equal(scan(octree, [0, 2, 0.5], integer(1000)).rays, scan(octree, [0, 2, 0.5], 1000).rays)
+    assert visible_faces(flat, [3, 3, 1.5], cuts=integer(3)).sum() == 6
+    depth = depth_map(octree, CAMERAS[0], integer(31), integer(23))
+    np.testing.assert_array_equal(depth, depth_map(octree, CAMERAS[0], 31, 23))
+    for pattern in (fibonacci_sphere, fibonacci_hemisphere, cosine_hemisphere):
+        np.testing.assert_array_equal(pattern(integer(300)).directions, pattern(300).directions)
+    np.testing.assert_array_equal(reinhart(integer(3)).directions, reinhart(3).directions)
+    points, up = np.array([[0.0, 2.0, 0.5]]), np.array([[0.0, 0.0, 1.0]])
+    for ask, option in ((sky_view_factor, "patches"), (ambient_occlusion, "samples")):
+        given = ask(octree, points, up, **{option: integer(145)})
+        np.testing.assert_array_equal(given, ask(octree, points, up, **{option: 145}))
+
+
+class _camera_of:  # noqa: N801  # as a function that gives a camera
+    """A camera with rows of one's own."""
+
+    def __init__(self, rows):
+        self._rows = rows
+
+    def rows(self, width, height):
+        return self._rows
+
+
+def test_rows_of_a_camera_of_ones_own_may_be_a_list():
+    octree, rows = Octree.from_mesh(torus()), CAMERAS[0].rows(31, 23).tolist()
+    np.testing.assert_array_equal(depth_map(octree, _camera_of(rows), 31, 23), depth_map(octree, CAMERAS[0], 31, 23))
+
+
 @pytest.mark.parametrize(
     ("ask", "argument", "said"),
     [
@@ -100,8 +179,29 @@ def test_a_scan_has_the_hits_of_its_rays():
         (lambda o: depth_map(o, CAMERAS[0], 0, 5), "width", "from 1 to 65536"),
         (lambda o: depth_map(o, CAMERAS[0], 5, 2.5), "height", "from 1 to 65536"),
         (lambda o: depth_map(o, "camera", 5, 5), "camera", "a camera, got str"),
+        (
+            lambda o: depth_map(o, PerspectiveCamera, 5, 5),
+            "camera",
+            r"rows\(width, height\) of shape \(6, 3\).* got .*height",
+        ),
+        (lambda o: depth_map(o, _camera_of(None), 5, 5), "camera", r"shape \(6, 3\), finite, got NoneType"),
+        (lambda o: depth_map(o, _camera_of("rows"), 5, 5), "camera", r"shape \(6, 3\), finite, got str"),
+        (lambda o: depth_map(o, _camera_of([[1.0], [2.0, 3.0]]), 5, 5), "camera", r"shape \(6, 3\), finite, got list"),
+        (
+            lambda o: depth_map(o, _camera_of(np.ones((3, 3))), 5, 5),
+            "camera",
+            r"shape \(6, 3\), finite, got shape \(3, 3\)",
+        ),
+        (lambda o: depth_map(o, _camera_of(np.ones(18)), 5, 5), "camera", r"shape \(6, 3\), finite, got shape \(18,\)"),
+        (
+            lambda o: depth_map(o, _camera_of(np.full((6, 3), np.nan)), 5, 5),
+            "camera",
+            r"finite, got \[nan, nan, nan\] in row 0",
+        ),
+        (lambda o: depth_map(o, _camera_of(np.zeros((6, 3))), 5, 5), "camera", "non-zero directions, got"),
         (lambda o: scan(o, [[0, 0, 9]]), "origin", "shape"),
         (lambda o: scan(o, [0, 0, 9], 0), "pattern", "an integer from 1"),
+        (lambda o: scan(o, [0, 0, 9], np.int64(0)), "pattern", "an integer from 1"),
         (lambda o: scan(o, [0, 0, 9], [[0, 0, 0]]), "pattern", "in row 0"),
         (lambda o: scan(o, [0, 0, 9], distance=-1), "distance", "a number >= 0"),
     ],

@@ -231,7 +231,7 @@ PICTURES = (
     _kernel("pictures", "film shifted by 0.1 pixel", "PerspectiveCamera.rows",
             "pixel * width / 2.0", "pixel * (width + 0.2) / 2.0"),
     _kernel("pictures", "camera rays 0.1 pixel off their pixel's centre", "_shoot",
-            "x + get(camera.samples, 2 * sample)", "x + 0.1 + get(camera.samples, 2 * sample)"),
+            "x + place[0]", "x + 0.1 + place[0]"),
     _kernel("pictures", "orthographic film 1 % too wide", "OrthographicCamera.rows",
             *_before("zero = np.zeros(3)",
                      "right = 1.01 * right")),

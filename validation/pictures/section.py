@@ -26,6 +26,7 @@ from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import camera as mitsuba_camera
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba import whitted as mitsuba_whitted
+from validation.references.mitsuba.scene import in_float32
 from validation.scenes import SCENE_CASES
 
 WHITTED = "Whitted recursion over Mitsuba's scene, BSDFs and rays (scalar_rgb)"
@@ -114,8 +115,11 @@ def check_scene(
     """Check one scene; returns its record for JSON and the gates.
 
     A rung that no reference can judge fails a gate; the record lists each rung or reference that is left out with its
-    reason. Pictures have one ray a pixel and no smallest weight, which no reference has.
+    reason. Pictures have one ray a pixel and no smallest weight, which no reference has. All draw the meshes as float32
+    holds them.
     """
+    objects, found = placement.check(name, scene)
+    scene = in_float32(scene)
     plan = plan_pictures(scene, effort)
     record: dict[str, Any] = {
         "name": name,
@@ -124,8 +128,8 @@ def check_scene(
         "faces": sum(len(instance.mesh.faces) for instance in scene.instances),
         "left_out": plan.left_out,
         "fault": plan.fault,
+        "objects": objects,
     }
-    record["objects"], found = placement.check(name, scene)
     theirs = _theirs(name, scene, plan, job)
     if plan.fault is None:
         record["aovs"], passed = _check_aovs(name, scene, plan.tasks[-1].resolution, job, theirs[AOVS])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
-from renderer.mesh.shapes import icosphere
+from renderer.mesh.shapes import box, icosphere
 from renderer.picture.image import Image
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
@@ -24,6 +24,7 @@ from validation.pictures import section as images
 from validation.pictures.section import PictureEffort, Reference
 from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import path as mitsuba_path
+from validation.references.mitsuba.scene import in_float32
 from validation.references.mitsuba.whitted import whitted
 from validation.scenes import SCENES
 from validation.thresholds import Thresholds
@@ -227,3 +228,13 @@ def test_a_users_scene_keeps_its_shape_and_climbs_the_ladder(tmp_path: Path) -> 
     job = Job(True, Thresholds(), tmp_path, lambda _: None, files)
     assert [scene[0] for scene in images.scenes_of(job)] == ["stairs", "mirrors"]
     assert images.steps(job) > 0
+
+
+def test_both_sides_draw_the_meshes_as_float32_holds_them_where_that_keeps_their_shapes() -> None:
+    near, far = (SceneObject(mesh=box(), material="red", translate=(0.0, 0.0, z)) for z in (0.3, 1e6 + 0.3))
+    scene = Scene(camera=balls().camera, materials=balls().materials, objects=(near, far))
+    ours = [instance.mesh.vertices for instance in in_float32(scene).instances]
+    given = [instance.mesh.vertices for instance in scene.instances]
+    np.testing.assert_array_equal(ours[0], given[0].astype(np.float32))
+    np.testing.assert_array_equal(ours[1], given[1])
+    assert (ours[0] != given[0]).any() and (given[1] != given[1].astype(np.float32)).any()

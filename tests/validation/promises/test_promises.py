@@ -371,7 +371,7 @@ def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert broken("codes") == {"float32 numbers"}
 
 
-def test_vertices_that_are_rounded_by_the_extent_of_the_file_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_placed_vertices_that_are_rounded_to_float32_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = scene._place
     monkeypatch.setattr(scene, "_place", lambda mesh, matrix: replace(
         sound(mesh, matrix), vertices=sound(mesh, matrix).vertices.astype(np.float32)))  # fmt: skip

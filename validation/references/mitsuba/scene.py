@@ -7,6 +7,7 @@ A diffuse BSDF is k_d / pi in Mitsuba and k_d for us, so every light is multipli
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -14,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import primary_rays, sample_offsets
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.scene import Instance, Scene
@@ -91,6 +93,21 @@ def meshes(scene: Scene, bsdfs: Sequence[mi.BSDF]) -> dict[mi.Mesh, int]:
     """
     placed = zip(scene.instances, bsdfs, strict=True)
     return {_mesh(i, instance, bsdf): i for i, (instance, bsdf) in enumerate(placed) if len(instance.mesh.faces)}
+
+
+def in_float32(scene: Scene) -> Scene:
+    """``scene`` with vertices rounded to float32, so that we draw the very triangles that Mitsuba gets of it.
+
+    A mesh whose shape does not survive that stays as it is, see ``VERTEX_ROUNDING``.
+    """
+    return scene.altered(instances=tuple(replace(i, mesh=_in_float32(i.mesh)) for i in scene.instances))
+
+
+def _in_float32(mesh: Mesh) -> Mesh:
+    with np.errstate(over="ignore"):  # beyond float32 it is inf, which is farther than any bound
+        vertices = mesh.vertices.astype(np.float32).astype(np.float64)
+    moved = np.abs(vertices - mesh.vertices).max(initial=0.0)
+    return replace(mesh, vertices=vertices) if moved <= VERTEX_ROUNDING * mesh.extent.max() else mesh
 
 
 def assemble(shapes: dict[mi.Mesh, int], emitters: Sequence[mi.Emitter]) -> mi.Scene:

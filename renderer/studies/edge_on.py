@@ -1,0 +1,57 @@
+"""Faces seen edge-on: those whose plane an eye lies in, by exact signs."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.kernels.jit import kernel
+from renderer.kernels.simd import at, local_doubles, pointer
+from renderer.kernels.vec3 import row3
+from renderer.points.rational import cross, dot, exact, less
+from renderer.kernels.signs import UNDECIDED, volume_sign
+
+Floats = NDArray[np.float64]
+
+# A volume of float64 errs by less than this share of its terms, 7 units of 2^-53 (Shewchuk, 1997), where these are
+# within the range in which what vanishes is far less.
+_SHARE, _LEAST, _FARTHEST = 2.0**-50, 2.0**-600, 2.0**200
+
+
+def are_edge_on(corners: Floats, eye: Floats) -> NDArray[np.bool_]:
+    """Whether an eye (3,) lies in the planes of faces with corners (n, 3, 3), (n,); no rounding tells.
+
+    The volume of face and eye is 0 there. Float64 tells that it is not for almost all faces.
+    """
+    sides = np.ones(len(corners), np.int64)
+    rows = np.flatnonzero(~_are_apart(corners, eye))
+    if len(rows):
+        some, told = np.ascontiguousarray(corners[rows]), np.empty(len(rows), np.int64)
+        _tell_sides(some, eye, told)
+        for row in np.flatnonzero(told == UNDECIDED):
+            told[row] = _is_beside(some[row], eye)
+        sides[rows] = told
+    return sides == 0
+
+
+def _are_apart(corners: Floats, eye: Floats) -> NDArray[np.bool_]:
+    """Whether float64 tells that the eye is beside a face's plane."""
+    with np.errstate(all="ignore"):  # what overflows or vanishes is not told
+        a, b, c = np.moveaxis(corners - eye, 1, 0)
+        x, y = b[:, [1, 2, 0]] * c[:, [2, 0, 1]], b[:, [2, 0, 1]] * c[:, [1, 2, 0]]
+        volume, terms = (a * (x - y)).sum(axis=1), (np.abs(a) * (np.abs(x) + np.abs(y))).sum(axis=1)
+    near = np.abs(corners - eye).max(axis=(1, 2), initial=0.0) <= _FARTHEST
+    return near & (terms >= _LEAST) & (np.abs(volume) > _SHARE * terms)
+
+
+@kernel
+def _tell_sides(corners, eye, sides):
+    """``volume_sign`` of faces and an eye to ``sides``."""
+    parts, p = local_doubles(), row3(pointer(eye), 0)
+    for i in range(len(corners)):
+        face = at(pointer(corners), 9 * i)
+        sides[i] = volume_sign(row3(face, 0), row3(face, 1), row3(face, 2), p, parts)
+
+
+def _is_beside(face: Floats, eye: Floats) -> bool:
+    """Whether the eye is beside the plane of a face (3, 3), by rational numbers."""
+    a, b, c = (less(exact(corner), exact(eye)) for corner in face)
+    return bool(dot(a, cross(b, c)) != 0)
