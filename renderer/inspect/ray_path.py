@@ -21,10 +21,17 @@ from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHO
 from renderer.shade.shading import reflect
 from renderer.shade.surface import MAX_MEDIA, Surface, phong_of, surface_of
 from renderer.shade.whitted import refract_from
-from renderer.trace.spawn import BOUNDED, spawn_origin
+from renderer.trace.batch import check_rays, make_starts
+from renderer.trace.hits import Hits
+from renderer.trace.query import closest_hits
+from renderer.trace.spawn import BOUNDED, Place, spawn_origin, start_row
+from renderer.trace.starts.record import HEAD, ROW
 
 Vector = tuple[float, float, float]
+Floats = NDArray[np.float64]
 Kind = Literal["camera", "reflected", "refracted", "shadow"]
+# The start of a ray that starts on no surface.
+_NO_START = np.empty(0)
 
 # In glass there are up to 2^d rays of depth d: too many to look at, and to wait for after a click. This many are all of
 # them to depth 8, the shadow rays not counted, and take about a tenth of a second.
@@ -59,7 +66,9 @@ class Segment:
 
 
 class _Ray(NamedTuple):
-    """A ray that waits to be traced; media are rows of materials, outermost first."""
+    """A ray that waits to be traced; media are rows of materials, outermost first. start is its row of
+    ``starts.record``, empty where it starts on no surface.
+    """
 
     kind: Kind
     depth: int
@@ -68,12 +77,16 @@ class _Ray(NamedTuple):
     direction: Vector
     weight: Vector
     media: tuple[int, ...]
+    start: Floats
 
 
 class _Met(NamedTuple):
-    """The face that a ray met, its surface, the normal that faces the ray, and the material's row with its columns."""
+    """The face that a ray met and the place there, its surface, the normal that faces the ray, and the material's row
+    with its columns.
+    """
 
     face: int
+    place: Place
     surface: Surface
     n: Vector
     inside: bool
@@ -89,6 +102,7 @@ class _Aim(NamedTuple):
     t_max: float
     end: Vector
     radiance: Vector
+    start: Floats
 
 
 def ray_path(
@@ -113,7 +127,7 @@ def ray_path(
     o, d = checked_vector("origin", origin), checked_vector("direction", direction)
     expect(any(d), "direction", "a vector of non-zero length", repr(direction))
     bounces = max_depth if prepared.needs.reflection or prepared.needs.refraction else 0
-    waiting = deque([_Ray("camera", 0, -1, o, normalized(d), (1.0, 1.0, 1.0), _media_at(prepared, o))])
+    waiting = deque([_Ray("camera", 0, -1, o, normalized(d), (1.0, 1.0, 1.0), _media_at(prepared, o), _NO_START)])
     path: list[Segment] = []
     for _ in range(MAX_RAYS):
         if not waiting:
@@ -139,14 +153,32 @@ def _goes_on(weight: Vector, min_weight: float) -> bool:
 
 def _meet(prepared: PreparedScene, ray: _Ray) -> _Met | None:
     """The nearest surface that the ray meets."""
-    hits = prepared.octree.closest_hit([ray.origin], [ray.direction])
+    hits = _closest(prepared, ray.origin, ray.direction, np.inf, ray.start)
     if not hits.hit[0]:
         return None
-    face = int(hits.face[0])
-    surface = surface_of(prepared.arrays, face, float(hits.u[0]), float(hits.v[0]), ray.direction)
+    face, u, v = int(hits.face[0]), float(hits.u[0]), float(hits.v[0])
+    surface = surface_of(prepared.arrays, face, u, v, ray.direction)
+    came = -1.0 if dot(ray.direction, surface.n_g) > 0.0 else 1.0
     inside = dot(ray.direction, surface.n_s) > 0.0
     n, row = scale(surface.n_s, -1.0) if inside else surface.n_s, int(surface.material)
-    return _Met(face, surface, n, inside, row, prepared.arrays.materials[row // MATERIAL_COLUMNS])
+    return _Met(face, Place(float(face), u, v, surface.slack, came), surface, n, inside, row, prepared.arrays.materials[row // MATERIAL_COLUMNS])
+
+
+def _closest(prepared: PreparedScene, origin: Vector, direction: Vector, t_max: float, start: Floats) -> Hits:
+    """The closest hit of one ray as a picture traces it."""
+    rays, _ = check_rays([origin], [direction], 0.0, [t_max])
+    if len(start):
+        starts = make_starts(1, prepared.mesh)
+        starts[HEAD:].view(np.float64)[:] = start
+        rays = rays._replace(starts=starts)
+    return closest_hits(prepared.tree, rays, prepared.mesh, 1)
+
+
+def _start(met: _Met, direction: Vector) -> Floats:
+    """The row of the start of a ray that leaves a surface."""
+    row = np.empty(ROW)
+    start_row(row, met.place, met.surface.n_g, direction)
+    return row
 
 
 def _color(columns: NDArray[np.float64], first: int) -> Vector:
@@ -192,13 +224,14 @@ def _aim(prepared: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
             continue
         end = _beyond(prepared, o, way) if seen.directional else seen.place
         share = phong_of(prepared.arrays, met.row, met.n, ray.direction, seen.towards)
-        aims.append(_Aim(o, way, float(t_max), end, times(ray.weight, times(share, seen.arriving))))
+        radiance = times(ray.weight, times(share, seen.arriving))
+        aims.append(_Aim(o, way, float(t_max), end, radiance, _start(met, way)))
     return aims
 
 
 def _shadow(prepared: PreparedScene, ray: _Ray, own: int, aim: _Aim) -> Segment:
     """The segment of a shadow ray; it ends at the nearest surface that hides the light."""
-    hits = prepared.octree.closest_hit([aim.origin], [aim.direction], t_max=aim.t_max)
+    hits = _closest(prepared, aim.origin, aim.direction, aim.t_max, aim.start)
     hidden = bool(hits.hit[0])
     end = _color(hits.points[0], 0) if hidden else aim.end
     radiance = (0.0, 0.0, 0.0) if hidden else aim.radiance
@@ -224,4 +257,4 @@ def _child(
     kind: Kind, ray: _Ray, met: _Met, own: int, direction: Vector, weight: Vector, media: tuple[int, ...]
 ) -> _Ray:
     w, (p, error, n_g, *_) = normalized(direction), met.surface
-    return _Ray(kind, ray.depth + 1, own, spawn_origin(p, error, n_g, w, BOUNDED), w, weight, media)
+    return _Ray(kind, ray.depth + 1, own, spawn_origin(p, error, n_g, w, BOUNDED), w, weight, media, _start(met, w))

@@ -6,14 +6,15 @@ import numpy as np
 
 from renderer.kernels.jit import inlined
 from renderer.kernels.simd import at, get, put
+from renderer.trace.starts.record import ROW
 
 # The side in pixels of the block that a bundle of camera rays covers, and the most rays of a bundle.
 SIDE = 8
 SIZE = SIDE * SIDE
-# Columns of float64: origin, direction and weight of each ray. Columns of int64: the number of rays and their depth;
+# Columns of float64: origin, direction and weight of each ray, and its row of ``starts.record``. Columns of int64: the number of rays and their depth;
 # for each ray its pixel, the number of media that it is in, and room for ``limit`` of them, as the rows of their
 # materials, outermost first.
-_ORIGIN, _DIRECTION, _WEIGHT, BUNDLE_DOUBLES = 0, 3 * SIZE, 6 * SIZE, 9 * SIZE
+_ORIGIN, _DIRECTION, _WEIGHT, _START, BUNDLE_DOUBLES = 0, 3 * SIZE, 6 * SIZE, 9 * SIZE, (9 + ROW) * SIZE
 _PIXEL, _COUNT, BUNDLE_INTEGERS = 2, 2 + SIZE, 2 + 2 * SIZE
 
 
@@ -23,6 +24,7 @@ class Bundle(NamedTuple):
     origins: Any
     directions: Any
     weights: Any
+    starts: Any
     header: Any
     pixels: Any
     media_counts: Any
@@ -35,7 +37,7 @@ def bundle_at(doubles, integers, limit, slot):
     """The bundle in place ``slot`` of two arrays of bundles."""
     doubles, integers = at(doubles, slot * BUNDLE_DOUBLES), at(integers, slot * (BUNDLE_INTEGERS + SIZE * limit))
     return Bundle(
-        at(doubles, _ORIGIN), at(doubles, _DIRECTION), at(doubles, _WEIGHT),
+        at(doubles, _ORIGIN), at(doubles, _DIRECTION), at(doubles, _WEIGHT), at(doubles, _START),
         integers, at(integers, _PIXEL), at(integers, _COUNT), at(integers, BUNDLE_INTEGERS), limit,
     )  # fmt: skip
 
@@ -61,7 +63,7 @@ def depth_of(bundle):
 
 @inlined
 def append(bundle, o, d, weight, pixel, media, count):
-    """Add a ray that is in the first ``count`` of ``media``."""
+    """Add a ray that is in the first ``count`` of ``media``; returns its row of starts, which is to be written."""
     i = get(bundle.header, 0)
     put(bundle.header, 0, i + 1)
     for k in range(3):
@@ -72,3 +74,4 @@ def append(bundle, o, d, weight, pixel, media, count):
     put(bundle.media_counts, i, count)
     for k in range(count):
         put(bundle.media, i * bundle.limit + k, get(media, k))
+    return at(bundle.starts, i * ROW)

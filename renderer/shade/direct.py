@@ -13,14 +13,17 @@ from renderer.shade.lights import aim, see_light
 from renderer.shade.records import DIELECTRIC, KIND, MIRROR, UNLIT
 from renderer.shade.surface import phong
 from renderer.trace.rays import RayPointers
+from renderer.trace.spawn import Place, put_start
+from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import search_blocks, trace
 
 # The surface that a ray of a bundle met, for its light and the rays that it spawns: SURFACE_DOUBLES float64 per ray.
-POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT = 0, 3, 6, 9, 10, 11, 12
-SURFACE_DOUBLES = 15
-# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, and the light from there.
+POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT, PLACE = 0, 3, 6, 9, 10, 11, 12, 15
+SURFACE_DOUBLES = 20
+# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and the
+# row of ``starts.record``.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
-_TOWARDS, _ARRIVING, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE
+_TOWARDS, _ARRIVING, _START, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE, (13 + ROW) * SIZE
 
 
 @kernel
@@ -29,7 +32,7 @@ def trace_rays(tree, rays, found, count, scratch, any_hit):
     if tree.has_nodes:
         trace(tree, rays, found, 0, count, scratch, any_hit)
     else:
-        search_blocks(tree, rays, found, 0, count, any_hit)
+        search_blocks(tree, rays, found, 0, count, scratch.holders, any_hit)
 
 
 @inlined
@@ -38,6 +41,13 @@ def put3(base, first, a):
     put(base, first, a[0])
     put(base, first + 1, a[1])
     put(base, first + 2, a[2])
+
+
+@inlined
+def place_of(surface):
+    """The ``Place`` of a surface."""
+    row = at(surface, PLACE)
+    return Place(get(row, 0), get(row, 1), get(row, 2), get(row, 3), get(row, 4))
 
 
 @inlined
@@ -64,6 +74,7 @@ def _aim_all(scene, surfaces, lit, count, light, offset, shadows):
             put3(shadows, _ORIGIN + 3 * aimed, ray.origin)
             put3(shadows, _DIRECTION + 3 * aimed, ray.direction)
             put(shadows, _T_MAX + aimed, ray.t_max)
+            put_start(at(shadows, _START + ROW * aimed), place_of(surface), n_g, ray.direction, offset)
             put3(shadows, _TOWARDS + 3 * aimed, seen.towards)
             put3(shadows, _ARRIVING + 3 * aimed, seen.arriving)
             put(lit, SIZE + aimed, i)
@@ -80,10 +91,13 @@ def _add_light(scene, bundle, surface, i, towards, arriving):
 
 
 @inlined
-def _trace_shadows(tree, bundle, lit, aimed, work):
+def _trace_shadows(tree, scene, bundle, lit, aimed, work):
     """Find which of the ``aimed`` shadow rays hit anything, and count all of them in their pixels."""
     shadows = work.shadows
-    rays = RayPointers(at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 3, 0, 1, 1.0)
+    starts = StartPointers(at(shadows, _START), ROW, scene.vertices, scene.faces)
+    rays = RayPointers(
+        at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 3, 0, 1, 1.0, starts
+    )  # fmt: skip
     trace_rays(tree, rays, work.found, aimed, work.trace, np.bool_(True))
     for k in range(aimed):
         pixel = get(bundle.pixels, get(lit, SIZE + k))
@@ -102,7 +116,7 @@ def light_surfaces(tree, scene, bundle, surfaces, lit, settings, work):
     for light in range(scene.light_count):
         aimed = _aim_all(scene, surfaces, lit, count, light, settings.offset, shadows)
         if settings.shadows:
-            _trace_shadows(tree, bundle, lit, aimed, work)
+            _trace_shadows(tree, scene, bundle, lit, aimed, work)
         for k in range(aimed):
             i = get(lit, SIZE + k)
             if not (settings.shadows and get(work.found.hit, k)):

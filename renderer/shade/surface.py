@@ -81,7 +81,7 @@ def scene_pointers(scene):
 
 class Surface(NamedTuple):
     """The surface where a ray met the scene: its point p, the ``offset_distance`` of p, the geometric and the shading
-    normal, and the place at which its material's row begins.
+    normal, the place at which its material's row begins, and the slack of rays from there.
     """
 
     p: tuple
@@ -89,6 +89,7 @@ class Surface(NamedTuple):
     n_g: tuple
     n_s: tuple
     material: int
+    slack: float
 
 
 @inlined
@@ -103,8 +104,8 @@ def surface_at(scene, face, u, v, d):
         n = barycentric(row3(scene.normals, a), row3(scene.normals, b), row3(scene.normals, c), u, v)
         # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
         n_s = normalized(n) if largest_component(n) > 0.0 else n_g
-    error = offset_distance(p, p0, p1, p2, u, v, n_g)
-    return Surface(p, error, n_g, n_s, get(scene.material, face))
+    error, slack = offset_distance(p, p0, p1, p2, u, v, n_g)
+    return Surface(p, error, n_g, n_s, get(scene.material, face), slack)
 
 
 @inlined

@@ -27,6 +27,7 @@ from renderer.shade.whitted import (
 )
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
+from renderer.trace.spawn import put_no_start
 from renderer.trace.traverse import Memory, make_memory, make_scratch
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
@@ -78,7 +79,8 @@ def _shoot(camera, scene, bundle, place, block):
             rows = camera.rows
             o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))
             d = add(row3(rows, 3), add(scale(row3(rows, 4), px), scale(row3(rows, 5), py)))
-            append(bundle, o, normalized(d), (1.0, 1.0, 1.0), j * SIDE + i, scene.media, scene.media_count)
+            row = append(bundle, o, normalized(d), (1.0, 1.0, 1.0), j * SIDE + i, scene.media, scene.media_count)
+            put_no_start(row)
 
 
 @inlined

@@ -30,11 +30,13 @@ from renderer.shade.direct import (
     LIGHT,
     MATERIAL,
     NORMAL,
+    PLACE,
     POINT,
     SHADOW_DOUBLES,
     SURFACE_DOUBLES,
     is_lit,
     light_surfaces,
+    place_of,
     put3,
     trace_rays,
 )
@@ -42,7 +44,8 @@ from renderer.shade.records import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLE
 from renderer.shade.shading import fresnel, reflect, refract
 from renderer.shade.surface import scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
-from renderer.trace.spawn import OffsetRule, spawn_origin
+from renderer.trace.spawn import OffsetRule, put_start, spawn_origin
+from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import Scratch
 
 
@@ -97,7 +100,7 @@ def work_lengths(settings: Settings) -> tuple[int, int]:
     """
     slots = settings.max_depth + 4
     doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE
-    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + settings.media + 2 * SIZE
+    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + settings.media + 3 * SIZE
     return doubles, integers
 
 
@@ -114,7 +117,8 @@ def make_work(doubles, integers, hits, settings, scratch):
     lit = at(face, SIZE)
     beyond = at(lit, 1 + 2 * SIZE)
     traced = at(beyond, settings.media)
-    found = HitPointers(t, face, u, v, hits)
+    side = at(traced, 2 * SIZE)
+    found = HitPointers(t, face, u, v, side, hits)
     return Work(
         doubles, integers, order, scratch, found, zero, infinity, surfaces, shadows, lit, beyond,
         at(shadows, SHADOW_DOUBLES), traced, at(traced, SIZE),
@@ -172,13 +176,18 @@ def _meet_surface(scene, bundle, work, i):
     """Write the surface that ray ``i`` met, and its ambient light, to ``work``."""
     found, surface = work.found, at(work.surfaces, i * SURFACE_DOUBLES)
     d = row3(bundle.directions, i)
-    met = surface_at(scene, get(found.face, i), get(found.u, i), get(found.v, i), d)
+    face, u, v = get(found.face, i), get(found.u, i), get(found.v, i)
+    met = surface_at(scene, face, u, v, d)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, met.n_s) > 0.0
     put3(surface, POINT, met.p)
     put3(surface, NORMAL, scale(met.n_s, -1.0) if inside else met.n_s)
     put3(surface, GEOMETRIC, met.n_g)
     put(surface, BOUND, met.error)
+    place = at(surface, PLACE)
+    put3(place, 0, (float(face), u, v))
+    put(place, 3, met.slack)
+    put(place, 4, -1.0 if dot(d, met.n_g) > 0.0 else 1.0)
     put(surface, MATERIAL, float(met.material))
     put(surface, INSIDE, 1.0 if inside else 0.0)
     put3(surface, LIGHT, times(three(scene.materials, met.material + AMBIENT), row3(scene.colors, 0)))
@@ -247,7 +256,8 @@ def _spawn(surface, pixel, w, weight, children, media, count, settings):
     w = normalized(w)
     p, n_g = three(surface, POINT), three(surface, GEOMETRIC)
     o = spawn_origin(p, get(surface, BOUND), n_g, w, settings.offset)
-    append(children, o, w, weight, pixel, media, count)
+    row = append(children, o, w, weight, pixel, media, count)
+    put_start(row, place_of(surface), n_g, w, settings.offset)
 
 
 @inlined
@@ -300,7 +310,8 @@ def _collect_light(scene, bundle, work):
 @inlined
 def meet(tree, scene, bundle, work):
     """Trace the rays of a bundle and write the surfaces that they meet to ``work``, of which none is lit yet."""
-    rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 3, 0, 0, 1.0)
+    starts = StartPointers(bundle.starts, ROW, scene.vertices, scene.faces)
+    rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 3, 0, 0, 1.0, starts)
     trace_rays(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
     _meet_surfaces(scene, bundle, work)
 

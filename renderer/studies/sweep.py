@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, get, pointer, put, smaller
-from renderer.kernels.vec3 import add, cross, dot, normalized, row3, scale, three
+from renderer.kernels.vec3 import add, cross, dot, largest_component, normalized, row3, scale, three
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.parallel_rays import (
@@ -24,7 +24,22 @@ from renderer.trace.parallel_rays import (
     trace_parallel,
 )
 from renderer.trace.rays import HitPointers, RayPointers, hit_pointers
-from renderer.trace.spawn import corners_of, has_normal, leave_face, leave_to_both_sides
+from renderer.trace.spawn import LEVEL, has_normal, leave_to_both_sides, put_no_start
+from renderer.trace.starts.record import (
+    ABOVE,
+    ANCHOR,
+    BARYCENTRIC,
+    CODE,
+    EDGE,
+    FACE,
+    KNOWN,
+    ROW,
+    SLACK,
+    StartPointers,
+    corners_of,
+    start_at,
+)
+from renderer.trace.starts.search import side_of_normal
 from renderer.trace.traverse import Memory, Scratch, make_memory, make_scratch, search_blocks, trace
 
 TILE = 256
@@ -41,26 +56,26 @@ RAYS = 1024
 # And in one call, or one more list: some 10 ms, so that Ctrl-C and other threads need not wait for long.
 RAYS_A_CALL = 1 << 14
 # For each point of a tile: where a ray starts that goes to the side of its face's normal, and to the other side; that
-# normal; the frame, whose third vector is the point's own normal; the sum so far; and that of all directions.
+# normal; the frame, whose third vector is the point's own normal; the sum so far; that of all directions; and its row of
+# ``starts.record``.
 _ABOVE, _BELOW, _FACING, _FRAME = 0, 3 * TILE, 6 * TILE, 9 * TILE
-_SUM, _WHOLE, _POINT_DOUBLES = 18 * TILE, 19 * TILE, 20 * TILE
-# Its row, its face, how its rays start, and the leaf that hid its last direction, or 0; and once for the tile, how
-# often tracing its rays together may still be tried.
-_ROW, _FACE, _START, _HIDER, _LEFT, _POINT_INTEGERS = 0, TILE, 2 * TILE, 3 * TILE, 4 * TILE, 4 * TILE + 8
-# At the point itself; on one of two sides of a face; or by a rule that needs each direction, as of a face whose corners
-# lie on a line.
-_AT_POINT, _BY_SIDE, _BY_DIRECTION = range(3)
+_SUM, _WHOLE, _START, _POINT_DOUBLES = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
+# Its row, and the leaf that hid its last direction, or 0; and once for the tile, how often tracing its rays together may
+# still be tried.
+_ROW, _HIDER, _LEFT, _POINT_INTEGERS = 0, TILE, 2 * TILE, 2 * TILE + 8
 
 
 class Places(NamedTuple):
-    """Where rays start. normals has one row for all, or none where there is no horizon; leaving may have no row.
+    """Where rays start. normals has one row for all, or none where there is no horizon.
 
-    points (n, 3), normals (n, 3), (1, 3) or (0, 3) float64, not zero; leaving (n,) or (0,) int64, -1 for no face
+    points (n, 3), normals (n, 3), (1, 3) or (0, 3) float64, not zero; leaving (n,) int64, -1 for a point that is on no
+    face; anchors (n, 3) float64, its barycentrics there and 0
     """
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     leaving: NDArray[np.int64]
+    anchors: NDArray[np.float64]
 
 
 class Sky(NamedTuple):
@@ -106,7 +121,7 @@ class SweepMemory(NamedTuple):
 
 
 class _Work(NamedTuple):
-    """Pointers into a ``SweepMemory``: the tile's points; origins, directions and t_max of rays; the points with
+    """Pointers into a ``SweepMemory``: the tile's points; origins, directions, t_max and starts of rays; the points with
     directions that are listed, (direction * TILE + point) * 2, and 1 more for those that have a ray; and their values.
     """
 
@@ -115,6 +130,7 @@ class _Work(NamedTuple):
     origins: Any
     directions: Any
     limits: Any
+    starts: Any
     values: Any
     zero: Any
     listed: Any
@@ -126,7 +142,7 @@ class _Work(NamedTuple):
 def make_sweep_memory(depth: int) -> SweepMemory:
     """Memory for tiles against a tree of ``depth`` levels."""
     return SweepMemory(
-        cache_aligned(_POINT_DOUBLES + 8 * RAYS + 8, np.float64),
+        cache_aligned(_POINT_DOUBLES + (8 + ROW) * RAYS + 8, np.float64),
         cache_aligned(_POINT_INTEGERS + RAYS, np.int64),
         cache_aligned(RAYS // 8, np.float64),
         make_memory(depth, RAYS),
@@ -139,10 +155,10 @@ def _work_in(memory):
     doubles, integers = pointer(memory.doubles), pointer(memory.integers)
     origins = at(doubles, _POINT_DOUBLES)
     directions, limits, values = at(origins, 3 * RAYS), at(origins, 6 * RAYS), at(origins, 7 * RAYS)
-    zero = at(origins, 8 * RAYS)
+    starts, zero = at(origins, 8 * RAYS), at(origins, (8 + ROW) * RAYS)
     put(zero, 0, 0.0)
     return _Work(
-        doubles, integers, origins, directions, limits, values, zero, at(integers, _POINT_INTEGERS),
+        doubles, integers, origins, directions, limits, starts, values, zero, at(integers, _POINT_INTEGERS),
         hit_pointers(memory.hits, 0), make_scratch(memory.trace), parallel_pointers(memory.parallel),
     )  # fmt: skip
 
@@ -167,57 +183,79 @@ def _frame_of(normal):
 
 
 @kernel
-def _begin_tile(mesh, places, rows, begin, count, work, unit):
+def _begin_tile(tree, mesh, places, rows, begin, count, work):
     """Read ``count`` points, those in ``rows`` from ``begin`` on, and prepare where their rays start."""
-    vertices, faces = pointer(mesh[0]), pointer(mesh[1])
     points, normals, leaving = pointer(places.points), pointer(places.normals), pointer(places.leaving)
     step = np.int64(len(places.normals) > 1)
     put(work.numbers, _LEFT, _TRIES)
     for i in range(count):
         row = rows[begin + i]
-        face = get(leaving, row) if len(places.leaving) > 0 else np.int64(-1)
-        o, start = row3(points, row), _AT_POINT
+        face, o, start = get(leaving, row), row3(points, row), at(work.points, _START + ROW * i)
         put(work.numbers, _ROW + i, row)
-        put(work.numbers, _FACE + i, face)
         put(work.numbers, _HIDER + i, 0)
         _put3(work.points, _ABOVE + 3 * i, o)
-        if face >= 0:
-            corners = corners_of(vertices, faces, face, unit)
-            start = _BY_DIRECTION
-            if has_normal(corners[0], corners[1], corners[2]):
-                start = _BY_SIDE
-                normal, above, below = leave_to_both_sides(corners, o, unit)
-                _put3(work.points, _FACING + 3 * i, normal)
-                _put3(work.points, _ABOVE + 3 * i, above)
-                _put3(work.points, _BELOW + 3 * i, below)
-        put(work.numbers, _START + i, start)
+        put_no_start(start)
         if len(places.normals) > 0:
             first, second, third = _frame_of(row3(normals, row * step))
             _put3(work.points, _FRAME + 9 * i, first)
             _put3(work.points, _FRAME + 9 * i + 3, second)
             _put3(work.points, _FRAME + 9 * i + 6, third)
+        if face >= 0:
+            _put3(start, ANCHOR, row3(pointer(places.anchors), row))
+            _begin_on_face(tree, mesh, work, i, o, face, len(places.normals) > 0)
         put(work.points, _SUM + i, 0.0)
         put(work.points, _WHOLE + i, 0.0)
 
 
-@inlined
-def _start_of(mesh, places, work, i, d, unit):
-    """Where the ray of point ``i`` in direction d starts."""
-    start = get(work.numbers, _START + i)
-    if start == _AT_POINT:
-        return three(work.points, _ABOVE + 3 * i)
-    if start == _BY_SIDE:
-        side = _ABOVE if dot(three(work.points, _FACING + 3 * i), d) >= 0.0 else _BELOW
-        return three(work.points, side + 3 * i)
-    corners = corners_of(pointer(mesh[0]), pointer(mesh[1]), get(work.numbers, _FACE + i), unit)
-    return leave_face(corners, row3(pointer(places.points), get(work.numbers, _ROW + i)), d, unit)
+@kernel
+def _begin_on_face(tree, mesh, work, i, o, face, has_normal_):
+    """Prepare where the rays of a tile's ``i``-th point start, which lies on a face; its normal says on which side."""
+    start, corners = at(work.points, _START + ROW * i), corners_of(pointer(mesh[0]), pointer(mesh[1]), face, tree.scale)
+    slack, code, own = EDGE, BARYCENTRIC, face
+    n = three(work.points, _FRAME + 9 * i + 6)
+    if has_normal(corners[0], corners[1], corners[2]):
+        normal, above, below, slack = leave_to_both_sides(corners, o, tree.scale)
+        _put3(work.points, _FACING + 3 * i, normal)
+        _put3(work.points, _ABOVE + 3 * i, above)
+        _put3(work.points, _BELOW + 3 * i, below)
+        if has_normal_ and slack != EDGE and dot(normal, n) != 0.0:
+            code |= KNOWN | (ABOVE if dot(normal, n) > 0.0 else 0)
+    put(start, FACE, np.float64(own))
+    put(start, SLACK, slack)
+    put(start, CODE, np.float64(code))
+    if has_normal_ and slack == EDGE:
+        starts = StartPointers(start, 0, pointer(mesh[0]), pointer(mesh[1]))
+        side = side_of_normal(tree, start_at(starts, 0, tree.scale), n, work.scratch.packet_stack, work.scratch.holders)
+        if side.face >= 0:
+            put(start, CODE, np.float64(side.code))
+            # The side is that of another face, which then is the one that the rays leave.
+            put(start, FACE, np.float64(side.face))
+            _put3(start, ANCHOR, (side.u, side.v, 0.0))
 
 
 @kernel
-def _aim(mesh, places, sky, work, begun, count, unit):
+def _start_ray(work, i, d, ray):
+    """Write the origin and the start of a ray from point ``i`` in direction d. Returns whether nothing stops it yet."""
+    own, row = at(work.points, _START + ROW * i), at(work.starts, ROW * ray)
+    for k in range(ROW):
+        put(row, k, get(own, k))
+    if get(own, FACE) < 0.0 or get(own, SLACK) == EDGE:
+        _put3(work.origins, 3 * ray, three(work.points, _ABOVE + 3 * i))
+        return True
+    slope, code = dot(three(work.points, _FACING + 3 * i), d), np.int64(get(own, CODE))
+    above = slope >= 0.0
+    _put3(work.origins, 3 * ray, three(work.points, (_ABOVE if above else _BELOW) + 3 * i))
+    if abs(slope) <= LEVEL * largest_component(d):
+        put(row, SLACK, EDGE)
+        return True
+    return code & KNOWN == 0 or above == (code & ABOVE != 0)
+
+
+@kernel
+def _aim(places, sky, work, begun, count):
     """List a tile's ``count`` points with one direction more; ``begun`` are that, and the entries and rays so far.
 
-    Returns the entries and rays with them. What is below the horizon of a point has no ray.
+    Returns the entries and rays with them. What is below the horizon of a point, or behind its face, has no ray.
     """
     k, listed, rays = begun
     given, weight, limit = row3(pointer(sky.directions), k), sky.values[k], sky.limits[k]
@@ -233,9 +271,8 @@ def _aim(mesh, places, sky, work, begun, count, unit):
         if sky.cosine:
             value *= abs(height)
         put(work.points, _WHOLE + i, get(work.points, _WHOLE + i) + value)
-        seen = height > 0.0
+        seen = height > 0.0 and _start_ray(work, i, d, rays)
         if seen:
-            _put3(work.origins, 3 * rays, _start_of(mesh, places, work, i, d, unit))
             _put3(work.directions, 3 * rays, d)
             put(work.limits, rays, limit)
             if rays < TILE:
@@ -277,9 +314,10 @@ def _end_tile(answers, work, count):
 
 
 @inlined
-def _trace(tree, work, rays, together):
+def _trace(tree, mesh, work, rays, together):
     """Find which rays hit anything; ``together`` says that they are those of one direction."""
-    batch = RayPointers(work.origins, work.directions, work.zero, work.limits, 3, 3, 0, 1, tree.scale)
+    starts = StartPointers(work.starts, ROW, pointer(mesh[0]), pointer(mesh[1]))
+    batch = RayPointers(work.origins, work.directions, work.zero, work.limits, 3, 3, 0, 1, tree.scale, starts)
     if together and rays > 0:
         if trace_parallel(tree, batch, work.found, rays, work.scratch, work.parallel):
             return
@@ -287,7 +325,7 @@ def _trace(tree, work, rays, together):
     if tree.has_nodes:
         trace(tree, batch, work.found, 0, rays, work.scratch, np.bool_(True))
     else:
-        search_blocks(tree, batch, work.found, 0, rays, np.bool_(True))
+        search_blocks(tree, batch, work.found, 0, rays, work.scratch.holders, np.bool_(True))
 
 
 @kernel
@@ -317,15 +355,15 @@ def sweep(words, mesh, places, sky, answers, rows, steps, state, memory):
     begin, k = state
     count = _tile_from(rows, steps, begin)
     if k == 0:
-        _begin_tile(mesh, places, rows, begin, count, work, tree.scale)
+        _begin_tile(tree, mesh, places, rows, begin, count, work)
     traced, parallel = np.int64(0), len(steps) > 0 and tree.has_nodes and not sky.turned and count >= _TOGETHER
     while k < len(sky.values) and traced < RAYS_A_CALL:
         together = parallel and get(work.numbers, _LEFT) > 0
         listed, rays, most = np.int64(0), np.int64(0), count if together else np.int64(RAYS)
         while k < len(sky.values) and listed + count <= most:
-            listed, rays = _aim(mesh, places, sky, work, (k, listed, rays), count, tree.scale)
+            listed, rays = _aim(places, sky, work, (k, listed, rays), count)
             k += 1
-        _trace(tree, work, rays, together)
+        _trace(tree, mesh, work, rays, together)
         _take_down(answers, work, listed)
         traced += listed
     if k < len(sky.values):

@@ -153,6 +153,13 @@ def check_faces(argument: str, faces: ArrayLike, shape: tuple[int, ...], most: i
     return rows
 
 
+def make_starts(count: int, mesh: Mesh) -> NDArray[np.int64]:
+    """An array for the starts of rays, as of ``starts.record``, on a mesh that the caller keeps; its rows follow HEAD."""
+    starts = np.empty(HEAD + ROW * count, np.int64)
+    starts[ROW_STEP], starts[VERTICES], starts[FACES] = ROW, mesh.vertices.ctypes.data, mesh.faces.ctypes.data
+    return starts
+
+
 class Leaving(NamedTuple):
     """The faces that rays leave, and how: checked arrays of one row a ray.
 
@@ -182,8 +189,7 @@ def moved_off(rays: RayBatch, leaving: Leaving, mesh: Mesh, scale: float, thread
     if not sound.all():
         # Rejected before it is moved, so that the message names the numbers as given.
         reject(rays, int((~sound).argmax()), scale)
-    origins, starts, bad = np.empty((count, 3)), np.empty(HEAD + ROW * count, np.int64), list[int]()
-    starts[ROW_STEP], starts[VERTICES], starts[FACES] = ROW, mesh.vertices.ctypes.data, mesh.faces.ctypes.data
+    origins, starts, bad = np.empty((count, 3)), make_starts(count, mesh), list[int]()
     rows, ways = starts[HEAD:].view(np.float64).reshape(count, ROW), (rays.origins, rays.directions)
 
     def leave(begin: int, end: int) -> None:

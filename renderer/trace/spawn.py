@@ -15,7 +15,19 @@ from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_componen
 from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import DOUBT, SLANT
 from renderer.trace.starts.anchor import anchor_of, far_from
-from renderer.trace.starts.record import ABOVE, ANCHOR, CODE, EDGE, FACE, KNOWN, SLACK, Start, corners_of
+from renderer.trace.starts.record import (
+    ABOVE,
+    ANCHOR,
+    BARYCENTRIC,
+    CODE,
+    EDGE,
+    FACE,
+    KNOWN,
+    SLACK,
+    THROUGH,
+    Start,
+    corners_of,
+)
 
 _ROUNDOFF = 2.0**-53
 # gamma(7) = 7 u / (1 - 7 u): the barycentric point's rounding (Pharr, Jakob, Humphreys, PBRT 4, section 6.8.4).
@@ -44,7 +56,7 @@ _SMALLEST = 2.0**-1074
 _INSIDE = 8.0
 # A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that is
 # not thinner than _SHARP.
-_LEVEL = 2.0**-20
+LEVEL = 2.0**-20
 # A point that went through float32 is off by 2^-24 of its largest coordinate: 64 times that is taken, as the same
 # may hold for the mesh and for what the point was computed from.
 FARTHEST_START = 2.0**-18
@@ -60,6 +72,18 @@ class OffsetRule(NamedTuple):
 
 
 BOUNDED = OffsetRule(True, 0.0)
+
+
+class Place(NamedTuple):
+    """Where a ray met the surface: the face, as float64, its barycentrics, the slack of rays from there, and the side
+    of n_g that the ray came from, 1 or -1.
+    """
+
+    face: float
+    u: float
+    v: float
+    slack: float
+    came: float
 
 
 @inlined
@@ -116,7 +140,8 @@ def _clearance(p0, p1, p2, double_area, reach):
 
 @inlined
 def offset_distance(p, p0, p1, p2, u, v, n_g):
-    """The distance by which p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain.
+    """The distance by which p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain; and
+    the slack of a ray that starts there, EDGE near an edge.
 
     The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
     matters where the first vanishes (on a plane through the origin) and for slivers.
@@ -125,7 +150,14 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
     for k in range(3):
         distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
         reach = larger(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
-    return _GAMMA7 * distance + _clearance(p0, p1, p2, length(cross(sub(p1, p0), sub(p2, p0))), reach)
+    one, other = sub(p1, p0), sub(p2, p0)
+    double_area = length(cross(one, other))
+    error = _GAMMA7 * distance + _clearance(p0, p1, p2, double_area, reach)
+    slack = slack_of(p, error)
+    side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
+    # A weight times the double area is the distance from its edge times the edge's length.
+    inside = smaller(u, smaller(v, w)) * double_area > _INSIDE * slack * side and double_area > side * LINE * side
+    return error, slack if inside else EDGE
 
 
 @inlined
@@ -154,6 +186,36 @@ def spawn_origin(p, error, n_g, w, offset):
         return add(p, scale(n_g, side * distance))
     step = scale(n_g, side * error)
     return (_away(p[0], step[0]), _away(p[1], step[1]), _away(p[2], step[2]))
+
+
+@inlined
+def put_start(row, place, n_g, w, offset):
+    """Write the row of ``starts.record`` for a ray in direction w from a ``Place``. It is on the side of the face that
+    it leads to: where that is not the one that the ray before it came from, it has gone through the face.
+    """
+    slope = dot(n_g, w)
+    side = 1.0 if slope >= 0.0 else -1.0
+    code = KNOWN | BARYCENTRIC | (ABOVE if side > 0.0 else 0) | (THROUGH if side != place.came else 0)
+    slack = place.slack if abs(slope) > LEVEL * largest_component(w) else EDGE
+    put(row, SLACK, slack if offset.bounded else 0.0)
+    put(row, FACE, place.face if offset.bounded else -1.0)
+    put(row, CODE, np.float64(code))
+    put(row, ANCHOR, place.u)
+    put(row, ANCHOR + 1, place.v)
+    put(row, ANCHOR + 2, 0.0)
+
+
+@kernel
+def start_row(row, place, n_g, w):
+    """For Python: ``put_start`` to an array (starts.record.ROW,), by the bounded offset."""
+    put_start(pointer(row), place, n_g, w, BOUNDED)
+
+
+@inlined
+def put_no_start(row):
+    """Write the row of ``starts.record`` for a ray that starts on no surface."""
+    put(row, SLACK, 0.0)
+    put(row, FACE, -1.0)
 
 
 @kernel
@@ -220,7 +282,7 @@ def _side_of(n, w, code):
     """
     slope = dot(n, w)
     side = 1.0 if slope >= 0.0 else -1.0
-    if abs(slope) <= _LEVEL * largest_component(w):
+    if abs(slope) <= LEVEL * largest_component(w):
         return 0.0
     known = 1.0 if code & ABOVE != 0 else -1.0
     return side if code & KNOWN == 0 or side == known else 0.0

@@ -9,7 +9,8 @@ Alexander's duality). A forest of the nodes with the parities to their parents t
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs, dot_pairs
+from renderer.kernels.pairs import as_pairs, dot_pairs, heads
+from renderer.kernels.vec3 import dot, normalized
 from renderer.trace.starts.cone import (
     FIRST_NODE,
     FREE,
@@ -196,3 +197,21 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
         if behind != 0 and _bounds_region(tree, anchor, holders, count, nodes, own, side, order, j, -behind):
             best = j
     return best
+
+
+@kernel
+def bounding_holder(tree, anchor, holders, count, nodes, n):
+    """The holder that bounds the region with direction n in it, the one that n is most across, lower ones first; and
+    the side of it. NOT_STOPPED for none.
+    """
+    best, best_side, most = NOT_STOPPED, 0, -1.0
+    for k in range(count):
+        face = cone_of(tree, anchor, holders, k).face
+        normal = heads(face.normal)
+        across = abs(dot(normalized(normal), n))
+        first = across > most or (across == most and holder(holders, k, NUMBER) < holder(holders, best, NUMBER))
+        own = slope_of(face, n)
+        for side in (own, -own) if own != 0 else (1, -1):
+            if first and _is_open(tree, anchor, holders, count, nodes, k, side, AT_ONCE, n):
+                best, best_side, most, first = k, side, across, False
+    return best, best_side

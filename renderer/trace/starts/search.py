@@ -31,8 +31,8 @@ from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, rounded
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
 from renderer.trace.starts.meeting import HOLDS, IS_HIT, is_grazed, meet_face, seen_from, unit_direction
-from renderer.trace.starts.record import ABOVE, EDGE, KNOWN, THROUGH, start_at
-from renderer.trace.starts.region import NOT_STOPPED, stopping_holder
+from renderer.trace.starts.record import ABOVE, BARYCENTRIC, EDGE, KNOWN, THROUGH, start_at
+from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, stopping_holder
 
 # Faces whose boxes are within this share of the largest coordinate of a start are met from the exact start: what others
 # are off by, 2^-53 of the coordinates, is a small part of their distance.
@@ -238,3 +238,27 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
         top = push_children(tree, child, bits, stack, top)
         steps += 1
     return best, steps
+
+
+class Side(NamedTuple):
+    """The side of a face that a start is on: the face, -1 for none, its code, and the start's barycentrics."""
+
+    face: int
+    code: int
+    u: float
+    v: float
+
+
+@kernel
+def side_of_normal(tree, start, n, stack, memory):
+    """The ``Side`` of a start whose normal n says in which region it is."""
+    anchor, holders = anchor_of(start), make_holders(memory)
+    d, _ = unit_direction(n)
+    count, _ = list_holders(tree, anchor, d, 1.0, stack, holders)
+    nodes = name_nodes(tree, anchor, holders, count)
+    k, side = bounding_holder(tree, anchor, holders, count, nodes, d)
+    if k == NOT_STOPPED:
+        return Side(-1, 0, 0.0, 0.0)
+    met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), d, 1.0)
+    code = KNOWN | BARYCENTRIC | (ABOVE if side > 0 else 0)
+    return Side(holder(holders, k, NUMBER), code, met.u / met.w, met.v / met.w)
