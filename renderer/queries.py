@@ -15,7 +15,7 @@ from renderer.errors import expect
 from renderer.inside.contains import contains
 from renderer.inside.winding import winding_number
 from renderer.mesh.mesh import Mesh, Repairs
-from renderer.points.visible import visible
+from renderer.distance.visible import visible
 from renderer.process.parallel import checked_threads
 from renderer.trace.batch import RayBatch, check_rays, moved_off
 from renderer.trace.error import add_errors

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import flag_argument, real_argument
+from renderer.distance.on_surface import on_surface
 from renderer.errors import expect
 from renderer.limits import LONGEST, SHORTEST
 from renderer.points.argument import check_points, farthest_of
@@ -48,11 +49,9 @@ def check_asked(
     """The arguments that all studies have, checked. Raises ``ValueError`` naming argument and row."""
     expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
     rows, shape = check_points("points", points, farthest_of(octree.tree.scale))
-    faces = np.empty(0, np.int64)
-    if leaving is not None:
-        faces = check_faces("leaving", leaving, shape, len(octree.mesh.faces))
+    faces = check_faces("leaving", -1 if leaving is None else leaving, shape, len(octree.mesh.faces))
     workers = octree.threads if threads is None else checked_threads(threads)
-    places = Places(rows, _check_normals(normals, shape), faces)
+    places = Places(rows, _check_normals(normals, shape), faces, np.empty((0, 3)))
     return Asked(places, shape, workers, flag_argument("progress", progress))
 
 
@@ -129,6 +128,8 @@ def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
     mesh, tree = octree._built
     count = len(asked.places.points)
     arrays = mesh.vertices, mesh.faces
+    faces, anchors = on_surface(tree, mesh, asked.places.points, asked.places.leaving, asked.threads)
+    places = asked.places._replace(leaving=faces, anchors=anchors)
     with progress_bar(count, "point", asked.progress) as update:
         for first in range(0, count, _BLOCK):
             block = asked.places.points[first : first + _BLOCK]
@@ -141,7 +142,7 @@ def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
                 rows, jumps = (part[begin:end] for part in way)
                 state, memory = (0, 0), make_sweep_memory(tree.depth)
                 while state[0] < len(rows):
-                    state = sweep(tree.words, arrays, asked.places, sky, answers, rows, jumps, state, memory)
+                    state = sweep(tree.words, arrays, places, sky, answers, rows, jumps, state, memory)
                     yield
 
             size = min(_MOST, max(_LEAST, len(order) // (16 * asked.threads)))

@@ -67,8 +67,8 @@ def settled(tree, at, ray, shear, hit, blurred):
     """
     height = _height_sign(tree, at, ray)
     if height == 0:
-        begun = _met_at_start(tree, at, ray, shear)
-        if begun[0] == 0.0:
+        holds, begun = _met_at_start(tree, at, ray, shear)
+        if holds:
             return begun
     if not passes_within(exact_sides(tree, at, shear)):
         return np.nan, 0.0, 0.0, 1.0
@@ -153,14 +153,17 @@ def _exact_t(tree, at, ray):
 
 @kernel
 def _met_at_start(tree, at, ray, shear):
-    """The hit of a face in whose plane a ray begins: at t = 0 where it begins on the face and leaves the plane."""
+    """Whether a ray that begins in the plane of a face begins on it, and then its hit: at t = 0, unless it runs in the
+    plane.
+    """
     (p0, p1, p2), o, slope = _corners(tree, at), (ray.ox, ray.oy, ray.oz), _slope(tree, at, ray)
-    if slope == 0 or lies_within(p0, p1, p2, o, local_doubles()) != 1:
-        return np.nan, 0.0, 0.0, 1.0
+    holds = lies_within(p0, p1, p2, o, local_doubles()) == 1
+    if not holds or slope == 0:
+        return holds, (np.nan, 0.0, 0.0, 1.0)
     a, b, c = sub(p0, o), sub(p1, o), sub(p2, o)
     e0, e1, e2 = length(cross(b, c)), length(cross(c, a)), length(cross(a, b))
     turn, whole = (-1.0 if slope * shear.direction_z > 0.0 else 1.0), e0 + e1 + e2
-    return 0.0, turn * (e1 / whole), turn * (e2 / whole), turn
+    return holds, (0.0, turn * (e1 / whole), turn * (e2 / whole), turn)
 
 
 @kernel

@@ -27,11 +27,17 @@ _ZERO = (0.0, 0.0)
 
 
 class Anchor(NamedTuple):
-    """A point of a face: ``base`` + ``unit`` ``way``, where ``way`` is a vector of pairs and ``unit`` a power of two."""
+    """A point of a face: ``base`` + ``unit`` ``way``, where ``way`` is a vector of pairs and ``unit`` a power of two.
+
+    corners  those of the face
+    zeros    the bits of the corners whose weights are exactly 0
+    """
 
     base: Any
     way: Any
     unit: float
+    corners: Any
+    zeros: int
 
 
 @kernel
@@ -40,12 +46,12 @@ def anchor_of(start):
 
     Barycentrics below 0, by rounding, count as 0.
     """
-    p0, p1, p2 = start.corners
+    p0, p1, p2 = corners = start.corners
     side = larger(largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2))))
     unit = power_below(larger(side, _LEAST_NORMAL))
     if start.code & BARYCENTRIC != 0:
-        return _at_weights(p0, p1, p2, start.anchor[0], start.anchor[1], unit)
-    return _nearest(p0, p1, p2, start.anchor, unit)
+        return _at_weights(corners, start.anchor[0], start.anchor[1], unit)
+    return _nearest(corners, start.anchor, unit)
 
 
 @inlined
@@ -77,60 +83,73 @@ def _sum(a, b):
     return plus(a[0], b[0]), plus(a[1], b[1]), plus(a[2], b[2])
 
 
+@inlined
+def _corner(corners, k):
+    return corners[0] if k == 0 else (corners[1] if k == 1 else corners[2])
+
+
+@inlined
+def _at_corner(corners, k, unit):
+    return Anchor(_corner(corners, k), (_ZERO, _ZERO, _ZERO), unit, corners, 7 & ~(1 << k))
+
+
 @kernel
-def _along(a, b, share, unit):
-    """The point of the side from a to b, ``share`` of it from a; at its ends the corner itself."""
+def _along(corners, i, j, share, unit):
+    """The point of the side from corner i to corner j, ``share`` of it from i; at its ends the corner itself."""
     if share[0] <= 0.0:
-        return Anchor(a, (_ZERO, _ZERO, _ZERO), unit)
+        return _at_corner(corners, i, unit)
     if minus((1.0, 0.0), share)[0] <= 0.0:
-        return Anchor(b, (_ZERO, _ZERO, _ZERO), unit)
-    return Anchor(a, _times(scaled_difference(b, a, 1.0 / unit), share), unit)
+        return _at_corner(corners, j, unit)
+    a, b = _corner(corners, i), _corner(corners, j)
+    return Anchor(a, _times(scaled_difference(b, a, 1.0 / unit), share), unit, corners, 7 & ~((1 << i) | (1 << j)))
 
 
 @kernel
-def _at_weights(p0, p1, p2, u, v, unit):
+def _at_weights(corners, u, v, unit):
     """The point (1 - u - v) p0 + u p1 + v p2."""
     u, v = larger(u, 0.0), larger(v, 0.0)
     w = minus(exact_sum(1.0, -u), (v, 0.0))
     if w[0] <= 0.0:
-        return _along(p1, p2, (v, 0.0), unit)
+        return _along(corners, 1, 2, (v, 0.0), unit)
     if u == 0.0:
-        return _along(p0, p2, (v, 0.0), unit)
+        return _along(corners, 0, 2, (v, 0.0), unit)
     if v == 0.0:
-        return _along(p0, p1, (u, 0.0), unit)
+        return _along(corners, 0, 1, (u, 0.0), unit)
+    p0, p1, p2 = corners
     one, other = scaled_difference(p1, p0, 1.0 / unit), scaled_difference(p2, p0, 1.0 / unit)
-    return Anchor(p0, _sum(_times(one, (u, 0.0)), _times(other, (v, 0.0))), unit)
+    return Anchor(p0, _sum(_times(one, (u, 0.0)), _times(other, (v, 0.0))), unit, corners, 0)
 
 
 @kernel
-def _nearest(p0, p1, p2, o, unit):
+def _nearest(corners, o, unit):
     """The point of a face that is nearest to o. Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.5."""
+    p0, p1, p2 = corners
     one, other = scaled_difference(p1, p0, 1.0 / unit), scaled_difference(p2, p0, 1.0 / unit)
     q = scaled_difference(o, p0, 1.0 / unit)
     d1, d2 = dot_pairs(one, q), dot_pairs(other, q)
     if d1[0] <= 0.0 and d2[0] <= 0.0:
-        return Anchor(p0, (_ZERO, _ZERO, _ZERO), unit)
+        return _at_corner(corners, 0, unit)
     aa, ab, bb = dot_pairs(one, one), dot_pairs(one, other), dot_pairs(other, other)
     d3, d4 = minus(d1, aa), minus(d2, ab)
     if d3[0] >= 0.0 and minus(d4, d3)[0] <= 0.0:
-        return Anchor(p1, (_ZERO, _ZERO, _ZERO), unit)
+        return _at_corner(corners, 1, unit)
     vc = minus(product(d1, d4), product(d3, d2))
     if vc[0] <= 0.0 and d1[0] >= 0.0 and d3[0] <= 0.0:
-        return _along(p0, p1, quotient(d1, aa), unit)
+        return _along(corners, 0, 1, quotient(d1, aa), unit)
     d5, d6 = minus(d1, ab), minus(d2, bb)
     if d6[0] >= 0.0 and minus(d5, d6)[0] <= 0.0:
-        return Anchor(p2, (_ZERO, _ZERO, _ZERO), unit)
+        return _at_corner(corners, 2, unit)
     vb = minus(product(d5, d2), product(d1, d6))
     if vb[0] <= 0.0 and d2[0] >= 0.0 and d6[0] <= 0.0:
-        return _along(p0, p2, quotient(d2, bb), unit)
+        return _along(corners, 0, 2, quotient(d2, bb), unit)
     va = minus(product(d3, d6), product(d5, d4))
     rise, fall = minus(d4, d3), minus(d5, d6)
     if va[0] <= 0.0 and rise[0] >= 0.0 and fall[0] >= 0.0:
-        return _along(p1, p2, quotient(rise, plus(rise, fall)), unit)
+        return _along(corners, 1, 2, quotient(rise, plus(rise, fall)), unit)
     n = cross_pairs(one, other)
     height = quotient(dot_pairs(n, q), dot_pairs(n, n))
     back = _times(n, (-height[0], -height[1]))
-    return Anchor(p0, _sum(q, back), unit)
+    return Anchor(p0, _sum(q, back), unit, corners, 0)
 
 
 @kernel

@@ -1,7 +1,8 @@
 """A face as a ray meets it from its exact start: it holds the start, is hit further on, or is not met.
 
 All signs are those of sums of pairs, and exact where the start is not one of their terms. What is less than their error
-counts as 0: what is nearer than 2^-88 of the size of both faces together.
+counts as 0: what is nearer than 2^-88 of the size of both faces together. Faces that share a side with the face of the
+start are judged exactly: what lies on that face is on the same side of another as the corner beside the common side.
 """
 
 from typing import Any, NamedTuple
@@ -10,17 +11,20 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, power_below, quotient, scaled_difference
-from renderer.kernels.signs import UNDECIDED, slope_sign
+from renderer.kernels.signs import UNDECIDED, slope_sign, volume_sign
 from renderer.kernels.simd import larger, local_doubles
 from renderer.kernels.vec3 import dot, largest_component, scale, sub
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
+NONE = -1
 # A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a corner
 # by 2^-100 of what it is the difference of.
 _ERROR, _WAY_ERROR = 2.0**-90, 2.0**-94
 _LEAST_NORMAL = 2.0**-1022
+# The least t of a face that does not hold the start.
+_LEAST = 2.0**-1074
 # A ray at a smaller angle to a face, about 1e-6, may meet it, as rounded, anywhere along it; and a start is as good as in
 # its plane nearer than 2^-40 of its corners' distance.
 _GRAZING, _NEAR = 2.0**-20, 2.0**-40
@@ -29,7 +33,7 @@ _GRAZING, _NEAR = 2.0**-20, 2.0**-40
 class SeenFace(NamedTuple):
     """A face from an anchor, scaled by a power of two: the ways to its corners and its normal, as pairs; the corners in
     the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by a
-    share; and the error of the ways.
+    share; the error of the ways; and for each corner the one of the anchor's face in its place, NONE for none.
     """
 
     a0: Any
@@ -40,6 +44,7 @@ class SeenFace(NamedTuple):
     factor: float
     sides: float
     error: float
+    same: Any
 
 
 class Meeting(NamedTuple):
@@ -56,6 +61,18 @@ class Meeting(NamedTuple):
     zeros: int
 
 
+@inlined
+def _equal(p, q):
+    return p[0] == q[0] and p[1] == q[1] and p[2] == q[2]
+
+
+@inlined
+def _same(anchor, p):
+    """The corner of the anchor's face that is in the place p, NONE for none."""
+    a, b, c = anchor.corners
+    return 0 if _equal(a, p) else (1 if _equal(b, p) else (2 if _equal(c, p) else NONE))
+
+
 @kernel
 def seen_from(tree, place, anchor):
     """The face at a place of a block, as ``SeenFace``."""
@@ -68,6 +85,7 @@ def seen_from(tree, place, anchor):
     return SeenFace(
         from_anchor(anchor, p0, factor), from_anchor(anchor, p1, factor), from_anchor(anchor, p2, factor),
         cross_pairs(one, other), (p0, p1, p2), factor, sides, _WAY_ERROR * (1.0 + anchor.unit * factor),
+        (_same(anchor, p0), _same(anchor, p1), _same(anchor, p2)),
     )  # fmt: skip
 
 
@@ -129,6 +147,14 @@ def slope_of(face, d):
 
 
 @kernel
+def slope_there(anchor, d):
+    """``slope_of`` the face of an anchor."""
+    p0, p1, p2 = anchor.corners
+    sign = slope_sign(p0, p1, p2, d, local_doubles())
+    return 0 if sign == UNDECIDED else sign
+
+
+@kernel
 def height_sign(face):
     """The sign of normal . (p0 - start), 0 where the start is in the face's plane."""
     error = face.sides * (_size(face.a0) * _ERROR + face.error)
@@ -148,34 +174,85 @@ def _none():
     return Meeting(MISSES, 0.0, 0.0, 0.0, 1.0, 0)
 
 
+@inlined
+def _third(i, j):
+    return 3 - i - j
+
+
+@inlined
+def _is_after(i, j):
+    """Whether corner j follows corner i around a face."""
+    return j == (i + 1 if i < 2 else 0)
+
+
 @kernel
-def meet_face(face, d, dz):
-    """How a ray in direction d, scaled to about 1, meets a face; ``dz`` is the direction's largest component."""
+def _common(face, anchor, slope, i, j, sign):
+    """The sign of direction . (way to corner i x way to corner j): exact where the side is one of the anchor's face."""
+    a, b = face.same[i], face.same[j]
+    if a == NONE or b == NONE or a == b:
+        return sign
+    weight = 0 if (anchor.zeros >> _third(a, b)) & 1 != 0 else 1
+    return weight * (slope if _is_after(a, b) else -slope)
+
+
+@kernel
+def _height(face, anchor):
+    """The sign of normal . (p0 - start): exact where the face shares a side with the anchor's."""
+    a, b, c = face.same
+    shared = int(a != NONE) + int(b != NONE) + int(c != NONE)
+    if shared == 3:
+        return 0
+    if shared == 2:
+        third = _third(a, b) if c == NONE else (_third(b, c) if a == NONE else _third(a, c))
+        if (anchor.zeros >> third) & 1 != 0:
+            return 0
+        p0, p1, p2 = face.corners
+        q0, q1, q2 = anchor.corners
+        beside = q0 if third == 0 else (q1 if third == 1 else q2)
+        sign = volume_sign(p0, p1, p2, beside, local_doubles())
+        if sign != UNDECIDED:
+            return sign
+    return height_sign(face)
+
+
+@kernel
+def meet_face(face, anchor, d, slope_there, dz):
+    """How a ray in direction d, scaled to about 1, meets a face; ``dz`` is the direction's largest component, and
+    ``slope_there`` the ``slope_of`` the anchor's own face.
+    """
     if not has_area(face):
         return _none()
-    if height_sign(face) == 0:
-        return _held(face, d, dz)
+    height = _height(face, anchor)
+    if height == 0:
+        return _held(face, anchor, d, dz)
     slope, way = slope_of(face, d), as_pairs(d)
-    if slope == 0:
-        return _none()
     s0, e0 = _way_sign(face, way, face.a1, face.a2)
     s1, e1 = _way_sign(face, way, face.a2, face.a0)
     s2, e2 = _way_sign(face, way, face.a0, face.a1)
-    if s0 * slope < 0 or s1 * slope < 0 or s2 * slope < 0 or (s0 == 0 and s1 == 0 and s2 == 0):
+    s0 = _common(face, anchor, slope_there, 1, 2, s0)
+    s1 = _common(face, anchor, slope_there, 2, 0, s1)
+    s2 = _common(face, anchor, slope_there, 0, 1, s2)
+    # Behind the start, or beside the face.
+    if height * slope <= 0 or s0 * slope < 0 or s1 * slope < 0 or s2 * slope < 0 or (s0 == 0 and s1 == 0 and s2 == 0):
         return _none()
     t = quotient(dot_pairs(face.normal, face.a0), dot_pairs(face.normal, way))
-    if t[0] <= 0.0:
-        return _none()
     u, v, w = _weights(e0, e1, e2, slope, dz)
-    return Meeting(IS_HIT, t[0] / face.factor, u, v, w, _zeros(s0, s1, s2))
+    return Meeting(IS_HIT, larger(t[0] / face.factor, _LEAST), u, v, w, _zeros(s0, s1, s2))
 
 
 @kernel
-def _held(face, d, dz):
+def _held(face, anchor, d, dz):
     """The meeting of a face with a start in its plane: it holds the start, or is not met."""
     s0, e0 = _corner_sign(face, face.a1, face.a2)
     s1, e1 = _corner_sign(face, face.a2, face.a0)
     s2, e2 = _corner_sign(face, face.a0, face.a1)
+    a, b, c = face.same
+    # The weights of common corners are those on the anchor's face, where it shares all that are not 0 there.
+    own = (np.int64(a != NONE) << (a & 3)) | (np.int64(b != NONE) << (b & 3)) | (np.int64(c != NONE) << (c & 3))
+    if (own | anchor.zeros) & 7 == 7:
+        s0 = 0 if a == NONE else 1 - ((anchor.zeros >> a) & 1)
+        s1 = 0 if b == NONE else 1 - ((anchor.zeros >> b) & 1)
+        s2 = 0 if c == NONE else 1 - ((anchor.zeros >> c) & 1)
     if s0 < 0 or s1 < 0 or s2 < 0 or (s0 == 0 and s1 == 0 and s2 == 0):
         return _none()
     u, v, w = _weights(e0, e1, e2, slope_of(face, d), dz)

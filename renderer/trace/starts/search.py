@@ -30,7 +30,15 @@ from renderer.trace.leaf import NO_FACE, blocks_of, push_children
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, rounded
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
-from renderer.trace.starts.meeting import HOLDS, IS_HIT, is_grazed, meet_face, seen_from, unit_direction
+from renderer.trace.starts.meeting import (
+    HOLDS,
+    IS_HIT,
+    is_grazed,
+    meet_face,
+    seen_from,
+    slope_there,
+    unit_direction,
+)
 from renderer.trace.starts.record import ABOVE, BARYCENTRIC, EDGE, KNOWN, THROUGH, start_at
 from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, stopping_holder
 
@@ -71,25 +79,27 @@ class Listed(NamedTuple):
 
 
 @kernel
-def list_holders(tree, anchor, d, dz, stack, holders):
-    """List the faces that hold an anchor; returns ``Listed`` of a ray in direction d."""
+def list_holders(tree, anchor, d, slope, dz, stack, holders):
+    """List the faces that hold an anchor; returns ``Listed`` of a ray in direction d, with the ``slope_of`` the
+    anchor's face.
+    """
     o, listed, top = rounded(anchor), Listed(0, False), 1
     if not tree.has_nodes:
-        return _add_holders(tree, 0, tree.count, anchor, o, d, dz, holders, listed)
+        return _add_holders(tree, 0, tree.count, anchor, o, d, slope, dz, holders, listed)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, blocks = blocks_of(child)
-            listed = _add_holders(tree, first, blocks, anchor, o, d, dz, holders, listed)
+            listed = _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, listed)
             continue
         top = push_children(tree, child, _holding_octants(tree, child, o), stack, top)
     return listed
 
 
 @kernel
-def _add_holders(tree, first, blocks, anchor, o, d, dz, holders, listed):
+def _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, listed):
     """List those faces of some blocks that hold an anchor."""
     count, grazes = listed
     for block in range(first, first + blocks):
@@ -98,27 +108,27 @@ def _add_holders(tree, first, blocks, anchor, o, d, dz, holders, listed):
             if face >= 0 and _box_holds(tree, place, o):
                 seen = seen_from(tree, place, anchor)
                 grazes = grazes or is_grazed(seen, d)
-                met = meet_face(seen, d, dz)
+                met = meet_face(seen, anchor, d, slope, dz)
                 if met.kind == HOLDS:
                     count = add_holder(tree, holders, count, place, face, met.zeros)
     return Listed(count, grazes)
 
 
 @kernel
-def _stopped(tree, start, anchor, count, d, dz, holders):
+def _stopped(tree, start, anchor, count, d, slope, dz, holders):
     """The hit (t, face, u, v, w) that stops a ray at its start, which ``count`` faces hold; NO_FACE for none."""
     nodes = name_nodes(tree, anchor, holders, count)
     side = 1 if start.code & ABOVE != 0 else -1
     k = stopping_holder(tree, anchor, holders, count, nodes, start.face, side, start.code & THROUGH != 0, d)
     if k == NOT_STOPPED:
         return _NOTHING
-    met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), d, dz)
+    met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, dz)
     return 0.0, np.int32(holder(holders, k, NUMBER)), met.u, met.v, met.w
 
 
 class Departure(NamedTuple):
     """A ray as it leaves its start: as ``intersect.Ray``, its anchor, the anchor rounded, its direction scaled by a
-    power of two, and that; and whether all faces are met from the exact start. They are where the ray grazes a face
+    power of two, the ``slope_there`` of that, and the power; and whether all faces are met from the exact start. They are where the ray grazes a face
     near the start, whose neighbours it may meet anywhere along it.
     """
 
@@ -126,6 +136,7 @@ class Departure(NamedTuple):
     anchor: Any
     o: Any
     d: Any
+    slope: int
     unit: float
     exactly: bool
 
@@ -143,13 +154,14 @@ def depart(tree, starts, i, ray, stack, memory):
     if ray.slack == EDGE:
         ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, ray.slack, ray.leaving)
     stopped, exactly, dz = _NOTHING, False, make_shear(ray).direction_z
+    slope = slope_there(anchor, d)
     if ray.slack == EDGE or start.code & KNOWN != 0:
         holders = make_holders(memory)
-        count, grazes = list_holders(tree, anchor, d, dz, stack, holders)
+        count, grazes = list_holders(tree, anchor, d, slope, dz, stack, holders)
         exactly = grazes and ray.slack == EDGE
         if start.code & KNOWN != 0 and ray.t_min == 0.0:
-            stopped = _stopped(tree, start, anchor, count, d, dz, holders)
-    return Departure(ray, anchor, o, d, unit, exactly), stopped
+            stopped = _stopped(tree, start, anchor, count, d, slope, dz, holders)
+    return Departure(ray, anchor, o, d, slope, unit, exactly), stopped
 
 
 @inlined
@@ -171,7 +183,7 @@ def near_bits(tree, block, departure, shear, seen):
 @inlined
 def meet_near(tree, place, departure, dz):
     """The hit (t, u, v, w) of a face that is met from the exact start, t = NaN for none, and its ``Meeting.zeros``."""
-    met = meet_face(seen_from(tree, place, departure.anchor), departure.d, dz)
+    met = meet_face(seen_from(tree, place, departure.anchor), departure.anchor, departure.d, departure.slope, dz)
     t = met.t / departure.unit if met.kind == IS_HIT else np.nan
     return (t, met.u, met.v, met.w), met.zeros
 
@@ -254,11 +266,16 @@ def side_of_normal(tree, start, n, stack, memory):
     """The ``Side`` of a start whose normal n says in which region it is."""
     anchor, holders = anchor_of(start), make_holders(memory)
     d, _ = unit_direction(n)
-    count, _ = list_holders(tree, anchor, d, 1.0, stack, holders)
+    slope = slope_there(anchor, d)
+    count, _ = list_holders(tree, anchor, d, slope, 1.0, stack, holders)
     nodes = name_nodes(tree, anchor, holders, count)
     k, side = bounding_holder(tree, anchor, holders, count, nodes, d)
     if k == NOT_STOPPED:
         return Side(-1, 0, 0.0, 0.0)
-    met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), d, 1.0)
+    met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, 1.0)
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0 else 0)
-    return Side(holder(holders, k, NUMBER), code, met.u / met.w, met.v / met.w)
+    # Exactly 0 or 1 at edges and corners.
+    u, v = (0.0 if met.zeros & 2 != 0 else met.u / met.w), (0.0 if met.zeros & 4 != 0 else met.v / met.w)
+    if met.zeros & 1 != 0:
+        u, v = (0.0 if u == 0.0 else 1.0 - v), (1.0 if u == 0.0 else v)
+    return Side(holder(holders, k, NUMBER), code, u, v)
