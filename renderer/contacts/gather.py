@@ -25,7 +25,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, push_children, tree_pointers
 from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.sides import coordinate, exact_sides
-from renderer.trace.starts.search import depart, meet_near, near_bits
+from renderer.trace.starts.search import counted_from_start, depart, meet_near, near_bits
 from renderer.trace.traverse import make_scratch
 
 # Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
@@ -168,7 +168,7 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
         count = np.int64(1)
     shear, largest = make_shear(ray), largest_of(ray)
     if not tree.has_nodes:
-        return _list_hits_from(tree, (0, tree.count), departure, shear, t_max, found, count)
+        return _list_hits_from(tree, rays.starts, i, (0, tree.count), departure, shear, t_max, found, count)
     slabs, top = make_slabs(ray, largest), 1
     lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
     put(stack, 0, 0)
@@ -176,7 +176,7 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
         top -= 1
         child = get(stack, top)
         if child < 0:
-            count = _list_hits_from(tree, blocks_of(child), departure, shear, t_max, found, count)
+            count = _list_hits_from(tree, rays.starts, i, blocks_of(child), departure, shear, t_max, found, count)
             continue
         _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
         top = push_children(tree, child, bits, stack, top)
@@ -184,9 +184,10 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
 
 
 @kernel
-def _list_hits_from(tree, blocks, departure, shear, t_max, found, count):
-    """``_list_hits`` for a ray that leaves the surface."""
+def _list_hits_from(tree, starts, row, blocks, departure, shear, t_max, found, count):
+    """``_list_hits`` for ray ``row``, which leaves the surface."""
     ray = departure.ray
+    largest = largest_of(ray)
     for block in range(blocks[0], blocks[0] + blocks[1]):
         base = block * BLOCK_WORDS
         bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, t_max)
@@ -205,6 +206,9 @@ def _list_hits_from(tree, blocks, departure, shear, t_max, found, count):
                     edges = _edges_passed(exact_sides(tree, base + i, shear))
                 if (doubts >> i) & 1 != 0:
                     hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
+                if ray.t_min <= hit[0] <= t_max:
+                    face = np.int64(get(tree.faces, block * BLOCK_FACES + i))
+                    hit = counted_from_start(tree, starts, row, ray, largest, hit, face)
             count = _add_hit(tree, found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
     return count
 

@@ -53,6 +53,8 @@ SLANT = 2.0**-16
 # The error of a numerator in doubt, as a share of A D Z: its own 11 u, and the determinant's share of 2^-27. Settling
 # moves t by no more, because the ray meets the plane itself within the face's box.
 ERROR = 2.0**-48
+# The error of an edge function as a share of A D, of ``unsure_sides``: 10 u and room.
+SIDE_ERROR = 2.0**-49
 # The share of its width by which a face's box is wider than the face, on each side.
 ROOM = 2.0**-21
 
@@ -385,7 +387,22 @@ def near_planes(edges, slack):
     across = wide + (magnitude(y0) + magnitude(y1) + magnitude(y2))
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
     height = magnitude(e0 * z0 + e1 * z1 + e2 * z2)
-    return movemask(height < across * (across + along) * splat4(slack))
+    return movemask(height <= across * (across + along) * splat4(slack))
+
+
+@inlined
+def unsure_sides(edges, slack):
+    """The bits of the triangles of which a ray may pass an edge on either side, if its origin is off by ``slack``.
+
+    With D as above a sheared coordinate errs by 4 u D and the slack, so an edge function by 2 A times that and 2 u A^2.
+    """
+    x0, x1, x2, y0, y1, y2, z0, z1, z2, _, _, _, least, most, _ = edges
+    wide = magnitude(x0) + magnitude(x1) + magnitude(x2)
+    across = wide + (magnitude(y0) + magnitude(y1) + magnitude(y2))
+    along = magnitude(z0) + magnitude(z1) + magnitude(z2)
+    error, zero = across * ((across + along) * splat4(SIDE_ERROR) + splat4(slack)), splat4(0.0)
+    may = (least >= zero - error) | (most <= error)
+    return movemask(may) & ~movemask((least > error) | (most < zero - error))
 
 
 @inlined

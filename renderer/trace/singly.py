@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from renderer.kernels.jit import kernel
+from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import LOCAL_WORDS, get, local_words, pointer, put, splat8
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_children, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
-from renderer.trace.starts.search import search_from
+from renderer.trace.starts.search import counted_from_start, search_from
 
 
 def stack_size(depth: int) -> int:
@@ -58,6 +58,16 @@ def search_carefully(tree, rays, i, stack, holders, any_hit):
     return search_singly(tree, ray, t_max, stack)
 
 
+@inlined
+def write_best(tree, rays, found, i, best, shear, largest, any_hit):
+    """Write the best hit (t, face, u, v, w) of ray ``i``, see ``write_hit``; t counts from its exact start."""
+    t, face, u, v, w = best
+    if shear.slack > 0.0 and not any_hit:
+        ray, _ = ray_at(rays, i)
+        t, u, v, w = counted_from_start(tree, rays.starts, i, ray, largest, (t, u, v, w), face)
+    write_hit(found, i, rays.scale, (t, face, u, v, w), shear.direction_z, any_hit)
+
+
 @kernel
 def trace_few(words, rays, out, holders):
     """Closest hits of a few rays, one by one, into the rows t, u, v, face and side of ``out``.
@@ -72,5 +82,6 @@ def trace_few(words, rays, out, holders):
     stack = local_words()
     for i in range(count):
         best, _ = search_carefully(tree, source, i, stack, pointer(holders), False)
-        write_hit(found, i, source.scale, best, make_shear(ray_at(source, i)[0]).direction_z, False)
+        ray, _ = ray_at(source, i)
+        write_best(tree, source, found, i, best, make_shear(ray), largest_of(ray), False)
     return -1

@@ -27,6 +27,7 @@ from renderer.trace.starts.record import (
     THROUGH,
     Start,
     corners_of,
+    slack_of,
 )
 
 _ROUNDOFF = 2.0**-53
@@ -253,14 +254,6 @@ def _moved(o, n_g, height, needed, away):
     """The point o near a face, moved along its normal to where it is off for certain; to the other side by away = -1."""
     step = scale(n_g, away * (needed - away * height))
     return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
-
-
-@inlined
-def slack_of(o, distance):
-    """The slack of a ray that starts at o, some distance from the surface: ``intersect.near_planes`` compares heights
-    with a product that may be an eighth of what it stands for.
-    """
-    return 8.0 * (distance + 2.0**-51 * largest_component(o))
 
 
 @inlined

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, get, lowest_bit, pointer, put, smaller
-from renderer.trace.intersect import make_shear
+from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import NO_FACE, search_all_blocks, tree_pointers
 from renderer.trace.packet import child_of, meet_octant, trace_packet
 from renderer.trace.ray_lanes import (
-    DIRECTION_Z,
     DOUBTFUL,
+    LARGEST,
     NUMBER,
     SIXTEEN,
     SLACK,
@@ -21,9 +21,10 @@ from renderer.trace.ray_lanes import (
     Prepared,
     best_of,
     prepare_eight,
+    shear_of,
 )
-from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
-from renderer.trace.singly import search_carefully, stack_size
+from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers
+from renderer.trace.singly import search_carefully, stack_size, write_best
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import EDGE
 from renderer.trace.stream import (
@@ -135,7 +136,7 @@ def _finish(tree, rays, found, scratch, r, any_hit):
         best, steps = search_carefully(
             tree, rays, i, at(scratch.lanes.stacks, stack_of(scratch.lanes, r)), scratch.holders, any_hit
         )
-    write_hit(found, i, rays.scale, best, get(doubles, DIRECTION_Z + r), any_hit)
+    write_best(tree, rays, found, i, best, shear_of(scratch.prepared, r), get(doubles, LARGEST + r), any_hit)
     return steps // ENOUGH
 
 
@@ -238,7 +239,7 @@ def search_blocks(tree, rays, found, begin, end, holders, any_hit):
             best, doubtful = search_all_blocks(tree, ray, t_max, any_hit)
         if doubtful:
             best, _ = search_carefully(tree, rays, i, holders, holders, any_hit)
-        write_hit(found, i, rays.scale, best, make_shear(ray).direction_z, any_hit)
+        write_best(tree, rays, found, i, best, make_shear(ray), largest_of(ray), any_hit)
 
 
 @kernel

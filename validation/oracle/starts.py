@@ -55,15 +55,16 @@ _MISS = First(None, -1, ())
 
 
 def start_on(corners: ArrayLike, u: float, v: float) -> Place:
-    """(1 - u - v) p0 + u p1 + v p2, exactly; the face's point nearest to it where rounding has put it outside.
+    """(1 - u - v) p0 + u p1 + v p2, exactly; a weight that rounding made negative counts as 0, the others as their shares.
 
     >>> [float(x) for x in start_on([[0, 0, 0], [4, 0, 0], [0, 4, 0]], 0.25, 0.5)]
     [1.0, 2.0, 0.0]
     """
     p0, p1, p2 = rational(np.asarray(corners, np.float64).tolist())
     b, c = Fraction(float(u)), Fraction(float(v))
-    x, y, z = ((1 - b - c) * k0 + b * k1 + c * k2 for k0, k1, k2 in zip(p0, p1, p2, strict=True))
-    return (x, y, z) if min(b, c, 1 - b - c) >= 0 else _nearest_on((p0, p1, p2), (x, y, z))
+    a, b, c = (max(weight, Fraction(0)) for weight in (1 - b - c, b, c))
+    x, y, z = ((a * k0 + b * k1 + c * k2) / (a + b + c) for k0, k1, k2 in zip(p0, p1, p2, strict=True))
+    return x, y, z
 
 
 def start_near(corners: ArrayLike, point: ArrayLike) -> Place:

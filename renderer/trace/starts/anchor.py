@@ -24,6 +24,8 @@ from renderer.trace.starts.record import BARYCENTRIC
 
 _LEAST_NORMAL = 2.0**-1022
 _ZERO = (0.0, 0.0)
+# A point of a face as near to an edge, as a share of the size of the face, is on it: pairs err by 2^-98 of four factors.
+_TINY = 2.0**-92
 
 
 class Anchor(NamedTuple):
@@ -44,7 +46,7 @@ class Anchor(NamedTuple):
 def anchor_of(start):
     """The exact start: the point of the barycentrics given, or the point of the face that is nearest to the one given.
 
-    Barycentrics below 0, by rounding, count as 0.
+    Barycentrics below 0, by rounding, count as 0; the two others are scaled to add up to 1.
     """
     p0, p1, p2 = corners = start.corners
     side = larger(largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2))))
@@ -96,9 +98,9 @@ def _at_corner(corners, k, unit):
 @kernel
 def _along(corners, i, j, share, unit):
     """The point of the side from corner i to corner j, ``share`` of it from i; at its ends the corner itself."""
-    if share[0] <= 0.0:
+    if share[0] <= _TINY:
         return _at_corner(corners, i, unit)
-    if minus((1.0, 0.0), share)[0] <= 0.0:
+    if minus((1.0, 0.0), share)[0] <= _TINY:
         return _at_corner(corners, j, unit)
     a, b = _corner(corners, i), _corner(corners, j)
     return Anchor(a, _times(scaled_difference(b, a, 1.0 / unit), share), unit, corners, 7 & ~((1 << i) | (1 << j)))
@@ -110,7 +112,7 @@ def _at_weights(corners, u, v, unit):
     u, v = larger(u, 0.0), larger(v, 0.0)
     w = minus(exact_sum(1.0, -u), (v, 0.0))
     if w[0] <= 0.0:
-        return _along(corners, 1, 2, (v, 0.0), unit)
+        return _along(corners, 1, 2, quotient((v, 0.0), exact_sum(u, v)), unit)
     if u == 0.0:
         return _along(corners, 0, 2, (v, 0.0), unit)
     if v == 0.0:
@@ -127,29 +129,32 @@ def _nearest(corners, o, unit):
     one, other = scaled_difference(p1, p0, 1.0 / unit), scaled_difference(p2, p0, 1.0 / unit)
     q = scaled_difference(o, p0, 1.0 / unit)
     d1, d2 = dot_pairs(one, q), dot_pairs(other, q)
+    aa, ab, bb = dot_pairs(one, one), dot_pairs(one, other), dot_pairs(other, other)
+    d3, d4, d5, d6 = minus(d1, aa), minus(d2, ab), minus(d1, ab), minus(d2, bb)
+    rise, fall = minus(d4, d3), minus(d5, d6)
     if d1[0] <= 0.0 and d2[0] <= 0.0:
         return _at_corner(corners, 0, unit)
-    aa, ab, bb = dot_pairs(one, one), dot_pairs(one, other), dot_pairs(other, other)
-    d3, d4 = minus(d1, aa), minus(d2, ab)
-    if d3[0] >= 0.0 and minus(d4, d3)[0] <= 0.0:
+    if d3[0] >= 0.0 and rise[0] <= 0.0:
         return _at_corner(corners, 1, unit)
-    vc = minus(product(d1, d4), product(d3, d2))
-    if vc[0] <= 0.0 and d1[0] >= 0.0 and d3[0] <= 0.0:
-        return _along(corners, 0, 1, quotient(d1, aa), unit)
-    d5, d6 = minus(d1, ab), minus(d2, bb)
-    if d6[0] >= 0.0 and minus(d5, d6)[0] <= 0.0:
+    if d6[0] >= 0.0 and fall[0] <= 0.0:
         return _at_corner(corners, 2, unit)
-    vb = minus(product(d5, d2), product(d1, d6))
-    if vb[0] <= 0.0 and d2[0] >= 0.0 and d6[0] <= 0.0:
+    if _is_beyond(d3, d2, d1, d4) and d1[0] >= 0.0 and d3[0] <= 0.0:
+        return _along(corners, 0, 1, quotient(d1, aa), unit)
+    if _is_beyond(d1, d6, d5, d2) and d2[0] >= 0.0 and d6[0] <= 0.0:
         return _along(corners, 0, 2, quotient(d2, bb), unit)
-    va = minus(product(d3, d6), product(d5, d4))
-    rise, fall = minus(d4, d3), minus(d5, d6)
-    if va[0] <= 0.0 and rise[0] >= 0.0 and fall[0] >= 0.0:
+    if _is_beyond(d5, d4, d3, d6) and rise[0] >= 0.0 and fall[0] >= 0.0:
         return _along(corners, 1, 2, quotient(rise, plus(rise, fall)), unit)
     n = cross_pairs(one, other)
     height = quotient(dot_pairs(n, q), dot_pairs(n, n))
     back = _times(n, (-height[0], -height[1]))
     return Anchor(p0, _sum(q, back), unit, corners, 0)
+
+
+@inlined
+def _is_beyond(a, b, c, d):
+    """Whether a b >= c d of pairs, or nearly so: a weight, which is c d - a b, is 0 or less."""
+    one, other = product(a, b), product(c, d)
+    return minus(other, one)[0] <= _TINY * (abs(one[0]) + abs(other[0]))
 
 
 @kernel

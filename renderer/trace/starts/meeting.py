@@ -13,7 +13,7 @@ from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, power_below, quotient, scaled_difference
 from renderer.kernels.signs import UNDECIDED, slope_sign, volume_sign
 from renderer.kernels.simd import larger, local_doubles
-from renderer.kernels.vec3 import dot, largest_component, scale, sub
+from renderer.kernels.vec3 import largest_component, scale, sub
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
 
@@ -21,13 +21,10 @@ MISSES, IS_HIT, HOLDS = 0, 1, 2
 NONE = -1
 # A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a corner
 # by 2^-100 of what it is the difference of.
-_ERROR, _WAY_ERROR = 2.0**-90, 2.0**-94
+_ERROR, _WAY_ERROR = 2.0**-94, 2.0**-98
 _LEAST_NORMAL = 2.0**-1022
 # The least t of a face that does not hold the start.
 _LEAST = 2.0**-1074
-# A ray at a smaller angle to a face, about 1e-6, may meet it, as rounded, anywhere along it; and a start is as good as in
-# its plane nearer than 2^-40 of its corners' distance.
-_GRAZING, _NEAR = 2.0**-20, 2.0**-40
 
 
 class SeenFace(NamedTuple):
@@ -159,14 +156,6 @@ def height_sign(face):
     """The sign of normal . (p0 - start), 0 where the start is in the face's plane."""
     error = face.sides * (_size(face.a0) * _ERROR + face.error)
     return _sign_beyond(dot_pairs(face.normal, face.a0)[0], error)
-
-
-@inlined
-def is_grazed(face, d):
-    """Whether a ray in direction d, scaled to about 1, runs along a face in whose plane the start is, or nearly so."""
-    n, way = heads(face.normal), heads(face.a0)
-    near = abs(dot(n, way)) <= _NEAR * face.sides * largest_component(way)
-    return near and abs(dot(n, d)) <= _GRAZING * largest_component(n)
 
 
 @inlined

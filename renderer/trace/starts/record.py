@@ -6,7 +6,7 @@ import numpy as np
 
 from renderer.kernels.jit import inlined
 from renderer.kernels.simd import address, at, float64_pointer, get, int32_pointer, pointer
-from renderer.kernels.vec3 import row3, scale
+from renderer.kernels.vec3 import largest_component, row3, scale
 
 # The head of an array of starts, int64: the float64 of a row that each ray is after the one before, 0 where no ray
 # starts on the surface; and the addresses of the mesh's vertices and faces.
@@ -71,3 +71,11 @@ def corners_of(vertices, faces, face, unit):
     """The corners of a face, as tuples, in units in which no product overflows or vanishes."""
     a, b, c = row3(faces, face)
     return scale(row3(vertices, a), unit), scale(row3(vertices, b), unit), scale(row3(vertices, c), unit)
+
+
+@inlined
+def slack_of(o, distance):
+    """The slack of a ray that starts at o, some distance from the surface: ``intersect.near_planes`` compares heights
+    with a product that may be an eighth of what it stands for.
+    """
+    return 8.0 * (distance + 2.0**-51 * largest_component(o))

@@ -194,9 +194,34 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
         if best != NOT_STOPPED and holder(holders, j, NUMBER) > holder(holders, best, NUMBER):
             continue
         behind = slope_of(cone_of(tree, anchor, holders, j).face, d)
-        if behind != 0 and _bounds_region(tree, anchor, holders, count, nodes, own, side, order, j, -behind):
+        facing = _facing_side(tree, anchor, holders, own, side, order, j)
+        if facing != 0:
+            bounds = facing == -behind
+        else:
+            bounds = behind != 0 and _bounds_region(
+                tree, anchor, holders, count, nodes, own, side, order, j, -behind
+            )
+        if bounds:
             best = j
     return best
+
+
+@kernel
+def _facing_side(tree, anchor, holders, k, side, order, j):
+    """The side of the j-th face on which a ray beside the k-th one is, where the two coincide; 0 where they do not."""
+    if j == k:
+        return side
+    own, cone = cone_of(tree, anchor, holders, k), cone_of(tree, anchor, holders, j)
+    if lean_sign(cone.face, own.first) != 0 or lean_sign(cone.face, own.second) != 0:
+        return 0
+    where = 0
+    for attempt in range(_ATTEMPTS):
+        where = within_cone(cone, middle_of(own, attempt)) if where == 0 else where
+    if where <= 0:
+        return 0
+    ahead = order == PASSED and holder(holders, j, NUMBER) > holder(holders, k, NUMBER)
+    turned = dot_pairs(cone.face.normal, own.face.normal)[0] < 0.0
+    return -side if ahead != turned else side
 
 
 @kernel

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
 from renderer.kernels.simd import extract, get, larger, load8, lowest_bit, movemask, put, smaller, splat8
-from renderer.kernels.vec3 import largest_component
+from renderer.kernels.vec3 import largest_component, sub
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import (
     Ray,
@@ -24,27 +25,28 @@ from renderer.trace.intersect import (
     round_both,
     round_down,
     see_triangles,
+    unsure_sides,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, push_children
 from renderer.trace.sides import corner
-from renderer.trace.starts.anchor import anchor_of, rounded
+from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
 from renderer.trace.starts.meeting import (
     HOLDS,
     IS_HIT,
-    is_grazed,
     meet_face,
     seen_from,
     slope_there,
     unit_direction,
 )
-from renderer.trace.starts.record import ABOVE, BARYCENTRIC, EDGE, KNOWN, THROUGH, start_at
+from renderer.trace.starts.record import ABOVE, BARYCENTRIC, EDGE, KNOWN, THROUGH, corners_of, slack_of, start_at
 from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, stopping_holder
 
-# Faces whose boxes are within this share of the largest coordinate of a start are met from the exact start: what others
-# are off by, 2^-53 of the coordinates, is a small part of their distance.
-_ROOM = 2.0**-40
+# The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
+_ROOM = 2.0**-50
+# A hit that is farther than so often its slack errs by less than 2^-20 of t by where the ray starts.
+_NEAR_HIT = 2.0**20
 _NOTHING = (np.inf, np.int32(NO_FACE), 0.0, 0.0, 1.0)
 
 
@@ -71,47 +73,35 @@ def _holding_octants(tree, child, o):
     return bits
 
 
-class Listed(NamedTuple):
-    """The number of faces that hold an anchor, and whether a ray grazes one of those near it."""
-
-    count: int
-    grazes: bool
-
-
 @kernel
 def list_holders(tree, anchor, d, slope, dz, stack, holders):
-    """List the faces that hold an anchor; returns ``Listed`` of a ray in direction d, with the ``slope_of`` the
-    anchor's face.
-    """
-    o, listed, top = rounded(anchor), Listed(0, False), 1
+    """List the faces that hold an anchor, from which a ray leaves in direction d; returns their number."""
+    o, count, top = rounded(anchor), 0, 1
     if not tree.has_nodes:
-        return _add_holders(tree, 0, tree.count, anchor, o, d, slope, dz, holders, listed)
+        return _add_holders(tree, 0, tree.count, anchor, o, d, slope, dz, holders, count)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, blocks = blocks_of(child)
-            listed = _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, listed)
+            count = _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, count)
             continue
         top = push_children(tree, child, _holding_octants(tree, child, o), stack, top)
-    return listed
+    return count
 
 
 @kernel
-def _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, listed):
+def _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, count):
     """List those faces of some blocks that hold an anchor."""
-    count, grazes = listed
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
             face, place = get(tree.faces, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
             if face >= 0 and _box_holds(tree, place, o):
-                seen = seen_from(tree, place, anchor)
-                grazes = grazes or is_grazed(seen, d)
-                met = meet_face(seen, anchor, d, slope, dz)
+                met = meet_face(seen_from(tree, place, anchor), anchor, d, slope, dz)
                 if met.kind == HOLDS:
                     count = add_holder(tree, holders, count, place, face, met.zeros)
-    return Listed(count, grazes)
+    return count
 
 
 @kernel
@@ -127,18 +117,16 @@ def _stopped(tree, start, anchor, count, d, slope, dz, holders):
 
 
 class Departure(NamedTuple):
-    """A ray as it leaves its start: as ``intersect.Ray``, its anchor, the anchor rounded, its direction scaled by a
-    power of two, the ``slope_there`` of that, and the power; and whether all faces are met from the exact start. They are where the ray grazes a face
-    near the start, whose neighbours it may meet anywhere along it.
+    """A ray as it leaves its start: as ``intersect.Ray``, its anchor, its direction scaled by a power of two, the
+    ``slope_there`` of that, and the power; and of a ray from an edge the slack of its rounded start.
     """
 
     ray: Any
     anchor: Any
-    o: Any
     d: Any
     slope: int
     unit: float
-    exactly: bool
+    slack: float
 
 
 @kernel
@@ -153,31 +141,26 @@ def depart(tree, starts, i, ray, stack, memory):
     o, (d, unit) = rounded(anchor), unit_direction((ray.dx, ray.dy, ray.dz))
     if ray.slack == EDGE:
         ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, ray.slack, ray.leaving)
-    stopped, exactly, dz = _NOTHING, False, make_shear(ray).direction_z
-    slope = slope_there(anchor, d)
-    if ray.slack == EDGE or start.code & KNOWN != 0:
-        holders = make_holders(memory)
-        count, grazes = list_holders(tree, anchor, d, slope, dz, stack, holders)
-        exactly = grazes and ray.slack == EDGE
-        if start.code & KNOWN != 0 and ray.t_min == 0.0:
-            stopped = _stopped(tree, start, anchor, count, d, slope, dz, holders)
-    return Departure(ray, anchor, o, d, slope, unit, exactly), stopped
+    stopped, slope = _NOTHING, slope_there(anchor, d)
+    if start.code & KNOWN != 0 and ray.t_min == 0.0:
+        dz, holders = make_shear(ray).direction_z, make_holders(memory)
+        count = list_holders(tree, anchor, d, slope, dz, stack, holders)
+        stopped = _stopped(tree, start, anchor, count, d, slope, dz, holders)
+    return Departure(ray, anchor, d, slope, unit, slack_of(o, 0.0)), stopped
 
 
 @inlined
 def near_bits(tree, block, departure, shear, seen):
-    """The bits of the faces of a block that are met from the exact start. The face that the ray leaves is one of them
-    at an edge; inside it is left out.
+    """The bits of the faces of a block that are met from the exact start: of a ray from an edge those of which rounding
+    may have made the side that it passes on or the sign of t, of others those near the start.
     """
-    near, ray, places = np.int64(0), departure.ray, block * BLOCK_FACES
-    if ray.slack == EDGE:
-        for i in range(BLOCK_FACES):
-            near_it = departure.exactly or _box_holds(tree, block * BLOCK_WORDS + i, departure.o)
-            near |= np.int64(near_it and get(tree.faces, places + i) >= 0) << i
-    elif seen != 0:
-        edges, _ = see_triangles(tree, block * BLOCK_WORDS, shear)
-        near = seen & near_planes(edges, ray.slack)
-    return near
+    if departure.ray.slack != EDGE and seen == 0:
+        return np.int64(0)
+    edges, _ = see_triangles(tree, block * BLOCK_WORDS, shear)
+    if departure.ray.slack != EDGE:
+        return seen & near_planes(edges, departure.ray.slack)
+    unsure = unsure_sides(edges, departure.slack)
+    return unsure | (seen & near_planes(edges, departure.slack))
 
 
 @inlined
@@ -252,6 +235,29 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
     return best, steps
 
 
+@kernel
+def _t_from(tree, starts, i, ray, face, t):
+    """Where a ray meets the plane of a face that it hits at t, counted from its exact start."""
+    anchor, (d, unit) = anchor_of(start_at(starts, i, tree.scale)), unit_direction((ray.dx, ray.dy, ray.dz))
+    p0, p1, p2 = corners_of(starts.vertices, starts.faces, face, tree.scale)
+    side = larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
+    factor = 1.0 / power_below(side)
+    normal = cross_pairs(scaled_difference(p1, p0, factor), scaled_difference(p2, p0, factor))
+    far = 1.0 / power_below(larger(largest_component(sub(p0, rounded(anchor))), 1.0 / factor))
+    exact = quotient(dot_pairs(normal, from_anchor(anchor, p0, far)), dot_pairs(normal, as_pairs(d)))[0] / far / unit
+    return exact if exact > 0.0 and abs(exact - t) <= t else t
+
+
+@inlined
+def counted_from_start(tree, starts, i, ray, largest, hit, face):
+    """A hit (t, u, v, w) with t counted from the exact start of ray ``i``: where it is near, the way that the origin was
+    moved is a part of t.
+    """
+    if 0.0 < ray.slack < EDGE and face != NO_FACE and hit[0] * largest <= _NEAR_HIT * ray.slack:
+        return _t_from(tree, starts, i, ray, face, hit[0]), hit[1], hit[2], hit[3]
+    return hit
+
+
 class Side(NamedTuple):
     """The side of a face that a start is on: the face, -1 for none, its code, and the start's barycentrics."""
 
@@ -267,7 +273,7 @@ def side_of_normal(tree, start, n, stack, memory):
     anchor, holders = anchor_of(start), make_holders(memory)
     d, _ = unit_direction(n)
     slope = slope_there(anchor, d)
-    count, _ = list_holders(tree, anchor, d, slope, 1.0, stack, holders)
+    count = list_holders(tree, anchor, d, slope, 1.0, stack, holders)
     nodes = name_nodes(tree, anchor, holders, count)
     k, side = bounding_holder(tree, anchor, holders, count, nodes, d)
     if k == NOT_STOPPED:
