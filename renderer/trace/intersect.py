@@ -160,14 +160,15 @@ class Slabs(NamedTuple):
 
 
 @inlined
-def make_slab(axis, o, d, largest):
-    """Near row, far row, origins and reciprocals of one axis, each rounded so that the slab only grows.
+def make_slab(axis, o, d, largest, slack):
+    """Near row, far row, origins and reciprocals of one axis, each rounded so that the slab only grows, by ``slack`` on
+    both sides.
 
     The sign bit chooses the rows, so -0.0 is a direction like any other. The near reciprocal is finite and never above
     the true one. The far one may be infinite; times a difference of 0 it makes NaN, which ``enter_boxes`` ignores.
     """
     inverse, back = narrow(largest / d), is_negative(d)
-    down, up = round_both(o)
+    down, up = round_both(o - slack)[0], round_both(o + slack)[1]
     near_inverse = smaller(larger(inverse, -LARGEST_FLOAT), LARGEST_FLOAT)
     low, high = np.int64(16 * axis), np.int64(16 * axis + 8)
     return (
@@ -179,9 +180,11 @@ def make_slab(axis, o, d, largest):
 @inlined
 def make_slabs(ray, largest):
     """Prepare a ray; ``largest`` is ``largest_of(ray)`` > 0."""
-    nx, fx, nox, fox, nix, fix = make_slab(0, ray.ox, ray.dx, largest)
-    ny, fy, noy, foy, niy, fiy = make_slab(1, ray.oy, ray.dy, largest)
-    nz, fz, noz, foz, niz, fiz = make_slab(2, ray.oz, ray.dz, largest)
+    # Infinite, it says that the ray goes through no box.
+    slack = select(ray.slack < np.inf, ray.slack, 0.0)
+    nx, fx, nox, fox, nix, fix = make_slab(0, ray.ox, ray.dx, largest, slack)
+    ny, fy, noy, foy, niy, fiy = make_slab(1, ray.oy, ray.dy, largest, slack)
+    nz, fz, noz, foz, niz, fiz = make_slab(2, ray.oz, ray.dz, largest, slack)
     return Slabs(
         nx, ny, nz, fx, fy, fz, nox, noy, noz, fox, foy, foz, nix, niy, niz, fix, fiy, fiz
     )  # fmt: skip

@@ -125,7 +125,8 @@ def _prepare_origins(rays, prepared, sixteen, limits):
     for half in range(0, WIDTH, 8):
         for axis in range(3):
             o = gather8(rays.origins, at(integers, NUMBER + half), rays.origin_step, axis) * rays.scale
-            far, near = round_both(o)
+            slack = gather8(rays.starts.rows, at(integers, NUMBER + half), rays.starts.step, START_SLACK)
+            far, near = round_both(o - slack)[0], round_both(o + slack)[1]
             if get(floats, NEAR_INVERSE + axis * WIDTH) < 0.0:
                 near, far = far, near
             store(floats, NEAR_ORIGIN + axis * WIDTH + half, near)
@@ -152,12 +153,13 @@ def _beam_between(beam, low, high):
 @inlined
 def _bounds(rays, live, count, axis):
     """The range of the origins of the rays ``live``, float32 and rounded outwards: rounding is monotone."""
-    low = get(rays.origins, get(live, 0) * rays.origin_step + axis)
-    high = low
-    for j in range(1, count):
-        o = get(rays.origins, get(live, j) * rays.origin_step + axis)
-        low, high = smaller(low, o), larger(high, o)
-    return round_both(low * rays.scale)[0], round_both(high * rays.scale)[1]
+    low, high = np.inf, -np.inf
+    for j in range(count):
+        i = get(live, j)
+        o = get(rays.origins, i * rays.origin_step + axis) * rays.scale
+        slack = get(rays.starts.rows, i * rays.starts.step + START_SLACK)
+        low, high = smaller(low, o - slack), larger(high, o + slack)
+    return round_both(low)[0], round_both(high)[1]
 
 
 @inlined

@@ -19,7 +19,7 @@ from renderer.kernels.pairs import (
     scaled_difference,
 )
 from renderer.kernels.simd import larger
-from renderer.kernels.vec3 import add, largest_component, scale, sub
+from renderer.kernels.vec3 import largest_component, sub
 from renderer.trace.starts.record import BARYCENTRIC
 
 _LEAST_NORMAL = 2.0**-1022
@@ -56,10 +56,17 @@ def anchor_of(start):
     return _nearest(corners, start.anchor, unit)
 
 
-@inlined
+@kernel
 def rounded(anchor):
-    """The anchor as float64."""
-    return add(anchor.base, scale(heads(anchor.way), anchor.unit))
+    """The anchor as float64, each coordinate rounded by little of itself."""
+    (x, y, z), (bx, by, bz), unit = anchor.way, anchor.base, anchor.unit
+    return _nearest_float(bx, x, unit), _nearest_float(by, y, unit), _nearest_float(bz, z, unit)
+
+
+@inlined
+def _nearest_float(base, way, unit):
+    head, tail = exact_sum(base, way[0] * unit)
+    return head + (tail + way[1] * unit)
 
 
 @kernel

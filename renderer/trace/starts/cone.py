@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, plus, power_below, scaled_difference
+from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, plus, power_below, product, scaled_difference
 from renderer.kernels.simd import at, get, put
 from renderer.kernels.vec3 import largest_component, sub
 from renderer.trace.sides import corner
@@ -19,10 +19,9 @@ from renderer.trace.starts.meeting import lean_sign, seen_from, turn_sign
 
 # The most faces that may hold a start; of more, those beyond are left out.
 MOST_HOLDERS = 4096
-# The words of a holder: its place in the blocks, its face, the bits of the corners of weight 0, its two nodes, and the
-# parities of two paths.
-PLACE, NUMBER, ZEROS, FIRST_NODE, SECOND_NODE, PATH, OTHER_PATH, HOLDER = range(8)
-_HOLDER_WORDS = 8
+# The words of a holder: its place in the blocks, its face, the bits of the corners of weight 0, its two nodes, the
+# parities of two paths, and that of the second where it is FREE.
+PLACE, NUMBER, ZEROS, FIRST_NODE, SECOND_NODE, PATH, OTHER_PATH, FREE_PATH, _HOLDER_WORDS = range(9)
 # Then for each node: the place of a corner in that direction, its parent in the forest, and the parity to it.
 NODE_PLACE, PARENT, PARITY, _NODE_WORDS = 0, 1, 2, 3
 HOLDERS_WORDS = MOST_HOLDERS * (_HOLDER_WORDS + 2 * _NODE_WORDS)
@@ -192,12 +191,14 @@ def middle_of(cone, attempt):
     return _mixed(cone.first, cone.second, share, other)
 
 
-@inlined
+@kernel
 def _mixed(a, b, s, t):
+    """s a + t b."""
+    s, t = (s, 0.0), (t, 0.0)
     return (
-        plus((a[0][0] * s, a[0][1] * s), (b[0][0] * t, b[0][1] * t)),
-        plus((a[1][0] * s, a[1][1] * s), (b[1][0] * t, b[1][1] * t)),
-        plus((a[2][0] * s, a[2][1] * s), (b[2][0] * t, b[2][1] * t)),
+        plus(product(a[0], s), product(b[0], t)),
+        plus(product(a[1], s), product(b[1], t)),
+        plus(product(a[2], s), product(b[2], t)),
     )
 
 

@@ -23,8 +23,7 @@ NONE = -1
 # by 2^-100 of what it is the difference of.
 _ERROR, _WAY_ERROR = 2.0**-94, 2.0**-98
 _LEAST_NORMAL = 2.0**-1022
-# The least t of a face that does not hold the start.
-_LEAST = 2.0**-1074
+
 
 
 class SeenFace(NamedTuple):
@@ -226,7 +225,7 @@ def meet_face(face, anchor, d, slope_there, dz):
         return _none()
     t = quotient(dot_pairs(face.normal, face.a0), dot_pairs(face.normal, way))
     u, v, w = _weights(e0, e1, e2, slope, dz)
-    return Meeting(IS_HIT, larger(t[0] / face.factor, _LEAST), u, v, w, _zeros(s0, s1, s2))
+    return Meeting(IS_HIT, larger(t[0], 0.0) / face.factor, u, v, w, _zeros(s0, s1, s2))
 
 
 @kernel

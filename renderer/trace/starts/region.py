@@ -14,6 +14,7 @@ from renderer.kernels.vec3 import dot, normalized
 from renderer.trace.starts.cone import (
     FIRST_NODE,
     FREE,
+    FREE_PATH,
     NO_NODE,
     NUMBER,
     OTHER_PATH,
@@ -36,10 +37,6 @@ from renderer.trace.starts.meeting import lean_sign, slope_of
 NOT_STOPPED = -1
 # Hubs that are tried until none of the paths meets an outline.
 _ATTEMPTS = 16
-# The order in which coincident faces are passed: all at once, or by their numbers, seen from the face that was passed
-# or from the one ahead.
-AT_ONCE, PASSED, AHEAD = range(3)
-
 
 @inlined
 def _hub(attempt):
@@ -51,7 +48,7 @@ def _hub(attempt):
 
 
 @kernel
-def _path_to_cone(tree, anchor, holders, count, k, side, order, attempt, word):
+def _path_to_cone(tree, anchor, holders, count, k, side, attempt, word):
     """Write the parities of the path from the hub to the k-th cone, on one side of its face; returns whether it meets
     no outline.
     """
@@ -66,9 +63,7 @@ def _path_to_cone(tree, anchor, holders, count, k, side, order, attempt, word):
         elif lean_sign(cone.face, middle) != 0:
             parity = crosses(cone, hub, middle, lean_sign(cone.face, middle))
         else:
-            ahead = order == PASSED and holder(holders, j, NUMBER) > holder(holders, k, NUMBER)
-            behind = order == AHEAD and holder(holders, j, NUMBER) < holder(holders, k, NUMBER)
-            parity = _parity_beside(cone, own, hub, middle, -side if ahead or behind else side)
+            parity = _parity_beside(cone, own, hub, middle, side)
         if parity == UNKNOWN:
             return False
         put_holder(holders, j, word, parity)
@@ -112,17 +107,14 @@ def _root(holders, k):
 
 
 @kernel
-def _are_even(holders, count, nodes, turned):
-    """Whether the two paths together cross every closed curve of arcs an even number of times.
-
-    A path that ends on an arc crosses it or not, as it comes from one side or the other: only the arc ``turned`` does.
-    """
+def _are_even(holders, count, nodes):
+    """Whether the two paths together cross every closed curve of arcs an even number of times."""
     for k in range(nodes):
         put_node(holders, k, PARENT, k)
         put_node(holders, k, PARITY, 0)
     for j in range(count):
         end = holder(holders, j, OTHER_PATH)
-        parity = holder(holders, j, PATH) ^ (np.int64(j == turned) if end == FREE else end)
+        parity = holder(holders, j, PATH) ^ (holder(holders, j, FREE_PATH) if end == FREE else end)
         if holder(holders, j, FIRST_NODE) == NO_NODE:
             # A great circle.
             if parity != 0:
@@ -140,36 +132,47 @@ def _are_even(holders, count, nodes, turned):
 
 
 @kernel
-def _is_connected(holders, count, nodes):
-    """Whether the ends of both paths are in one region, or the second end is on its outline."""
-    if _are_even(holders, count, nodes, -1):
+def _is_connected(tree, anchor, holders, count, nodes):
+    """Whether the ends of both paths are in one region, or the second end is on its outline.
+
+    A path that ends on an arc crosses it or not, as it comes from one side or the other: with all that coincide there.
+    """
+    for j in range(count):
+        put_holder(holders, j, FREE_PATH, 0)
+    if _are_even(holders, count, nodes):
         return True
     for j in range(count):
-        if holder(holders, j, OTHER_PATH) == FREE and _are_even(holders, count, nodes, j):
-            return True
+        if holder(holders, j, OTHER_PATH) == FREE:
+            own = cone_of(tree, anchor, holders, j)
+            for k in range(count):
+                face = cone_of(tree, anchor, holders, k).face
+                coincides = lean_sign(face, own.first) == 0 and lean_sign(face, own.second) == 0
+                put_holder(holders, k, FREE_PATH, coincides)
+            if _are_even(holders, count, nodes):
+                return True
     return False
 
 
 @kernel
-def _is_open(tree, anchor, holders, count, nodes, k, side, order, d):
+def _is_open(tree, anchor, holders, count, nodes, k, side, d):
     """Whether a direction is in the region beside the k-th cone."""
     for attempt in range(_ATTEMPTS):
-        if _path_to_cone(tree, anchor, holders, count, k, side, order, attempt, PATH) and _path_to_direction(
+        if _path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH) and _path_to_direction(
             tree, anchor, holders, count, d, attempt, OTHER_PATH
         ):
-            return _is_connected(holders, count, nodes)
+            return _is_connected(tree, anchor, holders, count, nodes)
     # No path avoids all outlines: nothing is known to separate the two.
     return True
 
 
 @kernel
-def _bounds_region(tree, anchor, holders, count, nodes, k, side, order, j, facing):
+def _bounds_region(tree, anchor, holders, count, nodes, k, side, j, facing):
     """Whether the region beside the k-th cone touches the j-th one on the side ``facing``."""
     for attempt in range(_ATTEMPTS):
-        if _path_to_cone(tree, anchor, holders, count, k, side, order, attempt, PATH) and _path_to_cone(
-            tree, anchor, holders, count, j, facing, AHEAD, attempt, OTHER_PATH
+        if _path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH) and _path_to_cone(
+            tree, anchor, holders, count, j, facing, attempt, OTHER_PATH
         ):
-            return _is_connected(holders, count, nodes)
+            return _is_connected(tree, anchor, holders, count, nodes)
     return False
 
 
@@ -178,50 +181,46 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
     """The holder that stops a ray at its start, or NOT_STOPPED.
 
     The ray starts in the region beside the cone of ``face``, on one side of it. It is stopped where its direction d
-    leads out of that region: by the lowest face that bounds the region and has d behind it. ``through`` says
-    that it has just passed the face: of those that coincide with it the lower ones are passed too, the higher ones lie
-    ahead.
+    leads out of that region: by the lowest face that bounds the region and has d behind it. ``through`` says that it has
+    just passed the face: then the lowest of the faces that coincide with it and have higher numbers stops it.
     """
     own = -1
     for k in range(count):
         if holder(holders, k, NUMBER) == face:
             own = k
-    order = PASSED if through else AT_ONCE
-    if own < 0 or _is_open(tree, anchor, holders, count, nodes, own, side, order, d):
+    if own < 0:
         return NOT_STOPPED
     best = NOT_STOPPED
+    if through and slope_of(cone_of(tree, anchor, holders, own).face, d) == side:
+        for j in range(count):
+            if holder(holders, j, NUMBER) > face and _coincide(tree, anchor, holders, own, j):
+                best = _lower(holders, best, j)
+    if best != NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
+        return best
     for j in range(count):
-        if best != NOT_STOPPED and holder(holders, j, NUMBER) > holder(holders, best, NUMBER):
-            continue
         behind = slope_of(cone_of(tree, anchor, holders, j).face, d)
-        facing = _facing_side(tree, anchor, holders, own, side, order, j)
-        if facing != 0:
-            bounds = facing == -behind
-        else:
-            bounds = behind != 0 and _bounds_region(
-                tree, anchor, holders, count, nodes, own, side, order, j, -behind
-            )
-        if bounds:
-            best = j
+        if behind != 0 and _bounds_region(tree, anchor, holders, count, nodes, own, side, j, -behind):
+            best = _lower(holders, best, j)
     return best
 
 
+@inlined
+def _lower(holders, k, j):
+    """The one of two holders whose face has the lower number; k may be NOT_STOPPED."""
+    return j if k == NOT_STOPPED or holder(holders, j, NUMBER) < holder(holders, k, NUMBER) else k
+
+
 @kernel
-def _facing_side(tree, anchor, holders, k, side, order, j):
-    """The side of the j-th face on which a ray beside the k-th one is, where the two coincide; 0 where they do not."""
-    if j == k:
-        return side
+def _coincide(tree, anchor, holders, k, j):
+    """Whether the cone of the j-th holder is in the plane of the k-th one and has its middle in it."""
     own, cone = cone_of(tree, anchor, holders, k), cone_of(tree, anchor, holders, j)
     if lean_sign(cone.face, own.first) != 0 or lean_sign(cone.face, own.second) != 0:
-        return 0
-    where = 0
+        return False
     for attempt in range(_ATTEMPTS):
-        where = within_cone(cone, middle_of(own, attempt)) if where == 0 else where
-    if where <= 0:
-        return 0
-    ahead = order == PASSED and holder(holders, j, NUMBER) > holder(holders, k, NUMBER)
-    turned = dot_pairs(cone.face.normal, own.face.normal)[0] < 0.0
-    return -side if ahead != turned else side
+        where = within_cone(cone, middle_of(own, attempt))
+        if where != 0:
+            return where > 0
+    return False
 
 
 @kernel
@@ -237,6 +236,6 @@ def bounding_holder(tree, anchor, holders, count, nodes, n):
         first = across > most or (across == most and holder(holders, k, NUMBER) < holder(holders, best, NUMBER))
         own = slope_of(face, n)
         for side in (own, -own) if own != 0 else (1, -1):
-            if first and _is_open(tree, anchor, holders, count, nodes, k, side, AT_ONCE, n):
+            if first and _is_open(tree, anchor, holders, count, nodes, k, side, n):
                 best, best_side, most, first = k, side, across, False
     return best, best_side

@@ -45,6 +45,8 @@ from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, stopping_
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
+# The least t of a face that does not hold the start: what is less would be 0 in the mesh's own units.
+_LEAST_T = 2.0**-900
 # A hit that is farther than so often its slack errs by less than 2^-20 of t by where the ray starts.
 _NEAR_HIT = 2.0**20
 _NOTHING = (np.inf, np.int32(NO_FACE), 0.0, 0.0, 1.0)
@@ -118,7 +120,7 @@ def _stopped(tree, start, anchor, count, d, slope, dz, holders):
 
 class Departure(NamedTuple):
     """A ray as it leaves its start: as ``intersect.Ray``, its anchor, its direction scaled by a power of two, the
-    ``slope_there`` of that, and the power; and of a ray from an edge the slack of its rounded start.
+    ``slope_there`` of that, and the power; and whether it starts near an edge, from the rounded anchor.
     """
 
     ray: Any
@@ -126,7 +128,7 @@ class Departure(NamedTuple):
     d: Any
     slope: int
     unit: float
-    slack: float
+    edge: bool
 
 
 @kernel
@@ -139,14 +141,15 @@ def depart(tree, starts, i, ray, stack, memory):
     start = start_at(starts, i, tree.scale)
     anchor = anchor_of(start)
     o, (d, unit) = rounded(anchor), unit_direction((ray.dx, ray.dy, ray.dz))
-    if ray.slack == EDGE:
-        ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, ray.slack, ray.leaving)
+    edge = ray.slack == EDGE
+    if edge:
+        ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, slack_of(o, 0.0), ray.leaving)
     stopped, slope = _NOTHING, slope_there(anchor, d)
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
         dz, holders = make_shear(ray).direction_z, make_holders(memory)
         count = list_holders(tree, anchor, d, slope, dz, stack, holders)
         stopped = _stopped(tree, start, anchor, count, d, slope, dz, holders)
-    return Departure(ray, anchor, d, slope, unit, slack_of(o, 0.0)), stopped
+    return Departure(ray, anchor, d, slope, unit, edge), stopped
 
 
 @inlined
@@ -154,20 +157,18 @@ def near_bits(tree, block, departure, shear, seen):
     """The bits of the faces of a block that are met from the exact start: of a ray from an edge those of which rounding
     may have made the side that it passes on or the sign of t, of others those near the start.
     """
-    if departure.ray.slack != EDGE and seen == 0:
+    if not departure.edge and seen == 0:
         return np.int64(0)
     edges, _ = see_triangles(tree, block * BLOCK_WORDS, shear)
-    if departure.ray.slack != EDGE:
-        return seen & near_planes(edges, departure.ray.slack)
-    unsure = unsure_sides(edges, departure.slack)
-    return unsure | (seen & near_planes(edges, departure.slack))
+    near = seen & near_planes(edges, departure.ray.slack)
+    return near | unsure_sides(edges, departure.ray.slack) if departure.edge else near
 
 
 @inlined
 def meet_near(tree, place, departure, dz):
     """The hit (t, u, v, w) of a face that is met from the exact start, t = NaN for none, and its ``Meeting.zeros``."""
     met = meet_face(seen_from(tree, place, departure.anchor), departure.anchor, departure.d, departure.slope, dz)
-    t = met.t / departure.unit if met.kind == IS_HIT else np.nan
+    t = larger(met.t / departure.unit, _LEAST_T) if met.kind == IS_HIT else np.nan
     return (t, met.u, met.v, met.w), met.zeros
 
 
