@@ -135,19 +135,22 @@ def _are_even(holders, count, nodes):
 def _is_connected(tree, anchor, holders, count, nodes):
     """Whether the ends of both paths are in one region, or the second end is on its outline.
 
-    A path that ends on an arc crosses it or not, as it comes from one side or the other: with all that coincide there.
+    A path that ends on an arc crosses it or not, as it comes from one side or the other: alone, as where two arcs meet,
+    or with all that lie upon each other there.
     """
     for j in range(count):
         put_holder(holders, j, FREE_PATH, 0)
     if _are_even(holders, count, nodes):
         return True
     for j in range(count):
-        if holder(holders, j, OTHER_PATH) == FREE:
-            own = cone_of(tree, anchor, holders, j)
+        if holder(holders, j, OTHER_PATH) != FREE:
+            continue
+        own = cone_of(tree, anchor, holders, j)
+        for together in range(2):
             for k in range(count):
                 face = cone_of(tree, anchor, holders, k).face
-                coincides = lean_sign(face, own.first) == 0 and lean_sign(face, own.second) == 0
-                put_holder(holders, k, FREE_PATH, coincides)
+                level = lean_sign(face, own.first) == 0 and lean_sign(face, own.second) == 0
+                put_holder(holders, k, FREE_PATH, k == j or (together == 1 and level))
             if _are_even(holders, count, nodes):
                 return True
     return False
