@@ -11,7 +11,19 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, power_below, scaled_difference
 from renderer.kernels.simd import at, larger, pointer, put, smaller
-from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_component, length, normalized, row3, scale, sub, three
+from renderer.kernels.vec3 import (
+    add,
+    barycentric,
+    cross,
+    dot,
+    largest_component,
+    length,
+    normalized,
+    row3,
+    scale,
+    sub,
+    three,
+)
 from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import DOUBT, SLANT
 from renderer.trace.starts.anchor import anchor_of, far_from
@@ -55,8 +67,8 @@ _SMALLEST = 2.0**-1074
 # A start is inside its face where it is farther from the edges than so often its slack: a face beside it, at more than
 # a 64th of a right angle, is farther from it than where it is moved to.
 _INSIDE = 8.0
-# A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that is
-# not thinner than _SHARP.
+# A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that
+# is not thinner than _SHARP.
 LEVEL = 2.0**-20
 # A point that went through float32 is off by 2^-24 of its largest coordinate: 64 times that is taken, as the same
 # may hold for the mesh and for what the point was computed from.
@@ -251,7 +263,7 @@ def _plane_below(p0, p1, p2, o, w):
 
 @inlined
 def _moved(o, n_g, height, needed, away):
-    """The point o near a face, moved along its normal to where it is off for certain; to the other side by away = -1."""
+    """The point o near a face, moved along its normal to where it is off for certain; to its other side by -1."""
     step = scale(n_g, away * (needed - away * height))
     return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
 
@@ -320,7 +332,9 @@ def lies_far(corners, o, unit):
     o = scale(o, unit)
     # Most are near the plane and inside.
     n = cross(sub(p1, p0), sub(p2, p0))
-    most = larger(largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2))))
+    most = larger(
+        largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    )
     if abs(dot(n, sub(o, p0))) <= FARTHEST_START * most * length(n) and _is_inside(p0, p1, p2, o, 0.0):
         return False
     anchor = anchor_of(Start(corners, o, 0, 0))
@@ -358,7 +372,9 @@ def leave_faces(vertices, faces, rays, leaving, code, anchors, starts, rows, bou
         own, slack, bits = o, 0.0, code[i * code_step]
         if face >= 0:
             around = corners_of(corners, pointer(faces), face, unit)
-            if lies_far(around, o, unit) or (len(anchors) > 0 and not _lies_at(around, row3(pointer(anchors), i), o, unit)):
+            if lies_far(around, o, unit) or (
+                len(anchors) > 0 and not _lies_at(around, row3(pointer(anchors), i), o, unit)
+            ):
                 return i
             own, slack = leave_face(around, o, w, unit, bits)
         anchor = o if len(anchors) == 0 else row3(pointer(anchors), i)

@@ -19,17 +19,16 @@ from renderer.trace.starts.anchor import from_anchor
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
 NONE = -1
-# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a corner
-# by 2^-100 of what it is the difference of.
+# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a
+# corner by 2^-100 of what it is the difference of.
 _ERROR, _WAY_ERROR = 2.0**-94, 2.0**-98
 _LEAST_NORMAL = 2.0**-1022
 
 
-
 class SeenFace(NamedTuple):
     """A face from an anchor, scaled by a power of two: the ways to its corners and its normal, as pairs; the corners in
-    the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by a
-    share; the error of the ways; and for each corner the one of the anchor's face in its place, NONE for none.
+    the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by
+    a share; the error of the ways; and for each corner the one of the anchor's face in its place, NONE for none.
     """
 
     a0: Any
@@ -177,7 +176,7 @@ def _is_after(i, j):
 def _common(face, anchor, slope, i, j, sign):
     """The sign of direction . (way to corner i x way to corner j): exact where the side is one of the anchor's face."""
     a, b = face.same[i], face.same[j]
-    if a == NONE or b == NONE or a == b:
+    if a == b or a < 0 or b < 0:  # NONE is the one below 0
         return sign
     weight = 0 if (anchor.zeros >> _third(a, b)) & 1 != 0 else 1
     return weight * (slope if _is_after(a, b) else -slope)
