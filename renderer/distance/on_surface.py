@@ -46,6 +46,15 @@ def on_surface(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64],
     return SurfacePoints(faces, anchors)
 
 
+def are_on(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether points (n, 3) lie on faces (n,), as near as a rounding."""
+    corners = mesh.vertices[mesh.faces[faces]]
+    u, v = _barycentrics(corners, points, np.zeros(len(points))).T
+    nearest = (1.0 - u - v)[:, None] * corners[:, 0] + u[:, None] * corners[:, 1] + v[:, None] * corners[:, 2]
+    # The nearest points are rounded, too.
+    return np.linalg.norm(points - nearest, axis=1) <= 2.0 * _room(points)
+
+
 def _room(points: Floats) -> Floats:
     """How far each point may be from the surface that it lies on."""
     with np.errstate(over="ignore", invalid="ignore"):

@@ -67,6 +67,9 @@ _SMALLEST = 2.0**-1074
 # A start is inside its face where it is farther from the edges than so often its slack: a face beside it, at more than
 # a 64th of a right angle, is farther from it than where it is moved to.
 _INSIDE = 8.0
+# A start that would be moved by more of its face's size, as of needles, is left to exact signs: t is counted from
+# there.
+_FARTHEST_MOVE = 2.0**-38
 # A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that
 # is not thinner than _SHARP.
 LEVEL = 2.0**-20
@@ -170,6 +173,7 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
     side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
     # A weight times the double area is the distance from its edge times the edge's length.
     inside = smaller(u, smaller(v, w)) * double_area > _INSIDE * slack * side and double_area > side * LINE * side
+    inside = inside and error <= _FARTHEST_MOVE * side
     return error, slack if inside else EDGE
 
 
@@ -269,15 +273,17 @@ def _moved(o, n_g, height, needed, away):
 
 
 @inlined
-def _is_inside(p0, p1, p2, o, slack):
-    """Whether a point near a face is far from all its edges, as seen from a start with this slack."""
+def _is_inside(p0, p1, p2, o, slack, needed):
+    """Whether a point near a face is far from all its edges, as seen from a start with this slack, and would be moved
+    by little.
+    """
     one, other, q = sub(p1, p0), sub(p2, p0), sub(o, p0)
     n = cross(one, other)
     u, v, whole = dot(cross(q, other), n), dot(cross(one, q), n), dot(n, n)
     side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
     # A weight is the distance from its edge times the edge's length times the double area.
     least = smaller(u, smaller(v, whole - u - v))
-    return least > _INSIDE * slack * side * math.sqrt(whole)
+    return least > _INSIDE * slack * side * math.sqrt(whole) and needed <= _FARTHEST_MOVE * side
 
 
 @inlined
@@ -306,7 +312,7 @@ def leave_face(corners, o, w, unit, code):
     slack = slack_of(o, needed)
     side = _side_of(n_g, w, code)
     start = _moved(o, n_g, height, needed, 1.0 if dot(n_g, w) >= 0.0 else -1.0)
-    inside = side != 0.0 and has_normal(p0, p1, p2) and _is_inside(p0, p1, p2, o, slack)
+    inside = side != 0.0 and has_normal(p0, p1, p2) and _is_inside(p0, p1, p2, o, slack, needed)
     return scale(start, 1.0 / unit), slack if inside else EDGE
 
 
@@ -321,7 +327,7 @@ def leave_to_both_sides(corners, o, unit):
     n_g, height, needed = _plane_below(p0, p1, p2, o, o)
     slack = slack_of(o, needed)
     above, below = _moved(o, n_g, height, needed, 1.0), _moved(o, n_g, height, needed, -1.0)
-    slack = slack if _is_inside(p0, p1, p2, o, slack) else EDGE
+    slack = slack if _is_inside(p0, p1, p2, o, slack, needed) else EDGE
     return n_g, scale(above, 1.0 / unit), scale(below, 1.0 / unit), slack
 
 
@@ -335,7 +341,7 @@ def lies_far(corners, o, unit):
     most = larger(
         largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
     )
-    if abs(dot(n, sub(o, p0))) <= FARTHEST_START * most * length(n) and _is_inside(p0, p1, p2, o, 0.0):
+    if abs(dot(n, sub(o, p0))) <= FARTHEST_START * most * length(n) and _is_inside(p0, p1, p2, o, 0.0, 0.0):
         return False
     anchor = anchor_of(Start(corners, o, 0, 0))
     return far_from(anchor, o) > FARTHEST_START * most

@@ -139,6 +139,11 @@ class Surface:
         """A face's normal by its winding, not of length 1."""
         return self._normals[face]
 
+    def corners(self, face: int) -> list[list[float]]:
+        """A face's corners."""
+        found: list[list[float]] = self._corners[face].tolist()
+        return found
+
     def holding(self, place: Place) -> list[tuple[int, tuple[bool, ...]]]:
         """The faces, ascending, that hold a point, and on which of their sides 01, 12, 20 it lies."""
         origin, bottom = self._scaled(place)

@@ -127,9 +127,20 @@ def _at_weights(corners, u, v, unit):
         return _along(corners, 0, 2, (v, 0.0), unit)
     if v == 0.0:
         return _along(corners, 0, 1, (u, 0.0), unit)
+    # From the corner of the largest weight: the way to one nearby has as many digits as others.
     p0, p1, p2 = corners
-    one, other = scaled_difference(p1, p0, 1.0 / unit), scaled_difference(p2, p0, 1.0 / unit)
-    return Anchor(p0, _sum(_times(one, (u, 0.0)), _times(other, (v, 0.0))), unit, corners, 0)
+    if u >= v and u >= w[0]:
+        return Anchor(p1, _mean(p1, p2, p0, (v, 0.0), w, unit), unit, corners, 0)
+    if v >= w[0]:
+        return Anchor(p2, _mean(p2, p0, p1, w, (u, 0.0), unit), unit, corners, 0)
+    return Anchor(p0, _mean(p0, p1, p2, (u, 0.0), (v, 0.0), unit), unit, corners, 0)
+
+
+@kernel
+def _mean(a, b, c, s, t, unit):
+    """s (b - a) + t (c - a), in a unit."""
+    one, other = scaled_difference(b, a, 1.0 / unit), scaled_difference(c, a, 1.0 / unit)
+    return _sum(_times(one, s), _times(other, t))
 
 
 @kernel
@@ -157,7 +168,9 @@ def _nearest(corners, o, unit):
     n = cross_pairs(one, other)
     height = quotient(dot_pairs(n, q), dot_pairs(n, n))
     back = _times(n, (-height[0], -height[1]))
-    return Anchor(p0, _sum(q, back), unit, corners, 0)
+    f0, f1, f2 = largest_component(sub(o, p0)), largest_component(sub(o, p1)), largest_component(sub(o, p2))
+    base = p0 if f0 <= f1 and f0 <= f2 else (p1 if f1 <= f2 else p2)
+    return Anchor(base, _sum(scaled_difference(o, base, 1.0 / unit), back), unit, corners, 0)
 
 
 @inlined
