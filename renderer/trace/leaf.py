@@ -188,7 +188,7 @@ def is_before(tree, ray, place, face, other_place, other):
 
 @kernel
 def _plane(tree, place, o, d):
-    """normal . (p0 - o) and normal . d of the face at a place, as pairs, in one unit of its own; and the first's size."""
+    """normal . (p0 - o) and normal . d of the face at a place, as pairs in a unit of its own; and the first's size."""
     p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
     side = 1.0 / power_below(larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0))))
     normal = cross_pairs(scaled_difference(p1, p0, side), scaled_difference(p2, p0, side))

@@ -104,7 +104,7 @@ def _size(a):
 
 @kernel
 def _way_sign(face, d, i, j):
-    """The sign of d . (a x b) of a direction and the ways to two corners, 0 where rounding may have made it; the value."""
+    """The sign of d . (a x b) for the ways to two corners, 0 where rounding may have made it; and the value."""
     a, b = _way(face, i), _way(face, j)
     value = dot_pairs(d, cross_pairs(a, b))[0]
     return _sign_beyond(value, _size(d) * _error_of(face, i, j)), value
