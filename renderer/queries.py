@@ -11,11 +11,11 @@ from renderer.arrays import flag_argument
 from renderer.contacts.all_hits import all_hits, count_hits
 from renderer.distance.closest import ClosestPoints, closest_point
 from renderer.distance.signed import signed_distance
+from renderer.distance.visible import visible
 from renderer.errors import expect
 from renderer.inside.contains import contains
 from renderer.inside.winding import winding_number
 from renderer.mesh.mesh import Mesh, Repairs
-from renderer.distance.visible import visible
 from renderer.process.parallel import checked_threads
 from renderer.trace.batch import RayBatch, check_rays, moved_off
 from renderer.trace.error import add_errors

@@ -64,7 +64,9 @@ def _room(points: Floats) -> Floats:
 
 def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
     """u and v (n, 2) of the nearest points of faces; nearer to an edge than ``room`` its weight is 0."""
-    sides = np.stack([corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 0]], axis=1)
+    sides = np.stack(
+        [corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 0]], axis=1
+    )
     ways = points[:, None] - corners
     with np.errstate(all="ignore"):
         normals = np.cross(sides[:, 2], -sides[:, 1])

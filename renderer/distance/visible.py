@@ -15,8 +15,8 @@ from renderer.trace.starts.record import BARYCENTRIC
 
 Floats = NDArray[np.float64]
 Faces = NDArray[np.int64]
-# What is nearer to an end than this share of the largest coordinate of both is not looked at: ends that went through more
-# roundings than ``on_surface`` takes.
+# What is nearer to an end than this share of the largest coordinate of both is not looked at: ends that went through
+# more roundings than ``on_surface`` takes.
 _BESIDE = 2.0**-40
 # The least room: an end at 0 is left out, too.
 _LEAST = float(np.finfo(np.float64).smallest_subnormal)

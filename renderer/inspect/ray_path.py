@@ -161,7 +161,15 @@ def _meet(prepared: PreparedScene, ray: _Ray) -> _Met | None:
     came = -1.0 if dot(ray.direction, surface.n_g) > 0.0 else 1.0
     inside = dot(ray.direction, surface.n_s) > 0.0
     n, row = scale(surface.n_s, -1.0) if inside else surface.n_s, int(surface.material)
-    return _Met(face, Place(float(face), u, v, surface.slack, came), surface, n, inside, row, prepared.arrays.materials[row // MATERIAL_COLUMNS])
+    return _Met(
+        face,
+        Place(float(face), u, v, surface.slack, came),
+        surface,
+        n,
+        inside,
+        row,
+        prepared.arrays.materials[row // MATERIAL_COLUMNS],
+    )
 
 
 def _closest(prepared: PreparedScene, origin: Vector, direction: Vector, t_max: float, start: Floats) -> Hits:

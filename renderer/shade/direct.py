@@ -20,8 +20,8 @@ from renderer.trace.traverse import search_blocks, trace
 # The surface that a ray of a bundle met, for its light and the rays that it spawns: SURFACE_DOUBLES float64 per ray.
 POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT, PLACE = 0, 3, 6, 9, 10, 11, 12, 15
 SURFACE_DOUBLES = 20
-# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and the
-# row of ``starts.record``.
+# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and
+# the row of ``starts.record``.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 _TOWARDS, _ARRIVING, _START, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE, (13 + ROW) * SIZE
 

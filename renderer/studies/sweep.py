@@ -56,12 +56,12 @@ RAYS = 1024
 # And in one call, or one more list: some 10 ms, so that Ctrl-C and other threads need not wait for long.
 RAYS_A_CALL = 1 << 14
 # For each point of a tile: where a ray starts that goes to the side of its face's normal, and to the other side; that
-# normal; the frame, whose third vector is the point's own normal; the sum so far; that of all directions; and its row of
-# ``starts.record``.
+# normal; the frame, whose third vector is the point's own normal; the sum so far; that of all directions; and its row
+# of ``starts.record``.
 _ABOVE, _BELOW, _FACING, _FRAME = 0, 3 * TILE, 6 * TILE, 9 * TILE
 _SUM, _WHOLE, _START, _POINT_DOUBLES = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
-# Its row, and the leaf that hid its last direction, or 0; and once for the tile, how often tracing its rays together may
-# still be tried.
+# Its row, and the leaf that hid its last direction, or 0; and once for the tile, how often tracing its rays together
+# may still be tried.
 _ROW, _HIDER, _LEFT, _POINT_INTEGERS = 0, TILE, 2 * TILE, 2 * TILE + 8
 
 
@@ -121,8 +121,9 @@ class SweepMemory(NamedTuple):
 
 
 class _Work(NamedTuple):
-    """Pointers into a ``SweepMemory``: the tile's points; origins, directions, t_max and starts of rays; the points with
-    directions that are listed, (direction * TILE + point) * 2, and 1 more for those that have a ray; and their values.
+    """Pointers into a ``SweepMemory``: the tile's points; origins, directions, t_max and starts of rays; the points
+    with directions that are listed, (direction * TILE + point) * 2, and 1 more for those that have a ray; and their
+    values.
     """
 
     points: Any

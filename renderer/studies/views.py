@@ -157,7 +157,8 @@ def scan(
               face that it stands on
     distance  how far the scanner reaches, in scene units
 
-    A ray of a scanner on the surface that leads through the surface meets it at a distance of 0. Raises ``ValueError`` naming the argument.
+    A ray of a scanner on the surface that leads through the surface meets it at a distance of 0. Raises ``ValueError``
+    naming the argument.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box

@@ -103,8 +103,9 @@ def push_children(tree, node, bits, stack, top):
 NO_FACE = np.iinfo(np.int32).max
 # The place of no face.
 NOWHERE = -1
-# Two hits are ordered with twice the digits where their t are nearer to each other than this share: 2^-46 of t is what a
-# sure t errs by where the ray does not graze the face. They are equal where that leaves no more than its own rounding.
+# Two hits are ordered with twice the digits where their t are nearer to each other than this share: 2^-46 of t is what
+# a sure t errs by where the ray does not graze the face. They are equal where that leaves no more than its own
+# rounding.
 TIE, _EQUAL = 2.0**-44, 2.0**-90
 # After each run of so many blocks a search of all blocks for any hit checks whether it has one.
 _BLOCKS_AT_ONCE = 16
@@ -115,7 +116,8 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
     """The better of ``best`` = (t, face, u, v, w) and the sure hits in ``count`` blocks: smallest t, then lowest face.
 
     The barycentrics are u / w and v / w; only those of the final hit are divided. Also returns whether a hit was in
-    doubt, or so near to another that rounding may have ordered the two. A call here that settles it would cost every ray its registers, so that is left to ``nearest_carefully``.
+    doubt, or so near to another that rounding may have ordered the two. A call here that settles it would cost every
+    ray its registers, so that is left to ``nearest_carefully``.
     """
     t, face, u, v, w = best
     doubtful = np.int64(0)
@@ -186,7 +188,7 @@ def is_before(tree, ray, place, face, other_place, other):
 
 @kernel
 def _plane(tree, place, o, d):
-    """normal . (p0 - o) and normal . d of the face at a place, as pairs, in one unit of its own; and the first's size."""
+    """normal . (p0 - o) and normal . d of the face at a place, as pairs in a unit of its own; and the first's size."""
     p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
     side = 1.0 / power_below(larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0))))
     normal = cross_pairs(scaled_difference(p1, p0, side), scaled_difference(p2, p0, side))

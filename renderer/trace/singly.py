@@ -5,7 +5,15 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import LOCAL_WORDS, get, local_words, pointer, put, splat8
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.leaf import NO_FACE, NOWHERE, blocks_of, nearest_carefully, nearest_placed, push_children, tree_pointers
+from renderer.trace.leaf import (
+    NO_FACE,
+    NOWHERE,
+    blocks_of,
+    nearest_carefully,
+    nearest_placed,
+    push_children,
+    tree_pointers,
+)
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.starts.search import counted_from_start, search_from
 

@@ -10,7 +10,19 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, larger, pointer, put, smaller
-from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_component, length, normalized, row3, scale, sub, three
+from renderer.kernels.vec3 import (
+    add,
+    barycentric,
+    cross,
+    dot,
+    largest_component,
+    length,
+    normalized,
+    row3,
+    scale,
+    sub,
+    three,
+)
 from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import DOUBT, SLANT
 from renderer.trace.starts.anchor import anchor_of, far_from
@@ -310,7 +322,9 @@ def _lies_far(corners, o, unit):
     """Whether a point is farther from a face than points that went through float32 are."""
     p0, p1, p2 = corners
     o = scale(o, unit)
-    most = larger(largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2))))
+    most = larger(
+        largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    )
     return far_from(anchor_of(Start(corners, o, 0, 0)), o) > FARTHEST_START * most
 
 

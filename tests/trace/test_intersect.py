@@ -265,7 +265,7 @@ def test_rounding_both_ways_is_outward_and_close(x):
 @kernel
 def entered(nodes, o, d, t_min, t_max, entry):
     largest = max(abs(d[0]), abs(d[1]), abs(d[2]))
-    slabs = make_slabs(Ray(o[0], o[1], o[2], d[0], d[1], d[2], t_min), largest)
+    slabs = make_slabs(Ray(o[0], o[1], o[2], d[0], d[1], d[2], t_min, 0.0, -1.0), largest)
     lower, upper = splat8(round_down(t_min * largest)), splat8(round_up(t_max * largest))
     t0, bits = enter_boxes(nodes, 0, slabs, lower, upper)
     store(entry, 0, t0)

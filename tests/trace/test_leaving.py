@@ -97,8 +97,8 @@ def plane_distance(vertices, face, point):
     return sum(k * (y - x) for k, x, y in zip(n, p0, p, strict=True)), sum(k * k for k in n)
 
 
-def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_distance():
-    from renderer.trace.batch import check_rays, moved_off
+def test_starts_are_beyond_the_plane_by_no_more_than_roundings_and_above_the_nearest_point_of_it():
+    from renderer.trace.batch import by_faces, check_rays, moved_off
 
     ball = icosphere(2)
     for offset in OFFSETS:
@@ -107,18 +107,17 @@ def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_dis
         face, points, directions = on_faces(vertices, ball.faces, 5, 300)
         # Some lie off the plane, on either side, by more than rounding.
         points[::3] += 1e-6 * ball.face_normals()[face[::3]] * np.random.default_rng(0).choice([-1, 1], (100, 1))
-        rays = moved_off(check_rays(points, directions, 0.0, np.inf)[0], face, octree.mesh, 1.0, 1)
+        rays = moved_off(check_rays(points, directions, 0.0, np.inf)[0], by_faces(face), octree.mesh, 1.0, 1)
         normals = ball.face_normals()[face]
         for k in range(len(face)):
             side = 1 if directions[k] @ normals[k] >= 0 else -1
             before, square = plane_distance(vertices, ball.faces[face[k]], points[k])
             after, _ = plane_distance(vertices, ball.faces[face[k]], rays.origins[k])
             assert side * after > 0
+            assert side * float(after) / float(square) ** 0.5 <= 2e-13 * (1.0 + offset)
+            # From either side along the normal.
             moved = np.linalg.norm(rays.origins[k] - points[k])
-            away = max(0.0, -side * float(before) / float(square) ** 0.5)
-            assert moved <= away + 2e-13 * (1.0 + offset)
-            if moved == 0.0:
-                assert side * before > 0
+            assert moved <= abs(float(before)) / float(square) ** 0.5 + 2e-13 * (1.0 + offset)
 
 
 def test_minus_one_leaves_no_face_and_one_number_stands_for_all():
@@ -205,11 +204,18 @@ def test_no_kernel_is_compiled_for_other_arrays(monkeypatch):
     kernel = batch.leave_faces
 
     def noted(*arguments):
-        seen.append([array.flags.writeable for array in arguments[2:6]])
+        origins, directions = arguments[2]
+        seen.append([array.flags.writeable for array in (origins, directions, *arguments[3:8])])
         return kernel(*arguments)
 
     monkeypatch.setattr(batch, "leave_faces", noted)
     octree, directions = Octree.from_mesh(icosphere(1)), np.eye(3)
+    starts = octree.mesh.triangles[:3].mean(axis=1)
     for ways in (directions, directions[0], np.broadcast_to(directions[0], (3, 3))):
-        octree.any_hit(np.zeros((3, 3)), ways, leaving=[0, 1, 2])
-    assert len(seen) == 3 and all(all(row) for row in seen)
+        octree.any_hit(starts, ways, leaving=[0, 1, 2])
+    corner = octree.mesh.triangles[0, 0]
+    octree.any_hit(np.broadcast_to(corner, (3, 3)), directions, leaving=0, side=1)
+    hits = octree.closest_hit(3.0 * starts, -starts)
+    for left in (hits, hits.through()):
+        octree.any_hit(hits.points, -starts, leaving=left)
+    assert len(seen) == 6 and all(all(row) for row in seen)

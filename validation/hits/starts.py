@@ -32,9 +32,9 @@ _SIGN_ROUNDINGS = 8 * 2.0**-53
 # t of the sample, relative and in units of the largest coordinate over the direction's part along the normal: an answer
 # beyond is another hit. A start inside a face is moved by up to 2^-38 of the face. How exact t is, other gates judge.
 _RELATIVE, _ABSOLUTE = 1e-9, 2.0**-37
-# Near its start a ray is judged exactly, but for what is beyond the pairs of float64 that decide: edge functions of less
-# than this share of their terms. Farther off, as any ray, it may pass an edge on either side that it passes by no more
-# than its start is moved.
+# Near its start a ray is judged exactly, but for what is beyond the pairs of float64 that decide: edge functions of
+# less than this share of their terms. Farther off, as any ray, it may pass an edge on either side that it passes by no
+# more than its start is moved.
 _CLOSEST, _NEAR = Fraction(1, 1 << 84), 2.0**-30
 _REASON = "exact arithmetic says so"
 

@@ -55,7 +55,7 @@ _MISS = First(None, -1, ())
 
 
 def start_on(corners: ArrayLike, u: float, v: float) -> Place:
-    """(1 - u - v) p0 + u p1 + v p2, exactly; a weight that rounding made negative counts as 0, the others as their shares.
+    """(1 - u - v) p0 + u p1 + v p2, exactly; a weight that rounding made negative counts as 0, others as their shares.
 
     >>> [float(x) for x in start_on([[0, 0, 0], [4, 0, 0], [0, 4, 0]], 0.25, 0.5)]
     [1.0, 2.0, 0.0]

@@ -24,7 +24,8 @@ from renderer.trace.starts.record import BARYCENTRIC
 
 _LEAST_NORMAL = 2.0**-1022
 _ZERO = (0.0, 0.0)
-# A point of a face as near to an edge, as a share of the size of the face, is on it: pairs err by 2^-98 of four factors.
+# A point of a face as near to an edge, as a share of the size of the face, is on it: pairs err by 2^-98 of four
+# factors.
 _TINY = 2.0**-92
 
 
@@ -49,7 +50,9 @@ def anchor_of(start):
     Barycentrics below 0, by rounding, count as 0; the two others are scaled to add up to 1.
     """
     p0, p1, p2 = corners = start.corners
-    side = larger(largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2))))
+    side = larger(
+        largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2)))
+    )
     unit = power_below(larger(side, _LEAST_NORMAL))
     if start.code & BARYCENTRIC != 0:
         return _at_weights(corners, start.anchor[0], start.anchor[1], unit)

@@ -19,17 +19,16 @@ from renderer.trace.starts.anchor import from_anchor
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
 NONE = -1
-# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a corner
-# by 2^-100 of what it is the difference of.
+# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a
+# corner by 2^-100 of what it is the difference of.
 _ERROR, _WAY_ERROR = 2.0**-94, 2.0**-98
 _LEAST_NORMAL = 2.0**-1022
 
 
-
 class SeenFace(NamedTuple):
     """A face from an anchor, scaled by a power of two: the ways to its corners and its normal, as pairs; the corners in
-    the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by a
-    share; the errors of the ways; and for each corner the one of the anchor's face in its place, NONE for none.
+    the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by
+    a share; the errors of the ways; and for each corner the one of the anchor's face in its place, NONE for none.
     """
 
     a0: Any
@@ -105,7 +104,7 @@ def _size(a):
 
 @kernel
 def _way_sign(face, d, i, j):
-    """The sign of d . (a x b) of a direction and the ways to two corners, 0 where rounding may have made it; the value."""
+    """The sign of d . (a x b) for the ways to two corners, 0 where rounding may have made it; and the value."""
     a, b = _way(face, i), _way(face, j)
     value = dot_pairs(d, cross_pairs(a, b))[0]
     return _sign_beyond(value, _size(d) * _error_of(face, i, j)), value
@@ -197,7 +196,7 @@ def _is_after(i, j):
 def _common(face, anchor, slope, i, j, sign):
     """The sign of direction . (way to corner i x way to corner j): exact where the side is one of the anchor's face."""
     a, b = face.same[i], face.same[j]
-    if a == NONE or b == NONE or a == b:
+    if a == b or a < 0 or b < 0:  # NONE is the one below 0
         return sign
     weight = 0 if (anchor.zeros >> _third(a, b)) & 1 != 0 else 1
     return weight * (slope if _is_after(a, b) else -slope)

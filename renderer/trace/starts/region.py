@@ -38,6 +38,7 @@ NOT_STOPPED = -1
 # Hubs that are tried until none of the paths meets an outline.
 _ATTEMPTS = 16
 
+
 @inlined
 def _hub(attempt):
     """A direction in general position, as pairs."""
@@ -184,8 +185,8 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
     """The holder that stops a ray at its start, or NOT_STOPPED.
 
     The ray starts in the region beside the cone of ``face``, on one side of it. It is stopped where its direction d
-    leads out of that region: by the lowest face that bounds the region and has d behind it. ``through`` says that it has
-    just passed the face: then the lowest of the faces that coincide with it and have higher numbers stops it.
+    leads out of that region: by the lowest face that bounds the region and has d behind it. ``through`` says that it
+    has just passed the face: then the lowest of the faces that coincide with it and have higher numbers stops it.
     """
     own = -1
     for k in range(count):

@@ -246,8 +246,8 @@ def _t_from(tree, starts, i, ray, face, t):
 
 @inlined
 def counted_from_start(tree, starts, i, ray, largest, hit, face):
-    """A hit (t, u, v, w) with t counted from the exact start of ray ``i``: where it is near, the way that the origin was
-    moved is a part of t.
+    """A hit (t, u, v, w) with t counted from the exact start of ray ``i``: where it is near, the way that the origin
+    was moved is a part of t.
     """
     if 0.0 < ray.slack < EDGE and face != NO_FACE and hit[0] * largest <= _NEAR_HIT * ray.slack:
         return _t_from(tree, starts, i, ray, face, hit[0]), hit[1], hit[2], hit[3]
