@@ -83,5 +83,9 @@ def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
     weights /= weights.sum(axis=1, keepdims=True)
     single = np.count_nonzero(weights, axis=1) == 1
     weights[single] = np.where(weights[single] > 0.0, 1.0, 0.0)
-    weights[:, 2] = np.where(weights[:, 0] == 0.0, 1.0 - weights[:, 1], weights[:, 2])
-    return weights[:, 1:]
+    # On the side opposite to the first corner 1 in all: what is left of one is exact if that is at least a half.
+    u, v = weights[:, 1], weights[:, 2]
+    opposite = weights[:, 0] == 0.0
+    v = np.where(opposite & (u >= 0.5), 1.0 - u, v)
+    u = np.where(opposite & (u < 0.5), 1.0 - v, u)
+    return np.stack([u, v], axis=1)

@@ -110,8 +110,11 @@ def _along(corners, i, j, share, unit):
     """The point of the side from corner i to corner j, ``share`` of it from i; at its ends the corner itself."""
     if share[0] <= _TINY:
         return _at_corner(corners, i, unit)
-    if minus((1.0, 0.0), share)[0] <= _TINY:
+    rest = minus((1.0, 0.0), share)
+    if rest[0] <= _TINY:
         return _at_corner(corners, j, unit)
+    if share[0] > 0.5:
+        i, j, share = j, i, rest
     a, b = _corner(corners, i), _corner(corners, j)
     return Anchor(a, _times(scaled_difference(b, a, 1.0 / unit), share), unit, corners, 7 & ~((1 << i) | (1 << j)))
 
