@@ -343,7 +343,7 @@ PICTURES = (
     _kernel("pictures", "rays leave a face from its other side", "search._stopped",
             "1 if start.code & ABOVE != 0 else -1", "-1 if start.code & ABOVE != 0 else 1"),
     _kernel("pictures", "rays leave a face by a thousandth of the bound", "spawn._moved",
-            "needed - away * height", "1e-3 * needed - away * height"),
+            "plane.needed - away * plane.height", "1e-3 * plane.needed - away * plane.height"),
     _kernel("pictures", "spawned rays start on their surface", "spawn_origin",
             "scale(n_g, side * error)", "scale(n_g, 0.0 * error)"),
     _kernel("pictures", "the tint of glass lost", "_refract",
