@@ -66,8 +66,8 @@ _SMALLEST = 2.0**-1074
 _INSIDE = 8.0
 # A start that would be moved by more of its face, as of needles, is left to exact signs: t is counted from there.
 _FARTHEST_MOVE = 2.0**-38
-# A ray at a smaller angle to its face is left to exact signs; of normal . direction 2^-43 is rounding, of a face that is
-# not thinner than 2^-10 of its side.
+# A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that
+# is not thinner than 2^-10 of its side.
 LEVEL = 2.0**-20
 # A point that went through float32 is off by 2^-24 of its largest coordinate: 64 times that is taken, as the same
 # may hold for the mesh and for what the point was computed from.
