@@ -264,6 +264,15 @@ def _weights(e0, e1, e2, slope, dz):
 
 
 @inlined
+def barycentrics_of(met):
+    """The barycentrics u and v of a meeting, exactly 0 or 1 at edges and corners."""
+    u, v = (0.0 if met.zeros & 2 != 0 else met.u / met.w), (0.0 if met.zeros & 4 != 0 else met.v / met.w)
+    if met.zeros & 1 != 0:
+        u, v = (0.0 if u == 0.0 else 1.0 - v), (1.0 if u == 0.0 else v)
+    return u, v
+
+
+@inlined
 def unit_direction(d):
     """A direction scaled by a power of two, so that its largest component is from 1 to 2, and that power."""
     unit = power_below(largest_component(d))

@@ -196,7 +196,7 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
     best = NOT_STOPPED
     if through and slope_of(cone_of(tree, anchor, holders, own).face, d) == side:
         for j in range(count):
-            if holder(holders, j, NUMBER) > face and _coincide(tree, anchor, holders, own, j):
+            if holder(holders, j, NUMBER) > face and coincide(tree, anchor, holders, own, j):
                 best = _lower(holders, best, j)
     if best != NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
         return best
@@ -214,7 +214,7 @@ def _lower(holders, k, j):
 
 
 @kernel
-def _coincide(tree, anchor, holders, k, j):
+def coincide(tree, anchor, holders, k, j):
     """Whether the cone of the j-th holder is in the plane of the k-th one and has its middle in it."""
     own, cone = cone_of(tree, anchor, holders, k), cone_of(tree, anchor, holders, j)
     if lean_sign(cone.face, own.first) != 0 or lean_sign(cone.face, own.second) != 0:

@@ -35,6 +35,7 @@ from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_h
 from renderer.trace.starts.meeting import (
     HOLDS,
     IS_HIT,
+    barycentrics_of,
     meet_face,
     seen_from,
     slope_there,
@@ -281,8 +282,5 @@ def side_of_normal(tree, start, n, stack, memory):
         return Side(-1, 0, 0.0, 0.0)
     met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, 1.0)
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0 else 0)
-    # Exactly 0 or 1 at edges and corners.
-    u, v = (0.0 if met.zeros & 2 != 0 else met.u / met.w), (0.0 if met.zeros & 4 != 0 else met.v / met.w)
-    if met.zeros & 1 != 0:
-        u, v = (0.0 if u == 0.0 else 1.0 - v), (1.0 if u == 0.0 else v)
+    u, v = barycentrics_of(met)
     return Side(holder(holders, k, NUMBER), code, u, v)
