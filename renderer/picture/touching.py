@@ -3,12 +3,14 @@
 Found once for a scene: too many cost time alone, so rounding counts as coinciding.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get, larger, load8, movemask, pointer, put, smaller, splat8
-from renderer.kernels.vec3 import cross, dot, largest_component, sub
+from renderer.kernels.simd import get, larger, load4, load8, lowest_bit, magnitude, movemask, pointer, put, smaller, splat4, splat8
+from renderer.kernels.vec3 import cross, largest_component, sub
 from renderer.process.parallel import for_chunks
 from renderer.scene.needs import Needs
 from renderer.shade.surface import SceneArrays, lets_through, scene_pointers
@@ -67,69 +69,99 @@ def _range(corners, k):
 
 
 @inlined
-def _octants_around(tree, child, corners, room):
+def _octants_around(tree, child, flat):
     """The bits of the octants of a node whose boxes meet that of a face."""
     base, bits = child * NODE_WORDS, 0xFF
     for k in range(3):
-        low, high = _range(corners, k)
-        low, high = round_both(low - room)[0], round_both(high + room)[1]
+        low, high = _range(flat.corners, k)
+        low, high = round_both(low - flat.room)[0], round_both(high + flat.room)[1]
         bits &= movemask(
             (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
         )
     return bits
 
 
+class _Flat(NamedTuple):
+    """A face: its corners, its normal, and what its box and heights above its plane are off by
+    rounding, the heights as a share of a distance.
+    """
+
+    corners: tuple
+    normal: tuple
+    room: float
+    error: float
+
+
 @inlined
-def _room(corners):
-    p0, p1, p2 = corners
-    return _ROOM * larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+def _flat_at(tree, slot):
+    """The ``_Flat`` in a place of a block."""
+    p0, p1, p2 = corners = _corners(tree, slot)
+    one, other = sub(p1, p0), sub(p2, p0)
+    room = _ROOM * larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    return _Flat(corners, cross(one, other), room, _ERROR * largest_component(one) * largest_component(other))
 
 
 @kernel
 def _touches(tree, slot, face, stack):
     """Whether the face in a place may coincide with another one."""
-    corners, top = _corners(tree, slot), 1
+    flat, top = _flat_at(tree, slot), 1
     if not tree.has_nodes:
-        return _touches_in(tree, 0, tree.count, corners, face)
+        return _touches_in(tree, 0, tree.count, flat, face)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, blocks = blocks_of(child)
-            if _touches_in(tree, first, blocks, corners, face):
+            if _touches_in(tree, first, blocks, flat, face):
                 return True
             continue
-        top = push_children(tree, child, _octants_around(tree, child, corners, _room(corners)), stack, top)
+        top = push_children(tree, child, _octants_around(tree, child, flat), stack, top)
     return False
 
 
-@kernel
-def _touches_in(tree, first, blocks, corners, face):
+@inlined
+def _touches_in(tree, first, blocks, flat, face):
     """Whether a face may coincide with another one of some blocks."""
-    room = _room(corners)
-    for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
-        other = get(tree.faces, slot)
-        if other >= 0 and other != face:
-            seen, near = _corners(tree, slot), True
-            for k in range(3):
-                (low, high), (least, most) = _range(corners, k), _range(seen, k)
-                near = near and least <= high + room and low <= most + room
-            if near and _may_coincide(corners, seen):
+    for block in range(first, first + blocks):
+        bits = _level_bits(tree, block * BLOCK_WORDS, flat)
+        while bits != 0:
+            slot = block * BLOCK_FACES + lowest_bit(bits)
+            bits &= bits - 1
+            other = get(tree.faces, slot)
+            if other >= 0 and other != face and _may_coincide(flat, _corners(tree, slot)):
                 return True
     return False
 
 
+@inlined
+def _coordinates(tree, at_):
+    """A coordinate of a corner of the four faces of a block."""
+    return load4(tree.wide_blocks, at_) if tree.wide != 0 else load4(tree.blocks, at_)
+
+
+@inlined
+def _level_bits(tree, base, flat):
+    """The bits of the faces of a block that are in the plane of a face, or nearly so."""
+    p, n, bits = flat.corners[0], flat.normal, np.int64(0xF)
+    for k in range(3):
+        x = _coordinates(tree, base + 12 * k) - splat4(p[0])
+        y = _coordinates(tree, base + 12 * k + 4) - splat4(p[1])
+        z = _coordinates(tree, base + 12 * k + 8) - splat4(p[2])
+        height = x * splat4(n[0]) + y * splat4(n[1]) + z * splat4(n[2])
+        bits &= movemask(magnitude(height) <= splat4(flat.error) * larger(magnitude(x), larger(magnitude(y), magnitude(z))))
+    return bits
+
+
 @kernel
-def _may_coincide(p, q):
-    """Whether two faces are in one plane, or nearly so, and no side of one has all of the other beyond it."""
-    one, other = sub(p[1], p[0]), sub(p[2], p[0])
-    n, size = cross(one, other), largest_component(one) * largest_component(other)
-    for a in q:
-        way = sub(a, p[0])
-        if abs(dot(n, way)) > _ERROR * size * largest_component(way):
+def _may_coincide(flat, q):
+    """Whether a face in a plane with another one meets its box, and no side of one has all of the other beyond it."""
+    p, (x, y, z) = flat.corners, flat.normal
+    for k in range(3):
+        (low, high), (least, most) = _range(p, k), _range(q, k)
+        if least > high + flat.room or low > most + flat.room:
             return False
-    x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
+    x, y, z = abs(x), abs(y), abs(z)
     axis = 0 if x >= y and x >= z else (1 if y >= z else 2)
     return not (_has_beyond(p, q, axis) or _has_beyond(q, p, axis))
 
