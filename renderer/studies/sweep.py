@@ -60,13 +60,13 @@ RAYS = 1024
 # And in one call, or one more list: some 10 ms, so that Ctrl-C and other threads need not wait for long.
 RAYS_A_CALL = 1 << 14
 # For each point of a tile: where a ray starts that goes to the side of its face's normal, and to the other side; that
-# normal; the frame, whose third vector is the point's own normal; the sum so far; that of all directions; and its row
-# of ``starts.record``.
+# normal; the frame, whose third vector is the point's own normal; the sum so far; that of all directions; its row of
+# ``starts.record``; and of a point on an edge the table of ``starts.fan``.
 _ABOVE, _BELOW, _FACING, _FRAME = 0, 3 * TILE, 6 * TILE, 9 * TILE
 _SUM, _WHOLE, _START, _FAN = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
 _POINT_DOUBLES = _FAN + FAN_DOUBLES * TILE
-# Its row; the leaf that hid its last direction, or 0; whether it is a corner of the mesh; and once for the tile, how often tracing its rays together
-# may still be tried.
+# Its row; the leaf that hid its last direction, or 0; whether it is a corner of the mesh; and once for the tile, how
+# often tracing its rays together may still be tried.
 _ROW, _HIDER, _CORNER, _LEFT, _POINT_INTEGERS = 0, TILE, 2 * TILE, 3 * TILE, 3 * TILE + 8
 
 

@@ -25,9 +25,9 @@ from renderer.trace.starts.region import ATTEMPTS, are_even, hub_of, path_to_con
 
 # The most faces of a table; with more every direction is left to ``region``.
 MOST_FACES = 16
-# The head of a table: the number of faces, 0 where there is no table; whether they are one closed fan; and the parity of
-# the path to the start's region. Then for each face: the unit normal n, n x a and n x b of the outline's directions a and
-# b, the products of these three with the hub, the parity of the path, and the two nodes.
+# The head of a table: the number of faces, 0 where there is no table; whether they are one closed fan; and the parity
+# of the path to the start's region. Then for each face: the unit normal n, n x a and n x b of the outline's directions
+# a and b, the products of these three with the hub, the parity of the path, and the two nodes.
 _COUNT, _CLOSED, _PARITY, _HEAD = range(4)
 _NORMAL, _FIRST, _SECOND, _HUB, _PATH, _NODES, _ROW = 0, 3, 6, 9, 12, 13, 15
 FAN_DOUBLES = _HEAD + MOST_FACES * _ROW
@@ -63,11 +63,11 @@ def write_fan(tree, anchor, holders, count, nodes, k, side, table):
     if count > MOST_FACES:
         return
     for attempt in range(ATTEMPTS):
-        if path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH):
-            if _write_rows(tree, anchor, holders, count, heads(hub_of(attempt)), table):
-                put(table, _CLOSED, np.float64(_are_closed(holders, count, nodes)))
-                put(table, _COUNT, np.float64(count))
-                return
+        sound = path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH)
+        if sound and _write_rows(tree, anchor, holders, count, heads(hub_of(attempt)), table):
+            put(table, _CLOSED, np.float64(_are_closed(holders, count, nodes)))
+            put(table, _COUNT, np.float64(count))
+            return
 
 
 @kernel

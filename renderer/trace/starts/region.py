@@ -197,7 +197,7 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
     best = NOT_STOPPED
     if through and slope_of(cone_of(tree, anchor, holders, own).face, d) == side:
         for j in range(count):
-            if holder(holders, j, NUMBER) > face and _coincide(tree, anchor, holders, own, j):
+            if holder(holders, j, NUMBER) > face and coincide(tree, anchor, holders, own, j):
                 best = _lower(holders, best, j)
     if best != NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
         return best
@@ -215,7 +215,7 @@ def _lower(holders, k, j):
 
 
 @kernel
-def _coincide(tree, anchor, holders, k, j):
+def coincide(tree, anchor, holders, k, j):
     """Whether the cone of the j-th holder is in the plane of the k-th one and has its middle in it."""
     own, cone = cone_of(tree, anchor, holders, k), cone_of(tree, anchor, holders, j)
     if lean_sign(cone.face, own.first) != 0 or lean_sign(cone.face, own.second) != 0:
@@ -244,7 +244,7 @@ def bounding_holder(tree, anchor, holders, count, nodes, n):
 
 @kernel
 def _next_across(tree, anchor, holders, count, n, most, last):
-    """The holder that n is most across after the one ``last``, with the product ``most``; that of it, and its number."""
+    """The holder that n is most across after the one ``last``, whose product is ``most``; returns its product, too."""
     best, found = -1.0, NOT_STOPPED
     for k in range(count):
         across = abs(dot(normalized(heads(cone_of(tree, anchor, holders, k).face.normal)), n))

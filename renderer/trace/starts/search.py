@@ -36,6 +36,7 @@ from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
     HOLDS,
     IS_HIT,
+    barycentrics_of,
     meet_face,
     seen_from,
     slope_there,
@@ -281,13 +282,3 @@ def side_of_normal(tree, start, n, stack, memory, table):
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0 else 0)
     u, v = barycentrics_of(met)
     return Side(holder(holders, k, NUMBER), code, u, v)
-
-
-@inlined
-def barycentrics_of(met):
-    """u and v of a ``Meeting``: exactly 0 or 1, or 1 in all, where it is on an edge or corner."""
-    u, v = (0.0 if met.zeros & 2 != 0 else met.u / met.w), (0.0 if met.zeros & 4 != 0 else met.v / met.w)
-    if met.zeros & 1 == 0:
-        return u, v
-    # What is left of one is exact if that is at least a half.
-    return (u, 1.0 - u) if u >= 0.5 else (1.0 - v, v)
