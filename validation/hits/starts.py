@@ -32,7 +32,7 @@ _SIGN_ROUNDINGS = 8 * 2.0**-53
 # t of the sample, relative and in units of the largest coordinate over the direction's part along the normal: an answer
 # beyond is another hit. A start inside a face is moved by up to 2^-38 of the face. How exact t is, other gates judge.
 _RELATIVE, _ABSOLUTE = 1e-9, 2.0**-37
-# Near its start a ray is judged exactly, but for what is beyond the pairs of float64 that decide: edge functions of
+# Near its start, by the size of the face, a ray is judged exactly, but for what is beyond the pairs of float64 that decide: edge functions of
 # less than this share of their terms. Farther off, as any ray, it may pass an edge on either side that it passes by no
 # more than its start is moved.
 _CLOSEST, _NEAR = Fraction(1, 1 << 84), 2.0**-30
@@ -295,7 +295,7 @@ def is_right(
             return True
     faces = {face, *(first.face for first in law)} - {-1}
     ends = [t, *(float(first.t) for first in law if first.t is not None)]
-    near = min(ends) * float(np.abs(direction).max()) <= _NEAR * surface.largest
+    near = min(ends) * float(np.abs(direction).max()) <= _NEAR * min(surface.size(number) for number in faces)
     return any(_is_closer(surface, number, start, direction, near) for number in faces)
 
 
