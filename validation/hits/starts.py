@@ -302,7 +302,8 @@ def is_right(
             return True
     faces = {face, *(first.face for first in law)} - {-1}
     ends = [t, *(float(first.t) for first in law if first.t is not None)]
-    near = min(ends) * float(np.abs(direction).max()) <= _NEAR * min(surface.size(number) for number in faces)
+    size = min(surface.size(number) for number in faces | ({start.face} - {-1}))
+    near = min(ends) * float(np.abs(direction).max()) <= _NEAR * size
     return any(_is_closer(surface, number, start, direction, near) for number in faces)
 
 
