@@ -32,7 +32,7 @@ def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> No
     where.add_argument("--faces", action="store_true", help="the middle of each face, the default")
     where.add_argument("--vertices", action="store_true", help="the same, as means of each vertex's faces")
     where.add_argument("--grid", type=float, metavar="SPACING", help=_GRID)
-    where.add_argument("--points", type=Path, metavar="FILE", help=".npy, (n, 3), or (n, 6) with normals")
+    where.add_argument("--points", type=Path, metavar="FILE", help=".npy, (n, 3), or (n, 6) with normals; on the surface or not")
     study.add_argument(
         "-o", "--output", type=Path, required=True, action="append", metavar="FILE",
         help=".npy, .ply or, of faces, .png; may be given more than once",
