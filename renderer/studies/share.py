@@ -46,7 +46,7 @@ def check_asked(
     threads: int | None,
     progress: bool,
 ) -> Asked:
-    """The arguments that all studies have, checked; faces not known are -1. Raises ``ValueError`` naming argument and row."""
+    """The arguments that all studies have, checked. Raises ``ValueError`` naming argument and row."""
     expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
     rows, shape = check_points("points", points, farthest_of(octree.tree.scale))
     faces = check_faces("leaving", -1 if leaving is None else leaving, shape, len(octree.mesh.faces))
