@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, get, pointer, put, smaller
 from renderer.kernels.vec3 import add, cross, dot, largest_component, normalized, row3, scale, three
+from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.parallel_rays import (
@@ -33,7 +34,6 @@ from renderer.trace.starts.record import (
     ANCHOR,
     BARYCENTRIC,
     CODE,
-    CORNER,
     EDGE,
     FACE,
     KNOWN,

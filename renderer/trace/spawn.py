@@ -24,14 +24,13 @@ from renderer.kernels.vec3 import (
     three,
 )
 from renderer.trace.doubt import LINE, ROUNDING
-from renderer.trace.intersect import DOUBT, SLANT
+from renderer.trace.intersect import CORNER, DOUBT, SLANT
 from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
     ABOVE,
     ANCHOR,
     BARYCENTRIC,
     CODE,
-    CORNER,
     EDGE,
     FACE,
     KNOWN,
@@ -216,7 +215,6 @@ def put_start(row, place, n_g, w, offset):
     put(row, CODE, np.float64(code))
     put(row, ANCHOR, place.u)
     put(row, ANCHOR + 1, place.v)
-    put(row, ANCHOR + 2, 0.0)
 
 
 @kernel

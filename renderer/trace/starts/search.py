@@ -50,7 +50,7 @@ _ROOM = 2.0**-50
 # The least t of a face that does not hold the start: what is less would be 0 in the mesh's own units.
 _LEAST_T = 2.0**-900
 # A hit that is farther than so often its slack errs by less than 2^-20 of t by where the ray starts.
-_NEAR_HIT = 2.0**20
+NEAR_HIT = 2.0**20
 _NOTHING = (np.inf, np.int32(NO_FACE), 0.0, 0.0, 1.0)
 
 
@@ -234,7 +234,7 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
 
 
 @kernel
-def _t_from(tree, starts, i, ray, face, t):
+def t_from(tree, starts, i, ray, face, t):
     """Where a ray meets the plane of a face that it hits at t, counted from its exact start."""
     anchor, (d, unit) = anchor_of(start_at(starts, i, tree.scale)), unit_direction((ray.dx, ray.dy, ray.dz))
     p0, p1, p2 = corners_of(starts.vertices, starts.faces, face, tree.scale)
@@ -251,8 +251,8 @@ def counted_from_start(tree, starts, i, ray, largest, hit, face):
     """A hit (t, u, v, w) with t counted from the exact start of ray ``i``: where it is near, the way that the origin
     was moved is a part of t.
     """
-    if 0.0 < ray.slack < EDGE and face != NO_FACE and hit[0] * largest <= _NEAR_HIT * ray.slack:
-        return _t_from(tree, starts, i, ray, face, hit[0]), hit[1], hit[2], hit[3]
+    if 0.0 < ray.slack < EDGE and face != NO_FACE and hit[0] * largest <= NEAR_HIT * ray.slack:
+        return t_from(tree, starts, i, ray, face, hit[0]), hit[1], hit[2], hit[3]
     return hit
 
 
