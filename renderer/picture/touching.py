@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import get, larger, load4, load8, lowest_bit, magnitude, movemask, pointer, put, smaller, splat4, splat8
-from renderer.kernels.vec3 import cross, largest_component, sub
+from renderer.kernels.vec3 import largest_component, length, sub
 from renderer.process.parallel import for_chunks
 from renderer.scene.needs import Needs
 from renderer.shade.surface import SceneArrays, lets_through, scene_pointers
@@ -19,9 +19,10 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS, Tree
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
 from renderer.trace.sides import corner
 from renderer.trace.singly import stack_size
+from renderer.trace.starts.level import CORNER_ERROR, plane_of
 
-# The share of a face's coordinates by which its box grows, and of the products of its sides that is taken for rounding.
-_ROOM, _ERROR = 2.0**-45, 2.0**-45
+# The share of a face's coordinates by which its box grows.
+_ROOM = 2.0**-45
 # Of the product of two vectors in the plane, only rounding.
 _EDGE_ERROR = 2.0**-50
 _CHUNK = 4096
@@ -82,23 +83,25 @@ def _octants_around(tree, child, flat):
 
 
 class _Flat(NamedTuple):
-    """A face: its corners, its normal, and what its box and heights above its plane are off by
-    rounding, the heights as a share of a distance.
+    """A face: its corners, its normal and the length of that, twice its longest side, its largest coordinate, and the
+    room by which its box grows.
     """
 
     corners: tuple
     normal: tuple
+    size: float
+    side: float
+    largest: float
     room: float
-    error: float
 
 
 @inlined
 def _flat_at(tree, slot):
     """The ``_Flat`` in a place of a block."""
     p0, p1, p2 = corners = _corners(tree, slot)
-    one, other = sub(p1, p0), sub(p2, p0)
-    room = _ROOM * larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
-    return _Flat(corners, cross(one, other), room, _ERROR * largest_component(one) * largest_component(other))
+    n, side = plane_of(corners)
+    largest = larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    return _Flat(corners, n, length(n), side, largest, _ROOM * largest)
 
 
 @kernel
@@ -149,7 +152,10 @@ def _level_bits(tree, base, flat):
         y = _coordinates(tree, base + 12 * k + 4) - splat4(p[1])
         z = _coordinates(tree, base + 12 * k + 8) - splat4(p[2])
         height = x * splat4(n[0]) + y * splat4(n[1]) + z * splat4(n[2])
-        bits &= movemask(magnitude(height) <= splat4(flat.error) * larger(magnitude(x), larger(magnitude(y), magnitude(z))))
+        # As ``level.are_level`` has it, with room to spare.
+        way = larger(magnitude(x), larger(magnitude(y), magnitude(z)))
+        error = splat4(2.0 * CORNER_ERROR) * (splat4(flat.largest) + way)
+        bits &= movemask(magnitude(height) <= error * (splat4(flat.size) + splat4(flat.side) * way))
     return bits
 
 
