@@ -1,6 +1,6 @@
-"""The faces that pass light and may coincide with another one: where rays meet them, kernels look which they meet there.
+"""The faces that may coincide with one that passes light: where rays meet them, kernels look which they meet there.
 
-Found once for a scene: too many cost time alone, so rounding counts as coinciding.
+Found once for a scene. Too many cost time alone.
 """
 
 from typing import NamedTuple
@@ -31,7 +31,7 @@ _CHUNK = 4096
 def find_touching(tree: Tree, arrays: SceneArrays, needs: Needs, threads: int, every: bool = False) -> SceneArrays:
     """``arrays`` with ``touching``; without faces that touch, or where nothing refracts, that has no rows.
 
-    With ``every``, faces that pass no light count too.
+    With ``every``, those that pass no light count too.
     """
     touching = np.zeros(len(arrays.faces) if needs.refraction else 0, np.uint8)
     if len(touching):
@@ -46,13 +46,14 @@ def find_touching(tree: Tree, arrays: SceneArrays, needs: Needs, threads: int, e
 
 @kernel
 def mark_touching(words, arrays, begin, end, every, stack, touching):
-    """Mark those faces of some places in blocks that pass light, or every one, and may coincide with another face."""
+    """Mark those faces of some places in blocks that pass light, or every one, and may coincide with another face; and
+    that one.
+    """
     tree, scene = tree_pointers(words), scene_pointers(arrays)
     for slot in range(begin, end):
         face = get(tree.faces, slot)
         if face >= 0 and (every or lets_through(scene.materials, np.int64(get(scene.material, face)))):
-            if _touches(tree, slot, face, pointer(stack)):
-                touching[face] = 1
+            _mark_touched(tree, slot, face, pointer(stack), touching)
 
 
 @inlined
@@ -105,27 +106,26 @@ def _flat_at(tree, slot):
 
 
 @kernel
-def _touches(tree, slot, face, stack):
-    """Whether the face in a place may coincide with another one."""
+def _mark_touched(tree, slot, face, stack, touching):
+    """Mark the face in a place and those that may coincide with it."""
     flat, top = _flat_at(tree, slot), 1
     if not tree.has_nodes:
-        return _touches_in(tree, 0, tree.count, flat, face)
+        _mark_touched_in(tree, 0, tree.count, flat, face, touching)
+        return
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, blocks = blocks_of(child)
-            if _touches_in(tree, first, blocks, flat, face):
-                return True
+            _mark_touched_in(tree, first, blocks, flat, face, touching)
             continue
         top = push_children(tree, child, _octants_around(tree, child, flat), stack, top)
-    return False
 
 
 @inlined
-def _touches_in(tree, first, blocks, flat, face):
-    """Whether a face may coincide with another one of some blocks."""
+def _mark_touched_in(tree, first, blocks, flat, face, touching):
+    """Mark a face and those of some blocks that may coincide with it."""
     for block in range(first, first + blocks):
         bits = _level_bits(tree, block * BLOCK_WORDS, flat)
         while bits != 0:
@@ -133,8 +133,7 @@ def _touches_in(tree, first, blocks, flat, face):
             bits &= bits - 1
             other = get(tree.faces, slot)
             if other >= 0 and other != face and _may_coincide(flat, _corners(tree, slot)):
-                return True
-    return False
+                touching[face], touching[other] = 1, 1
 
 
 @inlined

@@ -179,6 +179,52 @@ class TestGlassOnGlass:
             np.testing.assert_allclose(image.radiance, passed(0, 1, 1.5, 1), rtol=1e-5)
 
 
+def other_diagonals(mesh: Mesh) -> Mesh:
+    """A box of the same place whose squares are halved along their other diagonals."""
+    middle = mesh.vertices.mean(axis=0) * [2, 0, 0]
+    return Mesh(mesh.vertices * [-1, 1, 1] + middle, mesh.faces[:, ::-1])
+
+
+class TestTurned:
+    """Turned by any angle, planes that were one are so but for rounding."""
+
+    def seen(self, rotate: Any, parts: list[tuple[Mesh, Material]], eye: Any, target: Any, **more: Any) -> Image:
+        materials = {"ground": GROUND, **{str(m): m for _, m in parts}}
+        objects = tuple(
+            SceneObject(mesh=mesh, material=str(m), normals="flat", rotate=rotate, translate=(3, -7, 11)) for mesh, m in parts
+        )
+        turn = np.array(objects[0].matrix())
+        eye, target = ((turn @ (*p, 1.0))[:3].tolist() for p in (eye, target))
+        camera = PerspectiveCamera(eye=eye, target=target, up=(0.1, 0.7, -0.7), fov=more.pop("fov"))
+        return picture(Scene(camera=camera, materials=materials, objects=objects, ambient=1.0, **more), 40, max_depth=12)
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_glass_on_the_ground(self, seed: int) -> None:
+        rotate = np.random.default_rng(seed).uniform(-180, 180, 3).tolist()
+        for mesh in (cube(0.0), other_diagonals(cube(0.0))):
+            for parts in ([(mesh, clear(1.5)), (level(0.0), GROUND)], [(level(0.0), GROUND), (mesh, clear(1.5))]):
+                image = self.seen(rotate, parts, (1, 3, 2), (0, 0.4, 0), fov=20, background=SKY)
+                assert image.radiance.max() < 2.0
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_glass_on_glass(self, seed: int) -> None:
+        rotate = np.random.default_rng(seed).uniform(-180, 180, 3).tolist()
+        t = math.radians(50)
+        eye, target = (20 * math.sin(t) + 0.3, 20 * math.cos(t), 0.2), (0.3, 0.0, 0.2)
+        for mesh in (slab(1, 2), other_diagonals(slab(1, 2)), box((-40, 1, -35), (50, 2, 37))):
+            for parts in ((mesh, slab(0, 1)), (slab(0, 1), mesh)):
+                image = self.seen(rotate, [(m, clear(1.5)) for m in parts], eye, target, fov=1e-4, background=1.0)
+                np.testing.assert_allclose(image.radiance, passed(50, 1, 1.5, 1), rtol=5e-6)
+
+    def test_a_mirror_below_glass(self) -> None:
+        for seed in range(8):
+            rotate = np.random.default_rng(seed).uniform(-180, 180, 3).tolist()
+            for mesh in (cube(0.0), other_diagonals(cube(0.0))):
+                parts = [(mesh, clear(1.5)), (level(0.0), Mirror(reflectance=0.9))]
+                image = self.seen(rotate, parts, (0.1, 5, 0.2), (0.1, 0, 0.2), fov=1e-4, background=1.0)
+                np.testing.assert_allclose(image.radiance, 0.9 * 0.96**2, rtol=5e-6)
+
+
 def crowded() -> Scene:
     parts = (
         (box((0, 0, 0), (1, 1, 1)), GLASS),
@@ -239,9 +285,9 @@ class TestTouchingFaces:
         assert self.found((box(), GLASS), (level(-0.001), GROUND)) == []
         assert self.found((grid(7, 5), GLASS)) == []
 
-    def test_only_those_that_pass_light(self) -> None:
+    def test_only_those_of_which_one_passes_light(self) -> None:
         top, bottom = (box((0, 1, 0), (1, 2, 1)), GLASS), (box(), GROUND)
-        assert len(self.found(top, bottom)) == 2
+        assert len(self.found(top, bottom)) == 4
         assert len(self.found(top, (box(), WATER))) == 4
         assert self.found((box((0, 1, 0), (1, 2, 1)), GROUND), bottom) == []
 
