@@ -11,11 +11,11 @@ from renderer.arrays import flag_argument
 from renderer.contacts.all_hits import all_hits, count_hits
 from renderer.distance.closest import ClosestPoints, closest_point
 from renderer.distance.signed import signed_distance
+from renderer.distance.visible import visible
 from renderer.errors import expect
 from renderer.inside.contains import contains
 from renderer.inside.winding import winding_number
 from renderer.mesh.mesh import Mesh, Repairs
-from renderer.distance.visible import visible
 from renderer.process.parallel import checked_threads
 from renderer.trace.batch import RayBatch, check_rays, moved_off
 from renderer.trace.error import add_errors
@@ -353,14 +353,12 @@ class Queries:
         """Whether nothing lies between each point and its target, (...) bool; the shapes of both are broadcast.
 
         points, targets    (..., 3), finite
-        leaving, reaching  the faces that the points and the targets lie on, one or (...), -1 for none. The ray starts
-                           at the end that has one (at the point, where both have), moved off it as by ``closest_hit``:
-                           so a face that is turned away from the other end hides it. A corner lies on many faces: leave
-                           them out there
+        leaving, reaching  the faces that the points and the targets lie on, one or (...), -1 where that is not known:
+                           then it is found out
 
-        No end hides itself: what is nearer to it, along the way, than 2^-40 of the largest coordinate of both is not
-        looked at, but for an end whose face is left. A surface that the way only touches hides, and one seen at less
-        than 0.03 degrees may still hide its own points. Raises ``ValueError`` naming argument and row.
+        No end hides itself: the faces that hold it, those at an edge or corner too, hide nothing. What is nearer to an
+        end, along the way, than 2^-40 of the largest coordinate of both is not looked at, unless the end lies on the
+        surface. A surface that the way only touches hides. Raises ``ValueError`` naming argument and row.
 
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box

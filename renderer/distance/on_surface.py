@@ -46,6 +46,15 @@ def on_surface(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64],
     return SurfacePoints(faces, anchors)
 
 
+def are_on(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether points (n, 3) lie on faces (n,), as near as a rounding."""
+    corners = mesh.vertices[mesh.faces[faces]]
+    u, v = _barycentrics(corners, points, np.zeros(len(points))).T
+    nearest = (1.0 - u - v)[:, None] * corners[:, 0] + u[:, None] * corners[:, 1] + v[:, None] * corners[:, 2]
+    # The nearest points are rounded, too.
+    return np.linalg.norm(points - nearest, axis=1) <= 2.0 * _room(points)
+
+
 def _room(points: Floats) -> Floats:
     """How far each point may be from the surface that it lies on."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -55,7 +64,9 @@ def _room(points: Floats) -> Floats:
 
 def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
     """u and v (n, 2) of the nearest points of faces; nearer to an edge than ``room`` its weight is 0."""
-    sides = np.stack([corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 0]], axis=1)
+    sides = np.stack(
+        [corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 0]], axis=1
+    )
     ways = points[:, None] - corners
     with np.errstate(all="ignore"):
         normals = np.cross(sides[:, 2], -sides[:, 1])
@@ -72,5 +83,9 @@ def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
     weights /= weights.sum(axis=1, keepdims=True)
     single = np.count_nonzero(weights, axis=1) == 1
     weights[single] = np.where(weights[single] > 0.0, 1.0, 0.0)
-    weights[:, 2] = np.where(weights[:, 0] == 0.0, 1.0 - weights[:, 1], weights[:, 2])
-    return weights[:, 1:]
+    # On the side opposite to the first corner 1 in all: what is left of one is exact if that is at least a half.
+    u, v = weights[:, 1], weights[:, 2]
+    opposite = weights[:, 0] == 0.0
+    v = np.where(opposite & (u >= 0.5), 1.0 - u, v)
+    u = np.where(opposite & (u < 0.5), 1.0 - v, u)
+    return np.stack([u, v], axis=1)

@@ -5,27 +5,28 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.distance.on_surface import SurfacePoints, are_on, on_surface
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
-from renderer.trace.batch import RayBatch, broadcast_shape, check_faces, moved_off
+from renderer.trace.batch import Leaving, RayBatch, broadcast_shape, check_faces, moved_off
 from renderer.trace.layout import Tree
-from renderer.trace.query import any_hits
+from renderer.trace.query import any_hits, closest_hits
+from renderer.trace.starts.record import BARYCENTRIC
 
 Floats = NDArray[np.float64]
 Faces = NDArray[np.int64]
-# A point on a face is 2^-53 of its coordinates off the face's plane, and a ray is as much beside the point, by the
-# rounding of its direction and of t. At a slope of 2^-11, 0.03 degrees, it meets the plane 2^11 as far away.
+# What is nearer to an end than this share of the largest coordinate of both is not looked at: ends that went through
+# more roundings than ``on_surface`` takes.
 _BESIDE = 2.0**-40
 # The least room: an end at 0 is left out, too.
 _LEAST = float(np.finfo(np.float64).smallest_subnormal)
-_ZERO, _INFINITY = np.zeros(1), np.full(1, np.inf)
 
 
 class _Ends(NamedTuple):
-    """One end of n segments: its points (n, 3), and the faces (n,) that they lie on, -1 for none."""
+    """One end of n segments: its points (n, 3), and where on the surface they lie."""
 
     points: Floats
-    faces: Faces
+    places: SurfacePoints
 
 
 def visible(
@@ -43,37 +44,43 @@ def visible(
     a, b = np.broadcast_to(a, (*shape, 3)).reshape(-1, 3), np.broadcast_to(b, (*shape, 3)).reshape(-1, 3)
     on_a = check_faces("leaving", -1 if faces[0] is None else faces[0], shape, most)
     on_b = check_faces("reaching", -1 if faces[1] is None else faces[1], shape, most)
-    apart = (a != b).any(axis=1)
-    start, stop = _turned(_Ends(a[apart], on_a[apart]), _Ends(b[apart], on_b[apart]))
+    apart = np.flatnonzero((a != b).any(axis=1))
+    start, stop = (
+        _Ends(points[apart], on_surface(tree, mesh, points[apart], on[apart], threads))
+        for points, on in ((a, on_a), (b, on_b))
+    )
     seen = np.ones(len(a), np.bool_)
-    seen[apart] = ~any_hits(tree, _between(tree, mesh, start, stop, threads), threads)
+    seen[apart] = _are_open(tree, mesh, start, stop, threads)
     return seen.reshape(shape)
 
 
-def _turned(start: _Ends, stop: _Ends) -> tuple[_Ends, _Ends]:
-    """The ends, where only ``stop`` lies on a face the other way round: a ray is exact where it starts."""
-    turn = (start.faces < 0) & (stop.faces >= 0)
-    first = _Ends(np.where(turn[:, None], stop.points, start.points), np.where(turn, stop.faces, start.faces))
-    last = _Ends(np.where(turn[:, None], start.points, stop.points), np.where(turn, start.faces, stop.faces))
-    return first, last
+def _are_open(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> NDArray[np.bool_]:
+    """Whether nothing is between the ends of segments."""
+    seen = ~any_hits(tree, _between(tree, mesh, start, stop, threads), threads)
+    # Where a face that holds the end is the first that is met, nothing is before it.
+    doubtful = np.flatnonzero(~seen & (stop.places.faces >= 0))
+    if len(doubtful):
+        start, stop = (_Ends(end.points[doubtful], _picked(end.places, doubtful)) for end in (start, stop))
+        first = closest_hits(tree, _between(tree, mesh, start, stop, threads), mesh, threads).face
+        met = np.flatnonzero(first >= 0)
+        seen[doubtful[met]] = are_on(mesh, stop.points[met], first[met])
+    return seen
+
+
+def _picked(places: SurfacePoints, rows: NDArray[np.int64]) -> SurfacePoints:
+    return SurfacePoints(places.faces[rows], places.anchors[rows])
 
 
 def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> RayBatch:
     """Rays from the one end to the other, both left out."""
     room = _BESIDE * np.maximum(np.abs(start.points), np.abs(stop.points)).max(axis=1, initial=0.0)
-    first, last = (_moved(tree, mesh, *both, threads) for both in ((start, stop), (stop, start)))
-    directions, reach = _way(first, last)
+    directions, reach = _way(start.points, stop.points)
     room = np.maximum(room / np.abs(directions).max(axis=1, initial=0.0), _LEAST)
     # Where the ends leave no room between them, t_min is above t_max, and nothing hides.
-    return RayBatch(first, directions, np.where(start.faces < 0, room, 0.0), np.maximum(reach - room, 0.0))
-
-
-def _moved(tree: Tree, mesh: Mesh, ends: _Ends, others: _Ends, threads: int) -> Floats:
-    """The points of one end, moved off their faces towards the other."""
-    if (ends.faces < 0).all():
-        return ends.points
-    rays = RayBatch(ends.points, _way(ends.points, others.points)[0], _ZERO, _INFINITY)
-    return moved_off(rays, ends.faces, mesh, tree.scale, threads).origins
+    t_min = np.where(start.places.faces < 0, room, 0.0)
+    rays = RayBatch(start.points, directions, t_min, np.maximum(reach - room, 0.0))
+    leaving = Leaving(start.places.faces, np.full(1, BARYCENTRIC), start.places.anchors)
+    return moved_off(rays, leaving, mesh, tree.scale, threads) if (leaving.faces >= 0).any() else rays
 
 
 def _way(start: Floats, stop: Floats) -> tuple[Floats, Floats]:

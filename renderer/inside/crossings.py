@@ -9,7 +9,9 @@ of their rounding errors or by expansions, so the counts are those of real arith
 
 from typing import Any, NamedTuple
 
+from renderer.kernels.expansions import PARTS
 from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.signs import UNDECIDED, area_sign, differ, lies_within, volume_sign
 from renderer.kernels.simd import (
     at,
     count_bits,
@@ -24,8 +26,6 @@ from renderer.kernels.simd import (
     splat4,
     splat8,
 )
-from renderer.kernels.expansions import PARTS
-from renderer.kernels.signs import UNDECIDED, area_sign, differ, lies_within, volume_sign
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers

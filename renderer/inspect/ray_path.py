@@ -228,7 +228,12 @@ def _hit_segments(prepared: PreparedScene, ray: _Ray, met: _Met, own: int, shado
         else:
             radiance = add(radiance, aim.radiance)
     p = met.surface.p
-    return [Segment(ray.kind, ray.depth, ray.parent, ray.origin, p, True, int(met.together.seen.face), ray.weight, radiance), *shadow_rays]
+    return [
+        Segment(
+            ray.kind, ray.depth, ray.parent, ray.origin, p, True, int(met.together.seen.face), ray.weight, radiance
+        ),
+        *shadow_rays,
+    ]
 
 
 def _aim(prepared: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
@@ -272,7 +277,14 @@ def _bounce(prepared: PreparedScene, ray: _Ray, met: _Met, own: int) -> list[_Ra
 
 
 def _child(
-    kind: Kind, ray: _Ray, own: int, surface: Surface, place: Place, direction: Vector, weight: Vector, media: tuple[int, ...]
+    kind: Kind,
+    ray: _Ray,
+    own: int,
+    surface: Surface,
+    place: Place,
+    direction: Vector,
+    weight: Vector,
+    media: tuple[int, ...],
 ) -> _Ray:
     w, (p, error, n_g, *_) = normalized(direction), surface
     start = _start(place, n_g, w)

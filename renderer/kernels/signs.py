@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from renderer.kernels.expansions import OUT_OF_RANGE, expand_area, expand_slope, expand_volume, sign_of
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import power_below
 from renderer.kernels.simd import larger, smaller
-from renderer.kernels.expansions import OUT_OF_RANGE, expand_area, expand_slope, expand_volume, sign_of
 
 # What all functions here say where products would vanish or overflow.
 UNDECIDED = 2

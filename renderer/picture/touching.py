@@ -9,7 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get, larger, load4, load8, lowest_bit, magnitude, movemask, pointer, put, smaller, splat4, splat8
+from renderer.kernels.simd import (
+    get,
+    larger,
+    load4,
+    load8,
+    lowest_bit,
+    magnitude,
+    movemask,
+    pointer,
+    put,
+    smaller,
+    splat4,
+    splat8,
+)
 from renderer.kernels.vec3 import largest_component, length, sub
 from renderer.process.parallel import for_chunks
 from renderer.scene.needs import Needs

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import kernel
+from renderer.kernels.signs import UNDECIDED, volume_sign
 from renderer.kernels.simd import at, local_doubles, pointer
 from renderer.kernels.vec3 import row3
 from renderer.points.rational import cross, dot, exact, less
-from renderer.kernels.signs import UNDECIDED, volume_sign
 
 Floats = NDArray[np.float64]
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import flag_argument, real_array
+from renderer.distance.on_surface import on_surface
 from renderer.errors import expect, is_count
 from renderer.mesh.mesh import face_normals
 from renderer.points.argument import check_points, farthest_of
@@ -18,7 +19,10 @@ from renderer.queries import Queries
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
 from renderer.studies.edge_on import are_edge_on
 from renderer.studies.share import check_directions, lengths_of, limits_of
-from renderer.trace.hits import points_on
+from renderer.trace.batch import Leaving, check_rays, moved_off
+from renderer.trace.hits import Hits, points_on
+from renderer.trace.query import closest_hits
+from renderer.trace.starts.record import ABOVE, BARYCENTRIC, KNOWN
 
 Floats = NDArray[np.float64]
 
@@ -141,6 +145,7 @@ def scan(
     origin: ArrayLike,
     pattern: Pattern | ArrayLike | int = 100_000,
     *,
+    normal: ArrayLike | None = None,
     distance: float = np.inf,
     progress: bool = False,
 ) -> Scan:
@@ -148,9 +153,12 @@ def scan(
 
     pattern   directions (k, 3) of any length, a ``directions.Pattern`` of them, or their number, 1 to 2^24, for
               ``directions.fibonacci_sphere``
+    normal    (3,), for a scanner on the surface: it stands on this side. None: on the outer side by the winding of the
+              face that it stands on
     distance  how far the scanner reaches, in scene units
 
-    A scanner on the surface meets it at a distance of 0. Raises ``ValueError`` naming the argument.
+    A ray of a scanner on the surface that leads through the surface meets it at a distance of 0. Raises ``ValueError``
+    naming the argument.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
@@ -163,17 +171,32 @@ def scan(
     place = _one_place("origin", origin, octree)
     ways = _ways(pattern)
     reach = limits_of(distance, ways)
+    towards = None if normal is None else check_directions("normal", np.reshape(normal, (1, -1)))[0]
     parts: list[Scan] = []
     with progress_bar(len(ways), "ray", flag_argument("progress", progress)) as update:
         for begin in range(0, len(ways), _ROWS):
             some = ways[begin : begin + _ROWS]
-            hits = octree.closest_hit(place, some, t_max=reach[begin : begin + _ROWS])
+            hits = _first_hits(octree, place, some, reach[begin : begin + _ROWS], towards)
             rays = np.flatnonzero(hits.hit)
             away = hits.t[rays] * lengths_of(some[rays])
             parts.append(Scan(hits.points[rays], hits.normals[rays], away, hits.face[rays], begin + rays))
             if update is not None:
                 update(len(some))
     return Scan(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def _first_hits(octree: Queries, place: Floats, ways: Floats, reach: Floats, normal: Floats | None) -> Hits:
+    """The first hits of rays from one place, which may lie on the surface."""
+    mesh, tree = octree._built
+    rays, _ = check_rays(place, ways, 0.0, reach)
+    faces, anchors = on_surface(tree, mesh, place[None], np.full(1, -1), octree.threads)
+    if faces[0] >= 0:
+        outer = face_normals(mesh.vertices[mesh.faces[faces]])[0]
+        code = BARYCENTRIC | KNOWN | (ABOVE if normal is None or float(outer @ normal) >= 0.0 else 0)
+        count = len(ways)
+        leaving = Leaving(np.repeat(faces, count), np.full(1, code), np.repeat(anchors, count, axis=0))
+        rays = moved_off(rays, leaving, mesh, tree.scale, octree.threads)
+    return closest_hits(tree, rays, mesh, octree.threads)
 
 
 def _expect_octree(octree: Queries) -> None:

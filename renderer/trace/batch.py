@@ -154,7 +154,7 @@ def check_faces(argument: str, faces: ArrayLike, shape: tuple[int, ...], most: i
 
 
 def make_starts(count: int, mesh: Mesh) -> NDArray[np.int64]:
-    """An array for the starts of rays, as of ``starts.record``, on a mesh that the caller keeps; its rows follow HEAD."""
+    """Starts of rays as in ``starts.record``, on a mesh that the caller keeps; rows follow HEAD, not yet written."""
     starts = np.empty(HEAD + ROW * count, np.int64)
     starts[ROW_STEP], starts[VERTICES], starts[FACES] = ROW, mesh.vertices.ctypes.data, mesh.faces.ctypes.data
     return starts

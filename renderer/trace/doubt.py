@@ -63,7 +63,8 @@ def settled(tree, at, ray, shear, hit, blurred):
 
     A ray that begins exactly on the face hits it at t = 0. ``blurred`` says that the determinant is in doubt, not t or
     an edge alone. t lies where the ray is within the face's own box, in the arithmetic of ``enter_boxes``. That is
-    monotone: the ray enters no box around this one later, and leaves none earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
+    monotone: the ray enters no box around this one later, and leaves none earlier. The result depends on the ray and
+    the face alone, not on t_min, so every search gets the same.
     """
     height = _height_sign(tree, at, ray)
     if height == 0:

@@ -52,4 +52,5 @@ def _sides(side: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.int64]:
 
 
 def _codes(sides: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.where(sides == 0, 0, KNOWN) | np.where(sides > 0, ABOVE, 0)
+    codes: NDArray[np.int64] = KNOWN * (sides != 0) + ABOVE * (sides > 0)
+    return codes

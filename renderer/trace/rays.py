@@ -76,7 +76,7 @@ def ray_pointers(rays, scale):
 
 @inlined
 def hit_pointers(out, count):
-    """``HitPointers`` into the memory of ``out``: rows t, u, v, face and side of ``count`` values, or ``count`` bools."""
+    """``HitPointers`` into the memory of ``out``: rows t, u, v, face, side of ``count`` values, or ``count`` bools."""
     first, row = address(out), _BYTES * count
     return HitPointers(
         float64_pointer(first), int64_pointer(first + 3 * row), float64_pointer(first + row),

@@ -4,22 +4,34 @@ Vectors are tuples of float64.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, power_below, scaled_difference
 from renderer.kernels.simd import at, larger, pointer, put, smaller
-from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_component, length, normalized, row3, scale, sub, three
+from renderer.kernels.vec3 import (
+    add,
+    barycentric,
+    cross,
+    dot,
+    largest_component,
+    length,
+    normalized,
+    row3,
+    scale,
+    sub,
+    three,
+)
 from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import DOUBT, SLANT
-from renderer.trace.starts.anchor import anchor_of, far_from
+from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
     ABOVE,
     ANCHOR,
     BARYCENTRIC,
     CODE,
+    CORNER,
     EDGE,
     FACE,
     KNOWN,
@@ -49,14 +61,14 @@ _THIN = DOUBT / 4.0
 # A hit whose determinant is in doubt counts within ROUNDING of the face: twice that from its plane is off it, and four
 # times that from a line, which the face may be LINE wide.
 _LEAST = 2.0 * ROUNDING
-# Of a face thinner than this the distance from the plane errs by more than matters, so it takes twice the digits.
-_SHARP = 2.0**-10
 _SMALLEST = 2.0**-1074
 # A start is inside its face where it is farther from the edges than so often its slack: a face beside it, at more than
 # a 64th of a right angle, is farther from it than where it is moved to.
 _INSIDE = 8.0
-# A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that is
-# not thinner than _SHARP.
+# A start that would be moved by more of its face, as of needles, is left to exact signs: t is counted from there.
+_FARTHEST_MOVE = 2.0**-38
+# A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that
+# is not thinner than 2^-10 of its side.
 LEVEL = 2.0**-20
 # A point that went through float32 is off by 2^-24 of its largest coordinate: 64 times that is taken, as the same
 # may hold for the mesh and for what the point was computed from.
@@ -158,6 +170,7 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
     side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
     # A weight times the double area is the distance from its edge times the edge's length.
     inside = smaller(u, smaller(v, w)) * double_area > _INSIDE * slack * side and double_area > side * LINE * side
+    inside = inside and error <= _FARTHEST_MOVE * side
     return error, slack if inside else EDGE
 
 
@@ -219,61 +232,52 @@ def put_no_start(row):
     put(row, FACE, -1.0)
 
 
-@kernel
-def _exact_plane(p0, p1, p2, o):
-    """The unit normal of a thin face, and how far o is above its plane, by twice the digits."""
-    side = power_below(larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0))))
-    point = power_below(larger(largest_component(sub(o, p0)), side))
-    n = cross_pairs(scaled_difference(p1, p0, 1.0 / side), scaled_difference(p2, p0, 1.0 / side))
-    normal = heads(n)
-    return normalized(normal), dot_pairs(n, scaled_difference(o, p0, 1.0 / point))[0] / length(normal) * point
-
-
-@inlined
-def _plane_below(p0, p1, p2, o, w):
-    """The unit normal of a face that a ray leaves from o in direction w, how far o is above its plane, and how far it
-    must be to be off for certain.
+class _Plane(NamedTuple):
+    """The plane of a face near a point: the unit normal, the point's height above it, how far a start must be from it,
+    the slack of that start, and whether the point is so far inside the face that no more is to be known.
     """
-    double_area, reach, side = length(cross(sub(p1, p0), sub(p2, p0))), 0.0, 0.0
-    for p in (p0, p1, p2):
-        reach = larger(reach, largest_component(sub(p, o)))
-        side = larger(side, largest_component(sub(p, p0)))
-    n_g = normal_of(p0, p1, p2, scale(w, -1.0))
-    height = dot(n_g, sub(o, p0))
-    # A 1024th more, because the next test measures from where the point is moved to.
-    needed = _clearance(p0, p1, p2, double_area, reach) * (1.0 + 2.0**-10)
-    if double_area / side > _SHARP * side:
-        needed += _GAMMA336 * (reach / double_area * reach) * reach
-    elif double_area / side > LINE * side:
-        n_g, height = _exact_plane(p0, p1, p2, o)
-    return n_g, height, needed
+
+    normal: Any
+    height: float
+    needed: float
+    slack: float
+    inside: bool
 
 
 @inlined
-def _moved(o, n_g, height, needed, away):
-    """The point o near a face, moved along its normal to where it is off for certain; to the other side by away = -1."""
-    step = scale(n_g, away * (needed - away * height))
+def _plane_near(p0, p1, p2, o):
+    """The ``_Plane`` of a face near o. Of a face without area nothing is known, and no point is inside it."""
+    one, other, q = sub(p1, p0), sub(p2, p0), sub(o, p0)
+    n = cross(one, other)
+    whole = dot(n, n)
+    area = math.sqrt(whole)
+    side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
+    reach = larger(largest_component(q), larger(largest_component(sub(p1, o)), largest_component(sub(p2, o))))
+    share = reach / area * reach
+    # The bound of ``_clearance``, a 1024th more because the next test measures from where the point is moved to, and
+    # that of the height below.
+    needed = reach * (larger(_LEAST, smaller(_GAMMA264 * share, _MOST)) * (1.0 + 2.0**-10) + _GAMMA336 * share)
+    slack = slack_of(o, needed)
+    u, v = dot(cross(q, other), n), dot(cross(one, q), n)
+    # A weight is the distance from its edge times the edge's length times the double area.
+    least = smaller(u, smaller(v, whole - u - v))
+    inside = least > _INSIDE * slack * side * area and needed <= _FARTHEST_MOVE * side
+    n_g = scale(n, 1.0 / area)
+    return _Plane(n_g, dot(n_g, q), needed, slack, inside and area > _THIN * side * side)
+
+
+@inlined
+def _moved(o, plane, away):
+    """The point o near a face, moved along its normal to where it is off for certain; away = -1 is the other side."""
+    step = scale(plane.normal, away * (plane.needed - away * plane.height))
     return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
 
 
 @inlined
-def _is_inside(p0, p1, p2, o, slack):
-    """Whether a point near a face is far from all its edges, as seen from a start with this slack."""
-    one, other, q = sub(p1, p0), sub(p2, p0), sub(o, p0)
-    n = cross(one, other)
-    u, v, whole = dot(cross(q, other), n), dot(cross(one, q), n), dot(n, n)
-    side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
-    # A weight is the distance from its edge times the edge's length times the double area.
-    least = smaller(u, smaller(v, whole - u - v))
-    return least > _INSIDE * slack * side * math.sqrt(whole)
-
-
-@inlined
-def _side_of(n, w, code):
+def _side_of(slope, w, code):
     """The side of its face that a ray of direction w leaves to, 0 where rounding may have made it or where the code
-    says that it starts on the other one.
+    says that it starts on the other one; ``slope`` is the unit normal times w.
     """
-    slope = dot(n, w)
     side = 1.0 if slope >= 0.0 else -1.0
     if abs(slope) <= LEVEL * largest_component(w):
         return 0.0
@@ -281,21 +285,19 @@ def _side_of(n, w, code):
     return side if code & KNOWN == 0 or side == known else 0.0
 
 
-@kernel
+@inlined
 def leave_face(corners, o, w, unit, code):
     """Where a ray from the point o near a face starts in direction w: off the face, see ``leave_faces``; and its slack,
-    EDGE where the start is near an edge or the face stops the ray.
+    EDGE where the start is near an edge or the face stops the ray. Then it starts at o.
 
     ``corners`` are ``corners_of`` the face; o comes and goes in the mesh's own units, the slack is in those of corners.
     """
-    p0, p1, p2 = corners
-    o = scale(o, unit)
-    n_g, height, needed = _plane_below(p0, p1, p2, o, w)
-    slack = slack_of(o, needed)
-    side = _side_of(n_g, w, code)
-    start = _moved(o, n_g, height, needed, 1.0 if dot(n_g, w) >= 0.0 else -1.0)
-    inside = side != 0.0 and has_normal(p0, p1, p2) and _is_inside(p0, p1, p2, o, slack)
-    return scale(start, 1.0 / unit), slack if inside else EDGE
+    scaled = scale(o, unit)
+    plane = _plane_near(corners[0], corners[1], corners[2], scaled)
+    side = _side_of(dot(plane.normal, w), w, code)
+    if not plane.inside or side == 0.0:
+        return o, EDGE
+    return scale(_moved(scaled, plane, side), 1.0 / unit), plane.slack
 
 
 @kernel
@@ -304,27 +306,27 @@ def leave_to_both_sides(corners, o, unit):
 
     Returns that normal, the start for each w with normal . w >= 0, and the start for all others, and the slack of both.
     """
-    p0, p1, p2 = corners
-    o = scale(o, unit)
-    n_g, height, needed = _plane_below(p0, p1, p2, o, o)
-    slack = slack_of(o, needed)
-    above, below = _moved(o, n_g, height, needed, 1.0), _moved(o, n_g, height, needed, -1.0)
-    slack = slack if _is_inside(p0, p1, p2, o, slack) else EDGE
-    return n_g, scale(above, 1.0 / unit), scale(below, 1.0 / unit), slack
+    scaled = scale(o, unit)
+    plane = _plane_near(corners[0], corners[1], corners[2], scaled)
+    above, below = _moved(scaled, plane, 1.0), _moved(scaled, plane, -1.0)
+    return plane.normal, scale(above, 1.0 / unit), scale(below, 1.0 / unit), plane.slack if plane.inside else EDGE
 
 
 @inlined
-def lies_far(corners, o, unit):
+def _lies_above(start, o):
+    """Whether a start was moved by more than points that went through float32 are off, half of that at the least."""
+    return largest_component(sub(start, o)) > 0.25 * FARTHEST_START * largest_component(o)
+
+
+@kernel
+def _lies_far(corners, o, unit):
     """Whether a point is farther from a face than points that went through float32 are."""
     p0, p1, p2 = corners
     o = scale(o, unit)
-    # Most are near the plane and inside.
-    n = cross(sub(p1, p0), sub(p2, p0))
-    most = larger(largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2))))
-    if abs(dot(n, sub(o, p0))) <= FARTHEST_START * most * length(n) and _is_inside(p0, p1, p2, o, 0.0):
-        return False
-    anchor = anchor_of(Start(corners, o, 0, 0))
-    return far_from(anchor, o) > FARTHEST_START * most
+    most = larger(
+        largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    )
+    return far_from(anchor_of(Start(corners, o, 0, 0)), o) > FARTHEST_START * most
 
 
 @inlined
@@ -334,6 +336,15 @@ def _lies_at(corners, weights, o, unit):
     most = larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
     place = barycentric(p0, p1, p2, weights[0], weights[1])
     return largest_component(sub(place, scale(o, unit))) <= FARTHEST_START * most
+
+
+@kernel
+def _at_corner(start, o, unit):
+    """The corner that a start is on, from which a ray starts exactly, and its slack; elsewhere o and EDGE."""
+    anchor = anchor_of(start)
+    if anchor.zeros & (anchor.zeros - 1) == 0:
+        return o, EDGE
+    return scale(rounded(anchor), 1.0 / unit), CORNER
 
 
 @kernel
@@ -358,9 +369,15 @@ def leave_faces(vertices, faces, rays, leaving, code, anchors, starts, rows, bou
         own, slack, bits = o, 0.0, code[i * code_step]
         if face >= 0:
             around = corners_of(corners, pointer(faces), face, unit)
-            if lies_far(around, o, unit) or (len(anchors) > 0 and not _lies_at(around, row3(pointer(anchors), i), o, unit)):
-                return i
             own, slack = leave_face(around, o, w, unit, bits)
+            if len(anchors) > 0 and not _lies_at(around, row3(pointer(anchors), i), o, unit):
+                return i
+            # A point inside its face may only be above or below.
+            if len(anchors) == 0 and (slack == EDGE or _lies_above(own, o)) and _lies_far(around, o, unit):
+                return i
+            if slack == EDGE and bits & KNOWN == 0:
+                given = scale(o, unit) if len(anchors) == 0 else row3(pointer(anchors), i)
+                own, slack = _at_corner(Start(around, given, face, bits), o, unit)
         anchor = o if len(anchors) == 0 else row3(pointer(anchors), i)
         row = at(pointer(starts), 3 * i)
         for k in range(3):

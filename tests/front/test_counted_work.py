@@ -133,7 +133,7 @@ def _entered(nodes: Any, ray: Any) -> Any:
 
 def test_eight_octants_are_tested_at_once() -> None:
     octree = Octree.from_mesh(icosphere(3))
-    assert _entered(octree.tree.nodes, Ray(0.1, 0.2, 3.0, 0.0, 0.0, -1.0, 0.0)) > 0
+    assert _entered(octree.tree.nodes, Ray(0.1, 0.2, 3.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0)) > 0
     (code,) = _entered.inspect_llvm().values()
     compared = [line for line in code.splitlines() if " fcmp " in line and "float>" in line]
     assert len(compared) >= 7 and all("<8 x float>" in line for line in compared)

@@ -203,7 +203,8 @@ import numpy as np
 from numba import njit
 from renderer import Octree
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.rays import hit_pointers, ray_pointers
+from renderer.trace.batch import check_rays
+from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
 from renderer.trace.traverse import make_memory, make_scratch, trace
 
 @njit(error_model="numpy")
@@ -215,8 +216,8 @@ def mine(words, rays, out, memory):
 octree, rays = Octree.load(sys.argv[1]), np.random.default_rng(0).normal(size=(50, 3)) * 3
 expected = octree.closest_hit(rays, -rays)
 octree.any_hit(rays, -rays)
-out = np.zeros((4, 50))
-mine(octree.tree.words, (rays, -rays, np.zeros(50), np.full(50, np.inf)), out, make_memory(octree.tree.depth, 50))
+out = np.zeros((HIT_ROWS, 50))
+mine(octree.tree.words, check_rays(rays, -rays, np.zeros(50), np.inf)[0], out, make_memory(octree.tree.depth, 50))
 print((out[0] == expected.t).all())
 """
 

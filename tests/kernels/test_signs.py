@@ -4,10 +4,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import pointer
 from renderer.kernels.expansions import PARTS
+from renderer.kernels.jit import kernel
 from renderer.kernels.signs import UNDECIDED, lies_within
+from renderer.kernels.simd import pointer
 
 
 @kernel

@@ -125,11 +125,18 @@ def test_near_the_origin_a_far_surface_does_not_hide_itself():
     np.testing.assert_array_equal(octree.visible(eye, centres)[sure], (slope > 0)[sure])
 
 
-def test_beside_the_end_that_the_ray_starts_at_all_is_looked_at():
-    """A wall nearer than 2^-40 of 64 hides an end whose face is left: the point, where both have one."""
+@pytest.mark.parametrize("named", [False, True])
+def test_beside_an_end_on_the_surface_all_is_looked_at_and_beside_others_nothing(named):
+    """A wall nearer than 2^-40 of 64 hides an end that lies on a face below it, whether that is named or not."""
     corners, heights = np.array([[-1, -1, 0], [3, -1, 0], [-1, 3, 0]]), (0.0, 2.0**-37, 64.0)
-    octree = Octree(np.concatenate([np.add(corners, [0, 0, z]) for z in heights]), np.arange(9).reshape(3, 3))
+    vertices = np.concatenate([np.add(corners, [0, 0, z]) for z in heights])
     point, target = [0.25, 0.5, 0.0], [0.25, 0.5, 64.0]
-    assert octree.visible(point, target) and octree.visible(target, point)
-    assert not octree.visible(point, target, leaving=0) and not octree.visible(target, point, reaching=0)
-    assert not octree.visible(point, target, leaving=0, reaching=2)
+    octree = Octree(vertices, np.arange(9).reshape(-1, 3))
+    assert not octree.visible(point, target, **({"leaving": 0, "reaching": 2} if named else {}))
+    assert not octree.visible(target, point, **({"leaving": 2, "reaching": 0} if named else {}))
+    assert not octree.visible(point, target, **({"leaving": 0} if named else {}))
+    assert not octree.visible(target, point, **({"reaching": 0} if named else {}))
+    # Without the face the end is in the open.
+    octree = Octree(vertices[3:], np.arange(6).reshape(-1, 3))
+    assert octree.visible(point, target, reaching=1 if named else None)
+    assert octree.visible(target, point, leaving=1 if named else None)

@@ -72,7 +72,10 @@ class TestOnTheGround:
     def test_no_sky_is_seen_through_the_ground(self, material: Material, y: float, eye: Any) -> None:
         seen = {"eye": np.add(eye, (0, y, 0)).tolist(), "target": (0.0, y + 0.4, 0.0)}
         for turned in (False, True):
-            for parts in ([(cube(y), material), (level(y, turned), GROUND)], [(level(y, turned), GROUND), (cube(y), material)]):
+            for parts in (
+                [(cube(y), material), (level(y, turned), GROUND)],
+                [(level(y, turned), GROUND), (cube(y), material)],
+            ):
                 image = picture(scene(*parts, **seen))
                 assert image.radiance[image.face >= 0].max() < 2.0
 
@@ -88,7 +91,9 @@ class TestOnTheGround:
 
     def test_a_mirror_below_glass_reflects_within_it(self) -> None:
         """Straight down through glass of index 1.5, back up and out: (1 - 0.04)^2 times 0.9 of the sky."""
-        what = scene((cube(0.0), clear(1.5)), (level(0.0), Mirror(reflectance=0.9)), eye=(0.1, 5, 0.2), target=(0.1, 0, 0.2))
+        what = scene(
+            (cube(0.0), clear(1.5)), (level(0.0), Mirror(reflectance=0.9)), eye=(0.1, 5, 0.2), target=(0.1, 0, 0.2)
+        )
         image = render(what, resolution=(1, 1), max_depth=3)
         assert image.radiance[0, 0, 2] == pytest.approx(1000 * 0.9 * 0.96**2, rel=REL)
 
@@ -191,12 +196,15 @@ class TestTurned:
     def seen(self, rotate: Any, parts: list[tuple[Mesh, Material]], eye: Any, target: Any, **more: Any) -> Image:
         materials = {"ground": GROUND, **{str(m): m for _, m in parts}}
         objects = tuple(
-            SceneObject(mesh=mesh, material=str(m), normals="flat", rotate=rotate, translate=(3, -7, 11)) for mesh, m in parts
+            SceneObject(mesh=mesh, material=str(m), normals="flat", rotate=rotate, translate=(3, -7, 11))
+            for mesh, m in parts
         )
         turn = np.array(objects[0].matrix())
         eye, target = ((turn @ (*p, 1.0))[:3].tolist() for p in (eye, target))
         camera = PerspectiveCamera(eye=eye, target=target, up=(0.1, 0.7, -0.7), fov=more.pop("fov"))
-        return picture(Scene(camera=camera, materials=materials, objects=objects, ambient=1.0, **more), 40, max_depth=12)
+        return picture(
+            Scene(camera=camera, materials=materials, objects=objects, ambient=1.0, **more), 40, max_depth=12
+        )
 
     @pytest.mark.parametrize("seed", range(6))
     def test_glass_on_the_ground(self, seed: int) -> None:
@@ -259,7 +267,9 @@ class TestOneAnswer:
     def test_numbers_of_faces_do_not_matter(self) -> None:
         """But where a body later in the scene holds, or colours are those of the lowest: glass on the ground has neither."""
         parts = [(cube(0.0), GLASS), (level(0.0), GROUND), (box((0.5, 0, -0.5), (1.5, 1, 0.5)), GLASS)]
-        images = [picture(scene(*(parts[k] for k in order), eye=EYES[0])) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+        images = [
+            picture(scene(*(parts[k] for k in order), eye=EYES[0])) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+        ]
         for image in images[1:]:
             alike(image, images[0], 0.0)
 
@@ -298,4 +308,6 @@ class TestTouchingFaces:
         what = scene((box(), GROUND), (level(0.0), GROUND), eye=EYES[0])
         prepared = prepare_scene(what, needs_of(what), "octree")
         _, arrays = pack(what)
-        assert len(prepared.arrays.touching) == len(find_touching(prepared.tree, arrays, prepared.needs, 1).touching) == 0
+        assert (
+            len(prepared.arrays.touching) == len(find_touching(prepared.tree, arrays, prepared.needs, 1).touching) == 0
+        )

@@ -121,10 +121,17 @@ def test_answers_are_float64_in_the_dimensions_of_the_points(study: str) -> None
     np.testing.assert_array_equal(again.ravel(), whole)
 
 
-def test_a_scanner_on_the_surface_meets_it_at_once_and_none_beyond_its_reach() -> None:
+def test_a_scanner_on_the_surface_meets_what_leads_through_it_at_once_and_none_beyond_its_reach() -> None:
     floor = Octree.from_mesh(grid(2, 2))
     ways = [[0, -1, 0], [0, 2, 0], [0.5, -0.5, 0]]
-    assert scan(floor, [0.1, 0.0, 0.1], ways).distances.tolist() == [0.0, 0.0, 0.0]
+    # At a corner of several faces, on a side, and inside a face: on the outer side, if no normal says another.
+    for x, z in ((0.0, 0.0), (0.25, 0.0), (0.1, 0.15)):
+        for normal, through in ((None, [0, 2]), ([0, 3, 0], [0, 2]), ([0.1, 1e-9, 0.1], [0, 2]), ([0, -1, 0], [1])):
+            cloud = scan(floor, [x, 0.0, z], ways, normal=normal)
+            assert cloud.rays.tolist() == through and (cloud.distances == 0.0).all()
+            np.testing.assert_allclose(cloud.points, np.tile([x, 0.0, z], (len(through), 1)), rtol=0, atol=1e-15)
+    with pytest.raises(ValueError, match="normal: expected"):
+        scan(floor, [0.1, 0.0, 0.1], ways, normal=[0, 0, 0])
     assert scan(floor, [0.1, 3.0, 0.1], ways, distance=3).distances.tolist() == [3.0]
     assert len(scan(floor, [0.1, 3.0, 0.1], ways, distance=np.nextafter(3.0, 0.0)).rays) == 0
 

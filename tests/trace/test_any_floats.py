@@ -25,6 +25,7 @@ from renderer.kernels.simd import bits_float
 from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
+from renderer.trace.batch import NO_STARTS, RayBatch
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
 from renderer.trace.singly import stack_size
@@ -45,13 +46,13 @@ def unchecked(words, rays, out, any_hit, memory, by_blocks):
     count = len(rays[1])
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
     if by_blocks:
-        search_blocks(tree, source, found, 0, count, any_hit)
+        search_blocks(tree, source, found, 0, count, make_scratch(memory).holders, any_hit)
     else:
         trace(tree, source, found, 0, count, make_scratch(memory), any_hit)
 
 
 def answers(octree, rays, any_hit, by_blocks=False):
-    """t, u, v and face of rays that nobody checked, or hit; and that the words around the scratch are as they were."""
+    """t, u, v, face and side of rays that nobody checked, or hit; the words around the scratch are as they were."""
     count, memory = len(rays[1]), make_memory(octree.tree.depth, len(rays[1]))
     padded = np.full(len(memory.integers) + 128, GUARD, np.int64)
     memory = memory._replace(integers=padded[64:-64])
@@ -73,11 +74,12 @@ def any_rays(rng, count, alike):
         array[bad] = rng.choice(ANY, bad.sum())
     t_min = np.where(rng.random(count) < 0.1, rng.choice(ANY, count), 0.0)
     t_max = np.where(rng.random(count) < 0.1, rng.choice(ANY, count), np.inf)
-    return origins, directions, t_min, t_max
+    return RayBatch(origins, directions, t_min, t_max)
 
 
-def in_range(origins, directions, t_min, t_max):
+def in_range(origins, directions, t_min, t_max, starts):
     """The rays that queries would take."""
+    assert starts is NO_STARTS
     largest = np.abs(directions).max(axis=1)
     near, fits = (np.abs(origins) <= FARTHEST).all(axis=1), (largest >= SHORTEST) & (largest <= LONGEST)
     return near & fits & np.isfinite(directions).all(axis=1) & (t_min >= 0.0) & (t_min < np.inf) & (t_max >= 0.0)

@@ -9,7 +9,7 @@ from meshes import make_mesh, rays_at
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.trace import error as bounding
-from renderer.trace.batch import check_rays, moved_off
+from renderer.trace.batch import by_faces, check_rays, moved_off
 from validation.oracle import exact
 
 
@@ -93,7 +93,8 @@ def test_of_rays_that_leave_faces_the_bound_is_that_of_the_moved_rays():
     octree = Octree.from_mesh(icosphere(3))
     starts, inward = octree.mesh.triangles.mean(axis=1), -octree.mesh.face_normals()
     faces = np.arange(len(starts))
-    moved = moved_off(check_rays(starts, inward, 0.0, np.inf)[0], faces, octree.mesh, octree.tree.scale, 1)
+    rays = check_rays(starts, inward, 0.0, np.inf)[0]
+    moved = moved_off(rays, by_faces(faces), octree.mesh, octree.tree.scale, 1)
     hits = octree.closest_hit(starts, inward, leaving=faces, t_error=True)
     again = octree.closest_hit(moved.origins, inward, t_error=True)
     assert hits.hit.all()

@@ -11,6 +11,8 @@ from meshes import make_mesh
 from renderer import BruteForce, Octree
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.trace import batch
+from renderer.trace.hits import Hits
+from renderer.trace.starts.record import EDGE, HEAD, ROW, SLACK
 
 SCALES = (1e-12, 1.0, 1e12)
 OFFSETS = (0.0, 1e3, 1e8)
@@ -97,8 +99,8 @@ def plane_distance(vertices, face, point):
     return sum(k * (y - x) for k, x, y in zip(n, p0, p, strict=True)), sum(k * k for k in n)
 
 
-def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_distance():
-    from renderer.trace.batch import check_rays, moved_off
+def test_starts_are_beyond_the_plane_by_no_more_than_roundings_and_above_the_nearest_point_of_it():
+    from renderer.trace.batch import by_faces, check_rays, moved_off
 
     ball = icosphere(2)
     for offset in OFFSETS:
@@ -107,18 +109,23 @@ def test_starts_are_beyond_the_plane_and_no_further_than_roundings_and_their_dis
         face, points, directions = on_faces(vertices, ball.faces, 5, 300)
         # Some lie off the plane, on either side, by more than rounding.
         points[::3] += 1e-6 * ball.face_normals()[face[::3]] * np.random.default_rng(0).choice([-1, 1], (100, 1))
-        rays = moved_off(check_rays(points, directions, 0.0, np.inf)[0], face, octree.mesh, 1.0, 1)
+        rays = moved_off(check_rays(points, directions, 0.0, np.inf)[0], by_faces(face), octree.mesh, 1.0, 1)
         normals = ball.face_normals()[face]
+        edge = rays.starts[HEAD:].view(np.float64).reshape(-1, ROW)[:, SLACK] == EDGE
+        assert 0.1 < edge.mean() < (0.3 if offset == 0.0 else 1.0)
         for k in range(len(face)):
+            if edge[k]:
+                # Exact signs decide there, from the point itself.
+                np.testing.assert_array_equal(rays.origins[k], points[k])
+                continue
             side = 1 if directions[k] @ normals[k] >= 0 else -1
             before, square = plane_distance(vertices, ball.faces[face[k]], points[k])
             after, _ = plane_distance(vertices, ball.faces[face[k]], rays.origins[k])
             assert side * after > 0
+            assert side * float(after) / float(square) ** 0.5 <= 2e-13 * (1.0 + offset)
+            # From either side along the normal.
             moved = np.linalg.norm(rays.origins[k] - points[k])
-            away = max(0.0, -side * float(before) / float(square) ** 0.5)
-            assert moved <= away + 2e-13 * (1.0 + offset)
-            if moved == 0.0:
-                assert side * before > 0
+            assert moved <= abs(float(before)) / float(square) ** 0.5 + 2e-13 * (1.0 + offset)
 
 
 def test_minus_one_leaves_no_face_and_one_number_stands_for_all():
@@ -205,11 +212,210 @@ def test_no_kernel_is_compiled_for_other_arrays(monkeypatch):
     kernel = batch.leave_faces
 
     def noted(*arguments):
-        seen.append([array.flags.writeable for array in arguments[2:6]])
+        origins, directions = arguments[2]
+        seen.append([array.flags.writeable for array in (origins, directions, *arguments[3:8])])
         return kernel(*arguments)
 
     monkeypatch.setattr(batch, "leave_faces", noted)
     octree, directions = Octree.from_mesh(icosphere(1)), np.eye(3)
+    starts = octree.mesh.triangles[:3].mean(axis=1)
     for ways in (directions, directions[0], np.broadcast_to(directions[0], (3, 3))):
-        octree.any_hit(np.zeros((3, 3)), ways, leaving=[0, 1, 2])
-    assert len(seen) == 3 and all(all(row) for row in seen)
+        octree.any_hit(starts, ways, leaving=[0, 1, 2])
+    corner = octree.mesh.triangles[0, 0]
+    octree.any_hit(np.broadcast_to(corner, (3, 3)), directions, leaving=0, side=1)
+    hits = octree.closest_hit(3.0 * starts, -starts)
+    for left in (hits, hits.through()):
+        octree.any_hit(hits.points, -starts, leaving=left)
+    assert len(seen) == 6 and all(all(row) for row in seen)
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+@pytest.mark.parametrize("count", [7, 3000])
+def test_hits_know_the_side_of_the_face_that_their_ray_came_from(accelerator, count):
+    queries, rng = accelerator(*make_mesh("soup", 4, 300)), np.random.default_rng(6)
+    origins, directions = rng.normal(size=(2, count, 3))
+    hits, every = queries.closest_hit(origins, directions), queries.all_hits(origins, directions)
+    assert hits.side.dtype == every.side.dtype == np.int64 and hits.hit.any() and not hits.hit.all()
+    came = -np.sign(np.einsum("ij,ij->i", directions, np.nan_to_num(hits.normals)))
+    np.testing.assert_array_equal(hits.side, came)
+    assert (hits.side[~hits.hit] == 0).all() and {-1, 1} <= set(hits.side[hits.hit])
+    np.testing.assert_array_equal(every.side, -np.sign(np.einsum("ij,ij->i", directions[every.ray], every.normals)))
+    np.testing.assert_array_equal(queries.closest_hit(origins[:, None], directions[:, None]).side[:, 0], hits.side)
+    # Those made by hand know none, and neither do places beyond their faces.
+    none = Hits(hits.t, hits.face, hits.u, hits.v, queries.mesh)
+    assert none.side is None and none.through().side is None
+    np.testing.assert_array_equal(hits.through().side, -hits.side)
+
+
+ABOVE, BELOW, UP, DOWN = 1, -1, (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+@pytest.mark.parametrize("count", [1, 40])
+@pytest.mark.parametrize(
+    ("side", "direction", "met"),
+    [
+        (ABOVE, UP, []),
+        (ABOVE, DOWN, [0.0, 1.0]),
+        (BELOW, DOWN, [1.0]),
+        (BELOW, UP, [0.0]),
+        (0, UP, []),
+        (0, DOWN, [1.0]),
+        (None, UP, []),
+        (None, DOWN, [1.0]),
+    ],
+)
+def test_a_ray_that_leads_through_the_surface_to_another_side_is_stopped_at_once(
+    accelerator, count, side, direction, met
+):
+    queries = accelerator.from_mesh(box())
+    top, point = queries.closest_hit([0.25, 0.5, 3.0], DOWN), np.tile([0.25, 0.5, 1.0], (count, 1))
+    rays, given = (point, np.tile(direction, (count, 1))), {"leaving": int(top.face), "side": side}
+    hits, every = queries.closest_hit(*rays, **given), queries.all_hits(*rays, **given)
+    # Another face is as far as from where the start was moved to.
+    np.testing.assert_allclose(hits.t, met[0] if met else np.inf, rtol=1e-13, atol=0.0)
+    np.testing.assert_allclose(every.t, met * count, rtol=1e-13, atol=0.0)
+    if met and met[0] == 0.0:
+        assert (
+            (hits.face == top.face).all() and (hits.side == side).all() and (every.face[:: len(met)] == top.face).all()
+        )
+        np.testing.assert_allclose(hits.points, point, rtol=0, atol=1e-15)
+    assert (queries.any_hit(*rays, **given) == bool(met)).all()
+    assert (queries.count_hits(*rays, **given) == len(met)).all()
+    # A side for each ray is the same.
+    rows = {"leaving": np.full(count, top.face), "side": None if side is None else np.full(count, side)}
+    np.testing.assert_array_equal(queries.closest_hit(*rays, **rows).t, hits.t)
+
+
+def test_rays_go_on_from_hits_on_the_side_that_they_came_from_and_through_them_on_the_other():
+    ball = icosphere(3)
+    octree, rng = Octree.from_mesh(ball), np.random.default_rng(3)
+    origins, targets = 3.0 * rng.normal(size=(500, 3)), 0.5 * rng.random((500, 3))
+    origins[np.linalg.norm(origins, axis=1) < 1.5] = [3.0, 0.0, 0.0]
+    directions = targets - origins
+    hits, all_of_them = octree.closest_hit(origins, directions), octree.all_hits(origins, directions, contacts=False)
+    assert hits.hit.all() and (all_of_them.counts == 2).all()
+    # The direction leads through the face, but the ray is on this side of it.
+    stopped = octree.closest_hit(hits.points, directions, leaving=hits)
+    np.testing.assert_array_equal(stopped.t, 0.0)
+    np.testing.assert_array_equal(stopped.face, hits.face)
+    assert not octree.any_hit(hits.points, -directions, leaving=hits).any()
+    beyond = octree.closest_hit(hits.points, directions, leaving=hits.through())
+    np.testing.assert_array_equal(beyond.face, all_of_them.face[1::2])
+    np.testing.assert_array_equal(beyond.side, -1)
+    np.testing.assert_allclose(beyond.t + hits.t, all_of_them.t[1::2], rtol=1e-12)
+    np.testing.assert_array_equal(octree.closest_hit(hits.points, -directions, leaving=hits.through()).t, 0.0)
+    assert not octree.any_hit(beyond.points, directions, leaving=beyond.through()).any()
+    # Hits that know no side are places on faces alone.
+    plain = Hits(hits.t, hits.face, hits.u, hits.v, ball)
+    np.testing.assert_array_equal(octree.closest_hit(hits.points, directions, leaving=plain).face, beyond.face)
+    # A miss leaves none.
+    missed = octree.closest_hit(origins, -directions)
+    assert not missed.hit.any()
+    np.testing.assert_array_equal(octree.closest_hit(origins, directions, leaving=missed).t, hits.t)
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+@pytest.mark.parametrize("scale", SCALES)
+def test_at_corners_and_edges_of_a_box_its_faces_stop_what_leads_through_them_and_nothing_else(accelerator, scale):
+    """The box is the octant of each corner, and a quarter of space at an edge."""
+    solid = box()
+    queries, rng = accelerator(solid.vertices * scale, solid.faces), np.random.default_rng(8)
+    for along in range(3):  # the corners, and the middles of sides along y and z
+        points = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+        if along:
+            points[:, along] = 0.5
+        for point in np.unique(points, axis=0):
+            held = [number for number, corners in enumerate(solid.triangles) if _holds(corners, point)]
+            directions = rng.normal(size=(60, 3))
+            outer = np.where(point == 0.5, 0.0, 2.0 * point - 1.0)
+            inward = (np.where(outer == 0.0, -1.0, directions * outer) < 0.0).all(axis=1)
+            starts = np.tile(point * scale, (60, 1))
+            for face in held:
+                free = queries.closest_hit(starts, directions, leaving=face)
+                assert (free.hit == inward).all() and (free.t[inward] > 0.0).all()
+                outside = queries.closest_hit(starts, directions, leaving=face, side=1)
+                assert (outside.t[inward] == 0.0).all() and not outside.hit[~inward].any()
+                inside = queries.closest_hit(starts, directions, leaving=face, side=-1)
+                assert (inside.t[~inward] == 0.0).all()
+                np.testing.assert_array_equal(inside.t[inward], free.t[inward])
+                assert np.isin(np.concatenate([outside.face[inward], inside.face[~inward]]), held).all()
+
+
+def _holds(corners, point):
+    """Whether a right-angled face of a box, parallel to an axis, holds a point."""
+    p0, p1, p2 = corners
+    n = np.cross(p1 - p0, p2 - p0)
+    if (point - p0) @ n != 0.0:
+        return False
+    return all(np.cross(b - a, point - a) @ n >= 0.0 for a, b in ((p0, p1), (p1, p2), (p2, p0)))
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+def test_an_origin_exactly_on_faces_hits_the_lowest_of_those_that_its_direction_crosses_at_once(accelerator):
+    """Nothing is named: then t is 0, and not a rounding beside it, in all directions that are not in their planes."""
+    ball = icosphere(2)
+    queries, rng = accelerator.from_mesh(ball), np.random.default_rng(2)
+    for corner in rng.integers(0, len(ball.vertices), 12):
+        directions = rng.normal(size=(50, 3)) * 10.0 ** rng.integers(-9, 9, (50, 1))
+        hits = queries.closest_hit(np.tile(ball.vertices[corner], (50, 1)), directions)
+        np.testing.assert_array_equal(hits.t, 0.0)
+        np.testing.assert_array_equal(hits.face, np.flatnonzero((ball.faces == corner).any(axis=1)).min())
+    flat = accelerator([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
+    for exponent in (0, -20, -52, -300):
+        slopes = [[1.0, 1.0, 2.0**exponent], [1.0, 1.0, -(2.0**exponent)]]
+        assert flat.closest_hit([[0.25, 0.25, 0.0]] * 2, slopes).t.tolist() == [0.0, 0.0]
+    assert not flat.any_hit([0.25, 0.25, 0.0], [1.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"side": 1}, "side: expected None without leaving, got an array"),
+        ({"leaving": 0, "side": 2}, "side: expected 1, -1 or 0, got 2 in row 0"),
+        ({"leaving": [0, 1], "side": [1, -3]}, "side: expected 1, -1 or 0, got -3 in row 1"),
+        (
+            {"leaving": 0, "side": 0.5},
+            r"side: expected an integer or integers of shape \(2,\), got float64 of shape \(\)",
+        ),
+        (
+            {"leaving": 0, "side": [1]},
+            r"side: expected an integer or integers of shape \(2,\), got int64 of shape \(1,\)",
+        ),
+        ({"leaving": 0, "side": "x"}, "side: expected real numbers, got dtype <U1"),
+    ],
+)
+@pytest.mark.parametrize("query", ["closest_hit", "any_hit", "all_hits", "count_hits", "count_steps"])
+def test_sides_that_are_not_there_are_errors(query, given, told):
+    octree = Octree.from_mesh(box())
+    with pytest.raises(ValueError, match=f"^{told}$"):
+        getattr(octree, query)([[0.5, 0.25, 0.0]] * 2, [[0.0, 0.0, 1.0]] * 2, **given)
+
+
+def test_hits_of_other_rays_and_sides_beside_hits_are_errors():
+    octree = Octree.from_mesh(box())
+    rays = [[0.5, 0.25, 3.0]] * 2, [[0.0, 0.0, -1.0]] * 2
+    hits = octree.closest_hit(*rays)
+    with pytest.raises(ValueError, match=r"^leaving: expected hits of shape \(3,\), got shape \(2,\)$"):
+        octree.any_hit([hits.points[0]] * 3, [[0.0, 0.0, 1.0]] * 3, leaving=hits)
+    with pytest.raises(ValueError, match=r"^side: expected None, as the hits say it, got an array$"):
+        octree.any_hit(hits.points, rays[1], leaving=hits, side=1)
+    off = hits.points + np.array([[0.0, 0.0, 0.0], [1e-4, 0.0, 0.0]])
+    for left in (hits, hits.through()):
+        with pytest.raises(ValueError, match=r"^origins: expected a point of face .* in row 1$"):
+            octree.any_hit(off, rays[1], leaving=left)
+
+
+@pytest.mark.parametrize("largest", [1.0, 1e-9, 1e6])
+@pytest.mark.parametrize("direction", [0, 1])
+def test_a_point_that_is_far_from_the_face_that_it_names_is_an_error(largest, direction):
+    """Farther than 2^-18 of the largest coordinate, off the plane or beside the face; nearer ones are rounded."""
+    octree = Octree(np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]]) * largest, [[0, 1, 2]])
+    off = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])[direction] * largest
+    foot = np.array([[-0.5, -0.5, 0.0], [-1.0, 0.0, 0.0]])[direction] * largest
+    ways = [[0.3, 0.2, 1.0]] * 2
+    assert not octree.any_hit([foot, foot + 0.9 * 2.0**-18 * off], ways, leaving=0).any()
+    with pytest.raises(
+        ValueError, match=r"^origins: expected a point of face 0 that it leaves, within 4e-06 of .* in row 1$"
+    ):
+        octree.any_hit([foot, foot + 1.1 * 2.0**-18 * off], ways, leaving=0)

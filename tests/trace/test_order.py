@@ -176,7 +176,7 @@ def judged(words, origins, directions, out):
     tree = tree_pointers(words)
     for i in range(len(origins)):
         o, d = origins[i], directions[i]
-        ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
+        ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0, 0.0, -1.0)
         base, place = (i // BLOCK_FACES) * BLOCK_WORDS, i % BLOCK_FACES
         bits, doubts, blurred, _, t4 = hit_triangles(tree, base, make_shear(ray), 0.0, np.inf)[:5]
         t = extract(t4, place)

@@ -15,7 +15,7 @@ from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, ro
 from renderer.trace.layout import NODE_WORDS
 from renderer.trace.packet import enter_beam, make_beam
 from renderer.trace.ray_lanes import SIXTEEN, WIDTH, Prepared, prepare_eight, prepare_ray
-from renderer.trace.rays import RayPointers, ray_at, ray_pointers
+from renderer.trace.rays import ray_at, ray_pointers
 from renderer.trace.traverse import are_coherent
 
 SEEDS = st.integers(0, 2**20)
@@ -113,14 +113,12 @@ def test_eight_rays_are_prepared_as_each_is_alone(seed):
 
 
 @kernel
-def _are_coherent(origins, directions, bound):
-    return are_coherent(
-        RayPointers(pointer(origins), pointer(directions), pointer(bound), pointer(bound), 3, 3, 0, 0, 1.0), 0
-    )
+def _are_coherent(rays):
+    return are_coherent(ray_pointers(rays, 1.0), 0)
 
 
 def _coherent(origins, directions):
-    return _are_coherent(origins, directions, np.zeros(1))
+    return _are_coherent(RayBatch(origins, directions, np.zeros(1), np.zeros(1)))
 
 
 def test_what_is_coherent():
@@ -140,7 +138,7 @@ def _meet_beam_and_rays(nodes, origins, directions, t_max, room):
     rays, alone, limit = Prepared(pointer(floats), pointer(doubles), pointer(integers)), 0, np.float32(0.0)
     for r in range(WIDTH):
         o, d = origins[r], directions[r]
-        ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0)
+        ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0, 0.0, -1.0)
         prepare_ray(rays, r, ray, t_max)
         largest = max(abs(d[0]), max(abs(d[1]), abs(d[2])))
         farthest = box_limit(t_max, largest)

@@ -85,6 +85,7 @@ def test_what_lies_before_t_min_is_not_searched():
 def test_faces_are_left():
     corners = np.array([[-1.0, -1, 0], [3, -1, 0], [-1, 3, 0]])
     octree = Octree(np.concatenate([corners, np.add(corners, [0, 0, 1])]), [[0, 1, 2], [3, 4, 5]], leaf_size=1)
-    rays = [[0.25, 0.25, 0.0]], [[0.0, 0.0, -1.0]]
+    rays = [[0.25, 0.25, 0.0]], [[0.0, 0.0, 1.0]]
     whole, left = octree.count_steps(*rays), octree.count_steps(*rays, leaving=0)
-    assert whole.triangles.tolist() == [1] and left.triangles.tolist() == [0]
+    # A ray that hits the face that it starts on ends there; one that leaves it goes on to the next.
+    assert whole.triangles.tolist() == [1] and left.triangles.tolist() == [2]

@@ -80,9 +80,16 @@ HITS = (
     _kernel("hits", "faces of no area are never hit", "_meet_line",
             "return t, second, 0.0", "return np.nan, second, 0.0"),
     _kernel("hits", "a determinant that is noise is believed", "settled",
-            "_meet_face(tree, at, ray, first / largest, np.float64(last) / largest) if blurred else hit", "hit"),
+            "if blurred:\n"
+            "    t, u, v, w = _meet_face(tree, at, ray, first / largest, np.float64(last) / largest)\n"
+            "    w = -1.0 if _slope(tree, at, ray) * shear.direction_z > 0.0 else 1.0\n"
+            "    u, v = u * w, v * w\n"
+            "elif height != _FAR and height != 0:\n"
+            "    slope = _slope(tree, at, ray)\n"
+            "    t = height * abs(_exact_t(tree, at, ray)) * (1.0 if slope > 0 else -1.0)",
+            "pass"),
     _kernel("hits", "streams drop a doubt whose t is noise", "_are_due",
-            "blurred | (doubt & (t >= zero) & within)", "doubt & (t >= zero) & within"),
+            "blurred | (doubt & ahead & within)", "doubt & ahead & within"),
     _kernel("hits", "determinants that blow roundings up are not in doubt", "SLANT",
             "SLANT = 2.0**-16", "SLANT = 2.0**-40"),
     _kernel("hits", "edges as rounded are believed", "_may_be_on_edge",
@@ -106,8 +113,8 @@ HITS = (
             "first, count = blocks_of(child)\n"
             "count = count - 1 if count > 1 else count"),
     _kernel("hits", "single rays are an ulp too far", "trace_few",
-            "best, _ = search_singly(tree, ray, limit, stack)",
-            "(t, face, u, v, w), _ = search_singly(tree, ray, limit, stack)\n"
+            "best, _ = search_carefully(tree, source, i, stack, pointer(holders), False)",
+            "(t, face, u, v, w), _ = search_carefully(tree, source, i, stack, pointer(holders), False)\n"
             "best = t * (1.0 + 2.0**-52), face, u, v, w"),
     _python("hits", "bad rays are let through", "query._run",
             "if bad:\n"
@@ -135,8 +142,8 @@ HITS = (
             "refit_tree(tree, scaled, moved.faces, scale, self.threads)",
             "refit_tree(tree, scaled, moved.faces, tree.scale, self.threads)"),
     _python("hits", "bounds of t lose the dimensions of the rays", "Hits.shaped",
-            "Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error)",
-            "Hits(t, self.face.reshape(shape), u, v, self._mesh, self.t_error)"),
+            "Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error, side)",
+            "Hits(t, self.face.reshape(shape), u, v, self._mesh, self.t_error, side)"),
     _python("hits", "a loaded tree forgets its repairs", "Octree.load",
             "octree.repairs = stored.repairs", "octree.repairs = None"),
     _python("hits", "normals of OBJ files of which some corners have one", "obj._mesh",
@@ -161,18 +168,17 @@ QUERIES = (
     _kernel("queries", "a corner is taken for one of its edges", "_ends",
             "edges & (edges - 1) != 0", "False"),
     _kernel("queries", "of hits at one t the highest face comes first", "gather._precedes",
-            "get(found.integers, _row(found, _FACE, i)) < get(found.integers, _row(found, _FACE, j))",
-            "get(found.integers, _row(found, _FACE, i)) > get(found.integers, _row(found, _FACE, j))"),
+            "ti == tj and face < other", "ti == tj and face > other"),
     _kernel("queries", "max_hits keeps one more", "gather_chunk",
-            "smaller(_ordered(tree, found, count, merge, keep), most)",
-            "smaller(_ordered(tree, found, count, merge, keep), most + 1)"),
+            "smaller(_ordered(tree, ray_at(source, i)[0], found, count, merge, keep), most)",
+            "smaller(_ordered(tree, ray_at(source, i)[0], found, count, merge, keep), most + 1)"),
     _kernel("queries", "blocks of which a ray sees the first face alone are left out", "find_blocks",
             "get(lanes.bits, r) != 0", "get(lanes.bits, r) > 1"),
     _kernel("queries", "the nearest point is never a corner", "_distance_to_ordered",
             "behind <= 0.0", "behind != behind"),
     _kernel("queries", "points beside an edge are taken as over the face", "distance_to_face",
             "wa > on_a and wb > on_b and wc > on_c", "wa > on_a and wb > on_b"),
-    _kernel("queries", "points near a plane lose their digits", "_height",
+    _kernel("queries", "points near a plane lose their digits", "face_distance._height",
             "abs(height[0]) < _CANCELLED * _largest(normal)", "height[0] != height[0]"),
     _kernel("queries", "points near an edge lose their digits", "_distance_to_ordered",
             "_largest(area) < _CANCELLED * _largest(pa)", "behind != behind"),
@@ -334,12 +340,10 @@ PICTURES = (
             "-dot(r, d) <= 0.0", "-dot(r, d) <= 0.5"),
     _kernel("pictures", "interpolated normals not normalised", "surface_at",
             "normalized(n) if largest_component(n) > 0.0 else n_g", "n if largest_component(n) > 0.0 else n_g"),
-    _kernel("pictures", "rays leave a face from its other side", "spawn._leave",
-            "away * missing", "-away * missing"),
-    _kernel("pictures", "rays leave a face by a thousandth of the bound", "spawn._leave",
-            *_before("if missing <= 0.0:\n"
-                     "    return o",
-                     "missing *= 1e-3")),
+    _kernel("pictures", "rays leave a face from its other side", "search._stopped",
+            "1 if start.code & ABOVE != 0 else -1", "-1 if start.code & ABOVE != 0 else 1"),
+    _kernel("pictures", "rays leave a face by a thousandth of the bound", "spawn._moved",
+            "plane.needed - away * plane.height", "1e-3 * plane.needed - away * plane.height"),
     _kernel("pictures", "spawned rays start on their surface", "spawn_origin",
             "scale(n_g, side * error)", "scale(n_g, 0.0 * error)"),
     _kernel("pictures", "the tint of glass lost", "_refract",
@@ -368,14 +372,18 @@ PICTURES = (
 
 STUDIES = (
     _kernel(
-        "studies", "what lies at a point's horizon is open", "sweep._aim", "seen = height > 0.0", "seen = height >= 0.0"
+        "studies",
+        "what lies at a point's horizon is open",
+        "sweep._aim",
+        "height > 0.0 and _start_ray(work, i, d, rays)",
+        "height >= 0.0 and _start_ray(work, i, d, rays)",
     ),
     _kernel(
         "studies",
         "the first direction of all is hidden",
         "sweep._aim",
-        "seen = height > 0.0",
-        "seen = height > 0.0 and k > 0",
+        "height > 0.0 and _start_ray(work, i, d, rays)",
+        "height > 0.0 and _start_ray(work, i, d, rays) and k > 0",
     ),
     _kernel(
         "studies",
@@ -387,9 +395,9 @@ STUDIES = (
     _kernel(
         "studies",
         "rays of studies leave a face on its other side",
-        "sweep._start_of",
-        "dot(three(work.points, _FACING + 3 * i), d) >= 0.0",
-        "dot(three(work.points, _FACING + 3 * i), d) < 0.0",
+        "sweep._start_ray",
+        "above = slope >= 0.0",
+        "above = slope < 0.0",
     ),
     _kernel(
         "studies",

@@ -19,7 +19,7 @@ from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits.bodies import Body, bodies
 from validation.job import Job
-from validation.oracle.distance import dot
+from validation.oracle.distance import cross, difference, dot
 from validation.oracle.starts import First, Start, Surface, stopped
 
 Floats = NDArray[np.float64]
@@ -30,8 +30,12 @@ SEED = 2033
 # A float64 product of three terms with a rounded normal errs by 5 u of their sizes at most.
 _SIGN_ROUNDINGS = 8 * 2.0**-53
 # t of the sample, relative and in units of the largest coordinate over the direction's part along the normal: an answer
-# beyond is another hit. How exact t is, other gates judge.
-_RELATIVE, _ABSOLUTE = 1e-9, 2.0**-44
+# beyond is another hit. A start inside a face is moved by up to 2^-38 of the face. How exact t is, other gates judge.
+_RELATIVE, _ABSOLUTE = 1e-9, 2.0**-37
+# Near its start, by the size of the face, a ray is judged exactly, but for what is beyond the pairs of float64 that decide: edge functions of
+# less than this share of their terms. Farther off, as any ray, it may pass an edge on either side that it passes by no
+# more than its start is moved.
+_CLOSEST, _NEAR = Fraction(1, 1 << 84), 2.0**-30
 _REASON = "exact arithmetic says so"
 
 
@@ -286,13 +290,31 @@ def is_right(
             continue
         held = {number for number, _ in surface.holding(start.place)} if start.face >= 0 else set()
         possible = face in first.faces or face in surface.possible([start.place], direction[None])[0]
-        if face not in held and possible and abs(t - float(first.t)) <= _reach(surface, first, direction):
+        reach = max(_reach(surface, first, direction, number) for number in (first.face, face))
+        if face not in held and possible and abs(t - float(first.t)) <= reach:
+            return True
+    faces = {face, *(first.face for first in law)} - {-1}
+    ends = [t, *(float(first.t) for first in law if first.t is not None)]
+    near = min(ends) * float(np.abs(direction).max()) <= _NEAR * min(surface.size(number) for number in faces)
+    return any(_is_closer(surface, number, start, direction, near) for number in faces)
+
+
+def _is_closer(surface: Surface, face: int, start: Start, direction: Floats, near: bool) -> bool:
+    """Whether a ray passes an edge of a face closer than ours tells, near its start or farther off."""
+    corners = [[Fraction(x) - y for x, y in zip(p, start.place, strict=True)] for p in surface.corners(face)]
+    way = [Fraction(x) for x in direction.tolist()]
+    for k in range(3):
+        one, other = corners[k], corners[(k + 1) % 3]
+        size = max(map(abs, one)) * max(map(abs, other)) * _CLOSEST
+        if not near:
+            size = max(map(abs, difference(other, one))) * Fraction(_ABSOLUTE * surface.largest)
+        if abs(dot(way, cross(one, other))) <= max(map(abs, way)) * size:
             return True
     return False
 
 
-def _reach(surface: Surface, first: First, direction: Floats) -> float:
-    """How far t may be from the exact one."""
-    normal = np.array([float(x) for x in surface.normal(first.face)])
+def _reach(surface: Surface, first: First, direction: Floats, face: int) -> float:
+    """How far t may be from the exact one, by the slope of a face."""
+    normal = np.array([float(x) for x in surface.normal(face)])
     along = abs(float(normal @ direction)) / float(np.abs(normal).max())
     return _RELATIVE * float(first.t or 0) + (_ABSOLUTE * surface.largest / along if along else np.inf)

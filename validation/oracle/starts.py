@@ -55,7 +55,7 @@ _MISS = First(None, -1, ())
 
 
 def start_on(corners: ArrayLike, u: float, v: float) -> Place:
-    """(1 - u - v) p0 + u p1 + v p2, exactly; a weight that rounding made negative counts as 0, the others as their shares.
+    """(1 - u - v) p0 + u p1 + v p2, exactly; a weight that rounding made negative counts as 0, others as their shares.
 
     >>> [float(x) for x in start_on([[0, 0, 0], [4, 0, 0], [0, 4, 0]], 0.25, 0.5)]
     [1.0, 2.0, 0.0]
@@ -138,6 +138,15 @@ class Surface:
     def normal(self, face: int) -> list[int]:
         """A face's normal by its winding, not of length 1."""
         return self._normals[face]
+
+    def corners(self, face: int) -> list[list[float]]:
+        """A face's corners."""
+        found: list[list[float]] = self._corners[face].tolist()
+        return found
+
+    def size(self, face: int) -> float:
+        """A face's largest extent along an axis."""
+        return float(np.ptp(self._corners[face], axis=0).max())
 
     def holding(self, place: Place) -> list[tuple[int, tuple[bool, ...]]]:
         """The faces, ascending, that hold a point, and on which of their sides 01, 12, 20 it lies."""

@@ -24,7 +24,8 @@ from renderer.trace.starts.record import BARYCENTRIC
 
 _LEAST_NORMAL = 2.0**-1022
 _ZERO = (0.0, 0.0)
-# A point of a face as near to an edge, as a share of the size of the face, is on it: pairs err by 2^-98 of four factors.
+# A point of a face as near to an edge, as a share of the size of the face, is on it: pairs err by 2^-98 of four
+# factors.
 _TINY = 2.0**-92
 
 
@@ -49,7 +50,9 @@ def anchor_of(start):
     Barycentrics below 0, by rounding, count as 0; the two others are scaled to add up to 1.
     """
     p0, p1, p2 = corners = start.corners
-    side = larger(largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2))))
+    side = larger(
+        largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2)))
+    )
     unit = power_below(larger(side, _LEAST_NORMAL))
     if start.code & BARYCENTRIC != 0:
         return _at_weights(corners, start.anchor[0], start.anchor[1], unit)
@@ -107,8 +110,11 @@ def _along(corners, i, j, share, unit):
     """The point of the side from corner i to corner j, ``share`` of it from i; at its ends the corner itself."""
     if share[0] <= _TINY:
         return _at_corner(corners, i, unit)
-    if minus((1.0, 0.0), share)[0] <= _TINY:
+    rest = minus((1.0, 0.0), share)
+    if rest[0] <= _TINY:
         return _at_corner(corners, j, unit)
+    if share[0] > 0.5:
+        i, j, share = j, i, rest
     a, b = _corner(corners, i), _corner(corners, j)
     return Anchor(a, _times(scaled_difference(b, a, 1.0 / unit), share), unit, corners, 7 & ~((1 << i) | (1 << j)))
 
@@ -124,9 +130,20 @@ def _at_weights(corners, u, v, unit):
         return _along(corners, 0, 2, (v, 0.0), unit)
     if v == 0.0:
         return _along(corners, 0, 1, (u, 0.0), unit)
+    # From the corner of the largest weight: the way to one nearby has as many digits as others.
     p0, p1, p2 = corners
-    one, other = scaled_difference(p1, p0, 1.0 / unit), scaled_difference(p2, p0, 1.0 / unit)
-    return Anchor(p0, _sum(_times(one, (u, 0.0)), _times(other, (v, 0.0))), unit, corners, 0)
+    if u >= v and u >= w[0]:
+        return Anchor(p1, _mean(p1, p2, p0, (v, 0.0), w, unit), unit, corners, 0)
+    if v >= w[0]:
+        return Anchor(p2, _mean(p2, p0, p1, w, (u, 0.0), unit), unit, corners, 0)
+    return Anchor(p0, _mean(p0, p1, p2, (u, 0.0), (v, 0.0), unit), unit, corners, 0)
+
+
+@kernel
+def _mean(a, b, c, s, t, unit):
+    """s (b - a) + t (c - a), in a unit."""
+    one, other = scaled_difference(b, a, 1.0 / unit), scaled_difference(c, a, 1.0 / unit)
+    return _sum(_times(one, s), _times(other, t))
 
 
 @kernel
@@ -154,7 +171,9 @@ def _nearest(corners, o, unit):
     n = cross_pairs(one, other)
     height = quotient(dot_pairs(n, q), dot_pairs(n, n))
     back = _times(n, (-height[0], -height[1]))
-    return Anchor(p0, _sum(q, back), unit, corners, 0)
+    f0, f1, f2 = largest_component(sub(o, p0)), largest_component(sub(o, p1)), largest_component(sub(o, p2))
+    base = p0 if f0 <= f1 and f0 <= f2 else (p1 if f1 <= f2 else p2)
+    return Anchor(base, _sum(scaled_difference(o, base, 1.0 / unit), back), unit, corners, 0)
 
 
 @inlined

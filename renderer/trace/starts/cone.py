@@ -98,7 +98,7 @@ def _after(k):
 
 @kernel
 def name_nodes(tree, anchor, holders, count):
-    """Name the ends of all cones: two ends are one node where they lie in one direction. Returns the number of nodes."""
+    """Name the ends of all cones: two ends are one node where they lie in one direction. Returns how many there are."""
     nodes = 0
     for k in range(count):
         zeros, place = holder(holders, k, ZEROS), holder(holders, k, PLACE)
@@ -148,10 +148,11 @@ def _unit_way(anchor, p):
 
 
 class Cone(NamedTuple):
-    """A holder as a cone: its face from the anchor, and two vectors of pairs in its plane, exact differences of corners.
+    """A holder as a cone: its face from the anchor, and two vectors of pairs in its plane, exact differences of
+    corners.
 
-    A plane holds all directions x of its own, a half-plane those with normal . (first x x) >= 0, and a sector those with
-    normal . (x x second) >= 0 as well.
+    A plane holds all directions x of its own, a half-plane those with normal . (first x x) >= 0, and a sector those
+    with normal . (x x second) >= 0 as well.
 
     kind  the number of corners of weight 0: 0 a plane, 1 a half-plane, 2 a sector
     """

@@ -19,17 +19,16 @@ from renderer.trace.starts.anchor import from_anchor
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
 NONE = -1
-# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a corner
-# by 2^-100 of what it is the difference of.
+# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a
+# corner by 2^-100 of what it is the difference of.
 _ERROR, _WAY_ERROR = 2.0**-94, 2.0**-98
 _LEAST_NORMAL = 2.0**-1022
 
 
-
 class SeenFace(NamedTuple):
     """A face from an anchor, scaled by a power of two: the ways to its corners and its normal, as pairs; the corners in
-    the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by a
-    share; the error of the ways; and for each corner the one of the anchor's face in its place, NONE for none.
+    the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by
+    a share; the errors of the ways; and for each corner the one of the anchor's face in its place, NONE for none.
     """
 
     a0: Any
@@ -39,7 +38,7 @@ class SeenFace(NamedTuple):
     corners: Any
     factor: float
     sides: float
-    error: float
+    errors: Any
     same: Any
 
 
@@ -69,6 +68,13 @@ def _same(anchor, p):
     return 0 if _equal(a, p) else (1 if _equal(b, p) else (2 if _equal(c, p) else NONE))
 
 
+@inlined
+def _way_error(anchor, p, factor):
+    """The error of the way from an anchor to a corner: of the two that it is the difference of."""
+    way = largest_component(heads(anchor.way)) * anchor.unit
+    return _WAY_ERROR * factor * (largest_component(sub(p, anchor.base)) + way)
+
+
 @kernel
 def seen_from(tree, place, anchor):
     """The face at a place of a block, as ``SeenFace``."""
@@ -80,7 +86,8 @@ def seen_from(tree, place, anchor):
     sides = largest_component(heads(one)) * largest_component(heads(other))
     return SeenFace(
         from_anchor(anchor, p0, factor), from_anchor(anchor, p1, factor), from_anchor(anchor, p2, factor),
-        cross_pairs(one, other), (p0, p1, p2), factor, sides, _WAY_ERROR * (1.0 + anchor.unit * factor),
+        cross_pairs(one, other), (p0, p1, p2), factor, sides,
+        (_way_error(anchor, p0, factor), _way_error(anchor, p1, factor), _way_error(anchor, p2, factor)),
         (_same(anchor, p0), _same(anchor, p1), _same(anchor, p2)),
     )  # fmt: skip
 
@@ -96,23 +103,35 @@ def _size(a):
 
 
 @kernel
-def _way_sign(face, d, a, b):
-    """The sign of d . (a x b) of a direction and two ways to corners, 0 where rounding may have made it; the value."""
+def _way_sign(face, d, i, j):
+    """The sign of d . (a x b) for the ways to two corners, 0 where rounding may have made it; and the value."""
+    a, b = _way(face, i), _way(face, j)
     value = dot_pairs(d, cross_pairs(a, b))[0]
-    return _sign_beyond(value, _size(d) * _error_of(face, a, b)), value
+    return _sign_beyond(value, _size(d) * _error_of(face, i, j)), value
 
 
 @inlined
-def _error_of(face, a, b):
-    """The error of a x b, two ways to corners."""
-    return _size(a) * _size(b) * _ERROR + (_size(a) + _size(b)) * face.error
+def _way(face, k):
+    return face.a0 if k == 0 else (face.a1 if k == 1 else face.a2)
+
+
+@inlined
+def _error_of(face, i, j):
+    """The error of the vector product of the ways to two corners."""
+    a, b = _size(_way(face, i)), _size(_way(face, j))
+    return a * b * _ERROR + a * _chosen(face.errors, j) + b * _chosen(face.errors, i)
+
+
+@inlined
+def _chosen(three, k):
+    return three[0] if k == 0 else (three[1] if k == 1 else three[2])
 
 
 @kernel
-def _corner_sign(face, a, b):
-    """The sign of normal . (a x b) of two ways to corners, 0 where rounding may have made it; and the value."""
-    value = dot_pairs(face.normal, cross_pairs(a, b))[0]
-    return _sign_beyond(value, face.sides * _error_of(face, a, b)), value
+def _corner_sign(face, i, j):
+    """The sign of normal . (a x b) of the ways to two corners, 0 where rounding may have made it; and the value."""
+    value = dot_pairs(face.normal, cross_pairs(_way(face, i), _way(face, j)))[0]
+    return _sign_beyond(value, face.sides * _error_of(face, i, j)), value
 
 
 @kernel
@@ -153,7 +172,7 @@ def slope_there(anchor, d):
 @kernel
 def height_sign(face):
     """The sign of normal . (p0 - start), 0 where the start is in the face's plane."""
-    error = face.sides * (_size(face.a0) * _ERROR + face.error)
+    error = face.sides * (_size(face.a0) * _ERROR + face.errors[0])
     return _sign_beyond(dot_pairs(face.normal, face.a0)[0], error)
 
 
@@ -177,7 +196,7 @@ def _is_after(i, j):
 def _common(face, anchor, slope, i, j, sign):
     """The sign of direction . (way to corner i x way to corner j): exact where the side is one of the anchor's face."""
     a, b = face.same[i], face.same[j]
-    if a == NONE or b == NONE or a == b:
+    if a == b or a < 0 or b < 0:  # NONE is the one below 0
         return sign
     weight = 0 if (anchor.zeros >> _third(a, b)) & 1 != 0 else 1
     return weight * (slope if _is_after(a, b) else -slope)
@@ -214,9 +233,9 @@ def meet_face(face, anchor, d, slope_there, dz):
     if height == 0:
         return _held(face, anchor, d, dz)
     slope, way = slope_of(face, d), as_pairs(d)
-    s0, e0 = _way_sign(face, way, face.a1, face.a2)
-    s1, e1 = _way_sign(face, way, face.a2, face.a0)
-    s2, e2 = _way_sign(face, way, face.a0, face.a1)
+    s0, e0 = _way_sign(face, way, 1, 2)
+    s1, e1 = _way_sign(face, way, 2, 0)
+    s2, e2 = _way_sign(face, way, 0, 1)
     s0 = _common(face, anchor, slope_there, 1, 2, s0)
     s1 = _common(face, anchor, slope_there, 2, 0, s1)
     s2 = _common(face, anchor, slope_there, 0, 1, s2)
@@ -231,9 +250,9 @@ def meet_face(face, anchor, d, slope_there, dz):
 @kernel
 def _held(face, anchor, d, dz):
     """The meeting of a face with a start in its plane: it holds the start, or is not met."""
-    s0, e0 = _corner_sign(face, face.a1, face.a2)
-    s1, e1 = _corner_sign(face, face.a2, face.a0)
-    s2, e2 = _corner_sign(face, face.a0, face.a1)
+    s0, e0 = _corner_sign(face, 1, 2)
+    s1, e1 = _corner_sign(face, 2, 0)
+    s2, e2 = _corner_sign(face, 0, 1)
     a, b, c = face.same
     # The weights of common corners are those on the anchor's face, where it shares all that are not 0 there.
     own = (np.int64(a != NONE) << (a & 3)) | (np.int64(b != NONE) << (b & 3)) | (np.int64(c != NONE) << (c & 3))
@@ -265,11 +284,12 @@ def _weights(e0, e1, e2, slope, dz):
 
 @inlined
 def barycentrics_of(met):
-    """The barycentrics u and v of a meeting, exactly 0 or 1 at edges and corners."""
+    """u and v of a ``Meeting``: exactly 0 or 1, or 1 in all, where it is on an edge or corner."""
     u, v = (0.0 if met.zeros & 2 != 0 else met.u / met.w), (0.0 if met.zeros & 4 != 0 else met.v / met.w)
-    if met.zeros & 1 != 0:
-        u, v = (0.0 if u == 0.0 else 1.0 - v), (1.0 if u == 0.0 else v)
-    return u, v
+    if met.zeros & 1 == 0:
+        return u, v
+    # What is left of one is exact if that is at least a half.
+    return (u, 1.0 - u) if u >= 0.5 else (1.0 - v, v)
 
 
 @inlined

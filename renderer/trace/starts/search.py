@@ -28,10 +28,11 @@ from renderer.trace.intersect import (
     unsure_sides,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, blocks_of, push_children
+from renderer.trace.leaf import NO_FACE, NOWHERE, blocks_of, is_better, push_children
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
+from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
     HOLDS,
     IS_HIT,
@@ -173,14 +174,9 @@ def meet_near(tree, place, departure, dz):
     return (t, met.u, met.v, met.w), met.zeros
 
 
-@inlined
-def _is_better(t, face, ray, best):
-    return t >= ray.t_min and (t < best[0] or (t == best[0] and face < best[1]))
-
-
 @kernel
-def _nearest_from(tree, first, count, departure, shear, best):
-    """``leaf.nearest_carefully`` for a ray that leaves the surface."""
+def _nearest_from(tree, first, count, departure, shear, best, place):
+    """``leaf.nearest_placed`` for a ray that leaves the surface."""
     ray = departure.ray
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
@@ -199,9 +195,9 @@ def _nearest_from(tree, first, count, departure, shear, best):
                 hit = extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)
                 if (doubts >> i) & 1 != 0:
                     hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-            if _is_better(hit[0], face, ray, best):
-                best = hit[0], face, hit[1], hit[2], hit[3]
-    return best
+            if is_better(tree, ray, hit[0], face, base + i, best, place):
+                best, place = (hit[0], face, hit[1], hit[2], hit[3]), base + i
+    return best, place
 
 
 @kernel
@@ -218,15 +214,15 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
     if not tree.has_nodes:
-        return _nearest_from(tree, 0, tree.count, departure, shear, best), steps
-    lower, top = splat8(round_down(ray.t_min * largest)), 1
+        return _nearest_from(tree, 0, tree.count, departure, shear, best, NOWHERE)[0], steps
+    lower, top, place = splat8(round_down(ray.t_min * largest)), 1, NOWHERE
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, count = blocks_of(child)
-            best = _nearest_from(tree, first, count, departure, shear, best)
+            best, place = _nearest_from(tree, first, count, departure, shear, best, place)
             steps += count
             if any_hit and best[1] != NO_FACE:
                 break
@@ -252,8 +248,8 @@ def _t_from(tree, starts, i, ray, face, t):
 
 @inlined
 def counted_from_start(tree, starts, i, ray, largest, hit, face):
-    """A hit (t, u, v, w) with t counted from the exact start of ray ``i``: where it is near, the way that the origin was
-    moved is a part of t.
+    """A hit (t, u, v, w) with t counted from the exact start of ray ``i``: where it is near, the way that the origin
+    was moved is a part of t.
     """
     if 0.0 < ray.slack < EDGE and face != NO_FACE and hit[0] * largest <= _NEAR_HIT * ray.slack:
         return _t_from(tree, starts, i, ray, face, hit[0]), hit[1], hit[2], hit[3]
@@ -270,16 +266,18 @@ class Side(NamedTuple):
 
 
 @kernel
-def side_of_normal(tree, start, n, stack, memory):
-    """The ``Side`` of a start whose normal n says in which region it is."""
+def side_of_normal(tree, start, n, stack, memory, table):
+    """The ``Side`` of a start whose normal n says in which region it is; and its ``fan`` in ``table``."""
     anchor, holders = anchor_of(start), make_holders(memory)
     d, _ = unit_direction(n)
     slope = slope_there(anchor, d)
     count = list_holders(tree, anchor, d, slope, 1.0, stack, holders)
     nodes = name_nodes(tree, anchor, holders, count)
     k, side = bounding_holder(tree, anchor, holders, count, nodes, d)
+    clear_fan(table)
     if k == NOT_STOPPED:
         return Side(-1, 0, 0.0, 0.0)
+    write_fan(tree, anchor, holders, count, nodes, k, side, table)
     met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, 1.0)
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0 else 0)
     u, v = barycentrics_of(met)

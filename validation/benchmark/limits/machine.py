@@ -21,6 +21,7 @@ from renderer.kernels.simd import (
 )
 from renderer.octree import Octree
 from renderer.process.parallel import for_chunks
+from renderer.trace.batch import RayBatch
 from renderer.trace.intersect import largest_of, make_shear, make_slabs, meet_boxes, meet_planes, see_triangles
 from renderer.trace.layout import BLOCK_WORDS, CHILDREN, NODE_WORDS
 from renderer.trace.leaf import tree_pointers
@@ -69,7 +70,7 @@ def _steps(octree: Octree) -> dict[str, Any]:
     """The steps of a traversal, each in a loop that waits for no result of the last one."""
     words, out = octree.tree.words, np.zeros(64, np.int64)
     nodes, blocks = len(octree.tree.nodes) // NODE_WORDS, len(octree.tree.faces) // 4
-    rays = (np.array([[0.1, 0.2, -5.0]]), np.array([[0.11, 0.07, 1.0]]), np.zeros(1), np.full(1, np.inf))
+    rays = RayBatch(np.array([[0.1, 0.2, -5.0]]), np.array([[0.11, 0.07, 1.0]]), np.zeros(1), np.full(1, np.inf))
     memory = np.empty(256, np.float32), np.empty(256), np.zeros(256, np.int64)
     return {
         "node": _best(lambda: _time_nodes(words, rays, out, nodes, _ROUNDS), _ROUNDS),
@@ -101,8 +102,9 @@ def _time_blocks(words, rays, blocks, rounds):
     ray, _ = ray_at(ray_pointers(rays, tree.scale), 0)
     shear, found = make_shear(ray), np.int64(0)
     for k in range(rounds):
-        edges, seen = see_triangles(tree, (k % blocks) * BLOCK_WORDS, shear)
-        t, doubts, _, dues = meet_planes(edges, seen, shear, 0.0, 1e9)
+        base = (k % blocks) * BLOCK_WORDS
+        edges, seen = see_triangles(tree, base, shear)
+        t, doubts, _, dues = meet_planes(tree, base, edges, seen, shear, 0.0, 1e9)
         found += (seen & movemask(t >= edges.e1)) + doubts + dues
     return found
 

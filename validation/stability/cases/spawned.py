@@ -75,7 +75,7 @@ def self_hits(mesh: Mesh, count: int, offset: OffsetRule = BOUNDED) -> tuple[int
     for i in np.flatnonzero(hits.hit):
         n_g, p, d = vector(normals[i]), vector(points[i]), vector(directions[i])
         p0, p1, p2 = (vector(q) for q in corners[i])
-        error = offset_distance(p, p0, p1, p2, float(hits.u[i]), float(hits.v[i]), n_g)
+        error, _ = offset_distance(p, p0, p1, p2, float(hits.u[i]), float(hits.v[i]), n_g)
         enters = float(np.dot(n_g, d)) < 0.0
         n = n_g if enters else vector(-normals[i])
         shadow = rng.normal(size=3)
