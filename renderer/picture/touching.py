@@ -3,7 +3,7 @@
 Found once for a scene. Too many cost time alone.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,8 +101,8 @@ class _Flat(NamedTuple):
     room by which its box grows.
     """
 
-    corners: tuple
-    normal: tuple
+    corners: Any
+    normal: Any
     size: float
     side: float
     largest: float

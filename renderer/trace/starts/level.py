@@ -11,12 +11,12 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, quotient
 from renderer.kernels.simd import get, larger, load8, movemask, put, smaller, splat8
-from renderer.kernels.vec3 import cross, dot, largest_component, length, sub
+from renderer.kernels.vec3 import barycentric, cross, dot, largest_component, length, sub
 from renderer.trace.intersect import round_both
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children
 from renderer.trace.sides import corner
-from renderer.trace.starts.anchor import anchor_of, rounded
+from renderer.trace.starts.anchor import anchor_of
 from renderer.trace.starts.cone import MOST_HOLDERS, NUMBER, PLACE, holder, make_holders, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
 from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
@@ -26,6 +26,8 @@ NO_MEMBER = -1
 CORNER_ERROR = 2.0**-49
 # Whether a face holds a point is asked so far inside the face that the ray met: at these weights of its corners.
 _INWARDS, _U, _V = 2.0**-44, 0.3217, 0.4159
+# Of the products of lengths that say on which side of an edge a point is, what is taken for rounding.
+_BESIDE = 2.0**-36
 
 
 class Spot(NamedTuple):
@@ -94,8 +96,8 @@ def corners_at(tree, place):
 
 
 @kernel
-def _met_at(tree, vertices, faces, spot, d):
-    corners = corners_of(vertices, faces, spot.face, tree.scale)
+def _met_at(tree, surfaces, spot, d):
+    corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
     u, v = spot.u + _INWARDS * (_U - spot.u), spot.v + _INWARDS * (_V - spot.v)
     anchor = anchor_of(Start(corners, (spot.u, spot.v, 0.0), spot.face, BARYCENTRIC))
     inner = anchor_of(Start(corners, (u, v, 0.0), spot.face, BARYCENTRIC))
@@ -138,12 +140,12 @@ def _spot_of(tree, place, number, met):
 
 
 @kernel
-def list_members(tree, vertices, faces, spot, d, stack, memory):
+def list_members(tree, surfaces, spot, d, stack, memory):
     """The ``Members`` at a ``Spot`` that a ray of direction d met, at least that itself; and the point, for
     ``member_spot``. ``stack`` and ``memory`` as for ``search.depart``.
     """
-    met, holders = _met_at(tree, vertices, faces, spot, d), make_holders(memory)
-    count = _list(tree, met, stack, holders)
+    met, holders = _met_at(tree, surfaces, spot, d), make_holders(memory)
+    count = _keep_members(tree, met, holders, _list_near(tree, surfaces, spot, stack, holders))
     near, far, least, most, holds_own = NO_MEMBER, NO_MEMBER, 0.0, 0.0, False
     for k in range(count):
         t, number = _passed_at(tree, holder(holders, k, PLACE), met), holder(holders, k, NUMBER)
@@ -155,6 +157,12 @@ def list_members(tree, vertices, faces, spot, d, stack, memory):
     if count < 2 or not holds_own:
         return Members(1, spot, spot), met
     return Members(count, member_spot(tree, holders, near, spot, met), member_spot(tree, holders, far, spot, met)), met
+
+
+@kernel
+def meets_alone(tree, surfaces, spot, stack, memory):
+    """Whether no other face may coincide with one at a ``Spot``. It costs little: most answers are yes."""
+    return _list_near(tree, surfaces, spot, stack, make_holders(memory)) < 2
 
 
 @inlined
@@ -177,46 +185,68 @@ def _octants_at(tree, child, o, room):
 
 
 @kernel
-def _list(tree, met, stack, holders):
-    """List the members, lower faces first; returns their number."""
-    o, room, count, top = rounded(met.anchor), 4.0 * CORNER_ERROR * _largest(met.corners), 0, 1
+def _list_near(tree, surfaces, spot, stack, holders):
+    """List the faces that touch others and may hold a spot, as far as float64 tells; returns their number."""
+    corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
+    o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
+    room, count, top = 4.0 * CORNER_ERROR * _largest(corners), 0, 1
     if not tree.has_nodes:
-        return _list_in(tree, 0, tree.count, met, o, room, holders, count)
+        return _list_in(tree, 0, tree.count, surfaces.touching, o, room, holders, count)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, blocks = blocks_of(child)
-            count = _list_in(tree, first, blocks, met, o, room, holders, count)
+            count = _list_in(tree, first, blocks, surfaces.touching, o, room, holders, count)
             continue
         top = push_children(tree, child, _octants_at(tree, child, o, room), stack, top)
     return count
 
 
 @inlined
-def _is_near(corners, o, room):
-    """Whether the box of a face holds a point, with some room."""
-    near = True
-    for k in range(3):
-        a, b, c = corners[0][k], corners[1][k], corners[2][k]
-        near = near and smaller(a, smaller(b, c)) - room <= o[k] <= larger(a, larger(b, c)) + room
-    return near
-
-
-@kernel
-def _list_in(tree, first, blocks, met, o, room, holders, count):
-    """List the members among the faces of some blocks."""
+def _list_in(tree, first, blocks, touching, o, room, holders, count):
+    """List those of the faces of some blocks that touch others and may hold a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
-        place, face = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES, get(tree.faces, slot)
-        if face >= 0 and _is_near(corners_at(tree, place), o, room) and _is_member(tree, place, met):
-            count = _put_member(holders, count, place, np.int64(face))
+        face = get(tree.faces, slot)
+        if face >= 0 and get(touching, face) != 0:
+            place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
+            if _may_hold(corners_at(tree, place), o, room):
+                count = _put_face(holders, count, place, np.int64(face))
     return count
 
 
+@kernel
+def _may_hold(corners, o, room):
+    """Whether a face may hold a point, in its box with some room, and beyond its sides by no more than rounding."""
+    a, b, c = corners
+    for k in range(3):
+        low, high = smaller(a[k], smaller(b[k], c[k])), larger(a[k], larger(b[k], c[k]))
+        if o[k] < low - room or o[k] > high + room:
+            return False
+    a, b, c = sub(a, o), sub(b, o), sub(c, o)
+    n = cross(sub(b, a), sub(c, a))
+    reach = larger(largest_component(a), larger(largest_component(b), largest_component(c)))
+    least = -_BESIDE * largest_component(n) * reach * (reach + room)
+    return dot(n, cross(a, b)) >= least and dot(n, cross(b, c)) >= least and dot(n, cross(c, a)) >= least
+
+
+@kernel
+def _keep_members(tree, met, holders, count):
+    """Keep those of the listed faces that are members; returns their number."""
+    kept = 0
+    for k in range(count):
+        place, face = holder(holders, k, PLACE), holder(holders, k, NUMBER)
+        if _is_member(tree, place, met):
+            put_holder(holders, kept, PLACE, place)
+            put_holder(holders, kept, NUMBER, face)
+            kept += 1
+    return kept
+
+
 @inlined
-def _put_member(holders, count, place, face):
-    """Put a face where its number says among the members, unless there is no room; returns how many there are."""
+def _put_face(holders, count, place, face):
+    """Put a face where its number says among those listed, unless there is no room; returns how many there are."""
     if count >= MOST_HOLDERS:
         return count
     k = count
