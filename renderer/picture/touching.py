@@ -6,7 +6,6 @@ Found once for a scene. Too many cost time alone.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import (

@@ -16,7 +16,7 @@ from renderer.shade.surface import Surface, lets_through, scene_pointers, surfac
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.spawn import Place
 from renderer.trace.starts.cone import NUMBER, PATH, holder, make_holders, put_holder
-from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, meets_alone, member_spot
+from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, list_near, member_spot
 
 # Room for media that a ray enters at one place, beside those that it remembers.
 SPARE = 8
@@ -71,12 +71,13 @@ def faces_together(tree, scene, spot, d, stack, memory):
 
 @kernel
 def _faces_together(tree, scene, spot, d, stack, memory):
-    if meets_alone(tree, scene, spot, stack, memory):
+    holders, opaque = make_holders(memory), NO_MEMBER
+    near = list_near(tree, scene, spot, stack, holders)
+    if near < 2:
         return Together(spot, spot, spot, 0)
-    members, met = list_members(tree, scene, spot, d, stack, memory)
+    members, met = list_members(tree, scene, spot, d, holders, near)
     if members.count < 2:
         return Together(spot, spot, spot, 0)
-    holders, opaque = make_holders(memory), NO_MEMBER
     for k in range(members.count - 1, -1, -1):
         at_ = member_spot(tree, holders, k, spot, met)
         surface = surface_at(scene, at_.face, at_.u, at_.v, d)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, quotient
+from renderer.kernels.pairs import as_pairs, dot_pairs, quotient
 from renderer.kernels.simd import get, larger, load8, movemask, put, smaller, splat8
 from renderer.kernels.vec3 import barycentric, cross, dot, largest_component, length, sub
 from renderer.trace.intersect import round_both
@@ -17,7 +17,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of
-from renderer.trace.starts.cone import MOST_HOLDERS, NUMBER, PLACE, holder, make_holders, put_holder
+from renderer.trace.starts.cone import MOST_HOLDERS, NUMBER, PLACE, ZEROS, holder, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
 from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
 
@@ -49,11 +49,13 @@ class Members(NamedTuple):
 
 
 class _Met(NamedTuple):
-    """A point that a ray meets, exactly; the same point farther inside the face; and the ray's direction."""
+    """A point that a ray meets: the corners of the face, the barycentrics, the point as rounded, and the ray's direction,
+    scaled to about 1.
+    """
 
     corners: Any
-    anchor: Any
-    inner: Any
+    spot: Spot
+    o: Any
     d: Any
 
 
@@ -96,20 +98,17 @@ def corners_at(tree, place):
 
 
 @kernel
-def _met_at(tree, surfaces, spot, d):
-    corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
-    u, v = spot.u + _INWARDS * (_U - spot.u), spot.v + _INWARDS * (_V - spot.v)
-    anchor = anchor_of(Start(corners, (spot.u, spot.v, 0.0), spot.face, BARYCENTRIC))
-    inner = anchor_of(Start(corners, (u, v, 0.0), spot.face, BARYCENTRIC))
-    return _Met(corners, anchor, inner, unit_direction(d)[0])
+def _anchor_at(met, inwards):
+    """The point met, exactly, moved by some share of the way to a point inside the face."""
+    spot = met.spot
+    u, v = spot.u + inwards * (_U - spot.u), spot.v + inwards * (_V - spot.v)
+    return anchor_of(Start(met.corners, (u, v, 0.0), spot.face, BARYCENTRIC))
 
 
 @kernel
-def _is_member(tree, place, met):
-    """Whether a face is level with the one met, and holds its inner point."""
-    if not are_level(met.corners, corners_at(tree, place)):
-        return False
-    face = seen_from(tree, place, met.inner)
+def _holds_inner_point(tree, place, met):
+    """Whether a face holds the inner point, exactly."""
+    face = seen_from(tree, place, _anchor_at(met, _INWARDS))
     return has_area(face) and (
         turn_sign(face, face.a1, face.a2) >= 0
         and turn_sign(face, face.a2, face.a0) >= 0
@@ -117,10 +116,23 @@ def _is_member(tree, place, met):
     )
 
 
+@inlined
+def _share_axis(p, q):
+    """Whether two faces are in one plane across an axis."""
+    share = False
+    for k in range(3):
+        x = p[0][k]
+        own, other = p[1][k] == x and p[2][k] == x, q[0][k] == x and q[1][k] == x and q[2][k] == x
+        share = share or (own and other)
+    return share
+
+
 @kernel
 def _passed_at(tree, place, met):
     """Where the ray passes a member, counted from the point met: negative before it."""
-    face = seen_from(tree, place, met.anchor)
+    if _share_axis(met.corners, corners_at(tree, place)):
+        return 0.0
+    face = seen_from(tree, place, _anchor_at(met, 0.0))
     slope = dot_pairs(face.normal, as_pairs(met.d))
     if height_sign(face) == 0 or slope[0] == 0.0:
         return 0.0
@@ -130,22 +142,29 @@ def _passed_at(tree, place, met):
 @kernel
 def _spot_of(tree, place, number, met):
     """The ``Spot`` of a member."""
-    face = seen_from(tree, place, met.anchor)
-    n = heads(face.normal)
-    e0 = larger(dot(n, heads(cross_pairs(face.a1, face.a2))), 0.0)
-    e1 = larger(dot(n, heads(cross_pairs(face.a2, face.a0))), 0.0)
-    e2 = larger(dot(n, heads(cross_pairs(face.a0, face.a1))), 0.0)
+    n, around = _areas_at(corners_at(tree, place), met.o)
+    e0, e1, e2 = larger(around[0], 0.0), larger(around[1], 0.0), larger(around[2], 0.0)
     whole = e0 + e1 + e2
     return Spot(number, e1 / whole, e2 / whole)
 
 
+@inlined
+def _areas_at(corners, o):
+    """The normal of a face, and for each corner the product of that and the normal of the face with a point instead."""
+    a, b, c = sub(corners[0], o), sub(corners[1], o), sub(corners[2], o)
+    n = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]))
+    return n, (dot(n, cross(b, c)), dot(n, cross(c, a)), dot(n, cross(a, b)))
+
+
 @kernel
-def list_members(tree, surfaces, spot, d, stack, memory):
-    """The ``Members`` at a ``Spot`` that a ray of direction d met, at least that itself; and the point, for
-    ``member_spot``. ``stack`` and ``memory`` as for ``search.depart``.
+def list_members(tree, surfaces, spot, d, holders, count):
+    """The ``Members`` at a ``Spot`` that a ray of direction d met, of those that ``list_near`` has listed: at least that
+    spot itself; and the point, for ``member_spot``.
     """
-    met, holders = _met_at(tree, surfaces, spot, d), make_holders(memory)
-    count = _keep_members(tree, met, holders, _list_near(tree, surfaces, spot, stack, holders))
+    corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
+    o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
+    met = _Met(corners, spot, o, unit_direction(d)[0])
+    count = _keep_members(tree, met, holders, count)
     near, far, least, most, holds_own = NO_MEMBER, NO_MEMBER, 0.0, 0.0, False
     for k in range(count):
         t, number = _passed_at(tree, holder(holders, k, PLACE), met), holder(holders, k, NUMBER)
@@ -157,12 +176,6 @@ def list_members(tree, surfaces, spot, d, stack, memory):
     if count < 2 or not holds_own:
         return Members(1, spot, spot), met
     return Members(count, member_spot(tree, holders, near, spot, met), member_spot(tree, holders, far, spot, met)), met
-
-
-@kernel
-def meets_alone(tree, surfaces, spot, stack, memory):
-    """Whether no other face may coincide with one at a ``Spot``. It costs little: most answers are yes."""
-    return _list_near(tree, surfaces, spot, stack, make_holders(memory)) < 2
 
 
 @inlined
@@ -185,8 +198,10 @@ def _octants_at(tree, child, o, room):
 
 
 @kernel
-def _list_near(tree, surfaces, spot, stack, holders):
-    """List the faces that touch others and may hold a spot, as far as float64 tells; returns their number."""
+def list_near(tree, surfaces, spot, stack, holders):
+    """List the faces that touch others and may hold a spot, as far as float64 tells; returns their number, mostly 1.
+    ``stack`` is as for ``search.depart``.
+    """
     corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
     room, count, top = 4.0 * CORNER_ERROR * _largest(corners), 0, 1
@@ -211,24 +226,24 @@ def _list_in(tree, first, blocks, touching, o, room, holders, count):
         face = get(tree.faces, slot)
         if face >= 0 and get(touching, face) != 0:
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
-            if _may_hold(corners_at(tree, place), o, room):
-                count = _put_face(holders, count, place, np.int64(face))
+            held = _hold_sign(corners_at(tree, place), o, room)
+            if held >= 0:
+                count = _put_face(holders, count, place, np.int64(face), held)
     return count
 
 
 @kernel
-def _may_hold(corners, o, room):
-    """Whether a face may hold a point, in its box with some room, and beyond its sides by no more than rounding."""
+def _hold_sign(corners, o, room):
+    """Whether a face holds a point: 1 if it does, -1 if not, 0 where rounding may matter."""
     a, b, c = corners
     for k in range(3):
         low, high = smaller(a[k], smaller(b[k], c[k])), larger(a[k], larger(b[k], c[k]))
         if o[k] < low - room or o[k] > high + room:
-            return False
-    a, b, c = sub(a, o), sub(b, o), sub(c, o)
-    n = cross(sub(b, a), sub(c, a))
-    reach = larger(largest_component(a), larger(largest_component(b), largest_component(c)))
-    least = -_BESIDE * largest_component(n) * reach * (reach + room)
-    return dot(n, cross(a, b)) >= least and dot(n, cross(b, c)) >= least and dot(n, cross(c, a)) >= least
+            return -1
+    n, (e0, e1, e2) = _areas_at(corners, o)
+    reach = larger(largest_component(sub(a, o)), larger(largest_component(sub(b, o)), largest_component(sub(c, o))))
+    error, least = _BESIDE * largest_component(n) * reach * (reach + room), smaller(e0, smaller(e1, e2))
+    return 1 if least > error else (-1 if least < -error else 0)
 
 
 @kernel
@@ -237,7 +252,8 @@ def _keep_members(tree, met, holders, count):
     kept = 0
     for k in range(count):
         place, face = holder(holders, k, PLACE), holder(holders, k, NUMBER)
-        if _is_member(tree, place, met):
+        level = are_level(met.corners, corners_at(tree, place))
+        if level and (holder(holders, k, ZEROS) != 0 or _holds_inner_point(tree, place, met)):
             put_holder(holders, kept, PLACE, place)
             put_holder(holders, kept, NUMBER, face)
             kept += 1
@@ -245,7 +261,7 @@ def _keep_members(tree, met, holders, count):
 
 
 @inlined
-def _put_face(holders, count, place, face):
+def _put_face(holders, count, place, face, held):
     """Put a face where its number says among those listed, unless there is no room; returns how many there are."""
     if count >= MOST_HOLDERS:
         return count
@@ -253,7 +269,9 @@ def _put_face(holders, count, place, face):
     while k > 0 and holder(holders, k - 1, NUMBER) > face:
         put_holder(holders, k, PLACE, holder(holders, k - 1, PLACE))
         put_holder(holders, k, NUMBER, holder(holders, k - 1, NUMBER))
+        put_holder(holders, k, ZEROS, holder(holders, k - 1, ZEROS))
         k -= 1
     put_holder(holders, k, PLACE, place)
     put_holder(holders, k, NUMBER, face)
+    put_holder(holders, k, ZEROS, held)
     return count + 1
