@@ -49,8 +49,8 @@ class Members(NamedTuple):
 
 
 class _Met(NamedTuple):
-    """A point that a ray meets: the corners of the face, the barycentrics, the point as rounded, and the ray's direction,
-    scaled to about 1.
+    """A point that a ray meets: the corners of the face, the barycentrics, the point as rounded, and the direction of
+    the ray, scaled to about 1.
     """
 
     corners: Any
@@ -142,7 +142,7 @@ def _passed_at(tree, place, met):
 @kernel
 def _spot_of(tree, place, number, met):
     """The ``Spot`` of a member."""
-    n, around = _areas_at(corners_at(tree, place), met.o)
+    _, around = _areas_at(corners_at(tree, place), met.o)
     e0, e1, e2 = larger(around[0], 0.0), larger(around[1], 0.0), larger(around[2], 0.0)
     whole = e0 + e1 + e2
     return Spot(number, e1 / whole, e2 / whole)
@@ -158,8 +158,8 @@ def _areas_at(corners, o):
 
 @kernel
 def list_members(tree, surfaces, spot, d, holders, count):
-    """The ``Members`` at a ``Spot`` that a ray of direction d met, of those that ``list_near`` has listed: at least that
-    spot itself; and the point, for ``member_spot``.
+    """The ``Members`` at a ``Spot`` that a ray of direction d met, of those that ``list_near`` has listed: at least the
+    face of the spot; and the point, for ``member_spot``.
     """
     corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
