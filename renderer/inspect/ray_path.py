@@ -16,15 +16,18 @@ from renderer.kernels.vec3 import add, dot, normalized, scale, times
 from renderer.picture.pack import media_around
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import checked_vector
+from renderer.shade.crossing import SPARE, Change, Spot, Together, change_of, place_at, together_of
 from renderer.shade.lights import aim_from
 from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG
 from renderer.shade.shading import reflect
 from renderer.shade.surface import MAX_MEDIA, Surface, phong_of, surface_of
-from renderer.shade.whitted import refract_from
+from renderer.shade.whitted import passes_light_of, refract_from
 from renderer.trace.batch import check_rays, make_starts
 from renderer.trace.hits import Hits
 from renderer.trace.query import closest_hits
+from renderer.trace.singly import stack_size
 from renderer.trace.spawn import BOUNDED, Place, spawn_origin, start_row
+from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import HEAD, ROW
 
 Vector = tuple[float, float, float]
@@ -81,17 +84,20 @@ class _Ray(NamedTuple):
 
 
 class _Met(NamedTuple):
-    """The face that a ray met and the place there, its surface, the normal that faces the ray, and the material's row
-    with its columns.
+    """What a ray met: the faces that are crossed together, the place where they are seen, the surface there, the normal
+    that faces the ray, and the material's row with its columns; and where light passes, the change of media and those
+    beyond.
     """
 
-    face: int
+    together: Together
     place: Place
     surface: Surface
     n: Vector
     inside: bool
     row: int
     material: NDArray[np.float64]
+    change: Change
+    beyond: tuple[int, ...]
 
 
 class _Aim(NamedTuple):
@@ -156,20 +162,24 @@ def _meet(prepared: PreparedScene, ray: _Ray) -> _Met | None:
     hits = _closest(prepared, ray.origin, ray.direction, np.inf, ray.start)
     if not hits.hit[0]:
         return None
-    face, u, v = int(hits.face[0]), float(hits.u[0]), float(hits.v[0])
-    surface = surface_of(prepared.arrays, face, u, v, ray.direction)
-    came = -1.0 if dot(ray.direction, surface.n_g) > 0.0 else 1.0
-    inside = dot(ray.direction, surface.n_s) > 0.0
-    n, row = scale(surface.n_s, -1.0) if inside else surface.n_s, int(surface.material)
-    return _Met(
-        face,
-        Place(float(face), u, v, surface.slack, came),
-        surface,
-        n,
-        inside,
-        row,
-        prepared.arrays.materials[row // MATERIAL_COLUMNS],
-    )
+    spot, d, arrays = Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0])), ray.direction, prepared.arrays
+    stack, memory = np.empty(stack_size(prepared.tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
+    together = together_of(prepared.tree.words, arrays, spot, d, stack, memory)
+    seen = Spot(*together.seen)
+    surface = surface_of(arrays, *seen, d)
+    inside, row = dot(d, surface.n_s) > 0.0, int(surface.material)
+    media, beyond = np.array(ray.media, np.int64), np.zeros(_media_limit(prepared) + SPARE, np.int64)
+    change = Change(1.0, 1.0, 0)
+    if passes_light_of(arrays, row):
+        change = change_of(arrays, together, row, inside, media, beyond, memory)
+    n, columns = scale(surface.n_s, -1.0) if inside else surface.n_s, arrays.materials[row // MATERIAL_COLUMNS]
+    place = place_at(seen, surface, d)
+    return _Met(together, place, surface, n, inside, row, columns, change, tuple(beyond[: change.left].tolist()))
+
+
+def _media_limit(prepared: PreparedScene) -> int:
+    """The most media that a ray remembers."""
+    return MAX_MEDIA if prepared.needs.refraction else 0
 
 
 def _closest(prepared: PreparedScene, origin: Vector, direction: Vector, t_max: float, start: Floats) -> Hits:
@@ -182,10 +192,10 @@ def _closest(prepared: PreparedScene, origin: Vector, direction: Vector, t_max: 
     return closest_hits(prepared.tree, rays, prepared.mesh, 1)
 
 
-def _start(met: _Met, direction: Vector) -> Floats:
-    """The row of the start of a ray that leaves a surface."""
+def _start(place: Place, n_g: Vector, direction: Vector) -> Floats:
+    """The row of the start of a ray that leaves a surface of normal n_g."""
     row = np.empty(ROW)
-    start_row(row, met.place, met.surface.n_g, direction)
+    start_row(row, place, n_g, direction)
     return row
 
 
@@ -218,7 +228,10 @@ def _hit_segments(prepared: PreparedScene, ray: _Ray, met: _Met, own: int, shado
         else:
             radiance = add(radiance, aim.radiance)
     p = met.surface.p
-    return [Segment(ray.kind, ray.depth, ray.parent, ray.origin, p, True, met.face, ray.weight, radiance), *shadow_rays]
+    return [
+        Segment(ray.kind, ray.depth, ray.parent, ray.origin, p, True, int(met.place.face), ray.weight, radiance),
+        *shadow_rays,
+    ]
 
 
 def _aim(prepared: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
@@ -233,7 +246,7 @@ def _aim(prepared: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
         end = _beyond(prepared, o, way) if seen.directional else seen.place
         share = phong_of(prepared.arrays, met.row, met.n, ray.direction, seen.towards)
         radiance = times(ray.weight, times(share, seen.arriving))
-        aims.append(_Aim(o, way, float(t_max), end, radiance, _start(met, way)))
+        aims.append(_Aim(o, way, float(t_max), end, radiance, _start(met.place, met.surface.n_g, way)))
     return aims
 
 
@@ -248,21 +261,29 @@ def _shadow(prepared: PreparedScene, ray: _Ray, own: int, aim: _Aim) -> Segment:
 
 def _bounce(prepared: PreparedScene, ray: _Ray, met: _Met, own: int) -> list[_Ray]:
     """The rays that leave the surface: the reflected one, then the refracted one where light passes."""
-    limit = MAX_MEDIA if prepared.needs.refraction else 0
-    media, beyond = np.array(ray.media, np.int64), np.zeros(limit + 1, np.int64)
-    passes_light, through, passes, k_r, k_t, left = refract_from(
-        prepared.arrays, met.row, ray.direction, met.n, met.inside, media, beyond
-    )
-    mirrored = reflect(ray.direction, met.n)
-    children = [_child("reflected", ray, met, own, mirrored, times(ray.weight, k_r), ray.media)]
-    if passes_light and passes:
-        inside = tuple(beyond[:left].tolist())
-        children.append(_child("refracted", ray, met, own, through, times(ray.weight, k_t), inside))
+    change, m, d = met.change, met.row, ray.direction
+    through, passes, k_r, k_t = refract_from(prepared.arrays, m, d, met.n, change.n1, change.n2)
+    mirrored, weight = reflect(d, met.n), times(ray.weight, k_r)
+    children = [_child("reflected", ray, own, met.surface, met.place, mirrored, weight, ray.media)]
+    if passes_light_of(prepared.arrays, m) and passes:
+        last, surface, place = Spot(*met.together.last), met.surface, met.place
+        if last.face != int(met.place.face):
+            surface = surface_of(prepared.arrays, *last, d)
+            place = place_at(last, surface, d)
+        children.append(_child("refracted", ray, own, surface, place, through, times(ray.weight, k_t), met.beyond))
     return children
 
 
 def _child(
-    kind: Kind, ray: _Ray, met: _Met, own: int, direction: Vector, weight: Vector, media: tuple[int, ...]
+    kind: Kind,
+    ray: _Ray,
+    own: int,
+    surface: Surface,
+    place: Place,
+    direction: Vector,
+    weight: Vector,
+    media: tuple[int, ...],
 ) -> _Ray:
-    w, (p, error, n_g, *_) = normalized(direction), met.surface
-    return _Ray(kind, ray.depth + 1, own, spawn_origin(p, error, n_g, w, BOUNDED), w, weight, media, _start(met, w))
+    w, (p, error, n_g, *_) = normalized(direction), surface
+    start = _start(place, n_g, w)
+    return _Ray(kind, ray.depth + 1, own, spawn_origin(p, error, n_g, w, BOUNDED), w, weight, media, start)

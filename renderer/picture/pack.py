@@ -14,7 +14,8 @@ from renderer.shade.surface import MAX_MEDIA, SceneArrays
 def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
     """The merged mesh of all instances in their order, and everything else that the kernel reads.
 
-    Arrays that ``needs`` does not name are left empty; for None, those that the scene does not need.
+    Arrays that ``needs`` does not name are left empty; for None, those that the scene does not need. ``touching`` is for
+    ``touching.find_touching``.
     """
     needs = needs_of(scene) if needs is None else needs
     instances = scene.instances
@@ -37,6 +38,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
         lights=light_rows(scene, needs),
         colors=np.array([scene.ambient, scene.background]),
         media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
+        touching=np.zeros(0, np.uint8),
     )
     return mesh, arrays
 

@@ -12,7 +12,8 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import media_around, pack
-from renderer.process.parallel import for_chunks
+from renderer.picture.touching import find_touching
+from renderer.process.parallel import checked_threads, for_chunks
 from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.needs import Needs
 from renderer.scene.scene import RenderSettings, Scene
@@ -84,6 +85,8 @@ class PreparedScene:
         settings, arrays = kernel_settings_of(self.needs, chosen, offset), self.arrays
         if self.needs.refraction and camera is not self.scene.camera:
             arrays = arrays._replace(media=media_around(self.scene, camera))
+        if not offset.bounded:
+            arrays = arrays._replace(touching=arrays.touching[:0])
         across, cut = -(-width // TILE), np.zeros(tiles((width, end_row - first_row)), np.int64)
 
         def render_in(film: Film, first: int) -> Iterator[None]:
@@ -116,6 +119,7 @@ def prepare_scene(
     mesh, arrays = pack(scene, needs)
     octree = build_octree(mesh, accelerator, split, needs, threads)
     tree = tree_for(octree, needs)
+    arrays = find_touching(tree, arrays, needs, checked_threads(threads))
     return PreparedScene(scene, mesh, octree, needs, arrays, tree, clock.seconds())
 
 
@@ -125,8 +129,9 @@ def _bundles_in_a_row(tree: Tree) -> int:
 
 
 def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_seconds: float) -> PreparedScene:
-    _, arrays = pack(scene, needs)
-    return PreparedScene(scene, octree.mesh, octree, needs, arrays, tree_for(octree, needs), build_seconds)
+    (_, arrays), tree = pack(scene, needs), tree_for(octree, needs)
+    arrays = find_touching(tree, arrays, needs, checked_threads(None))
+    return PreparedScene(scene, octree.mesh, octree, needs, arrays, tree, build_seconds)
 
 
 def tiles(resolution: tuple[int, int]) -> int:

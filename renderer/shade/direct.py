@@ -18,10 +18,11 @@ from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import search_blocks, trace
 
 # The surface that a ray of a bundle met, for its light and the rays that it spawns: SURFACE_DOUBLES float64 per ray.
-POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT, PLACE = 0, 3, 6, 9, 10, 11, 12, 15
-SURFACE_DOUBLES = 20
-# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and
-# the row of ``starts.record``.
+# Where light passes, CHANGE has the ``crossing.Change``, and LAST the ``crossing.Spot`` that a refracted ray leaves.
+POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT, PLACE, CHANGE, LAST = 0, 3, 6, 9, 10, 11, 12, 15, 20, 23
+SURFACE_DOUBLES = 26
+# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and the
+# row of ``starts.record``.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 _TOWARDS, _ARRIVING, _START, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE, (13 + ROW) * SIZE
 
@@ -48,6 +49,15 @@ def place_of(surface):
     """The ``Place`` of a surface."""
     row = at(surface, PLACE)
     return Place(get(row, 0), get(row, 1), get(row, 2), get(row, 3), get(row, 4))
+
+
+@inlined
+def put_place(surface, place):
+    """Write the ``Place`` of a surface."""
+    row = at(surface, PLACE)
+    put3(row, 0, (place.face, place.u, place.v))
+    put(row, 3, place.slack)
+    put(row, 4, place.came)
 
 
 @inlined

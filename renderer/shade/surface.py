@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import get, pointer
 from renderer.kernels.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
-from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR
+from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
 from renderer.trace.spawn import normal_of, offset_distance
 
@@ -28,6 +28,7 @@ class SceneArrays(NamedTuple):
     lights     (L, LIGHT_COLUMNS)
     colors     (2, 3), ambient and background
     media      (m,) int64, m <= MAX_MEDIA, the same place for each medium that the eye is in, outermost first
+    touching   (F,) uint8, not 0 for faces that pass light and may coincide with another; without rows where none does
     """
 
     vertices: NDArray[np.float64]
@@ -39,11 +40,12 @@ class SceneArrays(NamedTuple):
     lights: NDArray[np.float64]
     colors: NDArray[np.float64]
     media: NDArray[np.int64]
+    touching: NDArray[np.uint8]
 
 
 class ScenePointers(NamedTuple):
     """A ``SceneArrays`` as the kernels read it: pointers, the numbers of lights and of media around the eye, and
-    whether any face is smooth.
+    whether any face is smooth, and whether any touches another.
     """
 
     vertices: Any
@@ -55,9 +57,11 @@ class ScenePointers(NamedTuple):
     lights: Any
     colors: Any
     media: Any
+    touching: Any
     light_count: int
     media_count: int
     has_smooth: bool
+    has_touching: bool
 
 
 @inlined
@@ -73,9 +77,11 @@ def scene_pointers(scene):
         pointer(scene.lights),
         pointer(scene.colors),
         pointer(scene.media),
+        pointer(scene.touching),
         len(scene.lights),
         len(scene.media),
         len(scene.smooth) > 0,
+        len(scene.touching) > 0,
     )
 
 
@@ -118,6 +124,12 @@ def phong(scene, m, n, d, towards):
         shininess = get(scene.materials, m + SHININESS)
         factor = add(factor, scale(three(scene.materials, m + SPECULAR), specular(d, n, towards, shininess)))
     return factor
+
+
+@inlined
+def lets_through(materials, m):
+    """Whether light goes through a surface of the material in row ``m``."""
+    return largest_component(three(materials, m + TRANSMITTANCE)) > 0.0
 
 
 @kernel

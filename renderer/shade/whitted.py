@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, pointer, put
+from renderer.kernels.simd import at, get, put
 from renderer.kernels.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
 from renderer.shade.bundle import (
     BUNDLE_DOUBLES,
@@ -23,10 +23,13 @@ from renderer.shade.bundle import (
     count_of,
     depth_of,
 )
+from renderer.shade.crossing import SPARE, Media, Spot, cross, faces_together, place_at
 from renderer.shade.direct import (
     BOUND,
+    CHANGE,
     GEOMETRIC,
     INSIDE,
+    LAST,
     LIGHT,
     MATERIAL,
     NORMAL,
@@ -38,13 +41,14 @@ from renderer.shade.direct import (
     light_surfaces,
     place_of,
     put3,
+    put_place,
     trace_rays,
 )
-from renderer.shade.records import AMBIENT, DIELECTRIC, IOR, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
+from renderer.shade.records import AMBIENT, DIELECTRIC, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
-from renderer.shade.surface import scene_pointers, surface_at
+from renderer.shade.surface import lets_through, scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
-from renderer.trace.spawn import OffsetRule, put_start, spawn_origin
+from renderer.trace.spawn import OffsetRule, Place, put_start, spawn_origin
 from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import Scratch
 
@@ -73,7 +77,7 @@ class Work(NamedTuple):
 
     The bundles and the order in which their places are used: first those that wait, then the free ones. For tracing,
     its scratch, its hits, and a zero and an infinity as bounds. For the bundle under way, its surfaces, its shadow
-    rays, the list of its lit rays, and one ray's media beyond a surface. For each pixel its colour, the number of rays
+    rays, the list of its lit rays, and the media beyond the surfaces. For each pixel its colour, the number of rays
     traced, and whether it was cut: without ``Settings.max_rays`` it would have spawned more.
     """
 
@@ -100,7 +104,8 @@ def work_lengths(settings: Settings) -> tuple[int, int]:
     """
     slots = settings.max_depth + 4
     doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE
-    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + settings.media + 3 * SIZE
+    beyond = SIZE * (settings.media + SPARE)
+    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + beyond + 3 * SIZE
     return doubles, integers
 
 
@@ -116,7 +121,7 @@ def make_work(doubles, integers, hits, settings, scratch):
     face = at(order, slots)
     lit = at(face, SIZE)
     beyond = at(lit, 1 + 2 * SIZE)
-    traced = at(beyond, settings.media)
+    traced = at(beyond, SIZE * (settings.media + SPARE))
     side = at(traced, 2 * SIZE)
     found = HitPointers(t, face, u, v, side, hits)
     return Work(
@@ -146,56 +151,50 @@ def _goes_on(weight, min_weight):
     return largest > 0.0 and largest >= min_weight
 
 
-@kernel
-def _enter_or_leave(media, count, material, inside, limit):
-    """Cross the surface of ``material``: change ``media`` in place, return their new number, at most ``limit``.
-
-    Leaving takes out the innermost entry of that material, wherever it stands, so overlapping objects are left one
-    by one.
-    """
-    if not inside:
-        if count < limit:
-            put(media, count, np.int64(material))
-            count += 1
-        return count
-    for k in range(count - 1, -1, -1):
-        if get(media, k) == material:
-            for j in range(k, count - 1):
-                put(media, j, get(media, j + 1))
-            return count - 1
-    return count
+@inlined
+def _beyond(work, limit, i):
+    """The place for the media beyond the surface that ray ``i`` met."""
+    return at(work.beyond, i * (limit + SPARE))
 
 
 @inlined
-def _innermost_ior(scene, media, count):
-    return get(scene.materials, get(media, count - 1) + IOR) if count > 0 else 1.0
+def _put_change(scene, bundle, work, i, together, inside):
+    """Write how the media of ray ``i`` change where it crosses the surface that it met."""
+    surface = at(work.surfaces, i * SURFACE_DOUBLES)
+    media = Media(at(bundle.media, i * bundle.limit), get(bundle.media_counts, i), bundle.limit)
+    m = np.int64(get(surface, MATERIAL))
+    change = cross(scene, together, m, inside, media, _beyond(work, bundle.limit, i), work.trace.holders)
+    put3(surface, CHANGE, (change.n1, change.n2, float(change.left)))
+    last = together.last
+    put3(surface, LAST, (float(last.face), last.u, last.v))
 
 
 @inlined
-def _meet_surface(scene, bundle, work, i):
+def _meet_surface(tree, scene, bundle, work, i):
     """Write the surface that ray ``i`` met, and its ambient light, to ``work``."""
     found, surface = work.found, at(work.surfaces, i * SURFACE_DOUBLES)
-    d = row3(bundle.directions, i)
-    face, u, v = get(found.face, i), get(found.u, i), get(found.v, i)
-    met = surface_at(scene, face, u, v, d)
+    d, spot = row3(bundle.directions, i), Spot(get(found.face, i), get(found.u, i), get(found.v, i))
+    together = faces_together(tree, scene, spot, d, work.trace.packet_stack, work.trace.holders)
+    seen = together.seen
+    put(found.face, i, seen.face)
+    met = surface_at(scene, seen.face, seen.u, seen.v, d)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, met.n_s) > 0.0
     put3(surface, POINT, met.p)
     put3(surface, NORMAL, scale(met.n_s, -1.0) if inside else met.n_s)
     put3(surface, GEOMETRIC, met.n_g)
     put(surface, BOUND, met.error)
-    place = at(surface, PLACE)
-    put3(place, 0, (float(face), u, v))
-    put(place, 3, met.slack)
-    put(place, 4, -1.0 if dot(d, met.n_g) > 0.0 else 1.0)
+    put_place(surface, place_at(seen, met, d))
     put(surface, MATERIAL, float(met.material))
     put(surface, INSIDE, 1.0 if inside else 0.0)
     put3(surface, LIGHT, times(three(scene.materials, met.material + AMBIENT), row3(scene.colors, 0)))
+    if passes_light(scene.materials, met.material):
+        _put_change(scene, bundle, work, i, together, inside)
     return met.material
 
 
 @kernel
-def _meet_surfaces(scene, bundle, work):
+def _meet_surfaces(tree, scene, bundle, work):
     """Write the surfaces that rays met to ``work``, and list the lit rays; rays that met none add the background."""
     lit = 0
     for i in range(count_of(bundle)):
@@ -204,60 +203,77 @@ def _meet_surfaces(scene, bundle, work):
         if get(work.found.face, i) < 0:
             seen = times(row3(bundle.weights, i), row3(scene.colors, 1))
             put3(work.color, 3 * pixel, add(row3(work.color, pixel), seen))
-        elif is_lit(scene.materials, _meet_surface(scene, bundle, work, i)):
+        elif is_lit(scene.materials, _meet_surface(tree, scene, bundle, work, i)):
             lit += 1
             put(work.lit, lit, i)
     put(work.lit, 0, lit)
 
 
 @inlined
-def _refract(scene, m, d, n, inside, around, beyond):
-    """The refracted ray of a ray in direction d at a surface of material ``m``, whose normal n faces it.
-
-    ``around`` = (media, count, limit) are the media that the ray is in, their number, and the most that it remembers.
-    Returns (its direction, whether there is one, k_r, k_t, the number of media beyond, which go to ``beyond``).
+def _refract(scene, m, d, n, n1, n2):
+    """The refracted ray of a ray in direction d that goes from index n1 to n2 at a surface of material ``m``, whose
+    normal n faces it: its direction, whether there is one, k_r and k_t.
     """
-    materials, (media, count, limit) = scene.materials, around
+    materials = scene.materials
     k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
-    for k in range(count):
-        put(beyond, k, get(media, k))
-    left = _enter_or_leave(beyond, count, m, inside, limit)
-    # From inside, n1 is that of this material even where the ray never entered it, as through the hole of a mesh.
-    n1 = get(materials, m + IOR) if inside else _innermost_ior(scene, media, count)
-    n2 = _innermost_ior(scene, beyond, left) if inside else get(materials, m + IOR)
     cos_t, through = refract(d, n, n1, n2)
     if get(materials, m + KIND) == DIELECTRIC:
         f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
         k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
-    return through, cos_t >= 0.0, k_r, k_t, left
+    return through, cos_t >= 0.0, k_r, k_t
 
 
 @inlined
-def _passes_light(materials, m):
-    """Whether the material in row ``m`` has refracted rays."""
-    return largest_component(three(materials, m + TRANSMITTANCE)) > 0.0 or get(materials, m + KIND) == DIELECTRIC
+def passes_light(materials, m):
+    """Whether the material in row ``m`` has refracted rays, of weight 0 perhaps."""
+    return lets_through(materials, m) or get(materials, m + KIND) == DIELECTRIC
 
 
 @kernel
-def refract_from(arrays, m, d, n, inside, media, beyond):
-    """For Python: (whether material ``m`` passes light, then as of ``_refract``) for a ray in ``media``, an array.
+def passes_light_of(arrays, m):
+    """``passes_light``, for Python."""
+    return passes_light(scene_pointers(arrays).materials, m)
 
-    ``beyond`` has one place more than the most media that the ray remembers.
-    """
-    scene = scene_pointers(arrays)
-    around = pointer(media), len(media), len(beyond) - 1
-    through, passes, k_r, k_t, left = _refract(scene, m, d, n, inside, around, pointer(beyond))
-    return _passes_light(scene.materials, m), through, passes, k_r, k_t, left
+
+@kernel
+def refract_from(arrays, m, d, n, n1, n2):
+    """``_refract``, for Python."""
+    return _refract(scene_pointers(arrays), m, d, n, n1, n2)
+
+
+class _Exit(NamedTuple):
+    """Where spawned rays leave a surface: its point, the ``offset_distance`` of that, its normal and its ``Place``."""
+
+    p: tuple
+    error: float
+    n_g: tuple
+    place: Place
 
 
 @inlined
-def _spawn(surface, pixel, w, weight, children, media, count, settings):
-    """Add the ray in direction ``w`` from the surface that a ray of ``pixel`` met to ``children``."""
+def _exit_of(surface):
+    """The ``_Exit`` of rays that stay on the side of a surface from which it was met."""
+    return _Exit(three(surface, POINT), get(surface, BOUND), three(surface, GEOMETRIC), place_of(surface))
+
+
+@inlined
+def _exit_beyond(scene, surface, d):
+    """The ``_Exit`` of a ray that goes through all the faces that a ray of direction d met together."""
+    row = at(surface, LAST)
+    last = Spot(np.int64(get(row, 0)), get(row, 1), get(row, 2))
+    if last.face == np.int64(get(surface, PLACE)):
+        return _exit_of(surface)
+    met = surface_at(scene, last.face, last.u, last.v, d)
+    return _Exit(met.p, met.error, met.n_g, place_at(last, met, d))
+
+
+@inlined
+def _spawn(leaving, pixel, w, weight, children, media, count, settings):
+    """Add the ray in direction ``w`` from an ``_Exit``, of a ray of ``pixel``, to ``children``."""
     w = normalized(w)
-    p, n_g = three(surface, POINT), three(surface, GEOMETRIC)
-    o = spawn_origin(p, get(surface, BOUND), n_g, w, settings.offset)
+    o = spawn_origin(leaving.p, leaving.error, leaving.n_g, w, settings.offset)
     row = append(children, o, w, weight, pixel, media, count)
-    put_start(row, place_of(surface), n_g, w, settings.offset)
+    put_start(row, leaving.place, leaving.n_g, w, settings.offset)
 
 
 @inlined
@@ -281,16 +297,16 @@ def _bounce(scene, bundle, settings, work, refracted, reflected):
         surface = at(work.surfaces, i * SURFACE_DOUBLES)
         m, weight, pixel = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i), get(bundle.pixels, i)
         d, n, k_r = row3(bundle.directions, i), three(surface, NORMAL), three(materials, m + REFLECTANCE)
-        if _passes_light(materials, m):
-            around = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i), bundle.limit
-            inside = get(surface, INSIDE) != 0.0
-            w, passes, k_r, k_t, left = _refract(scene, m, d, n, inside, around, work.beyond)
+        if passes_light(materials, m):
+            n1, n2, left = three(surface, CHANGE)
+            w, passes, k_r, k_t = _refract(scene, m, d, n, n1, n2)
             if passes and _may_leave(work, pixel, times(weight, k_t), settings):
-                _spawn(surface, pixel, w, times(weight, k_t), refracted, work.beyond, left, settings)
+                leaving, beyond = _exit_beyond(scene, surface, d), _beyond(work, bundle.limit, i)
+                _spawn(leaving, pixel, w, times(weight, k_t), refracted, beyond, np.int64(left), settings)
         if _may_leave(work, pixel, times(weight, k_r), settings):
             media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
             w = reflect(d, n)
-            _spawn(surface, pixel, w, times(weight, k_r), reflected, media, count, settings)
+            _spawn(_exit_of(surface), pixel, w, times(weight, k_r), reflected, media, count, settings)
 
 
 @inlined
@@ -313,7 +329,7 @@ def meet(tree, scene, bundle, work):
     starts = StartPointers(bundle.starts, ROW, scene.vertices, scene.faces)
     rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 3, 0, 0, 1.0, starts)
     trace_rays(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
-    _meet_surfaces(scene, bundle, work)
+    _meet_surfaces(tree, scene, bundle, work)
 
 
 @kernel

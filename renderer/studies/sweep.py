@@ -25,11 +25,15 @@ from renderer.trace.parallel_rays import (
 )
 from renderer.trace.rays import HitPointers, RayPointers, hit_pointers
 from renderer.trace.spawn import LEVEL, has_normal, leave_to_both_sides, put_no_start
+from renderer.trace.starts.anchor import anchor_of, rounded
+from renderer.trace.starts.cone import make_holders
+from renderer.trace.starts.fan import FAN_DOUBLES, OPEN, STOPPED, UNSURE, clear_fan, has_fan, stop_of
 from renderer.trace.starts.record import (
     ABOVE,
     ANCHOR,
     BARYCENTRIC,
     CODE,
+    CORNER,
     EDGE,
     FACE,
     KNOWN,
@@ -56,13 +60,14 @@ RAYS = 1024
 # And in one call, or one more list: some 10 ms, so that Ctrl-C and other threads need not wait for long.
 RAYS_A_CALL = 1 << 14
 # For each point of a tile: where a ray starts that goes to the side of its face's normal, and to the other side; that
-# normal; the frame, whose third vector is the point's own normal; the sum so far; that of all directions; and its row
-# of ``starts.record``.
+# normal; the frame, whose third vector is the point's own normal; the sum so far; that of all directions; its row of
+# ``starts.record``; and of a point on an edge the table of ``starts.fan``.
 _ABOVE, _BELOW, _FACING, _FRAME = 0, 3 * TILE, 6 * TILE, 9 * TILE
-_SUM, _WHOLE, _START, _POINT_DOUBLES = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
-# Its row, and the leaf that hid its last direction, or 0; and once for the tile, how often tracing its rays together
-# may still be tried.
-_ROW, _HIDER, _LEFT, _POINT_INTEGERS = 0, TILE, 2 * TILE, 2 * TILE + 8
+_SUM, _WHOLE, _START, _FAN = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
+_POINT_DOUBLES = _FAN + FAN_DOUBLES * TILE
+# Its row; the leaf that hid its last direction, or 0; whether it is a corner of the mesh; and once for the tile, how
+# often tracing its rays together may still be tried.
+_ROW, _HIDER, _CORNER, _LEFT, _POINT_INTEGERS = 0, TILE, 2 * TILE, 3 * TILE, 3 * TILE + 8
 
 
 class Places(NamedTuple):
@@ -209,29 +214,41 @@ def _begin_tile(tree, mesh, places, rows, begin, count, work):
 
 
 @kernel
-def _begin_on_face(tree, mesh, work, i, o, face, has_normal_):
+def _begin_on_face(tree, mesh, work, i, o, face, has_horizon):
     """Prepare where the rays of a tile's ``i``-th point start, which lies on a face; its normal says on which side."""
-    start, corners = at(work.points, _START + ROW * i), corners_of(pointer(mesh[0]), pointer(mesh[1]), face, tree.scale)
-    slack, code, own = EDGE, BARYCENTRIC, face
-    n = three(work.points, _FRAME + 9 * i + 6)
+    start, n = at(work.points, _START + ROW * i), three(work.points, _FRAME + 9 * i + 6)
+    starts = StartPointers(start, 0, pointer(mesh[0]), pointer(mesh[1]))
+    corners, slack, code = corners_of(starts.vertices, starts.faces, face, tree.scale), EDGE, BARYCENTRIC
     if has_normal(corners[0], corners[1], corners[2]):
         normal, above, below, slack = leave_to_both_sides(corners, o, tree.scale)
         _put3(work.points, _FACING + 3 * i, normal)
         _put3(work.points, _ABOVE + 3 * i, above)
         _put3(work.points, _BELOW + 3 * i, below)
-        if has_normal_ and slack != EDGE and dot(normal, n) != 0.0:
+        if has_horizon and slack != EDGE and dot(normal, n) != 0.0:
             code |= KNOWN | (ABOVE if dot(normal, n) > 0.0 else 0)
-    put(start, FACE, np.float64(own))
+    put(start, FACE, np.float64(face))
     put(start, SLACK, slack)
     put(start, CODE, np.float64(code))
-    if has_normal_ and slack == EDGE:
-        starts = StartPointers(start, 0, pointer(mesh[0]), pointer(mesh[1]))
-        side = side_of_normal(tree, start_at(starts, 0, tree.scale), n, work.scratch.packet_stack, work.scratch.holders)
+    if slack == EDGE:
+        _begin_on_edge(tree, starts, work, i, n, has_horizon)
+
+
+@kernel
+def _begin_on_edge(tree, starts, work, i, n, has_horizon):
+    """``_begin_on_face`` for a point on or near an edge."""
+    own, table = at(work.points, _START + ROW * i), at(work.points, _FAN + FAN_DOUBLES * i)
+    anchor = anchor_of(start_at(starts, 0, tree.scale))
+    put(work.numbers, _CORNER + i, np.int64(anchor.zeros & (anchor.zeros - 1) != 0))
+    _put3(work.points, _ABOVE + 3 * i, scale(rounded(anchor), 1.0 / tree.scale))
+    clear_fan(table)
+    if has_horizon:
+        stack, holders = work.scratch.packet_stack, work.scratch.holders
+        side = side_of_normal(tree, start_at(starts, 0, tree.scale), n, stack, holders, table)
         if side.face >= 0:
-            put(start, CODE, np.float64(side.code))
-            # The side is that of another face, which then is the one that the rays leave.
-            put(start, FACE, np.float64(side.face))
-            _put3(start, ANCHOR, (side.u, side.v, 0.0))
+            # The side is that of a face that may be another one, which then is the one that the rays leave.
+            put(own, FACE, np.float64(side.face))
+            put(own, CODE, np.float64(side.code))
+            _put3(own, ANCHOR, (side.u, side.v, 0.0))
 
 
 @kernel
@@ -240,16 +257,33 @@ def _start_ray(work, i, d, ray):
     own, row = at(work.points, _START + ROW * i), at(work.starts, ROW * ray)
     for k in range(ROW):
         put(row, k, get(own, k))
-    if get(own, FACE) < 0.0 or get(own, SLACK) == EDGE:
-        _put3(work.origins, 3 * ray, three(work.points, _ABOVE + 3 * i))
+    _put3(work.origins, 3 * ray, three(work.points, _ABOVE + 3 * i))
+    if get(own, FACE) < 0.0:
         return True
+    if get(own, SLACK) == EDGE:
+        return _start_on_edge(work, i, d, row)
     slope, code = dot(three(work.points, _FACING + 3 * i), d), np.int64(get(own, CODE))
     above = slope >= 0.0
-    _put3(work.origins, 3 * ray, three(work.points, (_ABOVE if above else _BELOW) + 3 * i))
+    if not above:
+        _put3(work.origins, 3 * ray, three(work.points, _BELOW + 3 * i))
     if abs(slope) <= LEVEL * largest_component(d):
         put(row, SLACK, EDGE)
         return True
     return code & KNOWN == 0 or above == (code & ABOVE != 0)
+
+
+@kernel
+def _start_on_edge(work, i, d, row):
+    """``_start_ray`` for a point on or near an edge, whose start is written."""
+    table, stop = at(work.points, _FAN + FAN_DOUBLES * i), OPEN
+    if np.int64(get(row, CODE)) & KNOWN != 0:
+        stop = stop_of(table, d, make_holders(work.scratch.holders)) if has_fan(table) else UNSURE
+    if stop == OPEN:
+        # Nothing is left to be decided at the start.
+        put(row, CODE, np.float64(BARYCENTRIC))
+        if get(work.numbers, _CORNER + i) != 0:
+            put(row, SLACK, CORNER)
+    return stop != STOPPED
 
 
 @kernel

@@ -367,19 +367,25 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
         doubt = blurred | low | _may_be_on_edge(edges)
         t_within, error = (t, t_min, t_max), product * along * splat4(ERROR)
         due = _are_due(edges, (wide, high), (height, base_t, error), doubt, blurred, t_within)
-        due = due | (height < reach)
         doubts, blurs = seen & movemask(doubt), seen & movemask(blurred)
-        dues = seen & movemask(due) & ~_left(tree, base, ray.leaving)
+        dues = seen & movemask(due | (height < reach)) & ~_left(tree, base, edges, ray)
     return t, doubts, blurs, dues
 
 
 @inlined
-def _left(tree, base, leaving):
-    """The bit of the face that a ray leaves, if it is in the block at ``base``."""
+def _left(tree, base, edges, ray):
+    """The bits of the faces of the block at ``base`` that a ray leaves: its own, and those with a corner at its origin,
+    which it meets nowhere else.
+    """
     place, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
+    if ray.slack == 0.0:
+        return bits
     for i in range(BLOCK_FACES):
-        bits |= np.int64(np.float64(get(tree.faces, place + i)) == leaving) << i
-    return bits
+        bits |= np.int64(np.float64(get(tree.faces, place + i)) == ray.leaving) << i
+    zero = splat4(0.0)
+    at0 = (edges.x0 == zero) & (edges.y0 == zero) & (edges.z0 == zero)
+    at1 = (edges.x1 == zero) & (edges.y1 == zero) & (edges.z1 == zero)
+    return bits | movemask(at0 | at1 | ((edges.x2 == zero) & (edges.y2 == zero) & (edges.z2 == zero)))
 
 
 @inlined

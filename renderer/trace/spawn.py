@@ -64,11 +64,10 @@ _SMALLEST = 2.0**-1074
 # A start is inside its face where it is farther from the edges than so often its slack: a face beside it, at more than
 # a 64th of a right angle, is farther from it than where it is moved to.
 _INSIDE = 8.0
-# A start that would be moved by more of its face's size, as of needles, is left to exact signs: t is counted from
-# there.
+# A start that would be moved by more of its face, as of needles, is left to exact signs: t is counted from there.
 _FARTHEST_MOVE = 2.0**-38
 # A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that
-# is not thinner than _SHARP.
+# is not thinner than 2^-10 of its side.
 LEVEL = 2.0**-20
 # A point that went through float32 is off by 2^-24 of its largest coordinate: 64 times that is taken, as the same
 # may hold for the mesh and for what the point was computed from.
@@ -268,7 +267,7 @@ def _plane_near(p0, p1, p2, o):
 
 @inlined
 def _moved(o, plane, away):
-    """The point o near a face, moved along its normal to where it is off for certain; to its other side by -1."""
+    """The point o near a face, moved along its normal to where it is off for certain; away = -1 is the other side."""
     step = scale(plane.normal, away * (plane.needed - away * plane.height))
     return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
 

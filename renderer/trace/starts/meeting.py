@@ -283,6 +283,16 @@ def _weights(e0, e1, e2, slope, dz):
 
 
 @inlined
+def barycentrics_of(met):
+    """u and v of a ``Meeting``: exactly 0 or 1, or 1 in all, where it is on an edge or corner."""
+    u, v = (0.0 if met.zeros & 2 != 0 else met.u / met.w), (0.0 if met.zeros & 4 != 0 else met.v / met.w)
+    if met.zeros & 1 == 0:
+        return u, v
+    # What is left of one is exact if that is at least a half.
+    return (u, 1.0 - u) if u >= 0.5 else (1.0 - v, v)
+
+
+@inlined
 def unit_direction(d):
     """A direction scaled by a power of two, so that its largest component is from 1 to 2, and that power."""
     unit = power_below(largest_component(d))

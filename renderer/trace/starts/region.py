@@ -36,11 +36,11 @@ from renderer.trace.starts.meeting import lean_sign, slope_of
 
 NOT_STOPPED = -1
 # Hubs that are tried until none of the paths meets an outline.
-_ATTEMPTS = 16
+ATTEMPTS = 16
 
 
 @inlined
-def _hub(attempt):
+def hub_of(attempt):
     """A direction in general position, as pairs."""
     turn = 2.399963229728653 * (attempt + 1)
     height = 0.9428090415820634 - 0.1178511301977579 * attempt
@@ -49,11 +49,11 @@ def _hub(attempt):
 
 
 @kernel
-def _path_to_cone(tree, anchor, holders, count, k, side, attempt, word):
+def path_to_cone(tree, anchor, holders, count, k, side, attempt, word):
     """Write the parities of the path from the hub to the k-th cone, on one side of its face; returns whether it meets
     no outline.
     """
-    hub, own = _hub(attempt), cone_of(tree, anchor, holders, k)
+    hub, own = hub_of(attempt), cone_of(tree, anchor, holders, k)
     middle = middle_of(own, attempt)
     if lean_sign(own.face, hub) == 0:
         return False
@@ -90,7 +90,7 @@ def _path_to_direction(tree, anchor, holders, count, d, attempt, word):
     """Write the parities of the path from the hub to a direction; returns whether it meets no outline."""
     for j in range(count):
         cone = cone_of(tree, anchor, holders, j)
-        parity = crosses(cone, _hub(attempt), as_pairs(d), slope_of(cone.face, d))
+        parity = crosses(cone, hub_of(attempt), as_pairs(d), slope_of(cone.face, d))
         if parity == UNKNOWN:
             return False
         put_holder(holders, j, word, parity)
@@ -108,7 +108,7 @@ def _root(holders, k):
 
 
 @kernel
-def _are_even(holders, count, nodes):
+def are_even(holders, count, nodes):
     """Whether the two paths together cross every closed curve of arcs an even number of times."""
     for k in range(nodes):
         put_node(holders, k, PARENT, k)
@@ -141,7 +141,7 @@ def _is_connected(tree, anchor, holders, count, nodes):
     """
     for j in range(count):
         put_holder(holders, j, FREE_PATH, 0)
-    if _are_even(holders, count, nodes):
+    if are_even(holders, count, nodes):
         return True
     for j in range(count):
         if holder(holders, j, OTHER_PATH) != FREE:
@@ -152,7 +152,7 @@ def _is_connected(tree, anchor, holders, count, nodes):
                 face = cone_of(tree, anchor, holders, k).face
                 level = lean_sign(face, own.first) == 0 and lean_sign(face, own.second) == 0
                 put_holder(holders, k, FREE_PATH, k == j or (together == 1 and level))
-            if _are_even(holders, count, nodes):
+            if are_even(holders, count, nodes):
                 return True
     return False
 
@@ -160,8 +160,8 @@ def _is_connected(tree, anchor, holders, count, nodes):
 @kernel
 def _is_open(tree, anchor, holders, count, nodes, k, side, d):
     """Whether a direction is in the region beside the k-th cone."""
-    for attempt in range(_ATTEMPTS):
-        if _path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH) and _path_to_direction(
+    for attempt in range(ATTEMPTS):
+        if path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH) and _path_to_direction(
             tree, anchor, holders, count, d, attempt, OTHER_PATH
         ):
             return _is_connected(tree, anchor, holders, count, nodes)
@@ -172,8 +172,8 @@ def _is_open(tree, anchor, holders, count, nodes, k, side, d):
 @kernel
 def _bounds_region(tree, anchor, holders, count, nodes, k, side, j, facing):
     """Whether the region beside the k-th cone touches the j-th one on the side ``facing``."""
-    for attempt in range(_ATTEMPTS):
-        if _path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH) and _path_to_cone(
+    for attempt in range(ATTEMPTS):
+        if path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH) and path_to_cone(
             tree, anchor, holders, count, j, facing, attempt, OTHER_PATH
         ):
             return _is_connected(tree, anchor, holders, count, nodes)
@@ -197,7 +197,7 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
     best = NOT_STOPPED
     if through and slope_of(cone_of(tree, anchor, holders, own).face, d) == side:
         for j in range(count):
-            if holder(holders, j, NUMBER) > face and _coincide(tree, anchor, holders, own, j):
+            if holder(holders, j, NUMBER) > face and coincide(tree, anchor, holders, own, j):
                 best = _lower(holders, best, j)
     if best != NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
         return best
@@ -215,12 +215,12 @@ def _lower(holders, k, j):
 
 
 @kernel
-def _coincide(tree, anchor, holders, k, j):
+def coincide(tree, anchor, holders, k, j):
     """Whether the cone of the j-th holder is in the plane of the k-th one and has its middle in it."""
     own, cone = cone_of(tree, anchor, holders, k), cone_of(tree, anchor, holders, j)
     if lean_sign(cone.face, own.first) != 0 or lean_sign(cone.face, own.second) != 0:
         return False
-    for attempt in range(_ATTEMPTS):
+    for attempt in range(ATTEMPTS):
         where = within_cone(cone, middle_of(own, attempt))
         if where != 0:
             return where > 0
@@ -232,14 +232,24 @@ def bounding_holder(tree, anchor, holders, count, nodes, n):
     """The holder that bounds the region with direction n in it, the one that n is most across, lower ones first; and
     the side of it. NOT_STOPPED for none.
     """
-    best, best_side, most = NOT_STOPPED, 0, -1.0
-    for k in range(count):
-        face = cone_of(tree, anchor, holders, k).face
-        normal = heads(face.normal)
-        across = abs(dot(normalized(normal), n))
-        first = across > most or (across == most and holder(holders, k, NUMBER) < holder(holders, best, NUMBER))
-        own = slope_of(face, n)
+    most, last = np.inf, NOT_STOPPED
+    for _ in range(count):
+        most, last = _next_across(tree, anchor, holders, count, n, most, last)
+        own = slope_of(cone_of(tree, anchor, holders, last).face, n)
         for side in (own, -own) if own != 0 else (1, -1):
-            if first and _is_open(tree, anchor, holders, count, nodes, k, side, n):
-                best, best_side, most, first = k, side, across, False
-    return best, best_side
+            if _is_open(tree, anchor, holders, count, nodes, last, side, n):
+                return last, side
+    return NOT_STOPPED, 0
+
+
+@kernel
+def _next_across(tree, anchor, holders, count, n, most, last):
+    """The holder that n is most across after the one ``last``, whose product is ``most``; returns its product, too."""
+    best, found = -1.0, NOT_STOPPED
+    for k in range(count):
+        across = abs(dot(normalized(heads(cone_of(tree, anchor, holders, k).face.normal)), n))
+        number = holder(holders, k, NUMBER)
+        after = across < most or (across == most and number > holder(holders, last, NUMBER))
+        if after and (across > best or (across == best and number < holder(holders, found, NUMBER))):
+            best, found = across, k
+    return best, found

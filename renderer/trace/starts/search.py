@@ -32,9 +32,11 @@ from renderer.trace.leaf import NO_FACE, NOWHERE, blocks_of, is_better, push_chi
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
+from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
     HOLDS,
     IS_HIT,
+    barycentrics_of,
     meet_face,
     seen_from,
     slope_there,
@@ -264,27 +266,19 @@ class Side(NamedTuple):
 
 
 @kernel
-def side_of_normal(tree, start, n, stack, memory):
-    """The ``Side`` of a start whose normal n says in which region it is."""
+def side_of_normal(tree, start, n, stack, memory, table):
+    """The ``Side`` of a start whose normal n says in which region it is; and its ``fan`` in ``table``."""
     anchor, holders = anchor_of(start), make_holders(memory)
     d, _ = unit_direction(n)
     slope = slope_there(anchor, d)
     count = list_holders(tree, anchor, d, slope, 1.0, stack, holders)
     nodes = name_nodes(tree, anchor, holders, count)
     k, side = bounding_holder(tree, anchor, holders, count, nodes, d)
+    clear_fan(table)
     if k == NOT_STOPPED:
         return Side(-1, 0, 0.0, 0.0)
+    write_fan(tree, anchor, holders, count, nodes, k, side, table)
     met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, 1.0)
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0 else 0)
     u, v = barycentrics_of(met)
     return Side(holder(holders, k, NUMBER), code, u, v)
-
-
-@inlined
-def barycentrics_of(met):
-    """u and v of a ``Meeting``: exactly 0 or 1, or 1 in all, where it is on an edge or corner."""
-    u, v = (0.0 if met.zeros & 2 != 0 else met.u / met.w), (0.0 if met.zeros & 4 != 0 else met.v / met.w)
-    if met.zeros & 1 == 0:
-        return u, v
-    # What is left of one is exact if that is at least a half.
-    return (u, 1.0 - u) if u >= 0.5 else (1.0 - v, v)

@@ -1,0 +1,264 @@
+"""Bodies that touch have no air between them: pictures against closed forms, and against bodies that are one or sunk."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from renderer.inspect.ray_path import MAX_RAYS, ray_path
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, grid, icosphere
+from renderer.picture.image import Image
+from renderer.picture.pack import pack
+from renderer.picture.prepare import prepare_scene
+from renderer.picture.render import render
+from renderer.picture.touching import find_touching
+from renderer.scene.camera import PerspectiveCamera
+from renderer.scene.light import DirectionalLight
+from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.scene.needs import needs_of
+from renderer.scene.scene import Floor, Scene, SceneObject
+from renderer.trace.spawn import MITSUBA_EPSILON
+
+REL = 2.0**-22
+GROUND = Phong(diffuse=0.0, ambient=0.5)
+GLASS, WATER = Dielectric(ior=1.5), Dielectric(ior=1.33)
+# The sky is blue, and nothing else is.
+SKY = (0.0, 0.0, 1000.0)
+EYES = [(2.3, 3.0, 4.1), (-1.7, 5.0, 0.4), (0.0, 4.0, 4.0), (0.3, 0.7, 5.0)]
+
+
+def clear(ior: float) -> Dielectric:
+    """Glass that reflects nothing: what it does not refract is lost."""
+    return Dielectric(ior=ior, reflectance=0.0)
+
+
+def scene(*parts: tuple[Mesh, Material], eye: Any, target: Any = (0, 0.4, 0), fov: float = 30, **more: Any) -> Scene:
+    """A scene of (mesh, material) pairs; equal materials are one."""
+    materials = {str(m): m for _, m in parts}
+    objects = tuple(SceneObject(mesh=mesh, material=str(m), normals="flat") for mesh, m in parts)
+    materials["ground"] = GROUND
+    more.setdefault("background", SKY)
+    camera = PerspectiveCamera(eye=eye, target=target, up=(0.1, 0.7, -0.7), fov=fov)
+    return Scene(camera=camera, materials=materials, objects=objects, ambient=1.0, **more)
+
+
+def level(y: float, turned: bool = False) -> Mesh:
+    """A large square whose diagonal passes below the cubes, or the other diagonal."""
+    square = [[-9.0, y, -9.0], [-9.0, y, 9.0], [9.0, y, 9.0], [9.0, y, -9.0]]
+    return Mesh(square, [[0, 1, 3], [1, 2, 3]] if turned else [[0, 1, 2], [0, 2, 3]])
+
+
+def cube(y: float, size: float = 1.0) -> Mesh:
+    return box((-0.5 * size, y, -0.5 * size), (0.5 * size, 1.0 + y, 0.5 * size))
+
+
+def picture(what: Scene, size: int = 48, **options: Any) -> Image:
+    return render(what, resolution=(size, size), samples=1, **{"threads": 1, **options})
+
+
+def alike(one: Image, other: Image, most: float) -> None:
+    """Equal within 1e-6, but for a share of the pixels, those at edges."""
+    scale = np.maximum(1.0, np.abs(other.radiance))
+    apart = (np.abs(one.radiance.astype(np.float64) - other.radiance) > 1e-6 * scale).any(axis=2)
+    assert apart.mean() <= most
+
+
+class TestOnTheGround:
+    @pytest.mark.parametrize("eye", EYES[:3])
+    @pytest.mark.parametrize("y", [0.0, 0.1, -3.7, 1e3 / 3])
+    @pytest.mark.parametrize("material", [clear(1.5), Phong(diffuse=0.0, transmittance=0.9, ior=1.0)])
+    def test_no_sky_is_seen_through_the_ground(self, material: Material, y: float, eye: Any) -> None:
+        seen = {"eye": np.add(eye, (0, y, 0)).tolist(), "target": (0.0, y + 0.4, 0.0)}
+        for turned in (False, True):
+            for parts in (
+                [(cube(y), material), (level(y, turned), GROUND)],
+                [(level(y, turned), GROUND), (cube(y), material)],
+            ):
+                image = picture(scene(*parts, **seen))
+                assert image.radiance[image.face >= 0].max() < 2.0
+
+    @pytest.mark.parametrize("eye", EYES)
+    @pytest.mark.parametrize("material", [GLASS, clear(1.5), Phong(diffuse=0.0, transmittance=0.9, ior=1.0)])
+    def test_as_if_sunk_into_the_ground(self, material: Material, eye: Any) -> None:
+        sun = {"lights": (DirectionalLight(direction=(1, -3, -2), irradiance=1.0),)}
+        ground = Floor(min=(-9, -9), max=(9, 9), materials=("ground",), squares=(3, 3))
+        for more, parts in (({"floor": ground}, []), ({}, [(level(0.0), Phong(diffuse=0.7))])):
+            stands = scene((cube(0.0), material), *parts, eye=eye, **sun, **more)
+            sunk = scene((cube(-1e-9), material), *parts, eye=eye, **sun, **more)
+            alike(picture(stands, max_depth=6), picture(sunk, max_depth=6), 0.004)
+
+    def test_a_mirror_below_glass_reflects_within_it(self) -> None:
+        """Straight down through glass of index 1.5, back up and out: (1 - 0.04)^2 times 0.9 of the sky."""
+        what = scene(
+            (cube(0.0), clear(1.5)), (level(0.0), Mirror(reflectance=0.9)), eye=(0.1, 5, 0.2), target=(0.1, 0, 0.2)
+        )
+        image = render(what, resolution=(1, 1), max_depth=3)
+        assert image.radiance[0, 0, 2] == pytest.approx(1000 * 0.9 * 0.96**2, rel=REL)
+
+    def test_in_a_corner_of_walls(self) -> None:
+        walls = [
+            (box((-2.0, -1.0, -2.0), (2.0, 0.0, 2.0)), GROUND),
+            (box((-2.0, 0.0, -2.0), (0.0, 3.0, 2.0)), GROUND),
+            (box((0.0, 0.0, -2.0), (2.0, 3.0, 0.0)), GROUND),
+        ]
+        for material in (clear(1.5), Phong(diffuse=0.0, transmittance=0.9, ior=1.0)):
+            parts = [*walls, (box((0, 0, 0), (1, 1, 1)), material)]
+            for order in (parts, parts[::-1]):
+                image = picture(scene(*order, eye=(3.1, 2.7, 3.3), target=(0.4, 0.4, 0.4)))
+                assert image.radiance[..., 2].max() < 2.0
+
+    def test_from_below_the_ground_hides_the_glass(self) -> None:
+        for parts in ([(cube(0.0), GLASS), (level(0.0), GROUND)], [(level(0.0), GROUND), (cube(0.0), GLASS)]):
+            image = picture(scene(*parts, eye=(0.3, -4, 0.2), fov=20))
+            np.testing.assert_array_equal(image.radiance, np.float32(0.5))
+
+
+def passed(angle: float, *indices: float) -> float:
+    """The share that goes through plane interfaces between media of such indices, in at an angle, unpolarised at each."""
+    share, sine = 1.0, math.sin(math.radians(angle)) * indices[0]
+    for n1, n2 in zip(indices, indices[1:], strict=False):
+        c1, c2 = math.sqrt(1 - (sine / n1) ** 2), math.sqrt(1 - (sine / n2) ** 2)
+        s, p = (n1 * c1 - n2 * c2) / (n1 * c1 + n2 * c2), (n1 * c2 - n2 * c1) / (n1 * c2 + n2 * c1)
+        share *= 1 - (s * s + p * p) / 2
+    return share
+
+
+def slab(low: float, high: float) -> Mesh:
+    return box((-30.0, low, -30.0), (30.0, high, 30.0))
+
+
+def through(angle: float, *parts: tuple[Mesh, Material], **options: Any) -> Image:
+    """Seen at an angle from above, by pixels nearly of one direction."""
+    t = math.radians(angle)
+    eye = (20 * math.sin(t) + 0.3, 20 * math.cos(t), 0.2)
+    what = scene(*parts, eye=eye, target=(0.3, 0.0, 0.2), fov=1e-4, background=1.0)
+    return picture(what, 16, max_depth=12, **options)
+
+
+class TestGlassOnGlass:
+    def test_two_boxes_are_one(self) -> None:
+        for parts in ((slab(0, 1), slab(1, 2)), (slab(1, 2), slab(0, 1))):
+            for angle in (0, 20, 50, 75):
+                two = through(angle, *((mesh, clear(1.5)) for mesh in parts))
+                one = through(angle, (slab(0, 2), clear(1.5)))
+                np.testing.assert_allclose(two.radiance, one.radiance, rtol=REL)
+                np.testing.assert_allclose(two.radiance, passed(angle, 1, 1.5, 1), rtol=5e-6)
+        assert passed(50, 1, 1.5, 1) == pytest.approx(0.888, abs=5e-4)
+
+    @pytest.mark.parametrize("iors", [(1.5, 1.33, 1.8), (1.2, 2.4, 1.2), (1.33, 1.5, 1.33), (1.5, 1.5, 1.7)])
+    @pytest.mark.parametrize("angle", [0.0, 33.0, 65.0])
+    def test_three_media(self, iors: tuple[float, ...], angle: float) -> None:
+        parts = [(slab(-k, 1 - k), clear(ior)) for k, ior in enumerate(iors)]
+        for order in ((0, 1, 2), (2, 1, 0), (1, 0, 2), (2, 0, 1)):
+            image = through(angle, *(parts[k] for k in order))
+            np.testing.assert_allclose(image.radiance, passed(angle, 1, *iors, 1), rtol=5e-6)
+
+    def test_a_body_in_water_that_touches_its_wall(self) -> None:
+        """From both sides; the body is later in the scene, so that it holds where both begin."""
+        water, body = (slab(0, 3), clear(1.33)), (slab(1, 3), clear(1.7))
+        for low, high in ((0.0, 2.0), (1.0, 3.0)):
+            image = through(30, water, (slab(low, high), clear(1.7)))
+            np.testing.assert_allclose(image.radiance, passed(30, 1, 1.33, 1.7, 1), rtol=5e-6)
+        # Earlier in the scene, it is entered before the water, which then holds until the ray leaves it.
+        image = through(30, body, water)
+        np.testing.assert_allclose(image.radiance, passed(30, 1, 1.33, 1), rtol=5e-6)
+
+    def test_the_body_that_was_entered_last_holds_in_an_overlap(self) -> None:
+        """Glass from 0 to 1.1 and water from 1 to 2: one interface between the two, wherever it is."""
+        parts = [(slab(0, 1.1), clear(1.5)), (slab(1, 2), clear(1.33))]
+        for order in (parts, parts[::-1]):
+            for angle in (0, 40):
+                image = through(angle, *order)
+                np.testing.assert_allclose(image.radiance, passed(angle, 1, 1.33, 1.5, 1), rtol=5e-6)
+        assert passed(0, 1, 1.33, 1.5, 1) == pytest.approx(0.96 * 0.99639 * 0.97994, abs=1e-4)
+
+    def test_boxes_of_which_one_is_smaller(self) -> None:
+        """Through the common part of a face, and beside it."""
+        small, large = (box((-1, 1, -1), (1, 2, 1)), clear(1.8)), (slab(0, 1), clear(1.5))
+        for order in ((small, large), (large, small)):
+            image = picture(scene(*order, eye=(0.1, 9, 0.2), target=(0.1, 0, 0.2), fov=0.1, background=1.0), 8)
+            np.testing.assert_allclose(image.radiance, passed(0, 1, 1.8, 1.5, 1), rtol=1e-5)
+            image = picture(scene(*order, eye=(5, 9, 0.2), target=(5, 0, 0.2), fov=0.1, background=1.0), 8)
+            np.testing.assert_allclose(image.radiance, passed(0, 1, 1.5, 1), rtol=1e-5)
+
+
+def crowded() -> Scene:
+    parts = (
+        (box((0, 0, 0), (1, 1, 1)), GLASS),
+        (box((1, 0, 0), (2, 1, 1)), WATER),
+        (box((0.25, 1, 0.25), (1.5, 2, 1)), Phong(diffuse=0.1, reflectance=0.1, transmittance=0.7, ior=1.2)),
+        (box((-1, 0, -1), (0, 2, 1)), Phong(diffuse=0.4, reflectance=0.2)),
+        (box((1, 0, 0.5), (1.5, 0.5, 1)), GLASS),
+        (level(0.0), Phong(diffuse=0.6, reflectance=0.1)),
+    )
+    lights = (DirectionalLight(direction=(-1, -3, -2), irradiance=0.7),)
+    return scene(*parts, eye=(2.9, 2.8, 4.3), target=(0.7, 0.7, 0.5), fov=40, background=(0.2, 0.4, 0.8), lights=lights)
+
+
+class TestOneAnswer:
+    def test_paths_add_up_to_the_pixels(self) -> None:
+        what, size = crowded(), (11, 9)
+        image = render(what, resolution=size, samples=1, threads=1, max_depth=5, accelerator="octree")
+        prepared = prepare_scene(what, needs_of(what, max_depth=5), "octree", threads=1)
+        rows = what.camera.rows(*size)
+        for y, x in np.ndindex(image.face.shape):
+            path = ray_path(prepared, rows[0], rows[3] + ((x + 0.5) * rows[4] + (y + 0.5) * rows[5]), 5)
+            assert len(path) == image.rays[y, x] < MAX_RAYS and path[0].face == image.face[y, x]
+            np.testing.assert_allclose(sum(np.array(s.radiance) for s in path), image.radiance[y, x], rtol=2.0**-23)
+
+    def test_tree_and_threads(self) -> None:
+        first = picture(crowded(), 64, accelerator="octree")
+        for options in ({"accelerator": "brute"}, {"accelerator": "octree", "threads": 3}):
+            other = picture(crowded(), 64, **options)
+            for one, two in ((first.radiance, other.radiance), (first.face, other.face), (first.rays, other.rays)):
+                np.testing.assert_array_equal(one, two)
+
+    def test_numbers_of_faces_do_not_matter(self) -> None:
+        """But where a body later in the scene holds, or colours are those of the lowest: glass on the ground has neither."""
+        parts = [(cube(0.0), GLASS), (level(0.0), GROUND), (box((0.5, 0, -0.5), (1.5, 1, 0.5)), GLASS)]
+        images = [
+            picture(scene(*(parts[k] for k in order), eye=EYES[0])) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+        ]
+        for image in images[1:]:
+            alike(image, images[0], 0.0)
+
+    def test_mitsubas_offset_leaves_each_face_alone(self) -> None:
+        two = [(slab(0, 1), clear(1.5)), (slab(1, 2), clear(1.5))]
+        image = through(50, *two, offset="mitsuba")
+        assert np.abs(image.radiance - passed(50, 1, 1.5, 1)).max() > 0.01 and MITSUBA_EPSILON > 0.0
+
+
+class TestTouchingFaces:
+    def found(self, *parts: tuple[Mesh, Material]) -> list[int]:
+        what = scene(*parts, eye=EYES[0])
+        needs = needs_of(what)
+        every = []
+        for accelerator in ("octree", "brute"):
+            prepared = prepare_scene(what, needs, accelerator, threads=2)
+            every.append(np.flatnonzero(prepared.arrays.touching).tolist())
+        assert every[0] == every[1]
+        return every[0]
+
+    def test_none_of_bodies_that_stand_alone(self) -> None:
+        assert self.found((icosphere(3), GLASS)) == []
+        assert self.found((box(), GLASS), (level(-0.001), GROUND)) == []
+        assert self.found((grid(7, 5), GLASS)) == []
+
+    def test_only_those_that_pass_light(self) -> None:
+        top, bottom = (box((0, 1, 0), (1, 2, 1)), GLASS), (box(), GROUND)
+        assert len(self.found(top, bottom)) == 2
+        assert len(self.found(top, (box(), WATER))) == 4
+        assert self.found((box((0, 1, 0), (1, 2, 1)), GROUND), bottom) == []
+
+    def test_faces_beside_each_other_do_not_touch(self) -> None:
+        assert self.found((box(), GLASS), (box((1, 1, 0), (2, 2, 1)), GLASS)) == []
+
+    def test_none_where_nothing_refracts(self) -> None:
+        what = scene((box(), GROUND), (level(0.0), GROUND), eye=EYES[0])
+        prepared = prepare_scene(what, needs_of(what), "octree")
+        _, arrays = pack(what)
+        assert (
+            len(prepared.arrays.touching) == len(find_touching(prepared.tree, arrays, prepared.needs, 1).touching) == 0
+        )
