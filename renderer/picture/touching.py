@@ -1,4 +1,5 @@
-"""The faces that pass light and may coincide with another one: where rays meet them, kernels look which they meet there.
+"""The faces that pass light and may coincide with another one: where rays meet them, kernels look which they meet
+there.
 
 Found once for a scene: too many cost time alone, so rounding counts as coinciding.
 """
@@ -61,9 +62,9 @@ def mark_touching(words, arrays, begin, end, every, stack, touching):
     tree, scene = tree_pointers(words), scene_pointers(arrays)
     for slot in range(begin, end):
         face = get(tree.faces, slot)
-        if face >= 0 and (every or lets_through(scene.materials, np.int64(get(scene.material, face)))):
-            if _touches(tree, slot, face, pointer(stack)):
-                touching[face] = 1
+        asked = face >= 0 and (every or lets_through(scene.materials, np.int64(get(scene.material, face))))
+        if asked and _touches(tree, slot, face, pointer(stack)):
+            touching[face] = 1
 
 
 @inlined

@@ -179,8 +179,8 @@ def _enter(media, count, material, most):
 
 @kernel
 def _leave(media, count, material):
-    """Take the innermost entry of a medium out of ``media`` in place, wherever it stands, so that overlapping bodies are
-    left one by one; returns their number, which is the same where there is none.
+    """Take the innermost entry of a medium out of ``media`` in place, wherever it stands, so that overlapping bodies
+    are left one by one; returns their number, which is the same where there is none.
     """
     for k in range(count - 1, -1, -1):
         if get(media, k) == material:

@@ -1,6 +1,7 @@
-"""Bodies that touch have no air between them: pictures against closed forms, and against bodies that are one or sunk."""
+"""Bodies that touch have no air between them: pictures by closed forms, and by bodies that are one or sunk."""
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -116,9 +117,9 @@ class TestOnTheGround:
 
 
 def passed(angle: float, *indices: float) -> float:
-    """The share that goes through plane interfaces between media of such indices, in at an angle, unpolarised at each."""
+    """The share that goes through plane interfaces between media of such indices, in at an angle, unpolarised."""
     share, sine = 1.0, math.sin(math.radians(angle)) * indices[0]
-    for n1, n2 in zip(indices, indices[1:], strict=False):
+    for n1, n2 in pairwise(indices):
         c1, c2 = math.sqrt(1 - (sine / n1) ** 2), math.sqrt(1 - (sine / n2) ** 2)
         s, p = (n1 * c1 - n2 * c2) / (n1 * c1 + n2 * c2), (n1 * c2 - n2 * c1) / (n1 * c2 + n2 * c1)
         share *= 1 - (s * s + p * p) / 2
@@ -216,7 +217,9 @@ class TestOneAnswer:
                 np.testing.assert_array_equal(one, two)
 
     def test_numbers_of_faces_do_not_matter(self) -> None:
-        """But where a body later in the scene holds, or colours are those of the lowest: glass on the ground has neither."""
+        """But where a body later in the scene holds, or colours are those of the lowest: glass on the ground has
+        neither.
+        """
         parts = [(cube(0.0), GLASS), (level(0.0), GROUND), (box((0.5, 0, -0.5), (1.5, 1, 0.5)), GLASS)]
         images = [
             picture(scene(*(parts[k] for k in order), eye=EYES[0])) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
