@@ -17,8 +17,8 @@ from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
 from renderer.trace.starts.meeting import lean_sign, seen_from, turn_sign
 
-# The most faces that may hold a start; of more, those beyond are left out.
-MOST_HOLDERS = 4096
+# The most faces that may hold a start; of more, those beyond are left out. Memory that is not used is not taken.
+MOST_HOLDERS = 1 << 16
 # The words of a holder: its place in the blocks, its face, the bits of the corners of weight 0, its two nodes, the
 # parities of two paths, and that of the second where it is FREE.
 PLACE, NUMBER, ZEROS, FIRST_NODE, SECOND_NODE, PATH, OTHER_PATH, FREE_PATH, _HOLDER_WORDS = range(9)
