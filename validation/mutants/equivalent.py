@@ -34,9 +34,6 @@ EQUIVALENT: dict[str, str] = {
             "of two equal numbers either may be taken"
         for n in (0, 1) for sign in "<>"
     },
-    "renderer.shade.whitted._passes_light #0: largest_component(three(materials, m + TRANSMITTANCE)) > 0.0 -> "
-    "(largest_component(three(materials, m + TRANSMITTANCE))) >= (0.0)":
-        "a ray of weight 0 does not go on, so the one refracted by a surface that lets no light through is not spawned",
     "validation.oracle.exact._BoxTree.__init__ #0: range(depth) -> range(depth - 1)":
         "the faces of the last level stay unsorted: wider boxes and more candidates, the same answers",
     "validation.oracle.star #0: 1 -> 2": "points are judged one by one, however many are taken together",
