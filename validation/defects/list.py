@@ -311,8 +311,8 @@ PICTURES = (
     _kernel("pictures", "total internal reflection lost", "_refract",
             "1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)",
             "0.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)"),
-    _kernel("pictures", "every medium stands in air", "whitted._innermost_ior",
-            "get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
+    _kernel("pictures", "every medium stands in air", "crossing._innermost_ior",
+            "get(scene.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
     _kernel("pictures", "refraction by the textbook's formula", "refract",
             "if s2 < 0.5:\n"
             "    s = math.sqrt(s2)\n"
@@ -360,7 +360,7 @@ PICTURES = (
             "color = (row + column) % len(floor.materials)", "color = (row + column + 1) % len(floor.materials)"),
     _kernel("pictures", "min_weight judged by the mean of the channels", "whitted._goes_on",
             "largest = largest_component(weight)", "largest = (weight[0] + weight[1] + weight[2]) / 3.0"),
-    _kernel("pictures", "leaving a medium forgets its outermost entry", "_enter_or_leave",
+    _kernel("pictures", "leaving a medium forgets its outermost entry", "crossing._leave",
             "range(count - 1, -1, -1)", "range(count)"),
     _python("pictures", "an eye within media is in the outermost", "media_around",
             "sorted(around, reverse=True)", "sorted(around)"),
