@@ -27,7 +27,7 @@ from renderer.trace.rays import HitPointers, RayPointers, hit_pointers
 from renderer.trace.spawn import LEVEL, has_normal, leave_to_both_sides, put_no_start
 from renderer.trace.starts.anchor import anchor_of, rounded
 from renderer.trace.starts.cone import make_holders
-from renderer.trace.starts.fan import FAN_DOUBLES, OPEN, STOPPED, UNSURE, clear_fan, has_fan, stop_of
+from renderer.trace.starts.fan import FAN_HEAD, OPEN, STOPPED, UNSURE, has_fan, size_of_fan, stop_of
 from renderer.trace.starts.record import (
     ABOVE,
     ANCHOR,
@@ -64,10 +64,14 @@ RAYS_A_CALL = 1 << 14
 # ``starts.record``; and of a point on an edge the table of ``starts.fan``.
 _ABOVE, _BELOW, _FACING, _FRAME = 0, 3 * TILE, 6 * TILE, 9 * TILE
 _SUM, _WHOLE, _START, _FAN = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
-_POINT_DOUBLES = _FAN + FAN_DOUBLES * TILE
-# Its row; the leaf that hid its last direction, or 0; whether it is a corner of the mesh; and once for the tile, how
-# often tracing its rays together may still be tried.
-_ROW, _HIDER, _CORNER, _LEFT, _POINT_INTEGERS = 0, TILE, 2 * TILE, 3 * TILE, 3 * TILE + 8
+# The room for all tables: what sixteen faces a point take; and for a table of none.
+_FANS, _LEAST_FAN = 256 * TILE, FAN_HEAD
+_POINT_DOUBLES = _FAN + _FANS
+# Its row; the leaf that hid its last direction, or 0; whether it is a corner of the mesh; where
+# its table begins, -1 for none; and once for the tile, how often tracing its rays together may still be tried, and where
+# the next table begins.
+_ROW, _HIDER, _CORNER, _TABLE = 0, TILE, 2 * TILE, 3 * TILE
+_LEFT, _TABLES, _POINT_INTEGERS = 4 * TILE, 4 * TILE + 1, 4 * TILE + 8
 
 
 class Places(NamedTuple):
@@ -194,6 +198,7 @@ def _begin_tile(tree, mesh, places, rows, begin, count, work):
     points, normals, leaving = pointer(places.points), pointer(places.normals), pointer(places.leaving)
     step = np.int64(len(places.normals) > 1)
     put(work.numbers, _LEFT, _TRIES)
+    put(work.numbers, _TABLES, 0)
     for i in range(count):
         row = rows[begin + i]
         face, o, start = get(leaving, row), row3(points, row), at(work.points, _START + ROW * i)
@@ -236,14 +241,17 @@ def _begin_on_face(tree, mesh, work, i, o, face, has_horizon):
 @kernel
 def _begin_on_edge(tree, starts, work, i, n, has_horizon):
     """``_begin_on_face`` for a point on or near an edge."""
-    own, table = at(work.points, _START + ROW * i), at(work.points, _FAN + FAN_DOUBLES * i)
+    own, begin = at(work.points, _START + ROW * i), get(work.numbers, _TABLES)
     anchor = anchor_of(start_at(starts, 0, tree.scale))
     put(work.numbers, _CORNER + i, np.int64(anchor.zeros & (anchor.zeros - 1) != 0))
     _put3(work.points, _ABOVE + 3 * i, scale(rounded(anchor), 1.0 / tree.scale))
-    clear_fan(table)
-    if has_horizon:
-        stack, holders = work.scratch.packet_stack, work.scratch.holders
-        side = side_of_normal(tree, start_at(starts, 0, tree.scale), n, stack, holders, table)
+    put(work.numbers, _TABLE + i, -1)
+    if has_horizon and _FANS - begin >= _LEAST_FAN:
+        stack, holders, table = work.scratch.packet_stack, work.scratch.holders, at(work.points, _FAN + begin)
+        side = side_of_normal(tree, start_at(starts, 0, tree.scale), n, stack, holders, table, _FANS - begin)
+        if has_fan(table):
+            put(work.numbers, _TABLE + i, begin)
+            put(work.numbers, _TABLES, begin + size_of_fan(table))
         if side.face >= 0:
             # The side is that of a face that may be another one, which then is the one that the rays leave.
             put(own, FACE, np.float64(side.face))
@@ -275,9 +283,11 @@ def _start_ray(work, i, d, ray):
 @kernel
 def _start_on_edge(work, i, d, row):
     """``_start_ray`` for a point on or near an edge, whose start is written."""
-    table, stop = at(work.points, _FAN + FAN_DOUBLES * i), OPEN
+    begin, stop = get(work.numbers, _TABLE + i), OPEN
     if np.int64(get(row, CODE)) & KNOWN != 0:
-        stop = stop_of(table, d, make_holders(work.scratch.holders)) if has_fan(table) else UNSURE
+        stop = UNSURE
+        if begin >= 0:
+            stop = stop_of(at(work.points, _FAN + begin), d, make_holders(work.scratch.holders))
     if stop == OPEN:
         # Nothing is left to be decided at the start.
         put(row, CODE, np.float64(BARYCENTRIC))

@@ -14,7 +14,6 @@ from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HIT_ROWS
 from renderer.trace.singly import FEW_DEPTH, stack_size, trace_few
-from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.traverse import Memory, make_memory, search_chunk, trace_chunk
 
 # Few rays go in smaller chunks, sixteen per thread, so that no thread has much more to do than another.
@@ -23,6 +22,7 @@ _LEAST_CHUNK = 1024
 _BLOCK_TESTS = 1 << 22
 # Fewer rays than a packet holds go one by one, by a kernel that compiles in a fraction of the time.
 FEW = WIDTH - 1
+# The room for the faces that hold a start, where no ray starts on the surface.
 _NO_ROOM = np.empty(1, np.int64)
 
 
@@ -55,15 +55,15 @@ def _are_few(tree: Tree, rays: RayBatch) -> bool:
 def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
     """Closest hits of a few rays on the caller's thread, as ``singly.trace_few`` writes them."""
     out = np.empty((HIT_ROWS, rays.number))
-    row = trace_few(tree.words, rays, out, _room(rays))
+    if rays.starts is NO_STARTS:
+        row = trace_few(tree.words, rays, out, _NO_ROOM)
+    else:
+        memory = _take_memory(tree.depth)
+        row = trace_few(tree.words, rays, out, memory.holders)
+        _local.memory = memory
     if row >= 0:
         reject(rays, row, tree.scale)
     return out
-
-
-def _room(rays: RayBatch) -> NDArray[np.int64]:
-    """Room for the faces that hold a start; none is needed where no ray starts on the surface."""
-    return _NO_ROOM if rays.starts is NO_STARTS else np.empty(HOLDERS_WORDS, np.int64)
 
 
 def rays_against_blocks(tree: Tree) -> int:
@@ -85,7 +85,9 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
         if bad and bad[0] < begin:
             return
         if not tree.has_nodes:
-            row = search_chunk(tree.words, rays, out, begin, end, any_hit, _room(rays))
+            memory = _take_memory(tree.depth)
+            row = search_chunk(tree.words, rays, out, begin, end, any_hit, memory.holders)
+            _local.memory = memory
             if row >= 0:
                 bad.append(row)
             return
@@ -108,7 +110,7 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
 
 
 class _Local(threading.local):
-    """Memory in which a thread traces its next chunk, kept from the last one: 100 kB."""
+    """Memory in which a thread traces its next chunk, kept from the last one: 100 kB are used."""
 
     memory: Memory | None = None
 

@@ -25,12 +25,13 @@ from renderer.kernels.vec3 import (
 )
 from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import DOUBT, SLANT
-from renderer.trace.starts.anchor import anchor_of, far_from
+from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
     ABOVE,
     ANCHOR,
     BARYCENTRIC,
     CODE,
+    CORNER,
     EDGE,
     FACE,
     KNOWN,
@@ -338,6 +339,15 @@ def _lies_at(corners, weights, o, unit):
 
 
 @kernel
+def _at_corner(start, o, unit):
+    """The corner that a start is on, from which a ray starts exactly, and its slack; elsewhere o and EDGE."""
+    anchor = anchor_of(start)
+    if anchor.zeros & (anchor.zeros - 1) == 0:
+        return o, EDGE
+    return scale(rounded(anchor), 1.0 / unit), CORNER
+
+
+@kernel
 def leave_faces(vertices, faces, rays, leaving, code, anchors, starts, rows, bounds):
     """Write to ``starts`` (n, 3) where the rays begin:end start that leave the faces ``leaving``, -1 for none.
 
@@ -365,6 +375,9 @@ def leave_faces(vertices, faces, rays, leaving, code, anchors, starts, rows, bou
             # A point inside its face may only be above or below.
             if len(anchors) == 0 and (slack == EDGE or _lies_above(own, o)) and _lies_far(around, o, unit):
                 return i
+            if slack == EDGE and bits & KNOWN == 0:
+                given = scale(o, unit) if len(anchors) == 0 else row3(pointer(anchors), i)
+                own, slack = _at_corner(Start(around, given, face, bits), o, unit)
         anchor = o if len(anchors) == 0 else row3(pointer(anchors), i)
         row = at(pointer(starts), 3 * i)
         for k in range(3):

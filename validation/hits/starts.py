@@ -32,9 +32,9 @@ _SIGN_ROUNDINGS = 8 * 2.0**-53
 # t of the sample, relative and in units of the largest coordinate over the direction's part along the normal: an answer
 # beyond is another hit. A start inside a face is moved by up to 2^-38 of the face. How exact t is, other gates judge.
 _RELATIVE, _ABSOLUTE = 1e-9, 2.0**-37
-# Near its start a ray is judged exactly, but for what is beyond the pairs of float64 that decide: edge functions of
-# less than this share of their terms. Farther off, as any ray, it may pass an edge on either side that it passes by no
-# more than its start is moved.
+# Near its start, by the size of the face, a ray is judged exactly, but for what is beyond the pairs of float64 that
+# decide: edge functions of less than this share of their terms. Farther off, as any ray, it may pass an edge on either
+# side that it passes by no more than its start is moved.
 _CLOSEST, _NEAR = Fraction(1, 1 << 84), 2.0**-30
 _REASON = "exact arithmetic says so"
 
@@ -242,9 +242,16 @@ def judged_at_once(surface: Surface, batch: Batch) -> tuple[Bools, Bools]:
             t, face, here = batch.t[rows[some]], batch.face[rows[some]], at[some]
             stopped_right = (t == 0.0) & np.isin(face, [stop for stop in stops if stop is not None])
             right = stopped_right | ((None in stops) & ~here & (t > 0.0))
-            wrong[rows[some]] = ~right
+            wrong[rows[some]] = ~right if not right.all() and not _runs_along(regions, way) else False
             goes_on[rows[some]] = (None in stops) & ~stopped_right
     return wrong, goes_on
+
+
+def _runs_along(regions: Any, way: tuple[int, int, int]) -> bool:
+    """Whether a direction is along an edge at the start, but for what is beyond the pairs of float64 that decide."""
+    borders = [side for cone in regions.cones.values() for side in (cone.first, cone.last) if side is not None]
+    size = max(map(abs, way))
+    return any(max(map(abs, cross(side, way))) <= _CLOSEST * size * max(map(abs, side)) for side in borders)
 
 
 def _stops(surface: Surface, regions: Any, start: Start, ray: tuple[Any, int, bool]) -> set[int | None]:
@@ -295,7 +302,8 @@ def is_right(
             return True
     faces = {face, *(first.face for first in law)} - {-1}
     ends = [t, *(float(first.t) for first in law if first.t is not None)]
-    near = min(ends) * float(np.abs(direction).max()) <= _NEAR * surface.largest
+    size = min(surface.size(number) for number in faces | ({start.face} - {-1}))
+    near = min(ends) * float(np.abs(direction).max()) <= _NEAR * size
     return any(_is_closer(surface, number, start, direction, near) for number in faces)
 
 

@@ -144,6 +144,10 @@ class Surface:
         found: list[list[float]] = self._corners[face].tolist()
         return found
 
+    def size(self, face: int) -> float:
+        """A face's largest extent along an axis."""
+        return float(np.ptp(self._corners[face], axis=0).max())
+
     def holding(self, place: Place) -> list[tuple[int, tuple[bool, ...]]]:
         """The faces, ascending, that hold a point, and on which of their sides 01, 12, 20 it lies."""
         origin, bottom = self._scaled(place)

@@ -17,8 +17,8 @@ from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
 from renderer.trace.starts.meeting import lean_sign, seen_from, turn_sign
 
-# The most faces that may hold a start; of more, those beyond are left out.
-MOST_HOLDERS = 4096
+# The most faces that may hold a start; of more, those beyond are left out. Memory that is not used is not taken.
+MOST_HOLDERS = 1 << 16
 # The words of a holder: its place in the blocks, its face, the bits of the corners of weight 0, its two nodes, the
 # parities of two paths, and that of the second where it is FREE.
 PLACE, NUMBER, ZEROS, FIRST_NODE, SECOND_NODE, PATH, OTHER_PATH, FREE_PATH, _HOLDER_WORDS = range(9)
@@ -98,7 +98,9 @@ def _after(k):
 
 @kernel
 def name_nodes(tree, anchor, holders, count):
-    """Name the ends of all cones: two ends are one node where they lie in one direction. Returns how many there are."""
+    """Name the ends of all cones: two ends are one node where they are one corner, and ends that no other cone has where
+    they lie in one direction. Returns the number of nodes.
+    """
     nodes = 0
     for k in range(count):
         zeros, place = holder(holders, k, ZEROS), holder(holders, k, PLACE)
@@ -107,29 +109,49 @@ def name_nodes(tree, anchor, holders, count):
         if zeros != 0:
             own = _corner_of(zeros) if count_zeros(zeros) == 2 else _opposite(zeros)
             first, second = _after(own), _after(_after(own))
-            one, nodes = _named(tree, anchor, holders, nodes, place + 12 * first)
+            one, nodes = _named(tree, holders, nodes, place + 12 * first)
             put_holder(holders, k, FIRST_NODE, one)
-            other, nodes = _named(tree, anchor, holders, nodes, place + 12 * second)
+            other, nodes = _named(tree, holders, nodes, place + 12 * second)
             put_holder(holders, k, SECOND_NODE, other)
+    _join_ends(tree, anchor, holders, count, nodes)
     return nodes
 
 
 @kernel
-def _named(tree, anchor, holders, nodes, place):
-    """The node in the direction of a corner, a new one if there is none; and the number of nodes."""
+def _named(tree, holders, nodes, place):
+    """The node of a corner, a new one if there is none; and the number of nodes. PARITY counts the ends there."""
     p = corner(tree, place)
     for k in range(nodes):
-        if _one_direction(tree, anchor, p, corner(tree, node(holders, k, NODE_PLACE))):
+        q = corner(tree, node(holders, k, NODE_PLACE))
+        if p[0] == q[0] and p[1] == q[1] and p[2] == q[2]:
+            put_node(holders, k, PARITY, node(holders, k, PARITY) + 1)
             return k, nodes
     put_node(holders, nodes, NODE_PLACE, place)
+    put_node(holders, nodes, PARITY, 1)
     return nodes, nodes + 1
 
 
 @kernel
-def _one_direction(tree, anchor, p, q):
+def _join_ends(tree, anchor, holders, count, nodes):
+    """Let ends that one cone alone has be one node where they lie in one direction, as where edges meet an edge."""
+    for i in range(nodes):
+        for j in range(i):
+            alone = node(holders, i, PARITY) == 1 and node(holders, j, PARITY) == 1
+            if alone and _one_direction(anchor, _node_corner(tree, holders, i), _node_corner(tree, holders, j)):
+                for k in range(count):
+                    for word in (FIRST_NODE, SECOND_NODE):
+                        if holder(holders, k, word) == i:
+                            put_holder(holders, k, word, j)
+
+
+@inlined
+def _node_corner(tree, holders, k):
+    return corner(tree, node(holders, k, NODE_PLACE))
+
+
+@kernel
+def _one_direction(anchor, p, q):
     """Whether two points are in one direction from the anchor."""
-    if p[0] == q[0] and p[1] == q[1] and p[2] == q[2]:
-        return True
     a, b = _unit_way(anchor, p), _unit_way(anchor, q)
     across = cross_pairs(a, b)
     error = 2.0**-86 + 2.0**-94 * anchor.unit * (1.0 / _size(anchor, p) + 1.0 / _size(anchor, q))

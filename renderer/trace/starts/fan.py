@@ -23,19 +23,28 @@ from renderer.trace.starts.cone import (
 )
 from renderer.trace.starts.region import ATTEMPTS, are_even, hub_of, path_to_cone
 
-# The most faces of a table; with more every direction is left to ``region``.
-MOST_FACES = 16
 # The head of a table: the number of faces, 0 where there is no table; whether they are one closed fan; and the parity
 # of the path to the start's region. Then for each face: the unit normal n, n x a and n x b of the outline's directions
 # a and b, the products of these three with the hub, the parity of the path, and the two nodes.
-_COUNT, _CLOSED, _PARITY, _HEAD = range(4)
+_COUNT, _CLOSED, _PARITY, FAN_HEAD = range(4)
 _NORMAL, _FIRST, _SECOND, _HUB, _PATH, _NODES, _ROW = 0, 3, 6, 9, 12, 13, 15
-FAN_DOUBLES = _HEAD + MOST_FACES * _ROW
 OPEN, STOPPED, UNSURE = range(3)
 # What rounding may have made of a product of unit vectors.
 _ROUNDED = 2.0**-40
 # The least product of a normal with the hub, so that its own rounding does not matter.
 _LEAST = 2.0**-12
+
+
+@inlined
+def fan_doubles(count):
+    """The float64 of a table of ``count`` faces."""
+    return FAN_HEAD + _ROW * count
+
+
+@inlined
+def size_of_fan(table):
+    """The float64 of a table."""
+    return fan_doubles(np.int64(get(table, _COUNT)))
 
 
 @inlined
@@ -57,10 +66,12 @@ def _put3(base, first, a):
 
 
 @kernel
-def write_fan(tree, anchor, holders, count, nodes, k, side, table):
-    """Write the table of a start in the region beside the k-th of its holders, on one side of it."""
+def write_fan(tree, anchor, holders, count, nodes, k, side, table, room):
+    """Write the table of a start in the region beside the k-th of its holders, on one side of it, if there are ``room``
+    float64 for it.
+    """
     clear_fan(table)
-    if count > MOST_FACES:
+    if fan_doubles(count) > room:
         return
     for attempt in range(ATTEMPTS):
         sound = path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH)
@@ -75,7 +86,7 @@ def _write_rows(tree, anchor, holders, count, hub, table):
     """Write the rows of all faces; returns whether the hub is far from their planes."""
     parity = np.int64(0)
     for j in range(count):
-        cone, row = cone_of(tree, anchor, holders, j), at(table, _HEAD + _ROW * j)
+        cone, row = cone_of(tree, anchor, holders, j), at(table, FAN_HEAD + _ROW * j)
         n = normalized(heads(cone.face.normal))
         first, second = cross(n, normalized(heads(cone.first))), cross(n, normalized(heads(cone.second)))
         if abs(dot(n, hub)) < _LEAST:
@@ -142,7 +153,7 @@ def stop_of(table, d, holders):
     count, size, parity = np.int64(get(table, _COUNT)), largest_component(d), np.int64(get(table, _PARITY))
     closed = get(table, _CLOSED) != 0.0
     for j in range(count):
-        row = at(table, _HEAD + _ROW * j)
+        row = at(table, FAN_HEAD + _ROW * j)
         crossed = _crosses(row, d, size)
         if crossed < 0:
             return UNSURE

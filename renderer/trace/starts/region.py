@@ -201,11 +201,24 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
                 best = _lower(holders, best, j)
     if best != NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
         return best
-    for j in range(count):
+    last = np.int64(-1)
+    for _ in range(count):
+        j = _next_face(holders, count, last)
+        last = holder(holders, j, NUMBER)
         behind = slope_of(cone_of(tree, anchor, holders, j).face, d)
         if behind != 0 and _bounds_region(tree, anchor, holders, count, nodes, own, side, j, -behind):
-            best = _lower(holders, best, j)
-    return best
+            return j
+    return NOT_STOPPED
+
+
+@inlined
+def _next_face(holders, count, last):
+    """The holder of the lowest face after ``last``."""
+    found = NOT_STOPPED
+    for j in range(count):
+        if holder(holders, j, NUMBER) > last:
+            found = _lower(holders, found, j)
+    return found
 
 
 @inlined

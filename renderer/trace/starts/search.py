@@ -266,8 +266,10 @@ class Side(NamedTuple):
 
 
 @kernel
-def side_of_normal(tree, start, n, stack, memory, table):
-    """The ``Side`` of a start whose normal n says in which region it is; and its ``fan`` in ``table``."""
+def side_of_normal(tree, start, n, stack, memory, table, room):
+    """The ``Side`` of a start whose normal n says in which region it is; and its ``fan`` in
+    ``table``, if ``room`` float64 hold it.
+    """
     anchor, holders = anchor_of(start), make_holders(memory)
     d, _ = unit_direction(n)
     slope = slope_there(anchor, d)
@@ -277,7 +279,7 @@ def side_of_normal(tree, start, n, stack, memory, table):
     clear_fan(table)
     if k == NOT_STOPPED:
         return Side(-1, 0, 0.0, 0.0)
-    write_fan(tree, anchor, holders, count, nodes, k, side, table)
+    write_fan(tree, anchor, holders, count, nodes, k, side, table, room)
     met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, 1.0)
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0 else 0)
     u, v = barycentrics_of(met)
