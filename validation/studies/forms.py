@@ -61,7 +61,8 @@ def streets() -> list[Form]:
     place = width * (np.arange(_PLACES) + 0.5) / _PLACES
     points = np.stack([place - width / 2.0, np.linspace(0.1, 0.9, _PLACES), np.zeros(_PLACES)], axis=1)
     left, right = np.arctan(depth / place), np.arctan(depth / (width - place))
-    asked = {"points": points, "leaving": 0 * points[:, 0].astype(np.int64)}
+    faces = Octree.from_mesh(street(width, depth)).closest_point(points).face
+    asked = {"points": points, "leaving": faces}
     return [
         _sky("floor of a street", "(cos a + cos b) / 2 of the walls' heights in angle (Oke 1987)", street(width, depth),
              (np.cos(left) + np.cos(right)) / 2.0, **asked),

@@ -143,7 +143,8 @@ def hours_behind_walls() -> Asked:
     suns = np.stack([np.cos(angle), np.zeros(179), np.sin(angle)], axis=1) * np.linspace(0.5, 9.0, 179)[:, None]
     hours = np.arange(1.0, 180.0) / 4.0
     x = np.linspace(-0.9, 0.9, 37)
-    found = sun_hours(octree, np.stack([x, x, 0 * x], axis=1), [0, 0, 1], suns, hours, leaving=0 * x.astype(np.int64))
+    points = np.stack([x, x, 0 * x], axis=1)
+    found = sun_hours(octree, points, [0, 0, 1], suns, hours, leaving=octree.closest_point(points).face)
     low, high = np.arctan(depth / (1.0 - x)), np.pi - np.arctan(depth / (1.0 + x))
     known = [hours[(angle > a) & (angle < b)].sum() for a, b in zip(low, high, strict=True)]
     return _count(found == known)
