@@ -14,12 +14,14 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.scene.scene import load_scene
 from validation.gates import Gate
-from validation.hits import watertight
+from validation.hits import mirrors, starts, watertight
 from validation.hits.rays import float32_exact
 from validation.hits.refit import check_refit
 from validation.hits.section import HitEffort, check_leaks, check_mesh
+from validation.hits.walks import check_walks
 from validation.job import Job
 from validation.pictures.section import PictureEffort, check_scene
+from validation.pictures.unseen import check_unseen
 from validation.promises import section as promises
 from validation.queries import section
 from validation.references.table import REFERENCES
@@ -39,6 +41,9 @@ _EMBREE = tuple(reference for reference in REFERENCES if reference.key == "embre
 _HITS = HitEffort(rays=3_000, exact=40, leaks=20_000, references=_EMBREE)
 # Other libraries are not asked: they judge nothing here.
 _QUERIES = section.QueryEffort(random=3_000, nasty=12_000, beside=0, distances=240, rays=40, drop_in=1)
+# Some hundred rays from each body, a few of which are judged to their end.
+_STARTS = starts.StartEffort(rays=20_000, exact=1_200)
+_WALKS, _MIRRORS = 12, 150
 # Leak rays of each kind in each placement: the rarest of these defects leaks one in 20,000.
 _LEAKS = 200_000
 # The extreme case of a million triangles; no defect here affects what it tests about size.
@@ -89,6 +94,18 @@ def sweep(job: Job) -> list[Gate]:
     return watertight.gates(counts)
 
 
+def from_surfaces(job: Job) -> Iterator[Gate]:
+    """Rays that start on surfaces, go through them, and are reflected within them."""
+    yield from starts.check_starts(job, _STARTS)[1]
+    yield from check_walks(job, _WALKS)[1]
+    yield from mirrors.check_mirrors(job, _MIRRORS)[1]
+
+
+def unseen(job: Job) -> list[Gate]:
+    """Closed mirrors from within, glass on the ground, glass on glass."""
+    return check_unseen(job)[1]
+
+
 def curves(job: Job) -> list[Gate]:
     """Error of t against offset, scale, angle and sliver height."""
     return [gate for index in range(len(sweeps.SWEEPS)) for gate in sweeps.curve(index, job.quick)[1]]
@@ -117,14 +134,23 @@ def queries(job: Job) -> list[Gate]:
 
 
 def studies(job: Job) -> list[Gate]:
-    """Closed forms, bits beside Embree and what holds exactly."""
+    """Closed forms, bits beside Embree and at corners, and what holds exactly."""
     return study_section.run(job)[1]
 
 
 # A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
-    "hits": (promised(promises.HITS), hits, extreme(1, 32), extreme(46, 46), extreme(49, 52), sweep, curves),
+    "hits": (
+        promised(promises.HITS),
+        hits,
+        extreme(1, 32),
+        extreme(46, 46),
+        extreme(49, 52),
+        sweep,
+        curves,
+        from_surfaces,
+    ),
     "queries": (promised(promises.QUERIES), queries, extreme(51, 54)),
     "studies": (studies,),
-    "pictures": (promised(promises.PICTURES), pictures, extreme(33, 45), extreme(47, 48)),
+    "pictures": (promised(promises.PICTURES), pictures, unseen, extreme(33, 45), extreme(47, 48)),
 }

@@ -19,7 +19,7 @@ from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits.bodies import Body, bodies
 from validation.job import Job
-from validation.oracle.distance import cross, difference, dot
+from validation.oracle.distance import cross, difference, dot, rational
 from validation.oracle.starts import First, Start, Surface, stopped
 
 Floats = NDArray[np.float64]
@@ -226,7 +226,7 @@ def judged_at_once(surface: Surface, batch: Batch) -> tuple[Bools, Bools]:
     ends = np.searchsorted(batch.which[order], np.arange(len(batch.starts) + 1))
     for number, start in enumerate(batch.starts):
         rows = order[ends[number] : ends[number + 1]]
-        if not len(rows):
+        if not len(rows) or _is_beside_an_edge(surface, start):
             continue
         held = surface.holding(start.place)
         regions = surface.regions(held)
@@ -252,6 +252,19 @@ def _runs_along(regions: Any, way: tuple[int, int, int]) -> bool:
     borders = [side for cone in regions.cones.values() for side in (cone.first, cone.last) if side is not None]
     size = max(map(abs, way))
     return any(max(map(abs, cross(side, way))) <= _CLOSEST * size * max(map(abs, side)) for side in borders)
+
+
+def _is_beside_an_edge(surface: Surface, start: Start) -> bool:
+    """Whether a start is in its face, and so near to an edge that pairs of float64 put it on that."""
+    if start.face < 0:
+        return False
+    corners = rational(surface.corners(start.face))
+    normal = cross(difference(corners[1], corners[0]), difference(corners[2], corners[0]))
+    for k in range(3):
+        along = difference(corners[(k + 1) % 3], corners[k])
+        if 0 < dot(normal, cross(along, difference(start.place, corners[k]))) <= _CLOSEST * dot(normal, normal):
+            return True
+    return False
 
 
 def _stops(surface: Surface, regions: Any, start: Start, ray: tuple[Any, int, bool]) -> set[int | None]:

@@ -17,7 +17,7 @@ from renderer.picture.render import render
 from renderer.scene.scene import UNLIMITED_RAYS, Scene, load_scene
 from validation.gates import Gate
 from validation.job import Job, Task
-from validation.pictures import aovs, check, ladder, monte_carlo, placement
+from validation.pictures import aovs, check, ladder, monte_carlo, placement, unseen
 from validation.pictures.check import Pair, Rule
 from validation.pictures.compare import Picture, fragile_pixels
 from validation.pictures.files import write_png
@@ -90,8 +90,10 @@ class _Plan(NamedTuple):
 
 
 def steps(job: Job) -> int:
-    """Number of calls of ``job.step`` in ``run``: one for the main scene, the others by the scenes' plans."""
-    return job.own + sum(plan_pictures(load_scene(path), effort).steps for _, _, path, effort in scenes_of(job))
+    """Number of calls of ``job.step`` in ``run``: those of the suite's own, the others by the scenes' plans."""
+    return job.own * (1 + unseen.steps()) + sum(
+        plan_pictures(load_scene(path), effort).steps for _, _, path, effort in scenes_of(job)
+    )
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
@@ -104,6 +106,8 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
         found += passed
     result: dict[str, Any] = {"scenes": records, "costs": costs_of(records)}
     if job.own:
+        result["unseen"], passed = unseen.check_unseen(job)
+        found += passed
         job.step("pictures: the main scene, 9 samples a pixel")
         result["hero"] = _hero(job)
     return result, found

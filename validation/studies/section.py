@@ -6,7 +6,7 @@ from typing import Any
 
 from validation.gates import Gate
 from validation.job import Job, Task
-from validation.studies import bits, bodies, forms, holds, picture
+from validation.studies import bits, bodies, corners, forms, holds, picture
 
 # Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
 # faces are traced together.
@@ -15,6 +15,7 @@ JUDGES = ("closed forms", "Embree robust", "exact arithmetic")
 _BITS = "exact: of each bit on which Embree differs, and of a sample of the others, exact arithmetic says who is right"
 _BOUND = "the bound: as if every patch along the boundary were wrong by half of its weight, all to one side"
 _SLOPE = "chance alone has -1/2; an even lattice does better"
+_NAMED = "exact: the normal says in which region rays start, and which face is named changes nothing"
 _HOLDS = "exact: it must hold of every answer"
 PICTURE = "studies-town.png"
 
@@ -30,6 +31,7 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     shares = [next(found) for _ in forms.forms()]
     slopes = next(found)["curves"]
     bit_rows = [next(found) for _ in bodies.bodies()]
+    corner_rows = [next(found) for _ in corners.CHECKS]
     held = [next(found) for _ in holds.CHECKS]
     drawn = next(found)
     gates = [
@@ -38,13 +40,14 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
         *(Gate("studies", row["subject"], "slope of the error", row["slope"], "at most", forms.SLOPE, _SLOPE)
           for row in slopes),
         *(Gate("studies", row["subject"], "wrong bits", float(row["wrong"]), "at most", 0.0, _BITS)
-          for row in bit_rows),
+          for row in (*bit_rows, *corner_rows)),
+        *(Gate("studies", row["subject"], "points with another sky where their face is named", float(row["unlike"]),
+               "at most", 0.0, _NAMED) for row in corner_rows),
         *(Gate("studies", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, _HOLDS)
           for row in held),
     ]  # fmt: skip
-    record = {"forms": shares, "slopes": slopes, "bits": bit_rows, "holds": held, "picture": drawn,
-              "patches": list(forms.PATCHES),
-              "costs": dict.fromkeys(JUDGES)}  # fmt: skip
+    record = {"forms": shares, "slopes": slopes, "bits": bit_rows, "corners": corner_rows, "holds": held,
+              "picture": drawn, "patches": list(forms.PATCHES), "costs": dict.fromkeys(JUDGES)}  # fmt: skip
     return record, gates
 
 
@@ -56,6 +59,8 @@ def _tasks(job: Job) -> list[Task]:
         Task("studies: error against directions", partial(forms.check_slope, job.quick)),
         *(Task(f"studies: bits of {name}", partial(bits.check_bits, name, points, directions))
           for name in bodies.bodies()),
+        *(Task(f"studies: bits at {kind} of {name}", partial(corners.check_corners, index, job.quick))
+          for index, (name, kind) in enumerate(corners.CHECKS)),
         *(Task(f"studies: {name}", partial(holds.check, name)) for name in holds.CHECKS),
         Task("studies: picture", partial(picture.write, Path(job.folder) / PICTURE)),
     ]  # fmt: skip

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from renderer import Octree
+from renderer.runs.chosen import Chosen
+from renderer.runs.study import Points
 from validation.job import Job
 from validation.report import page, studies_figures
-from validation.studies import bits, bodies, forms, holds, section
+from validation.studies import bits, bodies, corners, forms, holds, section
 from validation.thresholds import Thresholds
 
 
@@ -19,6 +21,8 @@ def run(tmp_path_factory):
     job = Job(True, Thresholds(), tmp_path_factory.mktemp("studies"), taken.append)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(section, "_QUICK", (150, 16))
+        patch.setattr(corners, "_QUICK", 40)
+        patch.setattr(corners, "_SAMPLE", 40)
         record, gates = section.run(job)
     assert len(taken) == section.steps(job)
     return record, gates, job.folder
@@ -26,8 +30,9 @@ def run(tmp_path_factory):
 
 def test_all_gates_pass_and_the_record_draws_a_figure(run):
     record, gates, folder = run
-    assert len(gates) == len(record["forms"]) + 2 + 5 + len(holds.CHECKS) and all(gate.passed for gate in gates)
-    assert all(row["asked"] > 0 for row in (*record["bits"], *record["holds"]))
+    assert len(gates) == len(record["forms"]) + 2 + 5 + 2 * 8 + len(holds.CHECKS)
+    assert all(gate.passed for gate in gates)
+    assert all(row["asked"] > 0 for row in (*record["bits"], *record["corners"], *record["holds"]))
     assert (folder / section.PICTURE).stat().st_size > 10_000
     (figure,) = studies_figures.figures(record)
     assert "N^-0.7" in figure["svg"] and "as by chance" in figure["svg"]
@@ -63,11 +68,62 @@ def test_a_wrong_bit_is_counted(monkeypatch, name):
     assert bits.check_bits(name, 40, 64)["wrong"] == 8
 
 
+@pytest.mark.parametrize("name", corners.MESHES)
+def test_a_wrong_bit_at_a_vertex_is_counted(monkeypatch, name):
+    own, index = corners.occlusion, list(corners.CHECKS).index((name, "vertices"))
+    monkeypatch.setattr(corners, "_QUICK", 20)
+    monkeypatch.setattr(corners, "_SAMPLE", 20)
+    asked = []
+
+    def one_wrong(octree, points, *told, **options):
+        """The second call is that of lifted starts."""
+        found = own(octree, points, *told, **options)
+        asked.append(points)
+        found[7, 0] ^= 0xFF * (len(asked) == 1)
+        return found
+
+    monkeypatch.setattr(corners, "occlusion", one_wrong)
+    assert corners.check_corners(index, True)["wrong"] == 8
+
+
+def test_a_face_that_turns_the_side_is_counted(monkeypatch):
+    own = corners.sky_view_factor
+    monkeypatch.setattr(corners, "_QUICK", 4)
+    monkeypatch.setattr(
+        corners, "sky_view_factor", lambda *a, leaving=None, **k: own(*a, **k) + (leaving is not None) * 2.0**-40
+    )
+    assert corners.check_corners(1, True)["unlike"] == 8
+
+
+def test_the_law_at_a_corner_by_hand():
+    """From a corner of a cube, out of which its normal points. A wall hides what goes there; along an edge the cube's
+    next face is met.
+    """
+    mesh = bodies.Mesh.concatenate([bodies.box(), bodies.box((3.0, -9.0, -9.0), (4.0, 9.0, 9.0))])
+    surface = corners.Surface(mesh.vertices, mesh.faces)
+    start = corners.Start((corners.Fraction(1), corners.Fraction(1), corners.Fraction(1)))
+    ways = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [-1.0, 2.0, -0.5], [-1.0, -1.0, -1.0]])
+    hidden = corners.hidden_by_law(surface, [start] * 5, np.tile([1.0, 1.0, 1.0], (5, 1)), ways)
+    assert hidden.tolist() == [True, True, False, False, True]
+
+
 def test_exact_rays_skip_the_face_that_they_leave_and_nothing_else():
     mesh = bodies.touching()
     start = np.array([[0.5, 0.5, 2.0]])
     assert bits.hidden_exactly(mesh, start, np.array([[0.0, 0.0, 1.0]])).tolist() == [False]
     assert bits.hidden_exactly(mesh, start, np.array([[0.0, 0.0, -1.0]])).tolist() == [True]
+
+
+def _below(own, octree, path):
+    found = own(octree, path).points
+    return found.normals, found.leaving
+
+
+class BlindAtEdges(Octree):
+    """What lies on an edge hides itself: nothing is seen from there."""
+
+    def visible(self, points, targets):
+        return super().visible(points, targets) & (self.closest_point(points).distance > 1e-12)
 
 
 BROKEN = {
@@ -83,6 +139,10 @@ BROKEN = {
     "weights and distances": ("occlusion", lambda own: lambda *a, distance=0, **k: own(*a, **k)),
     "faces that an eye sees": ("visible_faces", lambda own: lambda *a, **k: ~own(*a, **k)),
     "clouds and depths": ("depth_map", lambda own: lambda *a, **k: own(*a, **k) * (1 + 2.0**-50)),
+    "clouds from a roof": ("scan", lambda own: lambda o, p, w: own(o, np.add(p, (0.0, 0.0, 1e-4)), w)),
+    "places of a grid": (
+        "of_file", lambda own: lambda o, path: Chosen(Points(own(o, path).points.points * 1.1, *_below(own, o, path)))),
+    "edges from both sides": ("Octree", lambda own: lambda *a: BlindAtEdges(*a)),
 }  # fmt: skip
 
 

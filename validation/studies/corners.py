@@ -1,0 +1,137 @@
+"""Every bit of occlusion at points of the surface itself: vertices, and centroids through float32.
+
+No face is named: a point's normal says in which region around it rays start. Starts that are lifted off the surface
+must see the same, but for what the lift changes: where they differ, and on a sample of the others, exact arithmetic
+says who is right.
+"""
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box, icosphere, lattice_faces
+from renderer.octree import Octree
+from renderer.studies import face_points, fibonacci_sphere, occlusion, sky_view_factor
+from validation.oracle.starts import Start, Surface
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+_SEED = 2046
+# Lifted by so much of the largest coordinate: above what float32 rounds off, and so little that it changes few bits.
+_LIFT = 2.0**-21
+# On which side of its horizon a direction lies is told by rounded numbers: nearer to it than this, either will do.
+_LEVEL = 1e-12
+# Of the bits on which both agree, so many are judged too.
+_SAMPLE = 300
+# Points of a mesh, drawn from all: exact arithmetic finds the faces around each that is judged.
+_QUICK, _FULL = 200, 1500
+_DIRECTIONS = 64
+
+
+class Places(NamedTuple):
+    """Points on the surface with unit normals, and the exact start of each."""
+
+    points: Floats
+    normals: Floats
+    start: Callable[[Surface, int], Start]
+
+
+def _raster() -> Mesh:
+    """Random heights over a lattice."""
+    size, rng = 40, np.random.default_rng(_SEED)
+    row, column = np.divmod(np.arange(size * size), size)
+    return Mesh(np.stack([column, row, 1.5 * rng.random(size * size)], axis=1), lattice_faces(size, size))
+
+
+def _scan() -> Mesh:
+    """A bumpy ball far from the origin, whose vertices went through float32."""
+    ball, rng = icosphere(3), np.random.default_rng(_SEED + 1)
+    vertices = ball.vertices * (1.0 + 0.03 * rng.normal(size=(len(ball.vertices), 1))) * 3.0 + [40.0, -70.0, 12.0]
+    return Mesh(vertices.astype(np.float32).astype(np.float64), ball.faces)
+
+
+MESHES: dict[str, Callable[[], Mesh]] = {"raster": _raster, "box": box, "ball": lambda: icosphere(3), "scan": _scan}
+
+
+def _vertices(mesh: Mesh) -> Places:
+    normals = mesh.vertex_normals()
+    points = np.asarray(mesh.vertices, np.float64)
+
+    def start(surface: Surface, row: int) -> Start:
+        x, y, z = map(Fraction, points[row].tolist())
+        return Start((x, y, z))
+
+    return Places(points, normals, start)
+
+
+def _centroids(mesh: Mesh) -> Places:
+    exact, normals, faces = face_points(mesh)
+    points = exact.astype(np.float32).astype(np.float64)
+    return Places(points, normals, lambda surface, row: surface.start_near(int(faces[row]), points[row]))
+
+
+KINDS: dict[str, Callable[[Mesh], Places]] = {"vertices": _vertices, "centroids through float32": _centroids}
+# Which points of which meshes.
+CHECKS = tuple((name, kind) for kind in KINDS for name in MESHES)
+
+
+def check_corners(index: int, quick: bool) -> dict[str, Any]:
+    """A row: bits asked, those that a lifted start has otherwise, those judged, and the wrong ones; with them the
+    points whose share of the sky is another one where their face is named.
+    """
+    name, kind = CHECKS[index]
+    mesh = MESHES[name]()
+    octree, places, rng = Octree.from_mesh(mesh), KINDS[kind](mesh), np.random.default_rng([_SEED, index])
+    face = octree.closest_point(places.points).face
+    sky = sky_view_factor(octree, places.points, places.normals)
+    named = sky_view_factor(octree, places.points, places.normals, leaving=face)
+    most = _QUICK if quick else _FULL
+    rows = np.sort(rng.permutation(len(places.points))[:most])
+    points, normals = places.points[rows], places.normals[rows]
+    ways = fibonacci_sphere(_DIRECTIONS).directions @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    ours = _hidden(octree, points, normals, ways)
+    lifted = _hidden(octree, points + _LIFT * float(np.abs(points).max()) * normals, normals, ways)
+    height = normals @ ways.T
+    point, way = np.nonzero(height > _LEVEL)
+    differing = np.flatnonzero((ours != lifted)[point, way])
+    judged = np.union1d(differing, rng.choice(len(point), min(_SAMPLE, len(point)), replace=False))
+    surface = Surface(mesh.vertices, mesh.faces)
+    starts = {row: places.start(surface, int(rows[row])) for row in np.unique(point[judged]).tolist()}
+    asked = [starts[row] for row in point[judged].tolist()]
+    truth = hidden_by_law(surface, asked, normals[point[judged]], ways[way[judged]])
+    below = int((~ours[height < -_LEVEL]).sum())
+    wrong = int((ours[point[judged], way[judged]] != truth).sum()) + below
+    return {"subject": f"{kind} of {name}", "asked": ours.size, "differing": len(differing), "judged": len(judged),
+            "wrong": wrong, "points": len(sky), "unlike": int((sky != named).sum()),
+            "hidden": float(ours.mean())}  # fmt: skip
+
+
+def _hidden(octree: Octree, points: Floats, normals: Floats, ways: Floats) -> NDArray[np.bool_]:
+    packed: Any = occlusion(octree, points, normals, ways, packed=True)
+    return np.unpackbits(packed, axis=-1, count=len(ways)).astype(np.bool_)
+
+
+def hidden_by_law(surface: Surface, starts: list[Start], normals: Floats, ways: Floats) -> NDArray[np.bool_]:
+    """Whether each ray leads out of the region of its normal, or meets a face that does not hold its start."""
+    hidden, left = np.zeros(len(starts), np.bool_), []
+    for row, start in enumerate(starts):
+        held = surface.holding(start.place)
+        regions = surface.regions(held)
+        hidden[row] = not regions.around(_whole(normals[row])) & regions.around(_whole(ways[row]))
+        # Of a start that names a face and no side, no face that holds it stops the ray.
+        left.append(Start(start.place, held[0][0]))
+    goes = np.flatnonzero(~hidden)
+    firsts = surface.each([left[row] for row in goes], ways[goes], [0] * len(goes), [False] * len(goes))
+    hidden[goes] = [found[0].t is not None for found in firsts]
+    return hidden
+
+
+def _whole(direction: Floats) -> tuple[int, int, int]:
+    ratios = [x.as_integer_ratio() for x in direction.tolist()]
+    unit = max(bottom for _, bottom in ratios)
+    x, y, z = (top * (unit // bottom) for top, bottom in ratios)
+    return x, y, z
