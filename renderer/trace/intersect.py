@@ -376,8 +376,8 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
 
 @inlined
 def _left(tree, base, edges, ray):
-    """The bits of the faces of the block at ``base`` that a ray leaves: its own, and of one that starts at a corner those that have
-    it, which it meets nowhere else.
+    """The bits of the faces of the block at ``base`` that a ray leaves: its own, and where it starts at a corner those
+    that have it, which it meets nowhere else.
     """
     place, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
     for i in range(BLOCK_FACES):

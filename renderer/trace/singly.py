@@ -5,15 +5,7 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import LOCAL_WORDS, get, local_words, pointer, put, splat8
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.leaf import (
-    NO_FACE,
-    NOWHERE,
-    blocks_of,
-    nearest_carefully,
-    nearest_placed,
-    push_children,
-    tree_pointers,
-)
+from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_children, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.starts.record import EDGE
 from renderer.trace.starts.search import NEAR_HIT, search_from, t_from
@@ -42,14 +34,14 @@ def search_singly(tree, ray, t_max, stack):
     best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
     if not tree.has_nodes:
         return nearest_carefully(tree, 0, tree.count, ray, shear, best), tree.count
-    top, steps, place = 1, np.int64(0), NOWHERE
+    top, steps = 1, np.int64(0)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, count = blocks_of(child)
-            best, place = nearest_placed(tree, first, count, ray, shear, best, place)
+            best = nearest_carefully(tree, first, count, ray, shear, best)
             steps += count
             continue
         _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
