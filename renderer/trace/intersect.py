@@ -366,11 +366,14 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
     blurs, dues = np.int64(0), np.int64(0)
     # What only this needs is computed here: doubts are rare, and one branch costs less than they would in each block.
     if unlikely(doubts != 0):
-        doubt = blurred | low | _may_be_on_edge(edges)
-        t_within, error = (t, t_min, t_max), product * along * splat4(ERROR)
-        due = _are_due(edges, (wide, high), (height, base_t, error), doubt, blurred, t_within)
-        doubts, blurs = seen & movemask(doubt), seen & movemask(blurred)
-        dues = seen & movemask(due | (height < reach)) & ~_left(tree, base, edges, ray)
+        left = _left(tree, base, edges, ray) if ray.slack != 0.0 else np.int64(0)
+        # Most often the face that the ray leaves is the only one.
+        if doubts & ~left != 0:
+            doubt = blurred | low | _may_be_on_edge(edges)
+            t_within, error = (t, t_min, t_max), product * along * splat4(ERROR)
+            due = _are_due(edges, (wide, high), (height, base_t, error), doubt, blurred, t_within)
+            doubts, blurs = (seen & movemask(doubt)) | (doubts & left), seen & movemask(blurred)
+            dues = seen & movemask(due | (height < reach)) & ~left
     return t, doubts, blurs, dues
 
 
