@@ -346,4 +346,4 @@ def _keep(found, kept, count, scale, dz):
             get(found.doubles, _row(found, _V, i)),
             get(found.doubles, _row(found, _W, i)),
         )
-        write_hit(HitPointers(t, face, u, v, side, t), k, scale, hit, dz, False)
+        write_hit(HitPointers(t, face, u, v, side, side, t), k, scale, hit, dz, False)

@@ -124,7 +124,7 @@ def make_work(doubles, integers, hits, settings, scratch):
     beyond = at(lit, 1 + 2 * SIZE)
     traced = at(beyond, SIZE * (settings.media + SPARE))
     side = at(traced, 2 * SIZE)
-    found = HitPointers(t, face, u, v, side, hits)
+    found = HitPointers(t, face, u, v, side, side, hits)
     return Work(
         doubles, integers, order, scratch, found, zero, infinity, surfaces, shadows, lit, beyond,
         at(shadows, SHADOW_DOUBLES), traced, at(traced, SIZE),

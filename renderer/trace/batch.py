@@ -165,7 +165,7 @@ class Leaving(NamedTuple):
 
     faces    (n,) int64, -1 for none
     code     (n,) or (1,) int64, the bits of ``starts.record``
-    anchors  (n, 3) float64: u, v and 0; or no row, where the origins say where the rays start
+    anchors  (n, 3) float64: u, v and the pile; or no row, where the origins say where the rays start
     """
 
     faces: NDArray[np.int64]

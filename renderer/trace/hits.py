@@ -15,12 +15,14 @@ class Passage(NamedTuple):
     face  (...) int64
     u, v  (...) float64, the place on the face
     side  (...) int64, the side that the rays are on now; None where it is not known
+    pile  (...) int64, the face at which they came upon those that coincide there
     """
 
     face: NDArray[np.int64]
     u: NDArray[np.float64]
     v: NDArray[np.float64]
     side: NDArray[np.int64] | None
+    pile: NDArray[np.int64]
 
 
 # Slots and not frozen: a call with one ray spends a third of its time on making objects.
@@ -51,6 +53,7 @@ class Hits:
     _mesh: Mesh = field(repr=False)
     t_error: NDArray[np.float64] | None = None
     side: NDArray[np.int64] | None = None
+    _pile: NDArray[np.int64] | None = field(default=None, repr=False)
 
     def through(self) -> "Passage":
         """The same places, for rays that go on through the faces: ``leaving=hits.through()``.
@@ -64,7 +67,8 @@ class Hits:
         >>> octree.closest_hit(hits.points, down, leaving=hits.through()).t
         array([1.])
         """
-        return Passage(self.face, self.u, self.v, None if self.side is None else -self.side)
+        pile = self.face if self._pile is None else self._pile
+        return Passage(self.face, self.u, self.v, None if self.side is None else -self.side, pile)
 
     def shaped(self, shape: tuple[int, ...]) -> "Hits":
         """The same hits in other dimensions.
@@ -80,7 +84,8 @@ class Hits:
         t, u, v = (values.reshape(shape) for values in (self.t, self.u, self.v))
         t_error = None if self.t_error is None else self.t_error.reshape(shape)
         side = None if self.side is None else self.side.reshape(shape)
-        return Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error, side)
+        pile = None if self._pile is None else self._pile.reshape(shape)
+        return Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error, side, pile)
 
     @property
     def hit(self) -> NDArray[np.bool_]:

@@ -31,6 +31,8 @@ def _by_hits(leaving: Hits | Passage, side: ArrayLike | None, shape: tuple[int, 
     faces = check_faces("leaving", leaving.face, shape, most)
     anchors = np.zeros((len(faces), 3))
     anchors[:, 0], anchors[:, 1] = leaving.u.reshape(-1), leaving.v.reshape(-1)
+    if isinstance(leaving, Passage):
+        anchors[:, 2] = leaving.pile.reshape(-1)
     sides = np.zeros(1, np.int64) if leaving.side is None else leaving.side.reshape(-1)
     codes = _codes(sides) | BARYCENTRIC
     return Leaving(faces, codes | THROUGH if isinstance(leaving, Passage) else codes, anchors)

@@ -33,8 +33,8 @@ def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     else:
         out = np.empty((HIT_ROWS, rays.number))
         _run(tree, rays, out, threads, any_hit=False)
-    t, u, v, face, side = out
-    return Hits(t, face.view(np.int64), u, v, mesh, None, side.view(np.int64))
+    t, u, v, face, side, pile = out
+    return Hits(t, face.view(np.int64), u, v, mesh, None, side.view(np.int64), pile.view(np.int64))
 
 
 def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:

@@ -30,7 +30,7 @@ from renderer.trace.starts.record import FACE, SLACK, StartPointers, start_point
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
 _BYTES = 8
 # Rows of the array that closest hits are written to.
-HIT_ROWS = 5
+HIT_ROWS = 6
 
 
 class RayPointers(NamedTuple):
@@ -53,13 +53,16 @@ class RayPointers(NamedTuple):
 
 
 class HitPointers(NamedTuple):
-    """Pointers to the results: t, face, u, v and side as in ``Hits``, or for any hits only ``hit``, a bool."""
+    """Pointers to the results: t, face, u, v and side as in ``Hits``, the face at which a ray came upon
+    those that coincide with it, or for any hits only ``hit``, a bool.
+    """
 
     t: Any
     face: Any
     u: Any
     v: Any
     side: Any
+    pile: Any
     hit: Any
 
 
@@ -76,11 +79,13 @@ def ray_pointers(rays, scale):
 
 @inlined
 def hit_pointers(out, count):
-    """``HitPointers`` into the memory of ``out``: rows t, u, v, face, side of ``count`` values, or ``count`` bools."""
+    """``HitPointers`` into the memory of ``out``: rows t, u, v, face, side and pile of ``count``
+    values, or ``count`` bools."""
     first, row = address(out), _BYTES * count
     return HitPointers(
         float64_pointer(first), int64_pointer(first + 3 * row), float64_pointer(first + row),
-        float64_pointer(first + 2 * row), int64_pointer(first + 4 * row), bool_pointer(first),
+        float64_pointer(first + 2 * row), int64_pointer(first + 4 * row), int64_pointer(first + 5 * row),
+        bool_pointer(first),
     )  # fmt: skip
 
 
@@ -178,4 +183,6 @@ def write_hit(found, i, scale, best, dz, any_hit):
     put(found.face, i, np.int64(face if hit else -1))
     put(found.u, i, u / w + 0.0 if hit else np.nan)
     put(found.v, i, v / w + 0.0 if hit else np.nan)
+    # In this order, as those that keep no piles give the sides' memory for them.
+    put(found.pile, i, np.int64(face if hit else -1))
     put(found.side, i, np.int64((1 if (w > 0.0) == (dz > 0.0) else -1) if hit else 0))

@@ -3,11 +3,11 @@
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import LOCAL_WORDS, get, local_words, pointer, put, splat8
+from renderer.kernels.simd import LOCAL_WORDS, at, get, is_negative, local_words, pointer, put, splat8
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_children, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
-from renderer.trace.starts.record import EDGE
+from renderer.trace.starts.record import EDGE, PILE
 from renderer.trace.starts.search import NEAR_HIT, search_from, t_from
 
 
@@ -70,6 +70,8 @@ def write_best(tree, rays, found, i, best, start, dz, any_hit):
     if not any_hit and best[0] * largest < NEAR_HIT * slack and slack < EDGE:
         best = count_from_start(tree, rays, i, best)
     write_hit(found, i, rays.scale, best, dz, any_hit)
+    if not any_hit and best[0] == 0.0 and is_negative(best[0]):
+        put(found.pile, i, np.int64(get(at(rays.starts.rows, i * rays.starts.step), PILE)))
 
 
 @kernel

@@ -34,6 +34,7 @@ from renderer.trace.starts.record import (
     EDGE,
     FACE,
     KNOWN,
+    PILE,
     SLACK,
     THROUGH,
     Start,
@@ -215,6 +216,8 @@ def put_start(row, place, n_g, w, offset):
     put(row, CODE, np.float64(code))
     put(row, ANCHOR, place.u)
     put(row, ANCHOR + 1, place.v)
+    # Of faces that coincide those from the first one on are passed: pictures cross all at once.
+    put(row, PILE, 0.0)
 
 
 @kernel

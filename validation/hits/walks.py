@@ -48,30 +48,39 @@ def walk(body: Body, count: int, rng: Generator, make: Callable[..., Any] = Octr
     expected = []
     for ray in range(count):
         found = contacts(vertices, body.mesh.faces, origins[ray], directions[ray])
-        expected.append([face for _, face in hits(found)])
+        expected.append(hits(found))
         by_length[len(expected[-1])].append(ray)
     wrong = 0
     for length, rows in by_length.items():
-        want = np.array([expected[ray] for ray in rows], np.int64).reshape(len(rows), length)
-        wrong += _wrong(tracer, origins[rows], directions[rows], want)
+        want = np.array([[face for _, face in expected[ray]] for ray in rows], np.int64).reshape(len(rows), length)
+        places = [np.unique([t for t, _ in expected[ray]], return_inverse=True)[1] for ray in rows]
+        piles = np.array(places, np.int64).reshape(len(rows), length)
+        wrong += _wrong(tracer, origins[rows], directions[rows], want, piles)
     return wrong
 
 
-def _wrong(tracer: Any, origins: Floats, directions: Floats, want: Ints) -> int:
-    """How many rays do not meet the faces of their rows (n, k), one after the other, and then nothing."""
+def _wrong(tracer: Any, origins: Floats, directions: Floats, want: Ints, piles: Ints) -> int:
+    """How many rays do not meet the faces of their rows (n, k), one after the other, and then nothing.
+
+    ``piles`` numbers the places along the ray: faces at one place, whose t are equal but for rounding, may be met from
+    any of them on, each once.
+    """
     wrong = 0
     while len(origins):
         found = tracer.closest_hit(origins, directions)
-        right = np.ones(len(origins), np.bool_)
+        right, met = np.ones(len(origins), np.bool_), np.zeros(want.shape, np.bool_)
         for k in range(want.shape[1]):
-            right = found.face == want[:, k]
+            here = (want == found.face[:, None]) & (piles == piles[:, k : k + 1]) & ~met
+            met |= here
+            right = here.any(axis=1)
             if not right.all():
                 break
             found = tracer.closest_hit(found.points, directions, leaving=found.through())
         else:
             return wrong + int((found.face >= 0).sum())
         # Without those that met others, from the beginning: hits cannot be picked apart.
-        wrong, origins, directions, want = wrong + int((~right).sum()), origins[right], directions[right], want[right]
+        wrong += int((~right).sum())
+        origins, directions, want, piles = origins[right], directions[right], want[right], piles[right]
     return wrong
 
 

@@ -7,8 +7,9 @@ A start is a real point: an exact combination of a face's corners, or the face's
 - A face and a side are named: the faces that hold the start cut the directions into regions. The ray starts in the
   region on that side of the face. One that leads into its closure is not stopped. Another is stopped at t = 0 by the
   lowest face that holds the start and has the region on one side and the ray's direction on the other.
-- ``through``: the ray has gone through the face, to the named side. It has passed those that coincide with it and are
-  lower; if it leads to the named side, the lowest of the higher ones stops it at t = 0.
+- ``through``: the ray came upon the face, and upon those that coincide with it there, and has gone through it to the
+  named side. It passes the others in the order of their numbers, the lowest after the highest; if it leads to the named
+  side, the next one stops it at t = 0.
 
 All other faces are met as ``exact`` says. Where faces cross at the start, the face's side may be several regions, and
 each has its answer. A face without area is no face here.
@@ -265,10 +266,11 @@ def stopped(regions: Regions | Fan, face: int, way: Whole, side: int, through: b
     around, ahead = regions.around(way), through and regions.cones[face].side(way) == side
     found: set[int | None] = set()
     for piece in regions.pieces[face]:
-        higher = [other for other in piece.faces if other > face] if ahead else []
+        # Those of higher numbers come first, then the lowest.
+        later = sorted(piece.faces - {face}, key=lambda other: (other < face, other)) if ahead else []
         here = piece.above if side > 0 else piece.below
-        if higher:
-            found.add(min(higher))
+        if later:
+            found.add(later[0])
         elif here in around:
             found.add(None)
         else:

@@ -12,8 +12,9 @@ from renderer.kernels.vec3 import largest_component, row3, scale
 # starts on the surface; and the addresses of the mesh's vertices and faces.
 ROW_STEP, VERTICES, FACES, HEAD = 0, 1, 2, 8
 # The columns of a row, float64: the slack of ``intersect.Ray``, EDGE where the start is on an edge, or stopped at once;
-# the face, -1 for none; the code; and the anchor: the point as given, or the barycentrics u and v.
-SLACK, FACE, CODE, ANCHOR, ROW = 0, 1, 2, 3, 6
+# the face, -1 for none; the code; and the anchor: the point as given, or the barycentrics u and v and, of a ray that
+# came through the face, PILE: the face at which it came upon those that coincide there.
+SLACK, FACE, CODE, ANCHOR, PILE, ROW = 0, 1, 2, 3, 5, 6
 # The slack of a ray that no search takes as it is: ``search.search_from`` decides.
 EDGE = np.inf
 # The bits of a code: the side of the face that the ray starts on is known, and is that of its normal; the ray came
@@ -34,7 +35,7 @@ class Start(NamedTuple):
     """How one ray starts on the surface.
 
     corners  those of the face, in the tree's units
-    anchor   the point as given, in the tree's units, or (u, v, 0)
+    anchor   the point as given, in the tree's units, or u, v and the pile
     """
 
     corners: Any

@@ -181,26 +181,15 @@ def _bounds_region(tree, anchor, holders, count, nodes, k, side, j, facing):
 
 
 @kernel
-def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d):
+def stopping_holder(tree, anchor, holders, count, nodes, face, side, d):
     """The holder that stops a ray at its start, or NOT_STOPPED.
 
     The ray starts in the region beside the cone of ``face``, on one side of it. It is stopped where its direction d
-    leads out of that region: by the lowest face that bounds the region and has d behind it. ``through`` says that it
-    has just passed the face: then the lowest of the faces that coincide with it and have higher numbers stops it.
+    leads out of that region: by the lowest face that bounds the region and has d behind it.
     """
-    own = -1
-    for k in range(count):
-        if holder(holders, k, NUMBER) == face:
-            own = k
-    if own < 0:
+    own = _holder_of(holders, count, face)
+    if own == NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
         return NOT_STOPPED
-    best = NOT_STOPPED
-    if through and slope_of(cone_of(tree, anchor, holders, own).face, d) == side:
-        for j in range(count):
-            if holder(holders, j, NUMBER) > face and coincide(tree, anchor, holders, own, j):
-                best = _lower(holders, best, j)
-    if best != NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
-        return best
     last = np.int64(-1)
     for _ in range(count):
         j = _next_face(holders, count, last)
@@ -209,6 +198,41 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, through, d)
         if behind != 0 and _bounds_region(tree, anchor, holders, count, nodes, own, side, j, -behind):
             return j
     return NOT_STOPPED
+
+
+@kernel
+def holder_ahead(tree, anchor, holders, count, face, side, pile, d):
+    """The next holder that coincides with ``face``, which a ray has just gone through to one side, or NOT_STOPPED.
+
+    The ray came upon the pile of faces that coincide there at the face ``pile``. From that on it goes through them in
+    the order of their numbers, the lowest after the highest, however it leads on to that side.
+    """
+    own, best = _holder_of(holders, count, face), NOT_STOPPED
+    if own == NOT_STOPPED or slope_of(cone_of(tree, anchor, holders, own).face, d) != side:
+        return NOT_STOPPED
+    for j in range(count):
+        number = holder(holders, j, NUMBER)
+        sooner = best == NOT_STOPPED or _is_after(holder(holders, best, NUMBER), number, pile)
+        if _is_after(number, face, pile) and sooner and coincide(tree, anchor, holders, own, j):
+            best = j
+    return best
+
+
+@inlined
+def _is_after(face, other, pile):
+    """Whether a face comes after another one in the order of a pile."""
+    turned, other_turned = face < pile, other < pile
+    return face > other if turned == other_turned else turned
+
+
+@inlined
+def _holder_of(holders, count, face):
+    """The holder with the number ``face``."""
+    own = NOT_STOPPED
+    for k in range(count):
+        if holder(holders, k, NUMBER) == face:
+            own = k
+    return own
 
 
 @inlined

@@ -43,10 +43,12 @@ from renderer.trace.starts.meeting import (
     unit_direction,
 )
 from renderer.trace.starts.record import ABOVE, BARYCENTRIC, EDGE, KNOWN, THROUGH, corners_of, slack_of, start_at
-from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, stopping_holder
+from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, holder_ahead, stopping_holder
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
+# The t of a hit on the next face of a pile, which differs from others at t = 0 by its sign.
+AHEAD = -0.0
 # The least t of a face that does not hold the start: what is less would be 0 in the mesh's own units.
 _LEAST_T = 2.0**-900
 # A hit that is farther than so often its slack errs by less than 2^-20 of t by where the ray starts.
@@ -113,11 +115,15 @@ def _stopped(tree, start, anchor, count, d, slope, dz, holders):
     """The hit (t, face, u, v, w) that stops a ray at its start, which ``count`` faces hold; NO_FACE for none."""
     nodes = name_nodes(tree, anchor, holders, count)
     side = 1 if start.code & ABOVE != 0 else -1
-    k = stopping_holder(tree, anchor, holders, count, nodes, start.face, side, start.code & THROUGH != 0, d)
+    k, t = NOT_STOPPED, AHEAD
+    if start.code & THROUGH != 0:
+        k = holder_ahead(tree, anchor, holders, count, start.face, side, np.int64(start.anchor[2]), d)
+    if k == NOT_STOPPED:
+        k, t = stopping_holder(tree, anchor, holders, count, nodes, start.face, side, d), 0.0
     if k == NOT_STOPPED:
         return _NOTHING
     met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, dz)
-    return 0.0, np.int32(holder(holders, k, NUMBER)), met.u, met.v, met.w
+    return t, np.int32(holder(holders, k, NUMBER)), met.u, met.v, met.w
 
 
 class Departure(NamedTuple):
