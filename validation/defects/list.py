@@ -152,10 +152,8 @@ HITS = (
             "met.kind == IS_HIT", "met.kind >= IS_HIT"),
     _kernel("hits", "a ray passes faces that coincide all at once", "stopping_holder",
             "holder(holders, j, NUMBER) > face and coincide(tree, anchor, holders, own, j)", "False"),
-    _kernel("hits", "on an edge, the side that is not on it counts too", "meeting._common",
-            "0 if (anchor.zeros >> _third(a, b)) & 1 != 0 else 1", "1"),
-    _kernel("hits", "boxes do not grow by where a start may be", "make_slab",
-            "down, up = round_both(o - slack)[0], round_both(o + slack)[1]", "down, up = round_both(o)"),
+    _kernel("hits", "a start on an edge is beside the next face", "meeting._height",
+            "(anchor.zeros >> third) & 1 != 0", "False"),
     _kernel("hits", "which side a ray leads to is told by a rounded normal", "slope_of",
             "sign = slope_sign(p0, p1, p2, d, local_doubles())",
             "n = heads(face.normal)\n"

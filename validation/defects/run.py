@@ -49,6 +49,12 @@ KEPT = {
     "rays on which we are wrong": "judges all families by the thousand; extreme cases see the same faults on few rays",
     "differ from a new build": "asks every mesh again after it moved, of which extreme cases have two",
     "rays within float64 rounding": "guards the count of wrong rays, which excuses what float64 cannot decide",
+    "rays stopped at once, or not, against the law": "judges each ray by exact signs; sees what others see on few rays",
+    "rays that name no face, stopped against the law": "the same rays where they leave nothing: ties at t = 0",
+    "rays from inside that are lost": "counts all rays where the exact sample has a few",
+    "of the exact sample, rays from a surface with a wrong hit": "judges what is hit beyond the start, to its t",
+    "reflected rays": "what users see of the law: each reflection starts where the one before ended, fifty times",
+    "points with another sky where their face is named": "asks all points, of which exact arithmetic judges some",
     "slope of log RMSE": _PATHS,
     "p-value of the largest z": _PATHS,
 }
