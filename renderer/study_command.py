@@ -15,6 +15,7 @@ SPLIT: Literal["sah"] = "sah"
 _KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
 # Options that one kind alone has, which are its function's.
 _OWN = {"sky": ("patches", "definition"), "sun": ("suns",), "ao": ("samples",)}
+_POINTS = ".npy, (n, 3), or (n, 6) with normals; on the surface or not"
 _GRID = "points as seen from above (z up), so far apart, on what they see first"
 
 
@@ -32,7 +33,7 @@ def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> No
     where.add_argument("--faces", action="store_true", help="the middle of each face, the default")
     where.add_argument("--vertices", action="store_true", help="the same, as means of each vertex's faces")
     where.add_argument("--grid", type=float, metavar="SPACING", help=_GRID)
-    where.add_argument("--points", type=Path, metavar="FILE", help=".npy, (n, 3), or (n, 6) with normals")
+    where.add_argument("--points", type=Path, metavar="FILE", help=_POINTS)
     study.add_argument(
         "-o", "--output", type=Path, required=True, action="append", metavar="FILE",
         help=".npy, .ply or, of faces, .png; may be given more than once",

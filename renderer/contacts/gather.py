@@ -22,7 +22,7 @@ from renderer.trace.intersect import (
     round_down,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import NO_FACE, TIE, blocks_of, is_before, push_children, tree_pointers
+from renderer.trace.leaf import NO_FACE, blocks_of, push_children, tree_pointers
 from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.sides import coordinate, exact_sides
 from renderer.trace.starts.search import counted_from_start, depart, meet_near, near_bits
@@ -83,7 +83,7 @@ def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, memory)
             if kept + count > found.capacity or hits > _WORK:
                 return i, -1
             hits += count
-            counts[i] = smaller(_ordered(tree, ray_at(source, i)[0], found, count, merge, keep), most)
+            counts[i] = smaller(_ordered(tree, found, count, merge, keep), most)
             if keep:
                 _keep(found, kept, counts[i], tree.scale, make_shear(ray_at(source, i)[0]).direction_z)
                 kept += counts[i]
@@ -231,28 +231,28 @@ def _list_hit(found, i, hit, face, place, edges):
 
 
 @kernel
-def _ordered(tree, ray, found, count, merge, sort):
+def _ordered(tree, found, count, merge, sort):
     """Write the order of the listed hits, or of the contacts that they make, by t, then face; returns their number."""
     order = at(found.integers, _row(found, _ORDER, 0))
     if merge:
-        _merge(tree, ray, found, count, order)
+        _merge(tree, found, count, order)
     kept = 0
     for i in range(count):
         put(order, kept, i)
         kept += np.int64(get(found.integers, _row(found, _FACE, i)) != _MERGED)
     if sort:
-        _sort(tree, ray, found, order, kept, False)
+        _sort(tree, found, order, kept, False)
     return kept
 
 
 @kernel
-def _merge(tree, ray, found, count, order):
+def _merge(tree, found, count, order):
     """Mark, of the hits at one edge or corner, all but the first as merged."""
     on_edges = 0
     for i in range(count):
         put(order, on_edges, i)
         on_edges += np.int64(get(found.integers, _row(found, _EDGES, i)) != 0)
-    _sort(tree, ray, found, order, on_edges, True)
+    _sort(tree, found, order, on_edges, True)
     for k in range(1, on_edges):
         # Those of one place follow each other. The first one's place stands for all, merged or not.
         if _compare_places(tree, found, get(order, k - 1), get(order, k)) == 0:
@@ -260,26 +260,26 @@ def _merge(tree, ray, found, count, order):
 
 
 @kernel
-def _sort(tree, ray, found, order, count, by_place):
+def _sort(tree, found, order, count, by_place):
     """Sort ``order`` by t, then face, of the hits it names; or by their places first. A heap, as rays may hit much."""
     for start in range(count // 2 - 1, -1, -1):
-        _sift(tree, ray, found, order, start, count, by_place)
+        _sift(tree, found, order, start, count, by_place)
     for end in range(count - 1, 0, -1):
         first = get(order, 0)
         put(order, 0, get(order, end))
         put(order, end, first)
-        _sift(tree, ray, found, order, 0, end, by_place)
+        _sift(tree, found, order, 0, end, by_place)
 
 
 @kernel
-def _sift(tree, ray, found, order, parent, count, by_place):
+def _sift(tree, found, order, parent, count, by_place):
     """Let an entry of a heap sink to its place."""
     sinking = get(order, parent)
     while 2 * parent + 1 < count:
         child = 2 * parent + 1
-        if child + 1 < count and _precedes(tree, ray, found, get(order, child), get(order, child + 1), by_place):
+        if child + 1 < count and _precedes(tree, found, get(order, child), get(order, child + 1), by_place):
             child += 1
-        if not _precedes(tree, ray, found, sinking, get(order, child), by_place):
+        if not _precedes(tree, found, sinking, get(order, child), by_place):
             break
         put(order, parent, get(order, child))
         parent = child
@@ -287,7 +287,7 @@ def _sift(tree, ray, found, order, parent, count, by_place):
 
 
 @kernel
-def _precedes(tree, ray, found, i, j, by_place):
+def _precedes(tree, found, i, j, by_place):
     """Whether hit i comes before hit j."""
     if by_place:
         compared = _compare_places(tree, found, i, j)
@@ -295,9 +295,6 @@ def _precedes(tree, ray, found, i, j, by_place):
             return compared < 0
     ti, tj = get(found.doubles, _row(found, _T, i)), get(found.doubles, _row(found, _T, j))
     face, other = get(found.integers, _row(found, _FACE, i)), get(found.integers, _row(found, _FACE, j))
-    if ti != tj and abs(ti - tj) <= ti * TIE:
-        place, other_place = get(found.integers, _row(found, _AT, i)), get(found.integers, _row(found, _AT, j))
-        return is_before(tree, ray, place, face, other_place, other)
     return ti < tj or (ti == tj and face < other)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from renderer.distance.closest import closest_point
 from renderer.mesh.mesh import Mesh
+from renderer.trace.hits import points_on
 from renderer.trace.layout import Tree
 
 Floats = NDArray[np.float64]
@@ -46,13 +47,26 @@ def on_surface(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64],
     return SurfacePoints(faces, anchors)
 
 
-def are_on(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether points (n, 3) lie on faces (n,), as near as a rounding."""
+def places_of(mesh: Mesh, points: Floats, places: SurfacePoints) -> Floats:
+    """Points (n, 3), those on the surface moved to their places on it."""
+    found = points.copy()
+    on = np.flatnonzero(places.faces >= 0)
+    u, v = places.anchors[on, :2].T
+    found[on] = points_on(mesh, places.faces[on], u, v)
+    return found
+
+
+def distances_from(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> Floats:
+    """How far points (n, 3) are from faces (n,), along the axis where they are farthest."""
     corners = mesh.vertices[mesh.faces[faces]]
     u, v = _barycentrics(corners, points, np.zeros(len(points))).T
-    nearest = (1.0 - u - v)[:, None] * corners[:, 0] + u[:, None] * corners[:, 1] + v[:, None] * corners[:, 2]
-    # The nearest points are rounded, too.
-    return np.linalg.norm(points - nearest, axis=1) <= 2.0 * _room(points)
+    with np.errstate(over="ignore"):
+        return np.abs(points - points_on(mesh, faces, u, v)).max(axis=1, initial=0.0)
+
+
+def are_on(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether points (n, 3) lie on faces (n,), within the roundings of float64."""
+    return distances_from(mesh, points, faces) <= _DOUBLE * np.abs(points).max(axis=1, initial=0.0)
 
 
 def _room(points: Floats) -> Floats:
@@ -69,6 +83,9 @@ def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
     )
     ways = points[:, None] - corners
     with np.errstate(all="ignore"):
+        # In units of the face, so that no product overflows or vanishes.
+        size = np.abs(sides).max(axis=(1, 2), initial=0.0)[:, None, None]
+        sides, ways, room = sides / size, ways / size, room / size[:, 0, 0]
         normals = np.cross(sides[:, 2], -sides[:, 1])
         areas = np.linalg.norm(normals, axis=1)
         # The double areas of the point with each side, by the two corners of that side.
@@ -78,7 +95,7 @@ def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
     weights = np.where(near | ~(parts > 0.0), 0.0, parts)
     lost = ~(weights.sum(axis=1) > 0.0)
     # A face without area, or one smaller than the room: its nearest corner.
-    nearest = np.linalg.norm(ways[lost], axis=2).argmin(axis=1)
+    nearest = np.abs(points[lost, None] - corners[lost]).max(axis=2).argmin(axis=1)
     weights[lost] = np.eye(3)[nearest]
     weights /= weights.sum(axis=1, keepdims=True)
     single = np.count_nonzero(weights, axis=1) == 1

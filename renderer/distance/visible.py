@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.distance.on_surface import SurfacePoints, are_on, on_surface
+from renderer.distance.on_surface import SurfacePoints, are_on, on_surface, places_of
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
 from renderer.trace.batch import Leaving, RayBatch, broadcast_shape, check_faces, moved_off
@@ -45,13 +45,16 @@ def visible(
     on_a = check_faces("leaving", -1 if faces[0] is None else faces[0], shape, most)
     on_b = check_faces("reaching", -1 if faces[1] is None else faces[1], shape, most)
     apart = np.flatnonzero((a != b).any(axis=1))
-    start, stop = (
-        _Ends(points[apart], on_surface(tree, mesh, points[apart], on[apart], threads))
-        for points, on in ((a, on_a), (b, on_b))
-    )
+    start, stop = (_end(tree, mesh, points[apart], on[apart], threads) for points, on in ((a, on_a), (b, on_b)))
     seen = np.ones(len(a), np.bool_)
     seen[apart] = _are_open(tree, mesh, start, stop, threads)
     return seen.reshape(shape)
+
+
+def _end(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64], threads: int) -> _Ends:
+    """One end of segments, on the surface exactly where it lies on it."""
+    places = on_surface(tree, mesh, points, faces, threads)
+    return _Ends(places_of(mesh, points, places), places)
 
 
 def _are_open(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> NDArray[np.bool_]:
@@ -78,7 +81,9 @@ def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) ->
     room = np.maximum(room / np.abs(directions).max(axis=1, initial=0.0), _LEAST)
     # Where the ends leave no room between them, t_min is above t_max, and nothing hides.
     t_min = np.where(start.places.faces < 0, room, 0.0)
-    rays = RayBatch(start.points, directions, t_min, np.maximum(reach - room, 0.0))
+    rays = RayBatch(
+        start.points, directions, t_min, np.where(stop.places.faces < 0, np.maximum(reach - room, 0.0), reach)
+    )
     leaving = Leaving(start.places.faces, np.full(1, BARYCENTRIC), start.places.anchors)
     return moved_off(rays, leaving, mesh, tree.scale, threads) if (leaving.faces >= 0).any() else rays
 

@@ -16,7 +16,7 @@ from renderer.kernels.vec3 import add, dot, normalized, scale, times
 from renderer.picture.pack import media_around
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import checked_vector
-from renderer.shade.crossing import SPARE, Change, Spot, Together, change_of, place_at, together_of
+from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at, surface_together_of, together_of
 from renderer.shade.lights import aim_from
 from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG
 from renderer.shade.shading import reflect
@@ -28,6 +28,7 @@ from renderer.trace.query import closest_hits
 from renderer.trace.singly import stack_size
 from renderer.trace.spawn import BOUNDED, Place, spawn_origin, start_row
 from renderer.trace.starts.cone import HOLDERS_WORDS
+from renderer.trace.starts.level import Spot
 from renderer.trace.starts.record import HEAD, ROW
 
 Vector = tuple[float, float, float]
@@ -165,15 +166,14 @@ def _meet(prepared: PreparedScene, ray: _Ray) -> _Met | None:
     spot, d, arrays = Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0])), ray.direction, prepared.arrays
     stack, memory = np.empty(stack_size(prepared.tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
     together = together_of(prepared.tree.words, arrays, spot, d, stack, memory)
-    seen = Spot(*together.seen)
-    surface = surface_of(arrays, *seen, d)
+    surface = Surface(*surface_together_of(arrays, together, d))
     inside, row = dot(d, surface.n_s) > 0.0, int(surface.material)
     media, beyond = np.array(ray.media, np.int64), np.zeros(_media_limit(prepared) + SPARE, np.int64)
     change = Change(1.0, 1.0, 0)
     if passes_light_of(arrays, row):
         change = change_of(arrays, together, row, inside, media, beyond, memory)
     n, columns = scale(surface.n_s, -1.0) if inside else surface.n_s, arrays.materials[row // MATERIAL_COLUMNS]
-    place = place_at(seen, surface, d)
+    place = place_at(Spot(*together.near), surface, d)
     return _Met(together, place, surface, n, inside, row, columns, change, tuple(beyond[: change.left].tolist()))
 
 
@@ -229,7 +229,9 @@ def _hit_segments(prepared: PreparedScene, ray: _Ray, met: _Met, own: int, shado
             radiance = add(radiance, aim.radiance)
     p = met.surface.p
     return [
-        Segment(ray.kind, ray.depth, ray.parent, ray.origin, p, True, int(met.place.face), ray.weight, radiance),
+        Segment(
+            ray.kind, ray.depth, ray.parent, ray.origin, p, True, int(met.together.seen.face), ray.weight, radiance
+        ),
         *shadow_rays,
     ]
 
@@ -266,7 +268,7 @@ def _bounce(prepared: PreparedScene, ray: _Ray, met: _Met, own: int) -> list[_Ra
     mirrored, weight = reflect(d, met.n), times(ray.weight, k_r)
     children = [_child("reflected", ray, own, met.surface, met.place, mirrored, weight, ray.media)]
     if passes_light_of(prepared.arrays, m) and passes:
-        last, surface, place = Spot(*met.together.last), met.surface, met.place
+        last, surface, place = Spot(*met.together.far), met.surface, met.place
         if last.face != int(met.place.face):
             surface = surface_of(prepared.arrays, *last, d)
             place = place_at(last, surface, d)

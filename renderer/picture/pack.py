@@ -14,8 +14,8 @@ from renderer.shade.surface import MAX_MEDIA, SceneArrays
 def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
     """The merged mesh of all instances in their order, and everything else that the kernel reads.
 
-    Arrays that ``needs`` does not name are left empty; for None, those that the scene does not need. ``touching`` is for
-    ``touching.find_touching``.
+    Arrays that ``needs`` does not name are left empty; for None, those that the scene does not need; and ``touching``,
+    which ``touching.find_touching`` makes.
     """
     needs = needs_of(scene) if needs is None else needs
     instances = scene.instances

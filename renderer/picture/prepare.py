@@ -5,15 +5,17 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.errors import expect
 from renderer.kernels.notice import Stopwatch
+from renderer.lazy import lazy
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import media_around, pack
-from renderer.picture.touching import find_touching
-from renderer.process.parallel import checked_threads, for_chunks
+from renderer.picture.touching import find_touching, touching_faces
+from renderer.process.parallel import available_threads, checked_threads, for_chunks
 from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.needs import Needs
 from renderer.scene.scene import RenderSettings, Scene
@@ -60,6 +62,11 @@ class PreparedScene:
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles make the kernels' arrays anew, so that they are of the types that kernels know."""
         return _restored, (self.scene, self.octree, self.needs, self.build_seconds)
+
+    @lazy
+    def touching(self) -> NDArray[np.uint8]:
+        """``SceneArrays.touching`` for any materials."""
+        return touching_faces(self.tree, self.arrays, available_threads(), every=True)
 
     def picture(
         self,

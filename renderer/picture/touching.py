@@ -1,208 +1,29 @@
-"""The faces that pass light and may coincide with another one: where rays meet them, kernels look which they meet there.
-
-Found once for a scene: too many cost time alone, so rounding counts as coinciding.
-"""
-
-from typing import NamedTuple
+"""The faces of a scene that touch: see ``shade.touching``."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
-    get,
-    larger,
-    load4,
-    load8,
-    lowest_bit,
-    magnitude,
-    movemask,
-    pointer,
-    put,
-    smaller,
-    splat4,
-    splat8,
-)
-from renderer.kernels.vec3 import cross, largest_component, sub
 from renderer.process.parallel import for_chunks
 from renderer.scene.needs import Needs
-from renderer.shade.surface import SceneArrays, lets_through, scene_pointers
-from renderer.trace.intersect import round_both
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS, Tree
-from renderer.trace.leaf import blocks_of, push_children, tree_pointers
-from renderer.trace.sides import corner
+from renderer.shade.surface import SceneArrays
+from renderer.shade.touching import mark_touching
+from renderer.trace.layout import Tree
 from renderer.trace.singly import stack_size
 
-# The share of a face's coordinates by which its box grows, and of the products of its sides that is taken for rounding.
-_ROOM, _ERROR = 2.0**-45, 2.0**-45
-# Of the product of two vectors in the plane, only rounding.
-_EDGE_ERROR = 2.0**-50
 _CHUNK = 4096
 
 
-def find_touching(tree: Tree, arrays: SceneArrays, needs: Needs, threads: int, every: bool = False) -> SceneArrays:
-    """``arrays`` with ``touching``; without faces that touch, or where nothing refracts, that has no rows.
-
-    With ``every``, faces that pass no light count too.
-    """
-    touching = np.zeros(len(arrays.faces) if needs.refraction else 0, np.uint8)
-    if len(touching):
-        places = len(tree.faces)
-
-        def mark(begin: int, end: int) -> None:
-            mark_touching(tree.words, arrays, begin, end, every, np.empty(stack_size(tree.depth), np.int64), touching)
-
-        for_chunks(mark, places, _CHUNK, threads)
-    return arrays._replace(touching=touching if touching.any() else touching[:0])
+def find_touching(tree: Tree, arrays: SceneArrays, needs: Needs, threads: int) -> SceneArrays:
+    """``arrays`` with ``touching``."""
+    return arrays._replace(touching=touching_faces(tree, arrays, threads)) if needs.refraction else arrays
 
 
-@kernel
-def mark_touching(words, arrays, begin, end, every, stack, touching):
-    """Mark those faces of some places in blocks that pass light, or every one, and may coincide with another face."""
-    tree, scene = tree_pointers(words), scene_pointers(arrays)
-    for slot in range(begin, end):
-        face = get(tree.faces, slot)
-        if face >= 0 and (every or lets_through(scene.materials, np.int64(get(scene.material, face)))):
-            if _touches(tree, slot, face, pointer(stack)):
-                touching[face] = 1
+def touching_faces(tree: Tree, arrays: SceneArrays, threads: int, every: bool = False) -> NDArray[np.uint8]:
+    """``SceneArrays.touching``; with ``every``, whether or not one of two faces passes light."""
+    touching = np.zeros(len(arrays.faces), np.uint8)
 
+    def mark(begin: int, end: int) -> None:
+        mark_touching(tree.words, arrays, begin, end, every, np.empty(stack_size(tree.depth), np.int64), touching)
 
-@inlined
-def _corners(tree, slot):
-    """The corners of the face in a place of a block."""
-    place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
-    return corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
-
-
-@inlined
-def _range(corners, k):
-    """The least and largest coordinate of a face along an axis."""
-    a, b, c = corners[0][k], corners[1][k], corners[2][k]
-    return smaller(a, smaller(b, c)), larger(a, larger(b, c))
-
-
-@inlined
-def _octants_around(tree, child, flat):
-    """The bits of the octants of a node whose boxes meet that of a face."""
-    base, bits = child * NODE_WORDS, 0xFF
-    for k in range(3):
-        low, high = _range(flat.corners, k)
-        low, high = round_both(low - flat.room)[0], round_both(high + flat.room)[1]
-        bits &= movemask(
-            (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
-        )
-    return bits
-
-
-class _Flat(NamedTuple):
-    """A face: its corners, its normal, and what its box and heights above its plane are off by
-    rounding, the heights as a share of a distance.
-    """
-
-    corners: tuple
-    normal: tuple
-    room: float
-    error: float
-
-
-@inlined
-def _flat_at(tree, slot):
-    """The ``_Flat`` in a place of a block."""
-    p0, p1, p2 = corners = _corners(tree, slot)
-    one, other = sub(p1, p0), sub(p2, p0)
-    room = _ROOM * larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
-    return _Flat(corners, cross(one, other), room, _ERROR * largest_component(one) * largest_component(other))
-
-
-@kernel
-def _touches(tree, slot, face, stack):
-    """Whether the face in a place may coincide with another one."""
-    flat, top = _flat_at(tree, slot), 1
-    if not tree.has_nodes:
-        return _touches_in(tree, 0, tree.count, flat, face)
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, blocks = blocks_of(child)
-            if _touches_in(tree, first, blocks, flat, face):
-                return True
-            continue
-        top = push_children(tree, child, _octants_around(tree, child, flat), stack, top)
-    return False
-
-
-@inlined
-def _touches_in(tree, first, blocks, flat, face):
-    """Whether a face may coincide with another one of some blocks."""
-    for block in range(first, first + blocks):
-        bits = _level_bits(tree, block * BLOCK_WORDS, flat)
-        while bits != 0:
-            slot = block * BLOCK_FACES + lowest_bit(bits)
-            bits &= bits - 1
-            other = get(tree.faces, slot)
-            if other >= 0 and other != face and _may_coincide(flat, _corners(tree, slot)):
-                return True
-    return False
-
-
-@inlined
-def _coordinates(tree, at_):
-    """A coordinate of a corner of the four faces of a block."""
-    return load4(tree.wide_blocks, at_) if tree.wide != 0 else load4(tree.blocks, at_)
-
-
-@inlined
-def _level_bits(tree, base, flat):
-    """The bits of the faces of a block that are in the plane of a face, or nearly so."""
-    p, n, bits = flat.corners[0], flat.normal, np.int64(0xF)
-    for k in range(3):
-        x = _coordinates(tree, base + 12 * k) - splat4(p[0])
-        y = _coordinates(tree, base + 12 * k + 4) - splat4(p[1])
-        z = _coordinates(tree, base + 12 * k + 8) - splat4(p[2])
-        height = x * splat4(n[0]) + y * splat4(n[1]) + z * splat4(n[2])
-        bits &= movemask(
-            magnitude(height) <= splat4(flat.error) * larger(magnitude(x), larger(magnitude(y), magnitude(z)))
-        )
-    return bits
-
-
-@kernel
-def _may_coincide(flat, q):
-    """Whether a face in a plane with another one meets its box, and no side of one has all of the other beyond it."""
-    p, (x, y, z) = flat.corners, flat.normal
-    for k in range(3):
-        (low, high), (least, most) = _range(p, k), _range(q, k)
-        if least > high + flat.room or low > most + flat.room:
-            return False
-    x, y, z = abs(x), abs(y), abs(z)
-    axis = 0 if x >= y and x >= z else (1 if y >= z else 2)
-    return not (_has_beyond(p, q, axis) or _has_beyond(q, p, axis))
-
-
-@inlined
-def _flat(a, axis):
-    """The two components of a vector beside an axis."""
-    return (a[1], a[2]) if axis == 0 else ((a[2], a[0]) if axis == 1 else (a[0], a[1]))
-
-
-@kernel
-def _turn(a, b, c, axis):
-    """Twice the area of a triangle as seen along an axis, and what rounding may have made of it."""
-    (x, y), (s, t) = _flat(sub(b, a), axis), _flat(sub(c, a), axis)
-    return x * t - y * s, _EDGE_ERROR * (abs(x * t) + abs(y * s))
-
-
-@kernel
-def _has_beyond(p, q, axis):
-    """Whether a face has a side beyond which all of the other one is."""
-    around = _turn(p[0], p[1], p[2], axis)[0]
-    for k in range(3):
-        a, b = (p[0], p[1]) if k == 0 else ((p[1], p[2]) if k == 1 else (p[2], p[0]))
-        beyond = True
-        for c in q:
-            turn, error = _turn(a, b, c, axis)
-            beyond = beyond and (turn <= error if around >= 0.0 else turn >= -error)
-        if beyond:
-            return True
-    return False
+    for_chunks(mark, len(tree.faces), _CHUNK, threads)
+    return touching if touching.any() else touching[:0]

@@ -53,7 +53,7 @@ def on_faces(octree: Octree) -> Chosen:
 def on_vertices(octree: Octree) -> Chosen:
     """As on faces; a vertex gets the mean of its faces' answers by their areas.
 
-    A vertex itself lies on many faces, and half of what it would see is inside of one of them.
+    A vertex has no normal of its own, by which studies know its side.
     """
     chosen, mesh = on_faces(octree), octree.mesh
     assert chosen.of_faces is not None
@@ -99,9 +99,9 @@ def on_grid(octree: Octree, spacing: float) -> Chosen:
 
 
 def of_file(octree: Octree, path: Path) -> Chosen:
-    """Points of an ``.npy`` file, (n, 3), or (n, 6) with normals behind them; they lie on no face.
+    """Points of an ``.npy`` file, (n, 3), or (n, 6) with normals behind them. Points without normals look up.
 
-    Points without normals look up.
+    Studies find out which of them lie on the surface, and on which faces.
     """
     array = _read_array("--points", path)
     good = array.ndim == 2 and array.shape[1] in (3, 6) and len(array) > 0

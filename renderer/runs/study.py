@@ -31,7 +31,9 @@ _TOGETHER = 1 << 22
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """The points of a study: ``points`` and ``normals`` (n, 3) float64, and ``leaving`` (n,) int64, -1 for no face."""
+    """The points of a study: ``points`` and ``normals`` (n, 3) float64, and ``leaving`` (n,) int64, -1 for a face that
+    is not known.
+    """
 
     points: Floats
     normals: Floats

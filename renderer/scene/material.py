@@ -17,7 +17,8 @@ _WHITE = (1.0, 1.0, 1.0)
 class Phong(Fields):
     """Ambient, diffuse and specular light with a constant reflected and transmitted part.
 
-    ``ambient`` (k_a) is ``diffuse`` unless given. Under total internal reflection there is no transmitted part.
+    ``ambient`` (k_a) is ``diffuse`` unless given. Under total internal reflection there is no transmitted part. Bodies
+    that touch or overlap are as for ``Dielectric``.
 
     >>> from renderer import Phong
     >>> red = Phong(diffuse=(0.7, 0.1, 0.1), specular=0.2, shininess=50)
@@ -94,6 +95,10 @@ class Mirror(Fields):
 
 class Dielectric(Fields):
     """Clear glass of index ``ior``: Fresnel's share reflected, the rest refracted, tinted by the two colours.
+
+    Bodies that touch have no air between them: faces that coincide are crossed at once, from the medium before all of
+    them to the medium after all, by the colours of the one that is first in the scene; an opaque one stops the ray.
+    Where bodies overlap, the one that the ray entered last holds; of those entered at one place, the last in the scene.
 
     >>> from renderer import Dielectric
     >>> green = Dielectric(ior=1.33, transmittance=(0.8, 1, 0.8))

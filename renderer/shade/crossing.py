@@ -12,38 +12,26 @@ from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import get, pointer, put, smaller
 from renderer.kernels.vec3 import dot
 from renderer.shade.records import IOR
-from renderer.shade.surface import lets_through, scene_pointers, surface_at
+from renderer.shade.surface import Surface, lets_through, scene_pointers, surface_at
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.spawn import Place
-from renderer.trace.starts.anchor import anchor_of
-from renderer.trace.starts.cone import NUMBER, PATH, PLACE, holder, make_holders, put_holder
-from renderer.trace.starts.meeting import barycentrics_of, meet_face, seen_from, slope_there, unit_direction
-from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
-from renderer.trace.starts.region import coincide
-from renderer.trace.starts.search import list_holders
+from renderer.trace.starts.cone import NUMBER, PATH, holder, make_holders, put_holder
+from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, list_near, member_spot
 
 # Room for media that a ray enters at one place, beside those that it remembers.
 SPARE = 8
-_NONE = -1
-# The marks of holders, in their word PATH: apart from the others, or a body is entered or left through it.
-_APART, _ENTERED, _LEFT = 0, 1, 2
-
-
-class Spot(NamedTuple):
-    """A point of a face, by its barycentrics."""
-
-    face: int
-    u: float
-    v: float
+# The marks of members, in their word PATH: a body is entered or left through it.
+_ENTERED, _LEFT = 1, 2
 
 
 class Together(NamedTuple):
-    """Faces that a ray crosses at one point: where it sees them, where it leaves them behind, and the number of holders
-    among which they are marked, 0 where one face alone is met.
+    """Faces that a ray crosses at one point: what it sees of them, where rays leave them back and onwards, and how many
+    are marked, 0 where one face alone is met.
     """
 
     seen: Spot
-    last: Spot
+    near: Spot
+    far: Spot
     count: int
 
 
@@ -65,18 +53,6 @@ class Change(NamedTuple):
     left: int
 
 
-class _Contact(NamedTuple):
-    """A point where faces may coincide: its anchor, the direction of a ray there, the slope of that against the
-    anchor's face, the faces that hold it and their number.
-    """
-
-    anchor: Any
-    d: Any
-    slope: int
-    holders: Any
-    count: int
-
-
 @inlined
 def place_at(spot, surface, d):
     """The ``Place`` for rays that leave the ``Surface`` at a spot, which a ray of direction d met."""
@@ -90,77 +66,41 @@ def faces_together(tree, scene, spot, d, stack, memory):
     """
     if scene.has_touching and get(scene.touching, spot.face) != 0:
         return _faces_together(tree, scene, spot, d, stack, memory)
-    return Together(spot, spot, 0)
+    return Together(spot, spot, spot, 0)
 
 
 @kernel
 def _faces_together(tree, scene, spot, d, stack, memory):
-    contact = _contact_at(tree, scene, spot, d, stack, memory)
-    if _mark_members(tree, scene, contact, spot, d) < 2:
-        return Together(spot, spot, 0)
-    opaque, first, last = _NONE, _NONE, _NONE
-    k = _next_member(contact.holders, contact.count, _NONE)
-    while k != _NONE:
-        first = k if first == _NONE else first
-        if opaque == _NONE and not lets_through(scene.materials, _material_of(scene, contact.holders, k)):
+    holders, opaque = make_holders(memory), NO_MEMBER
+    near = list_near(tree, scene, spot, stack, holders)
+    if near < 2:
+        return Together(spot, spot, spot, 0)
+    members, met = list_members(tree, scene, spot, d, holders, near)
+    if members.count < 2:
+        return Together(spot, spot, spot, 0)
+    for k in range(members.count - 1, -1, -1):
+        at_ = member_spot(tree, holders, k, spot, met)
+        surface = surface_at(scene, at_.face, at_.u, at_.v, d)
+        put_holder(holders, k, PATH, _LEFT if dot(d, surface.n_s) > 0.0 else _ENTERED)
+        if not lets_through(scene.materials, surface.material):
             opaque = k
-        last = k
-        k = _next_member(contact.holders, contact.count, k)
-    if opaque != _NONE:
-        seen = _spot_of(tree, contact, opaque, spot)
-        return Together(seen, seen, 0)
-    return Together(_spot_of(tree, contact, first, spot), _spot_of(tree, contact, last, spot), contact.count)
+    seen = member_spot(tree, holders, 0 if opaque == NO_MEMBER else opaque, spot, met)
+    return Together(seen, members.near, members.far, members.count if opaque == NO_MEMBER else 0)
+
+
+@inlined
+def surface_together(scene, together, d):
+    """The ``Surface`` that a ray of direction d meets: the look of the face that is seen, where rays leave back."""
+    seen, near = together.seen, together.near
+    met = surface_at(scene, seen.face, seen.u, seen.v, d)
+    return met if near.face == seen.face else _moved(scene, met, near, d)
 
 
 @kernel
-def _contact_at(tree, scene, spot, d, stack, memory):
-    corners = corners_of(scene.vertices, scene.faces, spot.face, tree.scale)
-    anchor = anchor_of(Start(corners, (spot.u, spot.v, 0.0), spot.face, BARYCENTRIC))
-    way, _ = unit_direction(d)
-    slope, holders = slope_there(anchor, way), make_holders(memory)
-    count = list_holders(tree, anchor, way, slope, 1.0, stack, holders)
-    return _Contact(anchor, way, slope, holders, count)
-
-
-@kernel
-def _mark_members(tree, scene, contact, spot, d):
-    """Mark the holders that coincide with the face of a spot; returns their number."""
-    holders, own, members = contact.holders, _NONE, 0
-    for k in range(contact.count):
-        if holder(holders, k, NUMBER) == spot.face:
-            own = k
-    for k in range(contact.count):
-        mark = _APART
-        if own != _NONE and (k == own or coincide(tree, contact.anchor, holders, own, k)):
-            at_ = _spot_of(tree, contact, k, spot)
-            inside = dot(d, surface_at(scene, at_.face, at_.u, at_.v, d).n_s) > 0.0
-            mark, members = (_LEFT if inside else _ENTERED), members + 1
-        put_holder(holders, k, PATH, mark)
-    return members
-
-
-@kernel
-def _spot_of(tree, contact, k, met):
-    """The ``Spot`` of the k-th holder; ``met`` is that of the face that the ray was found to hit."""
-    face = holder(contact.holders, k, NUMBER)
-    if face == met.face:
-        return met
-    seen = seen_from(tree, holder(contact.holders, k, PLACE), contact.anchor)
-    u, v = barycentrics_of(meet_face(seen, contact.anchor, contact.d, contact.slope, 1.0))
-    return Spot(face, u, v)
-
-
-@kernel
-def _next_member(holders, count, k):
-    """The marked holder with the next higher number than the k-th one; the lowest for k = _NONE; _NONE for no more."""
-    best = _NONE
-    for j in range(count):
-        if holder(holders, j, PATH) != _APART:
-            number = holder(holders, j, NUMBER)
-            after = k == _NONE or number > holder(holders, k, NUMBER)
-            if after and (best == _NONE or number < holder(holders, best, NUMBER)):
-                best = j
-    return best
+def _moved(scene, met, near, d):
+    """A ``Surface`` with the place of another spot."""
+    other = surface_at(scene, near.face, near.u, near.v, d)
+    return Surface(other.p, other.error, other.n_g, met.n_s, met.material, other.slack)
 
 
 @inlined
@@ -179,8 +119,8 @@ def _enter(media, count, material, most):
 
 @kernel
 def _leave(media, count, material):
-    """Take the innermost entry of a medium out of ``media`` in place, wherever it stands, so that overlapping bodies are
-    left one by one; returns their number, which is the same where there is none.
+    """Take the innermost entry of a medium out of ``media`` in place, wherever it stands, so that overlapping bodies
+    are left one by one; returns their number, which is the same where there is none.
     """
     for k in range(count - 1, -1, -1):
         if get(media, k) == material:
@@ -217,23 +157,19 @@ def cross(scene, together, m, inside, media, beyond, memory):
 
 
 @kernel
-def _cross_all(scene, holder_count, media, beyond, memory):
-    """``cross`` of all marked faces: bodies are entered, lower faces first, before others are left, so that a sheet
-    that is entered and left at once changes nothing.
+def _cross_all(scene, members, media, beyond, memory):
+    """``cross`` of all members: bodies are entered, lower faces first, before others are left, so that a sheet that is
+    entered and left at once changes nothing.
     """
     holders, count, n1 = make_holders(memory), media.count, _innermost_ior(scene, media.rows, media.count)
-    for mark in (_ENTERED, _LEFT):
-        k = _next_member(holders, holder_count, _NONE)
-        while k != _NONE:
-            material = _material_of(scene, holders, k)
-            if holder(holders, k, PATH) == mark:
-                before = count
-                if mark == _ENTERED:
-                    count = _enter(beyond, count, material, media.limit + SPARE)
-                else:
-                    count = _leave(beyond, count, material)
-                    n1 = get(scene.materials, material + IOR) if count == before else n1
-            k = _next_member(holders, holder_count, k)
+    for k in range(members):
+        if holder(holders, k, PATH) == _ENTERED:
+            count = _enter(beyond, count, _material_of(scene, holders, k), media.limit + SPARE)
+    for k in range(members):
+        if holder(holders, k, PATH) == _LEFT:
+            material, before = _material_of(scene, holders, k), count
+            count = _leave(beyond, count, material)
+            n1 = get(scene.materials, material + IOR) if count == before else n1
     return Change(n1, _innermost_ior(scene, beyond, count), smaller(count, media.limit))
 
 
@@ -248,3 +184,9 @@ def change_of(arrays, together, m, inside, media, beyond, memory):
     """``cross``, for Python; ``media`` is an array."""
     around = Media(pointer(media), len(media), len(beyond) - SPARE)
     return cross(scene_pointers(arrays), together, m, inside, around, pointer(beyond), pointer(memory))
+
+
+@kernel
+def surface_together_of(arrays, together, d):
+    """``surface_together``, for Python."""
+    return surface_together(scene_pointers(arrays), together, d)

@@ -21,8 +21,8 @@ from renderer.trace.traverse import search_blocks, trace
 # Where light passes, CHANGE has the ``crossing.Change``, and LAST the ``crossing.Spot`` that a refracted ray leaves.
 POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT, PLACE, CHANGE, LAST = 0, 3, 6, 9, 10, 11, 12, 15, 20, 23
 SURFACE_DOUBLES = 26
-# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and the
-# row of ``starts.record``.
+# Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and
+# the row of ``starts.record``.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 _TOWARDS, _ARRIVING, _START, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE, (13 + ROW) * SIZE
 

@@ -28,7 +28,7 @@ class SceneArrays(NamedTuple):
     lights     (L, LIGHT_COLUMNS)
     colors     (2, 3), ambient and background
     media      (m,) int64, m <= MAX_MEDIA, the same place for each medium that the eye is in, outermost first
-    touching   (F,) uint8, not 0 for faces that pass light and may coincide with another; without rows where none does
+    touching   (F,) uint8, not 0 for faces that may coincide with one that passes light; without rows where none does
     """
 
     vertices: NDArray[np.float64]

@@ -23,7 +23,7 @@ from renderer.shade.bundle import (
     count_of,
     depth_of,
 )
-from renderer.shade.crossing import SPARE, Media, Spot, cross, faces_together, place_at
+from renderer.shade.crossing import SPARE, Media, cross, faces_together, place_at, surface_together
 from renderer.shade.direct import (
     BOUND,
     CHANGE,
@@ -49,6 +49,7 @@ from renderer.shade.shading import fresnel, reflect, refract
 from renderer.shade.surface import lets_through, scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
 from renderer.trace.spawn import OffsetRule, Place, put_start, spawn_origin
+from renderer.trace.starts.level import Spot
 from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import Scratch
 
@@ -165,7 +166,7 @@ def _put_change(scene, bundle, work, i, together, inside):
     m = np.int64(get(surface, MATERIAL))
     change = cross(scene, together, m, inside, media, _beyond(work, bundle.limit, i), work.trace.holders)
     put3(surface, CHANGE, (change.n1, change.n2, float(change.left)))
-    last = together.last
+    last = together.far
     put3(surface, LAST, (float(last.face), last.u, last.v))
 
 
@@ -175,16 +176,15 @@ def _meet_surface(tree, scene, bundle, work, i):
     found, surface = work.found, at(work.surfaces, i * SURFACE_DOUBLES)
     d, spot = row3(bundle.directions, i), Spot(get(found.face, i), get(found.u, i), get(found.v, i))
     together = faces_together(tree, scene, spot, d, work.trace.packet_stack, work.trace.holders)
-    seen = together.seen
-    put(found.face, i, seen.face)
-    met = surface_at(scene, seen.face, seen.u, seen.v, d)
+    put(found.face, i, together.seen.face)
+    met = surface_together(scene, together, d)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, met.n_s) > 0.0
     put3(surface, POINT, met.p)
     put3(surface, NORMAL, scale(met.n_s, -1.0) if inside else met.n_s)
     put3(surface, GEOMETRIC, met.n_g)
     put(surface, BOUND, met.error)
-    put_place(surface, place_at(seen, met, d))
+    put_place(surface, place_at(together.near, met, d))
     put(surface, MATERIAL, float(met.material))
     put(surface, INSIDE, 1.0 if inside else 0.0)
     put3(surface, LIGHT, times(three(scene.materials, met.material + AMBIENT), row3(scene.colors, 0)))

@@ -62,8 +62,8 @@ def openness(
 ) -> Floats:
     """The share of all directions around each point in which it sees out, (...) float64: the solid angle over 4 pi.
 
-    It is 1 far from everything, 1/2 on level ground, and 0 inside a closed mesh. This is no mean of horizon angles, as
-    the topographic openness of terrain is.
+    It is 1 far from everything, 1/2 just above level ground, and 0 inside a closed mesh. A point on the surface sees
+    out through the faces that hold it. This is no mean of horizon angles, as the topographic openness of terrain is.
 
     samples   directions, 1 to 2^24, of equal solid angle: those of ``directions.fibonacci_sphere``
     distance  how far the mesh hides, in scene units: nothing within it counts as open

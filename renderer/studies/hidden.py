@@ -34,10 +34,11 @@ def occlusion(
     normals     (..., 3) as points, or one (3,) for all; not zero, of any length; None: no point has a horizon
     directions  (k, 3), the same for all points, of any length as those of rays
     weights     (k,) >= 0, not all 0: what each direction counts; None: all the same
-    leaving     the face that each point lies on, (...) or one for all, -1 for none. The ray starts off this face by
-                more than rounding errors, on the side that the direction goes to: no epsilon is needed. A point on the
-                surface without it is hidden from all directions by the surface that it lies on; for points whose faces
-                are not known, ``leaving=octree.closest_point(points).face``
+    leaving     the face that each point lies on, (...) or one for all, -1 where that is not known; None: -1 for all. A
+                point is then on the surface where it is as near as 64 roundings of float32, if all its coordinates are
+                numbers of float32, else 32 of float64. Rays start at the point of the face that is nearest: no epsilon
+                is needed. The normal says on which side of the faces there the point is: directions that lead through
+                them to another side are hidden. Without a normal the faces that hold the point hide nothing
     packed      True: (..., ceil(k / 8)) uint8 with a set bit for each hidden direction, in the order of
                 ``numpy.unpackbits(..., axis=-1, count=k)``. There are no weights then
     distance    how far the mesh hides, in scene units

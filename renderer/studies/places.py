@@ -34,7 +34,7 @@ class FacePoints(NamedTuple):
 def face_points(mesh: Mesh) -> FacePoints:
     """The centroid of each face that has an area, its normal and its number.
 
-    Corners lie on many faces, of which a ray can leave one only: so there are no points at vertices.
+    A vertex has no normal of its own, by which studies know its side: so there are no points at vertices.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box

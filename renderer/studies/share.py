@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import flag_argument, real_argument
-from renderer.distance.on_surface import on_surface
+from renderer.distance.on_surface import distances_from, on_surface
 from renderer.errors import expect
 from renderer.limits import LONGEST, SHORTEST
+from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
 from renderer.points.curve import order_along_curve
 from renderer.process.parallel import checked_threads, for_chunks
@@ -20,6 +21,7 @@ from renderer.queries import Queries
 from renderer.studies.density import are_dense
 from renderer.studies.sweep import TILE, Answers, Places, Sky, make_sweep_memory, sweep
 from renderer.trace.batch import check_faces
+from renderer.trace.spawn import FARTHEST_START
 
 Floats = NDArray[np.float64]
 
@@ -50,9 +52,21 @@ def check_asked(
     expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
     rows, shape = check_points("points", points, farthest_of(octree.tree.scale))
     faces = check_faces("leaving", -1 if leaving is None else leaving, shape, len(octree.mesh.faces))
+    _check_places(octree.mesh, rows, faces)
     workers = octree.threads if threads is None else checked_threads(threads)
     places = Places(rows, _check_normals(normals, shape), faces, np.empty((0, 3)))
     return Asked(places, shape, workers, flag_argument("progress", progress))
+
+
+def _check_places(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> None:
+    """Raise ``ValueError`` naming the row of a point that is farther from its face than points of float32 are."""
+    named = np.flatnonzero(faces >= 0)
+    largest = np.maximum(np.abs(points[named]).max(axis=1, initial=0.0), np.abs(mesh.vertices).max(initial=0.0))
+    far = distances_from(mesh, points[named], faces[named]) > FARTHEST_START * largest
+    if far.any():
+        row = int(named[far.argmax()])
+        expected = f"points on the faces that they leave, within {FARTHEST_START:.1g} of the largest coordinate"
+        expect(False, "points", expected, f"{points[row].tolist()} and face {faces[row]} in row {row}")
 
 
 def _check_normals(normals: ArrayLike | None, shape: tuple[int, ...]) -> Floats:

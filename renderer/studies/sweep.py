@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import at, get, pointer, put, smaller
 from renderer.kernels.vec3 import add, cross, dot, largest_component, normalized, row3, scale, three
+from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.parallel_rays import (
@@ -33,7 +34,6 @@ from renderer.trace.starts.record import (
     ANCHOR,
     BARYCENTRIC,
     CODE,
-    CORNER,
     EDGE,
     FACE,
     KNOWN,
@@ -68,8 +68,8 @@ _SUM, _WHOLE, _START, _FAN = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
 _FANS, _LEAST_FAN = 256 * TILE, FAN_HEAD
 _POINT_DOUBLES = _FAN + _FANS
 # Its row; the leaf that hid its last direction, or 0; whether it is a corner of the mesh; where
-# its table begins, -1 for none; and once for the tile, how often tracing its rays together may still be tried, and where
-# the next table begins.
+# its table begins, -1 for none; and once for the tile, how often tracing its rays together may still be tried, and
+# where the next table begins.
 _ROW, _HIDER, _CORNER, _TABLE = 0, TILE, 2 * TILE, 3 * TILE
 _LEFT, _TABLES, _POINT_INTEGERS = 4 * TILE, 4 * TILE + 1, 4 * TILE + 8
 

@@ -71,8 +71,8 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
 
     A face that is seen only between these points counts as hidden; one that counts as seen is seen there. Rays leave
     the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
-    only what looks to the eye. An eye on the surface sees past what is nearer than 2^-40 of the largest coordinate; see
-    ``octree.visible``, which is asked. A face without area is not seen, and neither is one whose plane the eye lies in,
+    only what looks to the eye. An eye on the surface is not hidden by the faces that hold it; see ``octree.visible``,
+    which this calls. A face without area is not seen, and neither is one whose plane the eye lies in,
     which no rounding tells. Raises ``ValueError`` naming the argument.
 
     >>> from renderer import Octree

@@ -55,6 +55,8 @@ SLANT = 2.0**-16
 ERROR = 2.0**-48
 # The error of an edge function as a share of A D, of ``unsure_sides``: 10 u and room.
 SIDE_ERROR = 2.0**-49
+# The slack of a ray that starts exactly at its origin, a corner of the mesh.
+CORNER = 2.0**-1000
 # The share of its width by which a face's box is wider than the face, on each side.
 ROOM = 2.0**-21
 
@@ -364,28 +366,31 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
     blurs, dues = np.int64(0), np.int64(0)
     # What only this needs is computed here: doubts are rare, and one branch costs less than they would in each block.
     if unlikely(doubts != 0):
-        doubt = blurred | low | _may_be_on_edge(edges)
-        t_within, error = (t, t_min, t_max), product * along * splat4(ERROR)
-        due = _are_due(edges, (wide, high), (height, base_t, error), doubt, blurred, t_within)
-        doubts, blurs = seen & movemask(doubt), seen & movemask(blurred)
-        dues = seen & movemask(due | (height < reach)) & ~_left(tree, base, edges, ray)
+        left = _left(tree, base, edges, ray) if ray.slack != 0.0 else np.int64(0)
+        # Most often the face that the ray leaves is the only one.
+        if doubts & ~left != 0:
+            doubt = blurred | low | _may_be_on_edge(edges)
+            t_within, error = (t, t_min, t_max), product * along * splat4(ERROR)
+            due = _are_due(edges, (wide, high), (height, base_t, error), doubt, blurred, t_within)
+            doubts, blurs = (seen & movemask(doubt)) | (doubts & left), seen & movemask(blurred)
+            dues = seen & movemask(due | (height < reach)) & ~left
     return t, doubts, blurs, dues
 
 
 @inlined
 def _left(tree, base, edges, ray):
-    """The bits of the faces of the block at ``base`` that a ray leaves: its own, and those with a corner at its origin,
-    which it meets nowhere else.
+    """The bits of the faces of the block at ``base`` that a ray leaves: its own, and where it starts at a corner those
+    that have it, which it meets nowhere else.
     """
     place, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
-    if ray.slack == 0.0:
-        return bits
     for i in range(BLOCK_FACES):
         bits |= np.int64(np.float64(get(tree.faces, place + i)) == ray.leaving) << i
-    zero = splat4(0.0)
-    at0 = (edges.x0 == zero) & (edges.y0 == zero) & (edges.z0 == zero)
-    at1 = (edges.x1 == zero) & (edges.y1 == zero) & (edges.z1 == zero)
-    return bits | movemask(at0 | at1 | ((edges.x2 == zero) & (edges.y2 == zero) & (edges.z2 == zero)))
+    if ray.slack == CORNER:
+        zero = splat4(0.0)
+        at0 = (edges.x0 == zero) & (edges.y0 == zero) & (edges.z0 == zero)
+        at1 = (edges.x1 == zero) & (edges.y1 == zero) & (edges.z1 == zero)
+        bits |= movemask(at0 | at1 | ((edges.x2 == zero) & (edges.y2 == zero) & (edges.z2 == zero)))
+    return bits
 
 
 @inlined

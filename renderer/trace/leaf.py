@@ -5,16 +5,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import (
-    as_pairs,
-    cross_pairs,
-    dot_pairs,
-    heads,
-    minus,
-    power_below,
-    product,
-    scaled_difference,
-)
 from renderer.kernels.simd import (
     double_of,
     extract,
@@ -22,13 +12,11 @@ from renderer.kernels.simd import (
     float64_pointer,
     get,
     int32_pointer,
-    larger,
     lowest_bit,
     pointer,
     put,
     smaller,
 )
-from renderer.kernels.vec3 import largest_component, scale, sub
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import hit_triangles, make_shear
 from renderer.trace.layout import (
@@ -46,7 +34,6 @@ from renderer.trace.layout import (
     SCALE,
     WIDE,
 )
-from renderer.trace.sides import corner
 
 
 class TreePointers(NamedTuple):
@@ -101,12 +88,6 @@ def push_children(tree, node, bits, stack, top):
 
 
 NO_FACE = np.iinfo(np.int32).max
-# The place of no face.
-NOWHERE = -1
-# Two hits are ordered with twice the digits where their t are nearer to each other than this share: 2^-46 of t is what
-# a sure t errs by where the ray does not graze the face. They are equal where that leaves no more than its own
-# rounding.
-TIE, _EQUAL = 2.0**-44, 2.0**-90
 # After each run of so many blocks a search of all blocks for any hit checks whether it has one.
 _BLOCKS_AT_ONCE = 16
 
@@ -116,7 +97,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
     """The better of ``best`` = (t, face, u, v, w) and the sure hits in ``count`` blocks: smallest t, then lowest face.
 
     The barycentrics are u / w and v / w; only those of the final hit are divided. Also returns whether a hit was in
-    doubt, or so near to another that rounding may have ordered the two. A call here that settles it would cost every
+    doubt. A call here that settles it would cost every
     ray its registers, so that is left to ``nearest_carefully``.
     """
     t, face, u, v, w = best
@@ -130,7 +111,6 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
             bits &= bits - 1
             ti = extract(t4, i)
             fi = get(tree.faces, block * BLOCK_FACES + i)
-            doubtful |= np.int64(face != NO_FACE and ti >= t_min and abs(ti - t) <= ti * TIE)
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
                 t, face, u, v, w = ti, fi, extract(u4, i), extract(v4, i), extract(w4, i)
     return t, face, u, v, w, doubtful
@@ -139,12 +119,6 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
 @kernel
 def nearest_carefully(tree, first, count, ray, shear, best):
     """``nearest_in_blocks`` with the hits in doubt too, as ``settled`` makes them."""
-    return nearest_placed(tree, first, count, ray, shear, best, NOWHERE)[0]
-
-
-@kernel
-def nearest_placed(tree, first, count, ray, shear, best, place):
-    """``nearest_carefully`` of a best hit whose place in the blocks is known; returns both anew."""
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
         bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, best[0])
@@ -155,45 +129,15 @@ def nearest_placed(tree, first, count, ray, shear, best, place):
             hit = extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)
             if (doubts >> i) & 1 != 0:
                 hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-            if is_better(tree, ray, hit[0], face, base + i, best, place):
-                best, place = (hit[0], face, hit[1], hit[2], hit[3]), base + i
-    return best, place
+            if is_better(hit[0], face, ray, best):
+                best = hit[0], face, hit[1], hit[2], hit[3]
+    return best
 
 
 @inlined
-def is_better(tree, ray, t, face, place, best, best_place):
+def is_better(t, face, ray, best):
     """Whether a hit counts and is before the best one: a smaller t, or a lower face."""
-    if not t >= ray.t_min:
-        return False
-    if best_place != NOWHERE and t != best[0] and abs(t - best[0]) <= t * TIE:
-        return is_before(tree, ray, place, face, best_place, best[1])
-    return t < best[0] or (t == best[0] and face < best[1])
-
-
-@kernel
-def is_before(tree, ray, place, face, other_place, other):
-    """Whether a ray meets the plane of one face before that of another, with twice the digits, or at once and it is the
-    lower one.
-    """
-    o, d = (ray.ox, ray.oy, ray.oz), (ray.dx, ray.dy, ray.dz)
-    unit = 1.0 / power_below(largest_component(d))
-    height, slope, size = _plane(tree, place, o, scale(d, unit))
-    other_height, other_slope, other_size = _plane(tree, other_place, o, scale(d, unit))
-    # Of t the slopes are the denominators: where their signs differ the order turns round.
-    apart = minus(product(height, other_slope), product(other_height, slope))[0]
-    if abs(apart) <= _EQUAL * (size * abs(other_slope[0]) + other_size * abs(slope[0])):
-        return face < other
-    return apart < 0.0 if (slope[0] > 0.0) == (other_slope[0] > 0.0) else apart > 0.0
-
-
-@kernel
-def _plane(tree, place, o, d):
-    """normal . (p0 - o) and normal . d of the face at a place, as pairs in a unit of its own; and the first's size."""
-    p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
-    side = 1.0 / power_below(larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0))))
-    normal = cross_pairs(scaled_difference(p1, p0, side), scaled_difference(p2, p0, side))
-    size = largest_component(heads(normal)) * largest_component(sub(p0, o))
-    return dot_pairs(normal, scaled_difference(p0, o, 1.0)), dot_pairs(normal, as_pairs(d)), size
+    return t >= ray.t_min and (t < best[0] or (t == best[0] and face < best[1]))
 
 
 @kernel

@@ -5,17 +5,10 @@ import numpy as np
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import LOCAL_WORDS, get, local_words, pointer, put, splat8
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.leaf import (
-    NO_FACE,
-    NOWHERE,
-    blocks_of,
-    nearest_carefully,
-    nearest_placed,
-    push_children,
-    tree_pointers,
-)
+from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_children, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
-from renderer.trace.starts.search import counted_from_start, search_from
+from renderer.trace.starts.record import EDGE
+from renderer.trace.starts.search import NEAR_HIT, search_from, t_from
 
 
 def stack_size(depth: int) -> int:
@@ -41,14 +34,14 @@ def search_singly(tree, ray, t_max, stack):
     best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
     if not tree.has_nodes:
         return nearest_carefully(tree, 0, tree.count, ray, shear, best), tree.count
-    top, steps, place = 1, np.int64(0), NOWHERE
+    top, steps = 1, np.int64(0)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, count = blocks_of(child)
-            best, place = nearest_placed(tree, first, count, ray, shear, best, place)
+            best = nearest_carefully(tree, first, count, ray, shear, best)
             steps += count
             continue
         _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
@@ -67,13 +60,25 @@ def search_carefully(tree, rays, i, stack, holders, any_hit):
 
 
 @inlined
-def write_best(tree, rays, found, i, best, shear, largest, any_hit):
-    """Write the best hit (t, face, u, v, w) of ray ``i``, see ``write_hit``; t counts from its exact start."""
+def write_best(tree, rays, found, i, best, start, dz, any_hit):
+    """Write the best hit (t, face, u, v, w) of ray ``i``, see ``write_hit``; t counts from its exact start.
+
+    ``start`` is (the ray's slack, its largest component): where the hit is near, the way that its origin was moved is a
+    part of t.
+    """
+    slack, largest = start
+    if not any_hit and best[0] * largest < NEAR_HIT * slack and slack < EDGE:
+        best = count_from_start(tree, rays, i, best)
+    write_hit(found, i, rays.scale, best, dz, any_hit)
+
+
+@kernel
+def count_from_start(tree, rays, i, best):
+    """A hit with t counted from the exact start of ray ``i``."""
     t, face, u, v, w = best
-    if shear.slack > 0.0 and not any_hit:
-        ray, _ = ray_at(rays, i)
-        t, u, v, w = counted_from_start(tree, rays.starts, i, ray, largest, (t, u, v, w), face)
-    write_hit(found, i, rays.scale, (t, face, u, v, w), shear.direction_z, any_hit)
+    if face != NO_FACE:
+        t = t_from(tree, rays.starts, i, ray_at(rays, i)[0], np.int64(face), t)
+    return t, face, u, v, w
 
 
 @kernel
@@ -91,5 +96,5 @@ def trace_few(words, rays, out, holders):
     for i in range(count):
         best, _ = search_carefully(tree, source, i, stack, pointer(holders), False)
         ray, _ = ray_at(source, i)
-        write_best(tree, source, found, i, best, make_shear(ray), largest_of(ray), False)
+        write_best(tree, source, found, i, best, (ray.slack, largest_of(ray)), make_shear(ray).direction_z, False)
     return -1

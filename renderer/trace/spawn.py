@@ -24,14 +24,13 @@ from renderer.kernels.vec3 import (
     three,
 )
 from renderer.trace.doubt import LINE, ROUNDING
-from renderer.trace.intersect import DOUBT, SLANT
+from renderer.trace.intersect import CORNER, DOUBT, SLANT
 from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
     ABOVE,
     ANCHOR,
     BARYCENTRIC,
     CODE,
-    CORNER,
     EDGE,
     FACE,
     KNOWN,
@@ -175,15 +174,15 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
 
 
 @inlined
-def _away(x, step):
-    """x + step, rounded at least one float64 further in the direction of ``step``."""
+def _away(x, step, towards):
+    """x + step, rounded at least one float64 further in the direction of ``towards``."""
     y = x + step
-    if step == 0.0 or not math.isfinite(y):
+    if towards == 0.0 or not math.isfinite(y):
         return y
     # nextafter without its call: the bits of a float64 count up away from 0.
     if y == 0.0:
-        return math.copysign(_SMALLEST, step)
-    away = 1 if (y > 0.0) == (step > 0.0) else -1
+        return math.copysign(_SMALLEST, towards)
+    away = 1 if (y > 0.0) == (towards > 0.0) else -1
     return np.int64(np.float64(y).view(np.int64) + away).view(np.float64)
 
 
@@ -199,7 +198,7 @@ def spawn_origin(p, error, n_g, w, offset):
         distance = (1.0 + largest_component(p)) * offset.epsilon
         return add(p, scale(n_g, side * distance))
     step = scale(n_g, side * error)
-    return (_away(p[0], step[0]), _away(p[1], step[1]), _away(p[2], step[2]))
+    return (_away(p[0], step[0], step[0]), _away(p[1], step[1], step[1]), _away(p[2], step[2], step[2]))
 
 
 @inlined
@@ -216,7 +215,6 @@ def put_start(row, place, n_g, w, offset):
     put(row, CODE, np.float64(code))
     put(row, ANCHOR, place.u)
     put(row, ANCHOR + 1, place.v)
-    put(row, ANCHOR + 2, 0.0)
 
 
 @kernel
@@ -269,8 +267,9 @@ def _plane_near(p0, p1, p2, o):
 @inlined
 def _moved(o, plane, away):
     """The point o near a face, moved along its normal to where it is off for certain; away = -1 is the other side."""
-    step = scale(plane.normal, away * (plane.needed - away * plane.height))
-    return (_away(o[0], step[0]), _away(o[1], step[1]), _away(o[2], step[2]))
+    out = scale(plane.normal, away)
+    step = scale(out, plane.needed - away * plane.height)
+    return (_away(o[0], step[0], out[0]), _away(o[1], step[1], out[1]), _away(o[2], step[2], out[2]))
 
 
 @inlined

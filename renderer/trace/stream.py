@@ -27,7 +27,6 @@ from renderer.kernels.simd import (
 )
 from renderer.trace.intersect import box_limit, meet_boxes, meet_planes, see_triangles
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, TIE
 from renderer.trace.ray_lanes import (
     CHILD,
     DOUBTFUL,
@@ -53,8 +52,6 @@ _LOW_WORD = 0xFFFFFFFF
 END = -(1 << 31)
 _BOTTOM = (-0x800000 << 32) | (END & _LOW_WORD)
 _LINE = CACHE_LINE // 4
-# Hits that are so little farther than the best one may be before it.
-_BEYOND = 1.0 + TIE
 
 
 @inlined
@@ -213,7 +210,7 @@ def meet_leaves(tree, rays, lanes, count):
         edges, seen = see_triangles(tree, block * BLOCK_WORDS, shear)
         t_min, t_max = get(rays.doubles, T_MIN + r), get(rays.doubles, T + r)
         t, doubts, _, dues = meet_planes(tree, block * BLOCK_WORDS, edges, seen, shear, t_min, t_max)
-        put(lanes.bits, k, seen & ~doubts & movemask((t >= splat4(t_min)) & (t <= splat4(t_max * _BEYOND))))
+        put(lanes.bits, k, seen & ~doubts & movemask((t >= splat4(t_min)) & (t <= splat4(t_max))))
         put(lanes.doubts, k, dues)
         hits = 4 * BLOCK_FACES * k
         store(lanes.hits, hits, t)
@@ -224,8 +221,7 @@ def meet_leaves(tree, rays, lanes, count):
 
 @inlined
 def take_hits(tree, rays, lanes, k):
-    """Keep the best hit of the first block that the ``k``-th ray at a leaf met, and whether one was in doubt or as near
-    as rounding to another.
+    """Keep the best hit of the first block that the ``k``-th ray at a leaf met, and whether one was in doubt.
 
     Returns whether there is a hit.
     """
@@ -239,14 +235,12 @@ def take_hits(tree, rays, lanes, k):
         i = lowest_bit(bits)
         bits &= bits - 1
         ti, fi = get(hits, i), get(tree.faces, block * BLOCK_FACES + i)
-        if face != NO_FACE and abs(ti - t) <= ti * TIE:
-            put(rays.integers, DOUBTFUL + r, 1)
         if ti < t or (ti == t and fi < face):
             t, face = ti, fi
             u, v, w = get(hits, BLOCK_FACES + i), get(hits, 2 * BLOCK_FACES + i), get(hits, 3 * BLOCK_FACES + i)
     put_best(rays, r, (t, face, u, v, w))
     put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
-    return face != NO_FACE
+    return True
 
 
 @inlined

@@ -12,6 +12,7 @@ from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import NO_FACE, search_all_blocks, tree_pointers
 from renderer.trace.packet import child_of, meet_octant, trace_packet
 from renderer.trace.ray_lanes import (
+    DIRECTION_Z,
     DOUBTFUL,
     LARGEST,
     NUMBER,
@@ -21,7 +22,6 @@ from renderer.trace.ray_lanes import (
     Prepared,
     best_of,
     prepare_eight,
-    shear_of,
 )
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers
 from renderer.trace.singly import search_carefully, stack_size, write_best
@@ -131,12 +131,13 @@ def _finish(tree, rays, found, scratch, r, any_hit):
     Returns the rounds of lanes that take as long as that search.
     """
     best, (_, doubles, integers), steps = best_of(scratch.prepared, r), scratch.prepared, np.int64(0)
-    i = get(integers, NUMBER + r)
-    if get(integers, DOUBTFUL + r) != 0 or get(doubles, SLACK + r) == EDGE:
+    i, slack = get(integers, NUMBER + r), get(doubles, SLACK + r)
+    if get(integers, DOUBTFUL + r) != 0 or slack == EDGE:
         best, steps = search_carefully(
             tree, rays, i, at(scratch.lanes.stacks, stack_of(scratch.lanes, r)), scratch.holders, any_hit
         )
-    write_best(tree, rays, found, i, best, shear_of(scratch.prepared, r), get(doubles, LARGEST + r), any_hit)
+    start = slack, get(doubles, LARGEST + r)
+    write_best(tree, rays, found, i, best, start, get(doubles, DIRECTION_Z + r), any_hit)
     return steps // ENOUGH
 
 
@@ -239,7 +240,8 @@ def search_blocks(tree, rays, found, begin, end, holders, any_hit):
             best, doubtful = search_all_blocks(tree, ray, t_max, any_hit)
         if doubtful:
             best, _ = search_carefully(tree, rays, i, holders, holders, any_hit)
-        write_best(tree, rays, found, i, best, make_shear(ray), largest_of(ray), any_hit)
+        start = ray.slack, largest_of(ray)
+        write_best(tree, rays, found, i, best, start, make_shear(ray).direction_z, any_hit)
 
 
 @kernel

@@ -209,6 +209,8 @@ def _edited(prepared: PreparedScene, edits: Edits) -> PreparedScene:
         octree=geometry.octree,
     )
     arrays = _lit(repacked(prepared.arrays, scene, needs), scene, needs)
+    if any(m.passes_light and not prepared.scene.materials[name].passes_light for name, m in scene.materials.items()):
+        arrays = arrays._replace(touching=prepared.touching)
     return replace(prepared, scene=scene, needs=needs, arrays=arrays)
 
 

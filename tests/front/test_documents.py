@@ -156,7 +156,7 @@ def test_python_in_a_page_runs_as_it_stands(page, block, tmp_path, monkeypatch):
     names: dict[str, object] = {}
     exec(code, names)
     if page == README and "closest_hit" in block:
-        assert names["hits"].hit.tolist() == [True, False] and (tmp_path / "glass.png").stat().st_size > 10_000
+        assert names["shadowed"].tolist() == [True, False] and (tmp_path / "glass.png").stat().st_size > 10_000
 
 
 def unknown_names(block):

@@ -140,13 +140,19 @@ for points in (vertices, vertices.astype(np.float32)):
             target.closest_hit(rays, rays, t_error=True)
             target.all_hits(rays, rays, t_error=True)
             target.any_hit(rays, rays, t_min=0.5, t_max=np.full(len(rays), 9.0))
-            target.closest_hit(rays[:9], rays[:9], leaving=np.arange(9, dtype=np.int32))
+            left = np.arange(9, dtype=np.int32)
+            starts = target.mesh.triangles[:9].mean(axis=1)
+            target.closest_hit(starts, rays[:9], leaving=left)
+            target.any_hit(starts[0], rays[:9], leaving=0, side=-1)
+            hits = target.closest_hit(rays, rays)
+            target.any_hit(np.nan_to_num(hits.points), rays, leaving=hits)
+            target.all_hits(np.nan_to_num(hits.points), rays, leaving=hits.through())
 BruteForce.from_mesh(box()).contains(vertices.tolist())
 Octree.from_mesh(box(), threads=2).contains(np.asfortranarray(vertices.astype(np.float32)))
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(SIGNATURES + script).splitlines()[-1].split(maxsplit=1)
-    assert int(count) == 47 and not new
+    assert int(count) == 53 and not new
 
 
 def test_kernels_of_queries_are_those_of_every_query_of_either_kind():
@@ -158,7 +164,7 @@ before = signatures()
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.queries import Queries
-from renderer.studies import ambient_occlusion, occlusion, sky_view_factor, visible_faces
+from renderer.studies import ambient_occlusion, occlusion, scan, sky_view_factor, visible_faces
 ball, rng = icosphere(3), np.random.default_rng(1)
 # In float64 and in float32, of which the kernels of trees have two kinds.
 meshes = [ball, Mesh(ball.vertices.astype(np.float32), ball.faces), Mesh(ball.vertices * 1e-60, ball.faces)]
@@ -169,17 +175,26 @@ for tree in trees:
     for count in (1, 9, 100):
         a, b = rng.normal(size=(2, count, 3)) * size
         faces = np.arange(count)
+        on, corners = tree.mesh.triangles[:count].mean(axis=1), tree.mesh.triangles[:count, 0]
+        hits, sides = tree.closest_hit(a, -a), np.where(faces % 2, 1, -1)
+        met = np.nan_to_num(hits.points)
         for name in ("closest_hit", "any_hit", "all_hits", "count_hits", "count_steps"):
             asked.add(name)
-            for more in ({}, {"t_min": 0.1, "t_max": np.full(count, 9.0)}, {"leaving": faces}):
+            for more in ({}, {"t_min": 0.1, "t_max": np.full(count, 9.0)}):
                 getattr(tree, name)(a, b, **more)
+            for start in (on, corners):
+                getattr(tree, name)(start, b, leaving=faces), getattr(tree, name)(start, b, leaving=faces, side=sides)
+            getattr(tree, name)(on[0], b, leaving=0), getattr(tree, name)(on, b[0], leaving=faces, side=1)
+            getattr(tree, name)(met, a, leaving=hits), getattr(tree, name)(met, -a, leaving=hits.through())
         tree.closest_hit(a, b, t_error=True), tree.all_hits(a, b, t_error=True, contacts=False, max_hits=2)
-        tree.visible(a, b), tree.visible(a, b, leaving=faces, reaching=faces)
+        tree.visible(a, b), tree.visible(on, corners, leaving=faces, reaching=faces), tree.visible(on, b)
         tree.contains(a), tree.contains(a, False, "even-odd"), tree.contains(a, winding=True)
         tree.winding_number(a), tree.closest_point(a, 0.5 * size), tree.signed_distance(a)
-        for of in ({}, {"leaving": faces}):
-            occlusion(tree, a, b, b, **of), occlusion(tree, a.astype(np.float32), None, b, packed=True, **of)
-            sky_view_factor(tree, a, up=[1, 2, 3], **of), ambient_occlusion(tree, a, b[::-1], samples=9, **of)
+        for at, of in ((a, {}), (on, {}), (corners, {}), (on, {"leaving": faces})):
+            occlusion(tree, at, b, b, **of), occlusion(tree, at, None, b, packed=True, **of)
+            sky_view_factor(tree, at, up=[1, 2, 3], **of), ambient_occlusion(tree, at, b[::-1], samples=9, **of)
+            scan(tree, at[0], b), scan(tree, at[0], b, normal=b[0])
+        occlusion(tree, a.astype(np.float32), None, b, packed=True)
         visible_faces(tree, tree.mesh.vertices[0])  # in the planes of some faces
         asked |= {"visible", "contains", "winding_number", "closest_point", "signed_distance"}
     tree.refit(tree.mesh.vertices * 1.5)

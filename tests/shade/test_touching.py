@@ -1,6 +1,7 @@
-"""Bodies that touch have no air between them: pictures against closed forms, and against bodies that are one or sunk."""
+"""Bodies that touch have no air between them: pictures against closed forms, and bodies that are one or sunk."""
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -116,9 +117,9 @@ class TestOnTheGround:
 
 
 def passed(angle: float, *indices: float) -> float:
-    """The share that goes through plane interfaces between media of such indices, in at an angle, unpolarised at each."""
+    """The share that goes through planes between media of such indices, in at an angle, unpolarised at each."""
     share, sine = 1.0, math.sin(math.radians(angle)) * indices[0]
-    for n1, n2 in zip(indices, indices[1:], strict=False):
+    for n1, n2 in pairwise(indices):
         c1, c2 = math.sqrt(1 - (sine / n1) ** 2), math.sqrt(1 - (sine / n2) ** 2)
         s, p = (n1 * c1 - n2 * c2) / (n1 * c1 + n2 * c2), (n1 * c2 - n2 * c1) / (n1 * c2 + n2 * c1)
         share *= 1 - (s * s + p * p) / 2
@@ -184,6 +185,55 @@ class TestGlassOnGlass:
             np.testing.assert_allclose(image.radiance, passed(0, 1, 1.5, 1), rtol=1e-5)
 
 
+def other_diagonals(mesh: Mesh) -> Mesh:
+    """A box of the same place whose squares are halved along their other diagonals."""
+    middle = mesh.vertices.mean(axis=0) * [2, 0, 0]
+    return Mesh(mesh.vertices * [-1, 1, 1] + middle, mesh.faces[:, ::-1])
+
+
+class TestTurned:
+    """Turned by any angle, planes that were one are so but for rounding."""
+
+    def seen(self, rotate: Any, parts: list[tuple[Mesh, Material]], eye: Any, target: Any, **more: Any) -> Image:
+        materials = {"ground": GROUND, **{str(m): m for _, m in parts}}
+        objects = tuple(
+            SceneObject(mesh=mesh, material=str(m), normals="flat", rotate=rotate, translate=(3, -7, 11))
+            for mesh, m in parts
+        )
+        turn = np.array(objects[0].matrix())
+        eye, target = ((turn @ (*p, 1.0))[:3].tolist() for p in (eye, target))
+        camera = PerspectiveCamera(eye=eye, target=target, up=(0.1, 0.7, -0.7), fov=more.pop("fov"))
+        return picture(
+            Scene(camera=camera, materials=materials, objects=objects, ambient=1.0, **more), 40, max_depth=12
+        )
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_glass_on_the_ground(self, seed: int) -> None:
+        rotate = np.random.default_rng(seed).uniform(-180, 180, 3).tolist()
+        for mesh in (cube(0.0), other_diagonals(cube(0.0))):
+            for parts in ([(mesh, clear(1.5)), (level(0.0), GROUND)], [(level(0.0), GROUND), (mesh, clear(1.5))]):
+                image = self.seen(rotate, parts, (1, 3, 2), (0, 0.4, 0), fov=20, background=SKY)
+                assert image.radiance.max() < 2.0
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_glass_on_glass(self, seed: int) -> None:
+        rotate = np.random.default_rng(seed).uniform(-180, 180, 3).tolist()
+        t = math.radians(50)
+        eye, target = (20 * math.sin(t) + 0.3, 20 * math.cos(t), 0.2), (0.3, 0.0, 0.2)
+        for mesh in (slab(1, 2), other_diagonals(slab(1, 2)), box((-40, 1, -35), (50, 2, 37))):
+            for parts in ((mesh, slab(0, 1)), (slab(0, 1), mesh)):
+                image = self.seen(rotate, [(m, clear(1.5)) for m in parts], eye, target, fov=1e-4, background=1.0)
+                np.testing.assert_allclose(image.radiance, passed(50, 1, 1.5, 1), rtol=5e-6)
+
+    def test_a_mirror_below_glass(self) -> None:
+        for seed in range(8):
+            rotate = np.random.default_rng(seed).uniform(-180, 180, 3).tolist()
+            for mesh in (cube(0.0), other_diagonals(cube(0.0))):
+                parts = [(mesh, clear(1.5)), (level(0.0), Mirror(reflectance=0.9))]
+                image = self.seen(rotate, parts, (0.1, 5, 0.2), (0.1, 0, 0.2), fov=1e-4, background=1.0)
+                np.testing.assert_allclose(image.radiance, 0.9 * 0.96**2, rtol=5e-6)
+
+
 def crowded() -> Scene:
     parts = (
         (box((0, 0, 0), (1, 1, 1)), GLASS),
@@ -216,7 +266,7 @@ class TestOneAnswer:
                 np.testing.assert_array_equal(one, two)
 
     def test_numbers_of_faces_do_not_matter(self) -> None:
-        """But where a body later in the scene holds, or colours are those of the lowest: glass on the ground has neither."""
+        """But where the later of two bodies holds, or the colours of the first: not for one glass on the ground."""
         parts = [(cube(0.0), GLASS), (level(0.0), GROUND), (box((0.5, 0, -0.5), (1.5, 1, 0.5)), GLASS)]
         images = [
             picture(scene(*(parts[k] for k in order), eye=EYES[0])) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
@@ -246,9 +296,9 @@ class TestTouchingFaces:
         assert self.found((box(), GLASS), (level(-0.001), GROUND)) == []
         assert self.found((grid(7, 5), GLASS)) == []
 
-    def test_only_those_that_pass_light(self) -> None:
+    def test_only_those_of_which_one_passes_light(self) -> None:
         top, bottom = (box((0, 1, 0), (1, 2, 1)), GLASS), (box(), GROUND)
-        assert len(self.found(top, bottom)) == 2
+        assert len(self.found(top, bottom)) == 4
         assert len(self.found(top, (box(), WATER))) == 4
         assert self.found((box((0, 1, 0), (1, 2, 1)), GROUND), bottom) == []
 

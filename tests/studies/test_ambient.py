@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from renderer import Octree
-from renderer.mesh.shapes import box, icosphere, torus
+from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.studies import ambient_occlusion, cosine_hemisphere, face_points, openness
 
 SAMPLES = [64, 256, 4096, 30000]
@@ -94,6 +94,13 @@ def test_threads_slices_and_other_points_change_no_bit():
     np.testing.assert_array_equal(ambient_occlusion(octree, points, normals, threads=3), whole)
     np.testing.assert_array_equal(ambient_occlusion(octree, points[50:99], normals[50:99]), whole[50:99])
     np.testing.assert_array_equal(ambient_occlusion(octree, points, 7.0 * normals), whole)
+
+
+def test_a_point_on_a_sheet_sees_out_on_both_sides_and_one_beside_it_on_its_own():
+    octree = Octree.from_mesh(grid(size=(1e6, 1e6)))
+    open_ = openness(octree, [[0.1, 0.0, 0.2], [-5e5, 0.0, -5e5], [0.1, 1e-3, 0.2], [0.1, -1e-3, 0.2]], samples=1000)
+    assert open_[:2].tolist() == [1.0, 1.0]
+    np.testing.assert_allclose(open_[2:], 0.5, atol=1e-2)
 
 
 def test_a_closed_cube_from_inside_is_dark():

@@ -132,6 +132,39 @@ def test_points_on_faces_are_not_hidden_by_their_own():
     assert occlusion(octree, place.points, place.normals, directions).mean() > 0.6
 
 
+def test_whether_points_lie_on_the_surface_is_found_out_and_their_normals_say_the_side():
+    octree, around = Octree.from_mesh(box()), fibonacci_sphere(500).directions
+
+    def hidden(point, normal):
+        return unpacked(occlusion(octree, [point], normal, around, packed=True), 500)[0]
+
+    into = (around < 0.0).all(axis=1)  # from the corner at 1, 1, 1
+    np.testing.assert_array_equal(hidden([1, 1, 1], None), into)
+    n = np.array([1.0, 0.0, -1.0])
+    assert (into & (around @ n > 0.0)).any()
+    np.testing.assert_array_equal(hidden([1, 1, 1], n), into | ~(around @ n > 0.0))
+    assert hidden([1, 1, 1], [-1, -1, -1]).all()  # from within
+    into, n = (around[:, :2] < 0.0).all(axis=1), np.array([1.0, 0.0, -0.5])
+    assert (into & (around @ n > 0.0)).any()
+    np.testing.assert_array_equal(hidden([1, 1, 0.3], n), into | ~(around @ n > 0.0))
+
+    # As near as 64 roundings of numbers of float32, 32 of others; farther within, a point is hidden all around.
+    octree, place = Octree.from_mesh(icosphere(3)), face_points(icosphere(3))
+    points, normals = place.points, place.normals
+    below = ~(normals @ around.T > 0.0)
+    assert (points != points.astype(np.float32)).any(axis=1).all()
+    for near, on in (
+        (points, True),
+        (points - 2.0**-50 * normals, True),
+        (points - 2.0**-44 * normals, False),
+        (points.astype(np.float32), True),
+        ((points - 2.0**-20 * normals).astype(np.float32), True),
+        ((points - 2.0**-15 * normals).astype(np.float32), False),
+    ):
+        seen = unpacked(occlusion(octree, near, normals, around, packed=True), 500)
+        np.testing.assert_array_equal(seen, below if on else True)
+
+
 def test_nothing_hides_beyond_the_distance():
     octree = Octree.from_mesh(box())
     points, ways = [[3.0, 0.5, 0.25]], [[-1.0, 0.0, 0.0], [-0.125, 0.0, 0.0], [-8.0, 0.0, 0.0]]

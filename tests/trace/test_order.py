@@ -15,11 +15,12 @@ from numpy.random import Generator
 from renderer.kernels.jit import kernel
 from renderer.kernels.simd import extract
 from renderer.octree import BruteForce, Octree
-from renderer.trace.doubt import settled
+from renderer.trace.doubt import _meet_slab, settled
 from renderer.trace.hits import Hits
-from renderer.trace.intersect import Ray, hit_triangles, make_shear
+from renderer.trace.intersect import FAR_PADDING, Ray, box_limit, hit_triangles, largest_of, make_shear, round_down
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import tree_pointers
+from validation.oracle import exact
 
 SIDE = 100
 
@@ -171,8 +172,20 @@ def test_every_way_to_ask_has_the_same_answer(kind, seed, count, chosen):
 
 
 @kernel
+def within_own_box(tree, at, ray, t):
+    """Whether a ray at t is within the box of the face at ``at``, in the arithmetic of boxes."""
+    largest, first, last = largest_of(ray), np.float32(0.0), np.float32(np.inf)
+    first, last = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, first, last)
+    first, last = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, first, last)
+    first, last = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, first, last)
+    return first <= box_limit(t, largest) and round_down(t * largest) <= np.float32(last * FAR_PADDING)
+
+
+@kernel
 def judged(words, origins, directions, out):
-    """Of ray i at face i: 0 for a miss, 1 for a hit, 2 where t is in doubt, 3 where the determinant is; then both t."""
+    """Of ray i at face i: 0 for a miss, 1 for a hit, 2 where t is in doubt, 3 where the determinant is; then t, t
+    settled, and 1 where t, or that of a hit in doubt settled, is within the face's own box.
+    """
     tree = tree_pointers(words)
     for i in range(len(origins)):
         o, d = origins[i], directions[i]
@@ -185,6 +198,7 @@ def judged(words, origins, directions, out):
             # A sure hit is settled too, to see that its t stays.
             hit, is_blurred = (t, 0.0, 0.0, 1.0), (blurred >> place) & 1 != 0
             out[i, 2] = settled(tree, base + place, ray, make_shear(ray), hit, is_blurred)[0]
+            out[i, 3] = within_own_box(tree, base + place, ray, t if out[i, 0] == 1 else out[i, 2])
 
 
 def rays_close_to_planes(rng, count):
@@ -209,14 +223,19 @@ def test_a_hit_beyond_doubt_lies_within_its_own_box_and_so_within_all(seed):
     brute = BruteForce(*separate(corners))
     assert brute.tree.scale == 1.0
     np.testing.assert_array_equal(brute.tree.faces[: len(corners)], np.arange(len(corners)))
-    found = np.zeros((len(corners), 3))
+    found = np.zeros((len(corners), 4))
     judged(brute.tree.words, origins, directions, found)
     sure, doubtful = found[:, 0] == 1, found[:, 0] == 2
     assert sure.sum() > 50_000
     assert doubtful.sum() > 2_000
     assert (found[:, 0] == 3).sum() > 20_000
-    np.testing.assert_array_equal(found[sure, 1], found[sure, 2])
+    assert found[sure, 3].all()
+    # A sure hit that is settled all the same stays, but where its t is counted with twice the digits.
+    for row in np.flatnonzero(sure & (found[:, 1] != found[:, 2])):
+        u, v, w, t = exact.determinants(corners[row], origins[row], directions[row])
+        assert found[row, 2] == float(t / (u + v + w))
     counted = doubtful & ~np.isnan(found[:, 2])
+    assert found[counted, 3].all()
     assert (found[counted, 2] > found[counted, 1]).any()
     assert (found[counted, 2] < found[counted, 1]).any()
 

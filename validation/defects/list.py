@@ -328,7 +328,7 @@ PICTURES = (
             "1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)",
             "0.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)"),
     _kernel("pictures", "every medium stands in air", "crossing._innermost_ior",
-            "get(scene.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
+            "get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
     _kernel("pictures", "refraction by the textbook's formula", "refract",
             "if s2 < 0.5:\n"
             "    s = math.sqrt(s2)\n"

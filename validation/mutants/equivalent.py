@@ -34,7 +34,7 @@ EQUIVALENT: dict[str, str] = {
             "of two equal numbers either may be taken"
         for n in (0, 1) for sign in "<>"
     },
-    "renderer.shade.whitted._passes_light #0: largest_component(three(materials, m + TRANSMITTANCE)) > 0.0 -> "
+    "renderer.shade.surface.lets_through #0: largest_component(three(materials, m + TRANSMITTANCE)) > 0.0 -> "
     "(largest_component(three(materials, m + TRANSMITTANCE))) >= (0.0)":
         "a ray of weight 0 does not go on, so the one refracted by a surface that lets no light through is not spawned",
     "validation.oracle.exact._BoxTree.__init__ #0: range(depth) -> range(depth - 1)":

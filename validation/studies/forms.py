@@ -12,7 +12,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.studies import ambient_occlusion, openness, sky_view_factor
-from validation.studies.bodies import shaft, street, walls
+from validation.studies.bodies import FAR, shaft, street, walls
 
 Floats = NDArray[np.float64]
 # Where a street's floor is asked: so many places across it, and as many streets.
@@ -61,8 +61,8 @@ def streets() -> list[Form]:
     place = width * (np.arange(_PLACES) + 0.5) / _PLACES
     points = np.stack([place - width / 2.0, np.linspace(0.1, 0.9, _PLACES), np.zeros(_PLACES)], axis=1)
     left, right = np.arctan(depth / place), np.arctan(depth / (width - place))
-    faces = Octree.from_mesh(street(width, depth)).closest_point(points).face
-    asked = {"points": points, "leaving": faces}
+    # The floor is cut along the line from x = -1, y = -FAR to x = 1, y = FAR.
+    asked = {"points": points, "leaving": np.where(points[:, 0] * FAR > points[:, 1] * width / 2.0, 0, 1)}
     return [
         _sky("floor of a street", "(cos a + cos b) / 2 of the walls' heights in angle (Oke 1987)", street(width, depth),
              (np.cos(left) + np.cos(right)) / 2.0, **asked),

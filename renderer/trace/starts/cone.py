@@ -98,8 +98,8 @@ def _after(k):
 
 @kernel
 def name_nodes(tree, anchor, holders, count):
-    """Name the ends of all cones: two ends are one node where they are one corner, and ends that no other cone has where
-    they lie in one direction. Returns the number of nodes.
+    """Name the ends of all cones: two ends are one node where they are one corner, and ends that no other cone has
+    where they lie in one direction. Returns the number of nodes.
     """
     nodes = 0
     for k in range(count):

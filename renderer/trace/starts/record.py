@@ -16,8 +16,6 @@ ROW_STEP, VERTICES, FACES, HEAD = 0, 1, 2, 8
 SLACK, FACE, CODE, ANCHOR, ROW = 0, 1, 2, 3, 6
 # The slack of a ray that no search takes as it is: ``search.search_from`` decides.
 EDGE = np.inf
-# The slack of a ray that starts exactly at its origin, a corner of the mesh.
-CORNER = 2.0**-1000
 # The bits of a code: the side of the face that the ray starts on is known, and is that of its normal; the ray came
 # through the face; the anchor has barycentrics.
 KNOWN, ABOVE, THROUGH, BARYCENTRIC = 1, 2, 4, 8

@@ -28,7 +28,7 @@ from renderer.trace.intersect import (
     unsure_sides,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, NOWHERE, blocks_of, is_better, push_children
+from renderer.trace.leaf import NO_FACE, blocks_of, is_better, push_children
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
@@ -50,7 +50,7 @@ _ROOM = 2.0**-50
 # The least t of a face that does not hold the start: what is less would be 0 in the mesh's own units.
 _LEAST_T = 2.0**-900
 # A hit that is farther than so often its slack errs by less than 2^-20 of t by where the ray starts.
-_NEAR_HIT = 2.0**20
+NEAR_HIT = 2.0**20
 _NOTHING = (np.inf, np.int32(NO_FACE), 0.0, 0.0, 1.0)
 
 
@@ -175,8 +175,8 @@ def meet_near(tree, place, departure, dz):
 
 
 @kernel
-def _nearest_from(tree, first, count, departure, shear, best, place):
-    """``leaf.nearest_placed`` for a ray that leaves the surface."""
+def _nearest_from(tree, first, count, departure, shear, best):
+    """``leaf.nearest_carefully`` for a ray that leaves the surface."""
     ray = departure.ray
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
@@ -195,9 +195,9 @@ def _nearest_from(tree, first, count, departure, shear, best, place):
                 hit = extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)
                 if (doubts >> i) & 1 != 0:
                     hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-            if is_better(tree, ray, hit[0], face, base + i, best, place):
-                best, place = (hit[0], face, hit[1], hit[2], hit[3]), base + i
-    return best, place
+            if is_better(hit[0], face, ray, best):
+                best = hit[0], face, hit[1], hit[2], hit[3]
+    return best
 
 
 @kernel
@@ -214,15 +214,15 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
     if not tree.has_nodes:
-        return _nearest_from(tree, 0, tree.count, departure, shear, best, NOWHERE)[0], steps
-    lower, top, place = splat8(round_down(ray.t_min * largest)), 1, NOWHERE
+        return _nearest_from(tree, 0, tree.count, departure, shear, best), steps
+    lower, top = splat8(round_down(ray.t_min * largest)), 1
     put(stack, 0, 0)
     while top > 0:
         top -= 1
         child = get(stack, top)
         if child < 0:
             first, count = blocks_of(child)
-            best, place = _nearest_from(tree, first, count, departure, shear, best, place)
+            best = _nearest_from(tree, first, count, departure, shear, best)
             steps += count
             if any_hit and best[1] != NO_FACE:
                 break
@@ -234,7 +234,7 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
 
 
 @kernel
-def _t_from(tree, starts, i, ray, face, t):
+def t_from(tree, starts, i, ray, face, t):
     """Where a ray meets the plane of a face that it hits at t, counted from its exact start."""
     anchor, (d, unit) = anchor_of(start_at(starts, i, tree.scale)), unit_direction((ray.dx, ray.dy, ray.dz))
     p0, p1, p2 = corners_of(starts.vertices, starts.faces, face, tree.scale)
@@ -251,8 +251,8 @@ def counted_from_start(tree, starts, i, ray, largest, hit, face):
     """A hit (t, u, v, w) with t counted from the exact start of ray ``i``: where it is near, the way that the origin
     was moved is a part of t.
     """
-    if 0.0 < ray.slack < EDGE and face != NO_FACE and hit[0] * largest <= _NEAR_HIT * ray.slack:
-        return _t_from(tree, starts, i, ray, face, hit[0]), hit[1], hit[2], hit[3]
+    if 0.0 < ray.slack < EDGE and face != NO_FACE and hit[0] * largest <= NEAR_HIT * ray.slack:
+        return t_from(tree, starts, i, ray, face, hit[0]), hit[1], hit[2], hit[3]
     return hit
 
 

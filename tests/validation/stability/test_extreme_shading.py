@@ -102,7 +102,7 @@ class TestJudgesFindABrokenRefraction:
 
 # Place, rule, and what it is replaced by; then the rows whose cases must notice.
 FAULTS = [
-    ("whitted._innermost_ior", "get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
+    ("crossing._innermost_ior", "get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
     ("whitted._goes_on", "largest > 0.0 and largest >= min_weight", "largest > 0.02"),
     ("see_light", "dot(n, to_light) <= error", "dot(n, to_light) < -1e-3"),
     ("surface.phong", "dot(n, towards)", "abs(dot(n, towards))"),

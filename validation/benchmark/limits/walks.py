@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.kernels.jit import kernel
+from renderer.trace.batch import RayBatch
 from renderer.trace.packet import BUDGET
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import ray_pointers
@@ -50,7 +51,7 @@ def walk(tree: PlainTree, corners: NDArray[np.float64], rays: Family, together: 
     count, room = len(rays), _RECORDS
     scratch = np.empty((2, _STACK), np.int64), np.empty((2, _STACK))
     packed = (tree.boxes, tree.children, tree.faces, corners)
-    batch = (rays.origins, rays.directions, np.zeros(1), np.full(1, rays.t_max))
+    batch = RayBatch(rays.origins, rays.directions, np.zeros(1), np.full(1, rays.t_max))
     while True:
         t, sums, ends = np.full(count, rays.t_max), np.zeros(6, np.int64), np.empty(count, np.int64)
         records, found = np.empty(room * count, np.int64), np.zeros(count, np.bool_)

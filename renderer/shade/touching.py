@@ -1,0 +1,191 @@
+"""The faces that may coincide with one that passes light: where rays meet them, kernels look which they meet there.
+
+Found once for a scene. Too many cost time alone.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import (
+    get,
+    larger,
+    load4,
+    load8,
+    lowest_bit,
+    magnitude,
+    movemask,
+    pointer,
+    put,
+    smaller,
+    splat4,
+    splat8,
+)
+from renderer.kernels.vec3 import largest_component, length, sub
+from renderer.shade.surface import lets_through, scene_pointers
+from renderer.trace.intersect import round_both
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
+from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+from renderer.trace.sides import corner
+from renderer.trace.starts.level import CORNER_ERROR, plane_of
+
+# The share of a face's coordinates by which its box grows.
+_ROOM = 2.0**-45
+# Of the product of two vectors in the plane, only rounding.
+_EDGE_ERROR = 2.0**-50
+
+
+@kernel
+def mark_touching(words, arrays, begin, end, every, stack, touching):
+    """Mark those faces of some places in blocks that pass light, or every one, and may coincide with another face; and
+    that one.
+    """
+    tree, scene = tree_pointers(words), scene_pointers(arrays)
+    for slot in range(begin, end):
+        face = get(tree.faces, slot)
+        if face >= 0 and (every or lets_through(scene.materials, np.int64(get(scene.material, face)))):
+            _mark_touched(tree, slot, face, pointer(stack), touching)
+
+
+@inlined
+def _corners(tree, slot):
+    """The corners of the face in a place of a block."""
+    place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
+    return corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
+
+
+@inlined
+def _range(corners, k):
+    """The least and largest coordinate of a face along an axis."""
+    a, b, c = corners[0][k], corners[1][k], corners[2][k]
+    return smaller(a, smaller(b, c)), larger(a, larger(b, c))
+
+
+@inlined
+def _octants_around(tree, child, flat):
+    """The bits of the octants of a node whose boxes meet that of a face."""
+    base, bits = child * NODE_WORDS, 0xFF
+    for k in range(3):
+        low, high = _range(flat.corners, k)
+        low, high = round_both(low - flat.room)[0], round_both(high + flat.room)[1]
+        bits &= movemask(
+            (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
+        )
+    return bits
+
+
+class _Flat(NamedTuple):
+    """A face: its corners, its normal and the length of that, twice its longest side, its largest coordinate, and the
+    room by which its box grows.
+    """
+
+    corners: Any
+    normal: Any
+    size: float
+    side: float
+    largest: float
+    room: float
+
+
+@inlined
+def _flat_at(tree, slot):
+    """The ``_Flat`` in a place of a block."""
+    p0, p1, p2 = corners = _corners(tree, slot)
+    n, side = plane_of(corners)
+    largest = larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    return _Flat(corners, n, length(n), side, largest, _ROOM * largest)
+
+
+@kernel
+def _mark_touched(tree, slot, face, stack, touching):
+    """Mark the face in a place and those that may coincide with it."""
+    flat, top = _flat_at(tree, slot), 1
+    if not tree.has_nodes:
+        _mark_touched_in(tree, 0, tree.count, flat, face, touching)
+        return
+    put(stack, 0, 0)
+    while top > 0:
+        top -= 1
+        child = get(stack, top)
+        if child < 0:
+            first, blocks = blocks_of(child)
+            _mark_touched_in(tree, first, blocks, flat, face, touching)
+            continue
+        top = push_children(tree, child, _octants_around(tree, child, flat), stack, top)
+
+
+@inlined
+def _mark_touched_in(tree, first, blocks, flat, face, touching):
+    """Mark a face and those of some blocks that may coincide with it."""
+    for block in range(first, first + blocks):
+        bits = _level_bits(tree, block * BLOCK_WORDS, flat)
+        while bits != 0:
+            slot = block * BLOCK_FACES + lowest_bit(bits)
+            bits &= bits - 1
+            other = get(tree.faces, slot)
+            if other >= 0 and other != face and _may_coincide(flat, _corners(tree, slot)):
+                touching[face], touching[other] = 1, 1
+
+
+@inlined
+def _coordinates(tree, at_):
+    """A coordinate of a corner of the four faces of a block."""
+    return load4(tree.wide_blocks, at_) if tree.wide != 0 else load4(tree.blocks, at_)
+
+
+@inlined
+def _level_bits(tree, base, flat):
+    """The bits of the faces of a block that are in the plane of a face, or nearly so."""
+    p, n, bits = flat.corners[0], flat.normal, np.int64(0xF)
+    for k in range(3):
+        x = _coordinates(tree, base + 12 * k) - splat4(p[0])
+        y = _coordinates(tree, base + 12 * k + 4) - splat4(p[1])
+        z = _coordinates(tree, base + 12 * k + 8) - splat4(p[2])
+        height = x * splat4(n[0]) + y * splat4(n[1]) + z * splat4(n[2])
+        # As ``level.are_level`` has it, with room to spare.
+        way = larger(magnitude(x), larger(magnitude(y), magnitude(z)))
+        error = splat4(2.0 * CORNER_ERROR) * (splat4(flat.largest) + way)
+        bits &= movemask(magnitude(height) <= error * (splat4(flat.size) + splat4(flat.side) * way))
+    return bits
+
+
+@kernel
+def _may_coincide(flat, q):
+    """Whether a face in a plane with another one meets its box, and no side of one has all of the other beyond it."""
+    p, (x, y, z) = flat.corners, flat.normal
+    for k in range(3):
+        (low, high), (least, most) = _range(p, k), _range(q, k)
+        if least > high + flat.room or low > most + flat.room:
+            return False
+    x, y, z = abs(x), abs(y), abs(z)
+    axis = 0 if x >= y and x >= z else (1 if y >= z else 2)
+    return not (_has_beyond(p, q, axis) or _has_beyond(q, p, axis))
+
+
+@inlined
+def _flat(a, axis):
+    """The two components of a vector beside an axis."""
+    return (a[1], a[2]) if axis == 0 else ((a[2], a[0]) if axis == 1 else (a[0], a[1]))
+
+
+@kernel
+def _turn(a, b, c, axis):
+    """Twice the area of a triangle as seen along an axis, and what rounding may have made of it."""
+    (x, y), (s, t) = _flat(sub(b, a), axis), _flat(sub(c, a), axis)
+    return x * t - y * s, _EDGE_ERROR * (abs(x * t) + abs(y * s))
+
+
+@kernel
+def _has_beyond(p, q, axis):
+    """Whether a face has a side beyond which all of the other one is."""
+    around = _turn(p[0], p[1], p[2], axis)[0]
+    for k in range(3):
+        a, b = (p[0], p[1]) if k == 0 else ((p[1], p[2]) if k == 1 else (p[2], p[0]))
+        beyond = True
+        for c in q:
+            turn, error = _turn(a, b, c, axis)
+            beyond = beyond and (turn <= error if around >= 0.0 else turn >= -error)
+        if beyond:
+            return True
+    return False

@@ -1,0 +1,277 @@
+"""Faces that coincide where a ray meets the surface: in one plane, but for the rounding of their corners.
+
+Corners that were turned or moved are off by rounding, and so are planes that were one: such faces count as coinciding,
+and the order in which the ray passes them is exact.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import as_pairs, dot_pairs, quotient
+from renderer.kernels.simd import get, larger, load8, movemask, put, smaller, splat8
+from renderer.kernels.vec3 import barycentric, cross, dot, largest_component, length, sub
+from renderer.trace.intersect import round_both
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
+from renderer.trace.leaf import blocks_of, push_children
+from renderer.trace.sides import corner
+from renderer.trace.starts.anchor import anchor_of
+from renderer.trace.starts.cone import MOST_HOLDERS, NUMBER, PLACE, ZEROS, holder, put_holder
+from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
+from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
+
+NO_MEMBER = -1
+# The share of the largest coordinate by which corners are off: 16 roundings.
+CORNER_ERROR = 2.0**-49
+# Whether a face holds a point is asked so far inside the face that the ray met: at these weights of its corners.
+_INWARDS, _U, _V = 2.0**-44, 0.3217, 0.4159
+# Of the products of lengths that say on which side of an edge a point is, what is taken for rounding.
+_BESIDE = 2.0**-36
+
+
+class Spot(NamedTuple):
+    """A point of a face, by its barycentrics."""
+
+    face: int
+    u: float
+    v: float
+
+
+class Members(NamedTuple):
+    """Faces that coincide where a ray meets one of them, listed in words of ``cone.Holders``: their number, and where
+    the ray is before it passes all of them and after it. Of faces that it passes at once, the highest is last.
+    """
+
+    count: int
+    near: Spot
+    far: Spot
+
+
+class _Met(NamedTuple):
+    """A point that a ray meets: the corners of the face, the barycentrics, the point as rounded, and the direction of
+    the ray, scaled to about 1.
+    """
+
+    corners: Any
+    spot: Spot
+    o: Any
+    d: Any
+
+
+@inlined
+def _largest(corners):
+    p0, p1, p2 = corners
+    return larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+
+
+@inlined
+def plane_of(corners):
+    """The normal of a face, and twice the length of its longest side."""
+    one, other, third = sub(corners[1], corners[0]), sub(corners[2], corners[0]), sub(corners[2], corners[1])
+    side = larger(largest_component(one), larger(largest_component(other), largest_component(third)))
+    return cross(one, other), 4.0 * side
+
+
+@kernel
+def _is_below(p, q, error):
+    """Whether the corners of q are in the plane of p, whose corners are off by ``error``."""
+    n, side = plane_of(p)
+    size, level = length(n), True
+    for a in q:
+        way = sub(a, p[0])
+        level = level and abs(dot(n, way)) <= error * (size + side * largest_component(way))
+    return level
+
+
+@inlined
+def are_level(p, q):
+    """Whether two faces are in one plane, but for the rounding of their corners."""
+    error = CORNER_ERROR * larger(_largest(p), _largest(q))
+    return _is_below(p, q, error) and _is_below(q, p, error)
+
+
+@inlined
+def corners_at(tree, place):
+    """The corners of the face at a place of a block."""
+    return corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
+
+
+@kernel
+def _anchor_at(met, inwards):
+    """The point met, exactly, moved by some share of the way to a point inside the face."""
+    spot = met.spot
+    u, v = spot.u + inwards * (_U - spot.u), spot.v + inwards * (_V - spot.v)
+    return anchor_of(Start(met.corners, (u, v, 0.0), spot.face, BARYCENTRIC))
+
+
+@kernel
+def _holds_inner_point(tree, place, met):
+    """Whether a face holds the inner point, exactly."""
+    face = seen_from(tree, place, _anchor_at(met, _INWARDS))
+    return has_area(face) and (
+        turn_sign(face, face.a1, face.a2) >= 0
+        and turn_sign(face, face.a2, face.a0) >= 0
+        and turn_sign(face, face.a0, face.a1) >= 0
+    )
+
+
+@inlined
+def _share_axis(p, q):
+    """Whether two faces are in one plane across an axis."""
+    share = False
+    for k in range(3):
+        x = p[0][k]
+        own, other = p[1][k] == x and p[2][k] == x, q[0][k] == x and q[1][k] == x and q[2][k] == x
+        share = share or (own and other)
+    return share
+
+
+@kernel
+def _passed_at(tree, place, met):
+    """Where the ray passes a member, counted from the point met: negative before it."""
+    if _share_axis(met.corners, corners_at(tree, place)):
+        return 0.0
+    face = seen_from(tree, place, _anchor_at(met, 0.0))
+    slope = dot_pairs(face.normal, as_pairs(met.d))
+    if height_sign(face) == 0 or slope[0] == 0.0:
+        return 0.0
+    return quotient(dot_pairs(face.normal, face.a0), slope)[0] / face.factor
+
+
+@kernel
+def _spot_of(tree, place, number, met):
+    """The ``Spot`` of a member."""
+    _, around = _areas_at(corners_at(tree, place), met.o)
+    e0, e1, e2 = larger(around[0], 0.0), larger(around[1], 0.0), larger(around[2], 0.0)
+    whole = e0 + e1 + e2
+    return Spot(number, e1 / whole, e2 / whole)
+
+
+@inlined
+def _areas_at(corners, o):
+    """The normal of a face, and for each corner the product of that and the normal of the face with a point instead."""
+    a, b, c = sub(corners[0], o), sub(corners[1], o), sub(corners[2], o)
+    n = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]))
+    return n, (dot(n, cross(b, c)), dot(n, cross(c, a)), dot(n, cross(a, b)))
+
+
+@kernel
+def list_members(tree, surfaces, spot, d, holders, count):
+    """The ``Members`` at a ``Spot`` that a ray of direction d met, of those that ``list_near`` has listed: at least the
+    face of the spot; and the point, for ``member_spot``.
+    """
+    corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
+    o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
+    met = _Met(corners, spot, o, unit_direction(d)[0])
+    count = _keep_members(tree, met, holders, count)
+    near, far, least, most, holds_own = NO_MEMBER, NO_MEMBER, 0.0, 0.0, False
+    for k in range(count):
+        t, number = _passed_at(tree, holder(holders, k, PLACE), met), holder(holders, k, NUMBER)
+        holds_own = holds_own or number == spot.face
+        if near == NO_MEMBER or t < least or (t == least and number < holder(holders, near, NUMBER)):
+            near, least = k, t
+        if far == NO_MEMBER or t > most or (t == most and number > holder(holders, far, NUMBER)):
+            far, most = k, t
+    if count < 2 or not holds_own:
+        return Members(1, spot, spot), met
+    return Members(count, member_spot(tree, holders, near, spot, met), member_spot(tree, holders, far, spot, met)), met
+
+
+@inlined
+def member_spot(tree, holders, k, spot, met):
+    """The ``Spot`` of the k-th member; ``spot`` is that of the face met."""
+    number = holder(holders, k, NUMBER)
+    return spot if number == spot.face else _spot_of(tree, holder(holders, k, PLACE), number, met)
+
+
+@inlined
+def _octants_at(tree, child, o, room):
+    """The bits of the octants of a node whose boxes hold a point, with some room."""
+    base, bits = child * NODE_WORDS, 0xFF
+    for k in range(3):
+        low, high = round_both(o[k] - room)[0], round_both(o[k] + room)[1]
+        bits &= movemask(
+            (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
+        )
+    return bits
+
+
+@kernel
+def list_near(tree, surfaces, spot, stack, holders):
+    """List the faces that touch others and may hold a spot, as far as float64 tells; returns their number, mostly 1.
+    ``stack`` is as for ``search.depart``.
+    """
+    corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
+    o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
+    room, count, top = 4.0 * CORNER_ERROR * _largest(corners), 0, 1
+    if not tree.has_nodes:
+        return _list_in(tree, 0, tree.count, surfaces.touching, o, room, holders, count)
+    put(stack, 0, 0)
+    while top > 0:
+        top -= 1
+        child = get(stack, top)
+        if child < 0:
+            first, blocks = blocks_of(child)
+            count = _list_in(tree, first, blocks, surfaces.touching, o, room, holders, count)
+            continue
+        top = push_children(tree, child, _octants_at(tree, child, o, room), stack, top)
+    return count
+
+
+@inlined
+def _list_in(tree, first, blocks, touching, o, room, holders, count):
+    """List those of the faces of some blocks that touch others and may hold a point."""
+    for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
+        face = get(tree.faces, slot)
+        if face >= 0 and get(touching, face) != 0:
+            place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
+            held = _hold_sign(corners_at(tree, place), o, room)
+            if held >= 0:
+                count = _put_face(holders, count, place, np.int64(face), held)
+    return count
+
+
+@kernel
+def _hold_sign(corners, o, room):
+    """Whether a face holds a point: 1 if it does, -1 if not, 0 where rounding may matter."""
+    a, b, c = corners
+    for k in range(3):
+        low, high = smaller(a[k], smaller(b[k], c[k])), larger(a[k], larger(b[k], c[k]))
+        if o[k] < low - room or o[k] > high + room:
+            return -1
+    n, (e0, e1, e2) = _areas_at(corners, o)
+    reach = larger(largest_component(sub(a, o)), larger(largest_component(sub(b, o)), largest_component(sub(c, o))))
+    error, least = _BESIDE * largest_component(n) * reach * (reach + room), smaller(e0, smaller(e1, e2))
+    return 1 if least > error else (-1 if least < -error else 0)
+
+
+@kernel
+def _keep_members(tree, met, holders, count):
+    """Keep those of the listed faces that are members; returns their number."""
+    kept = 0
+    for k in range(count):
+        place, face = holder(holders, k, PLACE), holder(holders, k, NUMBER)
+        level = are_level(met.corners, corners_at(tree, place))
+        if level and (holder(holders, k, ZEROS) != 0 or _holds_inner_point(tree, place, met)):
+            put_holder(holders, kept, PLACE, place)
+            put_holder(holders, kept, NUMBER, face)
+            kept += 1
+    return kept
+
+
+@inlined
+def _put_face(holders, count, place, face, held):
+    """Put a face where its number says among those listed, unless there is no room; returns how many there are."""
+    if count >= MOST_HOLDERS:
+        return count
+    k = count
+    while k > 0 and holder(holders, k - 1, NUMBER) > face:
+        put_holder(holders, k, PLACE, holder(holders, k - 1, PLACE))
+        put_holder(holders, k, NUMBER, holder(holders, k - 1, NUMBER))
+        put_holder(holders, k, ZEROS, holder(holders, k - 1, ZEROS))
+        k -= 1
+    put_holder(holders, k, PLACE, place)
+    put_holder(holders, k, NUMBER, face)
+    put_holder(holders, k, ZEROS, held)
+    return count + 1
