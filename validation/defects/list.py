@@ -159,8 +159,6 @@ HITS = (
             "n = heads(face.normal)\n"
             "x = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]\n"
             "sign = 1 if x > 0.0 else (-1 if x < 0.0 else 0)"),
-    _kernel("hits", "of nearly equal t the rounded one decides", "leaf.is_better",
-            "best_place != NOWHERE and t != best[0] and abs(t - best[0]) <= t * TIE", "False"),
     _kernel("hits", "starts beside an edge are moved as if inside", "_plane_near",
             "inside = least > _INSIDE * slack * side * area and needed <= _FARTHEST_MOVE * side",
             "inside = least > -1.0"),
@@ -186,8 +184,8 @@ QUERIES = (
     _kernel("queries", "of hits at one t the highest face comes first", "gather._precedes",
             "ti == tj and face < other", "ti == tj and face > other"),
     _kernel("queries", "max_hits keeps one more", "gather_chunk",
-            "smaller(_ordered(tree, ray_at(source, i)[0], found, count, merge, keep), most)",
-            "smaller(_ordered(tree, ray_at(source, i)[0], found, count, merge, keep), most + 1)"),
+            "smaller(_ordered(tree, found, count, merge, keep), most)",
+            "smaller(_ordered(tree, found, count, merge, keep), most + 1)"),
     _kernel("queries", "blocks of which a ray sees the first face alone are left out", "find_blocks",
             "get(lanes.bits, r) != 0", "get(lanes.bits, r) > 1"),
     _kernel("queries", "the nearest point is never a corner", "_distance_to_ordered",
@@ -385,9 +383,10 @@ PICTURES = (
     _python("pictures", "another camera's eye is in the media of the scene's", "PreparedScene.picture",
             "self.needs.refraction and camera is not self.scene.camera", "False"),
     _kernel("pictures", "light passes an opaque face that glass touches", "_faces_together",
-            "opaque != _NONE", "False"),
+            "if not lets_through(scene.materials, surface.material):\n"
+            "    opaque = k", "pass"),
     _kernel("pictures", "bodies that touch have air between them", "_faces_together",
-            "_mark_members(tree, scene, contact, spot, d) < 2", "_mark_members(tree, scene, contact, spot, d) >= 0"),
+            "members.count < 2", "members.count >= 0"),
     _kernel("pictures", "where bodies touch a ray comes from air", "_cross_all",
             "holders, count, n1 = make_holders(memory), media.count, _innermost_ior(scene, media.rows, media.count)",
             "holders, count, n1 = make_holders(memory), media.count, 1.0"),

@@ -53,6 +53,8 @@ KEPT = {
     "rays that name no face, stopped against the law": "the same rays where they leave nothing: ties at t = 0",
     "rays from inside that are lost": "counts all rays where the exact sample has a few",
     "of the exact sample, rays from a surface with a wrong hit": "judges what is hit beyond the start, to its t",
+    "rays that go through other faces than all": "asks faces that coincide, one after the other, as users go through",
+    "pixels that see what they cannot": "what users see of the law, through all that pictures do with it",
     "reflected rays": "what users see of the law: each reflection starts where the one before ended, fifty times",
     "points with another sky where their face is named": "asks all points, of which exact arithmetic judges some",
     "slope of log RMSE": _PATHS,
