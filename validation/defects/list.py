@@ -148,6 +148,20 @@ HITS = (
             "octree.repairs = stored.repairs", "octree.repairs = None"),
     _python("hits", "normals of OBJ files of which some corners have one", "obj._mesh",
             "(normal >= 0).all()", "(normal >= 0).any()"),
+    _kernel("hits", "a face that holds a start is hit from there", "meet_near",
+            "met.kind == IS_HIT", "met.kind >= IS_HIT"),
+    _kernel("hits", "a ray passes faces that coincide all at once", "stopping_holder",
+            "holder(holders, j, NUMBER) > face and coincide(tree, anchor, holders, own, j)", "False"),
+    _kernel("hits", "a start on an edge is beside the next face", "meeting._height",
+            "(anchor.zeros >> third) & 1 != 0", "False"),
+    _kernel("hits", "which side a ray leads to is told by a rounded normal", "slope_of",
+            "sign = slope_sign(p0, p1, p2, d, local_doubles())",
+            "n = heads(face.normal)\n"
+            "x = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]\n"
+            "sign = 1 if x > 0.0 else (-1 if x < 0.0 else 0)"),
+    _kernel("hits", "starts beside an edge are moved as if inside", "_plane_near",
+            "inside = least > _INSIDE * slack * side * area and needed <= _FARTHEST_MOVE * side",
+            "inside = least > -1.0"),
 )  # fmt: skip
 
 QUERIES = (
@@ -170,8 +184,8 @@ QUERIES = (
     _kernel("queries", "of hits at one t the highest face comes first", "gather._precedes",
             "ti == tj and face < other", "ti == tj and face > other"),
     _kernel("queries", "max_hits keeps one more", "gather_chunk",
-            "smaller(_ordered(tree, ray_at(source, i)[0], found, count, merge, keep), most)",
-            "smaller(_ordered(tree, ray_at(source, i)[0], found, count, merge, keep), most + 1)"),
+            "smaller(_ordered(tree, found, count, merge, keep), most)",
+            "smaller(_ordered(tree, found, count, merge, keep), most + 1)"),
     _kernel("queries", "blocks of which a ray sees the first face alone are left out", "find_blocks",
             "get(lanes.bits, r) != 0", "get(lanes.bits, r) > 1"),
     _kernel("queries", "the nearest point is never a corner", "_distance_to_ordered",
@@ -368,6 +382,16 @@ PICTURES = (
             "any(light.row()[4:])", "light.row()[4] > 0.0"),
     _python("pictures", "another camera's eye is in the media of the scene's", "PreparedScene.picture",
             "self.needs.refraction and camera is not self.scene.camera", "False"),
+    _kernel("pictures", "light passes an opaque face that glass touches", "_faces_together",
+            "if not lets_through(scene.materials, surface.material):\n"
+            "    opaque = k", "pass"),
+    _kernel("pictures", "bodies that touch have air between them", "_faces_together",
+            "members.count < 2", "members.count >= 0"),
+    _kernel("pictures", "where bodies touch a ray comes from air", "_cross_all",
+            "holders, count, n1 = make_holders(memory), media.count, _innermost_ior(scene, media.rows, media.count)",
+            "holders, count, n1 = make_holders(memory), media.count, 1.0"),
+    _kernel("pictures", "edges count as the inside of their faces", "offset_distance",
+            "return error, slack if inside else EDGE", "return error, slack"),
 )  # fmt: skip
 
 STUDIES = (
@@ -454,6 +478,48 @@ STUDIES = (
         "visible_faces",
         "seen[left[reached]] = True",
         "seen[left] = True",
+    ),
+    _kernel(
+        "studies",
+        "at a corner the other side of the normal's region is taken",
+        "side_of_normal",
+        "ABOVE if side > 0 else 0",
+        "ABOVE if side < 0 else 0",
+    ),
+    _kernel(
+        "studies",
+        "faces around a corner at the rim count as closed",
+        "write_fan",
+        "np.float64(_are_closed(holders, count, nodes))",
+        "1.0",
+    ),
+    _python(
+        "studies",
+        "points that rounding put off the surface are not on it",
+        "on_surface.on_surface",
+        "closest_point(tree, mesh, points[unknown], room[unknown], threads).face",
+        "closest_point(tree, mesh, points[unknown], 0.0 * room[unknown], threads).face",
+    ),
+    _python(
+        "studies",
+        "a scanner on a roof stands below it",
+        "views._first_hits",
+        "normal is None or float(outer @ normal) >= 0.0",
+        "normal is not None and float(outer @ normal) >= 0.0",
+    ),
+    _python(
+        "studies",
+        "points of a file lie on the first face",
+        "chosen.of_file",
+        "np.full(len(points), -1, np.int64)",
+        "np.zeros(len(points), np.int64)",
+    ),
+    _python(
+        "studies",
+        "faces that hold the beginning of a view hide its end",
+        "visible._between",
+        "(leaving.faces >= 0).any()",
+        "False",
     ),
 )
 DEFECTS = HITS + QUERIES + STUDIES + PICTURES

@@ -29,14 +29,15 @@ _LEVEL = 1e-12
 _SAMPLE = 300
 # Points of a mesh, drawn from all: exact arithmetic finds the faces around each that is judged.
 _QUICK, _FULL = 200, 1500
-_DIRECTIONS = 64
+_DIRECTIONS, _ALONG = 64, 24
 
 
 class Places(NamedTuple):
-    """Points on the surface with unit normals, and the exact start of each."""
+    """Points on the surface with unit normals, a face that holds each, and its exact start."""
 
     points: Floats
     normals: Floats
+    faces: Ints
     start: Callable[[Surface, int], Start]
 
 
@@ -54,7 +55,24 @@ def _scan() -> Mesh:
     return Mesh(vertices.astype(np.float32).astype(np.float64), ball.faces)
 
 
-MESHES: dict[str, Callable[[], Mesh]] = {"raster": _raster, "box": box, "ball": lambda: icosphere(3), "scan": _scan}
+def _spire() -> Mesh:
+    """A star of 48 faces around a tip, and as many around a dent below."""
+    count, rng = 48, np.random.default_rng(_SEED + 2)
+    turn, reach = 2.0 * np.pi * np.arange(count) / count, rng.uniform(0.6, 1.4, count)
+    rim = np.stack([reach * np.cos(turn), reach * np.sin(turn), 0.2 * rng.random(count)], axis=1)
+    k, other = np.arange(count), np.roll(np.arange(count), -1)
+    tip, dent = np.full(count, count), np.full(count, count + 1)
+    faces = np.concatenate([np.stack([k, other, tip], axis=1), np.stack([other, k, dent], axis=1)])
+    return Mesh(np.concatenate([rim, [[0.0, 0.0, 1.5], [0.0, 0.0, 0.5]]]), faces)
+
+
+MESHES: dict[str, Callable[[], Mesh]] = {
+    "raster": _raster,
+    "box": box,
+    "ball": lambda: icosphere(3),
+    "scan": _scan,
+    "spire": _spire,
+}
 
 
 def _vertices(mesh: Mesh) -> Places:
@@ -65,13 +83,15 @@ def _vertices(mesh: Mesh) -> Places:
         x, y, z = map(Fraction, points[row].tolist())
         return Start((x, y, z))
 
-    return Places(points, normals, start)
+    faces = np.zeros(len(points), np.int64)
+    faces[mesh.faces.ravel()] = np.repeat(np.arange(len(mesh.faces)), 3)
+    return Places(points, normals, faces, start)
 
 
 def _centroids(mesh: Mesh) -> Places:
     exact, normals, faces = face_points(mesh)
     points = exact.astype(np.float32).astype(np.float64)
-    return Places(points, normals, lambda surface, row: surface.start_near(int(faces[row]), points[row]))
+    return Places(points, normals, faces, lambda surface, row: surface.start_near(int(faces[row]), points[row]))
 
 
 KINDS: dict[str, Callable[[Mesh], Places]] = {"vertices": _vertices, "centroids through float32": _centroids}
@@ -92,7 +112,7 @@ def check_corners(index: int, quick: bool) -> dict[str, Any]:
     most = _QUICK if quick else _FULL
     rows = np.sort(rng.permutation(len(places.points))[:most])
     points, normals = places.points[rows], places.normals[rows]
-    ways = fibonacci_sphere(_DIRECTIONS).directions @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    ways = _ways(mesh, places.faces[rows], rng)
     ours = _hidden(octree, points, normals, ways)
     lifted = _hidden(octree, points + _LIFT * float(np.abs(points).max()) * normals, normals, ways)
     height = normals @ ways.T
@@ -108,6 +128,16 @@ def check_corners(index: int, quick: bool) -> dict[str, Any]:
     return {"subject": f"{kind} of {name}", "asked": ours.size, "differing": len(differing), "judged": len(judged),
             "wrong": wrong, "points": len(sky), "unlike": int((sky != named).sum()),
             "hidden": float(ours.mean())}  # fmt: skip
+
+
+def _ways(mesh: Mesh, faces: Ints, rng: np.random.Generator) -> Floats:
+    """Directions all around, and some along faces and their edges, of which rounding cannot tell the side."""
+    around = fibonacci_sphere(_DIRECTIONS - _ALONG).directions @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    corners = mesh.triangles[rng.choice(faces, _ALONG)]
+    shares = np.where(rng.random((_ALONG, 2)) < 0.25, 0.0, rng.uniform(-1.0, 1.0, (_ALONG, 2)))
+    shares[~shares.any(axis=1)] = (0.0, 1.0)
+    along = np.einsum("nk,nkx->nx", shares, corners[:, 1:] - corners[:, :1])
+    return np.concatenate([around, along / np.linalg.norm(along, axis=1, keepdims=True)])
 
 
 def _hidden(octree: Octree, points: Floats, normals: Floats, ways: Floats) -> NDArray[np.bool_]:

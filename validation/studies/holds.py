@@ -1,6 +1,8 @@
 """What holds of studies exactly: each check counts the answers that are not as they must be."""
 
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.octree import Octree
+from renderer.runs.chosen import of_file, on_grid
+from renderer.runs.study import Study
 from renderer.scene.camera import OrthographicCamera
 from renderer.studies import (
     ambient_occlusion,
@@ -24,6 +28,7 @@ from renderer.studies import (
     visible_faces,
 )
 from validation.oracle.exact import closest_hits
+from validation.oracle.starts import Surface
 from validation.studies.bodies import FAR, bodies, street, terrain, touching, town
 
 Floats = NDArray[np.float64]
@@ -195,6 +200,77 @@ def clouds_and_depths() -> Asked:
     return _count(np.concatenate([_near(found, expected), _near(depth.ravel(), deep)]))
 
 
+def clouds_from_a_roof() -> Asked:
+    """A scanner on a roof, at its edge and on its corner meets the roof at once where it looks through it, and else
+    what exact arithmetic says.
+    """
+    mesh = town(2, 3)
+    octree, surface, ways = Octree.from_mesh(mesh), Surface(mesh.vertices, mesh.faces), fibonacci_sphere(300).directions
+    top = np.flatnonzero(mesh.vertices[:, 2] == mesh.vertices[:, 2].max())
+    middle = mesh.vertices[top].mean(axis=0)
+    corner = mesh.vertices[top[0]]
+    places = np.array([middle, (middle + corner) / 2.0, corner, (mesh.vertices[top[0]] + mesh.vertices[top[1]]) / 2.0])
+    right = []
+    for place, face in zip(places, octree.closest_point(places).face.tolist(), strict=True):
+        start = surface.start_near(face, place)
+        cloud = scan(octree, place, ways)
+        found, faces = np.full(len(ways), np.inf), np.full(len(ways), -1)
+        found[cloud.rays], faces[cloud.rays] = cloud.distances, cloud.faces
+        law = [one[0] for one in surface.each([start] * len(ways), ways, [1] * len(ways), [False] * len(ways))]
+        known = np.array([np.inf if one.t is None else float(one.t) for one in law])
+        # How exact distances are, others tell: what is farther off than this is another hit.
+        with np.errstate(invalid="ignore"):
+            close = (found == known) | ((known > 0.0) & (np.abs(found - known) <= 1e-9 * known))
+        right.append(close & [int(number) in (one.faces or (-1,)) for number, one in zip(faces, law, strict=True)])
+    return _count(np.concatenate(right))
+
+
+def places_of_a_grid() -> Asked:
+    """Points that a grid wrote to a file, read from there and on no face, have the grid's own bits."""
+    found = []
+    for mesh, spacing in ((town(), 0.11), (terrain(), 0.02), (touching(), 0.125)):
+        octree, study = Octree.from_mesh(mesh), Study("sky", {})
+        grid_points = on_grid(octree, spacing).points
+        with TemporaryDirectory(prefix="grid-") as folder:
+            path = Path(folder) / "points.npy"
+            np.save(path, np.concatenate([grid_points.points, grid_points.normals], axis=1))
+            read = of_file(octree, path).points
+        found.append(study.answer(octree, read) == study.answer(octree, grid_points))
+    return _count(np.concatenate(found))
+
+
+def edges_from_both_sides() -> Asked:
+    """Points of a tetrahedron's edges see its middle, each other, and what is before one of their two faces."""
+    rng = np.random.default_rng(_SEED)
+    corners = np.array([[0.1, 0.2, 0.3], [1.3, 0.1, 0.2], [0.4, 1.7, 0.1], [0.3, 0.4, 1.1]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    octree, middle = Octree(corners, faces), corners.mean(axis=0)
+    normals = octree.mesh.face_normals()
+    right = []
+    for i, j in np.argwhere(np.triu(np.ones((4, 4)), 1)):
+        share = np.concatenate([[0.0, 1.0], rng.random(30)])[:, None]
+        points = (1.0 - share) * corners[i] + share * corners[j]
+        others = rng.dirichlet(np.ones(4), len(points)) @ corners
+        right += [
+            octree.visible(points, middle),
+            octree.visible(middle, points),
+            octree.visible(points, others),
+            octree.visible(points, points[::-1]),
+            octree.visible(points, np.roll(corners, 1, axis=0)[i]),
+        ]
+        away = middle + 3.0 * rng.normal(size=(len(points), 3))
+        outside = ~octree.contains(away)
+        held = (faces[:, :, None] == [i, j]).any(axis=1)
+        # At a corner there are three faces, along the edge two.
+        at = np.where(share == 0.0, held[:, 0], np.where(share == 1.0, held[:, 1], held.all(axis=1)))
+        before = at & (np.einsum("fx,nx->nf", normals, away) > np.einsum("fx,fx->f", normals, corners[faces[:, 0]]))
+        right += [
+            (octree.visible(points, away) == before.any(axis=1))[outside],
+            (octree.visible(away, points) == before.any(axis=1))[outside],
+        ]
+    return _count(np.concatenate(right))
+
+
 def _near(found: Floats, known: Floats) -> NDArray[np.bool_]:
     """Equal, both infinite, or within 4 ulp; a scan multiplies t by a length, both rounded."""
     with np.errstate(invalid="ignore"):
@@ -213,6 +289,9 @@ CHECKS: dict[str, Callable[[], Asked]] = {
     "weights and distances": weights_and_distances_of_directions,
     "faces that an eye sees": faces_that_an_eye_sees,
     "clouds and depths": clouds_and_depths,
+    "clouds from a roof": clouds_from_a_roof,
+    "places of a grid": places_of_a_grid,
+    "edges from both sides": edges_from_both_sides,
 }
 
 

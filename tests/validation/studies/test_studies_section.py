@@ -30,7 +30,7 @@ def run(tmp_path_factory):
 
 def test_all_gates_pass_and_the_record_draws_a_figure(run):
     record, gates, folder = run
-    assert len(gates) == len(record["forms"]) + 2 + 5 + 2 * 8 + len(holds.CHECKS)
+    assert len(gates) == len(record["forms"]) + 2 + 5 + 2 * len(corners.CHECKS) + len(holds.CHECKS)
     assert all(gate.passed for gate in gates)
     assert all(row["asked"] > 0 for row in (*record["bits"], *record["corners"], *record["holds"]))
     assert (folder / section.PICTURE).stat().st_size > 10_000
