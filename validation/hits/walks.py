@@ -20,8 +20,8 @@ Ints = NDArray[np.int64]
 
 SEED = 2035
 QUICK, FULL = 20, 400
-# A ray from outside is rounded by 2^-50 of its length, some sizes of the body: it may pass a body that is hardly wider on
-# either side, as any silhouette.
+# A ray from outside is rounded by 2^-50 of its length, some sizes of the body: it may pass a body that is hardly wider
+# on either side, as any silhouette.
 _NARROWEST = 2.0**-36
 
 
