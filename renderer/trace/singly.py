@@ -67,10 +67,10 @@ def write_best(tree, rays, found, i, best, start, dz, any_hit):
     part of t.
     """
     slack, largest = start
-    if not any_hit and best[0] * largest < NEAR_HIT * slack and slack < EDGE:
+    if not any_hit and 0.0 < slack < EDGE and best[0] * largest < NEAR_HIT * slack:
         best = count_from_start(tree, rays, i, best)
     write_hit(found, i, rays.scale, best, dz, any_hit)
-    if not any_hit and best[0] == 0.0 and is_negative(best[0]):
+    if slack > 0.0 and not any_hit and best[0] == 0.0 and is_negative(best[0]):
         put(found.pile, i, np.int64(get(at(rays.starts.rows, i * rays.starts.step), PILE)))
 
 
