@@ -3,6 +3,7 @@
 Hypothesis draws a kind, a seed and a count; numpy fills the arrays.
 """
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -129,7 +130,9 @@ def answers(target: Octree | BruteForce, origins: Floats, directions: Floats) ->
     """The bits that each query answers, by its name; those that need a closed mesh only where it is one."""
     faces = np.arange(len(origins)) % max(1, len(target.mesh.faces)) if len(target.mesh.faces) else -1
     few, hits = target.closest_hit(origins[:5], directions[:5]), target.closest_hit(origins, directions)
-    every, left = target.all_hits(origins, directions), target.closest_hit(origins, directions, leaving=faces)
+    still = copy.copy(target)  # which another thread does not refit between these two lines
+    starts = still.mesh.triangles[faces].mean(axis=1) if len(still.mesh.faces) else origins
+    every, left = target.all_hits(origins, directions), still.closest_hit(starts, directions, leaving=faces)
     found = {
         "few": (few.t, few.face, few.u, few.v, few.points, few.normals),
         "closest_hit": (hits.t, hits.face, hits.u, hits.v, hits.points, hits.normals),

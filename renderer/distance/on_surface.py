@@ -94,9 +94,8 @@ def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
         near = parts <= room[:, None] * np.linalg.norm(sides, axis=2)
     weights = np.where(near | ~(parts > 0.0), 0.0, parts)
     lost = ~(weights.sum(axis=1) > 0.0)
-    # A face without area, or one smaller than the room: its nearest corner.
-    nearest = np.abs(points[lost, None] - corners[lost]).max(axis=2).argmin(axis=1)
-    weights[lost] = np.eye(3)[nearest]
+    # A face without area is its longest side.
+    weights[lost] = _along_longest(sides[lost], ways[lost], room[lost])
     weights /= weights.sum(axis=1, keepdims=True)
     single = np.count_nonzero(weights, axis=1) == 1
     weights[single] = np.where(weights[single] > 0.0, 1.0, 0.0)
@@ -106,3 +105,19 @@ def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
     v = np.where(opposite & (u >= 0.5), 1.0 - u, v)
     u = np.where(opposite & (u < 0.5), 1.0 - v, u)
     return np.stack([u, v], axis=1)
+
+
+def _along_longest(sides: Floats, ways: Floats, room: Floats) -> Floats:
+    """Weights (n, 3) of the points of the longest sides that are nearest to points; within ``room`` of a corner, its."""
+    lengths = np.linalg.norm(sides, axis=2)
+    rows, longest = np.arange(len(sides)), lengths.argmax(axis=1)
+    first, length = (longest + 1) % 3, lengths[rows, longest]
+    with np.errstate(all="ignore"):
+        along = np.einsum("nx,nx->n", sides[rows, longest], ways[rows, first]) / length
+        share = np.where(along > 0.0, np.minimum(along / length, 1.0), 0.0)
+        apart = np.linalg.norm(ways, axis=2)
+    weights = np.zeros((len(sides), 3))
+    weights[rows, first], weights[rows, (longest + 2) % 3] = 1.0 - share, share
+    at = ~(apart.min(axis=1) > room)
+    weights[at] = np.eye(3)[apart[at].argmin(axis=1)]
+    return weights

@@ -46,8 +46,10 @@ def visible(
     on_b = check_faces("reaching", -1 if faces[1] is None else faces[1], shape, most)
     apart = np.flatnonzero((a != b).any(axis=1))
     start, stop = (_end(tree, mesh, points[apart], on[apart], threads) for points, on in ((a, on_a), (b, on_b)))
+    # Ends that are as near to each other as rounding may lie at one place of the surface.
+    some = np.flatnonzero((start.points != stop.points).any(axis=1))
     seen = np.ones(len(a), np.bool_)
-    seen[apart] = _are_open(tree, mesh, start, stop, threads)
+    seen[apart[some]] = _are_open(tree, mesh, _picked(start, some), _picked(stop, some), threads)
     return seen.reshape(shape)
 
 
@@ -63,15 +65,15 @@ def _are_open(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -
     # Where a face that holds the end is the first that is met, nothing is before it.
     doubtful = np.flatnonzero(~seen & (stop.places.faces >= 0))
     if len(doubtful):
-        start, stop = (_Ends(end.points[doubtful], _picked(end.places, doubtful)) for end in (start, stop))
+        start, stop = _picked(start, doubtful), _picked(stop, doubtful)
         first = closest_hits(tree, _between(tree, mesh, start, stop, threads), mesh, threads).face
         met = np.flatnonzero(first >= 0)
         seen[doubtful[met]] = are_on(mesh, stop.points[met], first[met])
     return seen
 
 
-def _picked(places: SurfacePoints, rows: NDArray[np.int64]) -> SurfacePoints:
-    return SurfacePoints(places.faces[rows], places.anchors[rows])
+def _picked(end: _Ends, rows: NDArray[np.int64]) -> _Ends:
+    return _Ends(end.points[rows], SurfacePoints(end.places.faces[rows], end.places.anchors[rows]))
 
 
 def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> RayBatch:

@@ -19,8 +19,17 @@ def written_down(octree, points, normals, directions, leaving=None, distance=np.
     starts, ways = np.repeat(points, size, axis=0), np.tile(directions, (count, 1))
     faces = None if leaving is None else np.repeat(leaving, size)
     reach = distance / np.linalg.norm(ways, axis=1)
-    hit = octree.any_hit(starts, ways, t_max=reach, leaving=faces).reshape(count, size)
+    side = None
+    if faces is not None and normals is not None:
+        side = np.sign(np.einsum("nx,nx->n", octree.mesh.face_normals()[faces], np.repeat(normals, size, axis=0)))
+        side = np.where(faces >= 0, side, 0).astype(int)
+    hit = octree.any_hit(starts, ways, t_max=reach, leaving=faces, side=side).reshape(count, size)
     return hit if normals is None else hit | ~(normals @ directions.T > 0.0)
+
+
+def inside_of(corners, rng):
+    """Points (n, 3) anywhere on triangles (n, 3, 3); on a lattice rounding would decide what centroids meet."""
+    return np.einsum("nk,nkx->nx", rng.dirichlet(np.ones(3), len(corners)), corners)
 
 
 def unpacked(bits, count):
@@ -37,7 +46,7 @@ def test_bits_are_those_of_rays_that_are_written_down(mesh, seed, count, size, w
     leaving = None
     if leaves and len(faces):
         leaving = rng.integers(-1, len(faces), count)
-        on = octree.mesh.triangles[leaving].mean(axis=1)
+        on = inside_of(octree.mesh.triangles[leaving], rng)
         points = np.where((leaving >= 0)[:, None], on, points)
     # Of unit length to the last bit or not, the horizon is the same but for directions along it.
     bits = occlusion(octree, points, normals if with_normals else None, directions, leaving=leaving, packed=True)
@@ -106,12 +115,13 @@ def test_bits_stay_where_mesh_and_points_are_shifted_exactly(shift):
     rng = np.random.default_rng(7)
     # Whole multiples of 2^-20, so that the shift rounds nothing.
     ball = np.round(torus().vertices * 2.0**20) / 2.0**20
-    points = np.round(rng.uniform(-1.5, 1.5, (500, 3)) * 2.0**20) / 2.0**20
     near, far = Octree(ball, torus().faces), Octree(ball + shift, torus().faces)
-    assert ((ball + shift) - shift == ball).all() and ((points + shift) - shift == points).all()
-    faces = near.closest_point(points).face
+    free = np.round(rng.uniform(-1.5, 1.5, (500, 3)) * 2.0**20) / 2.0**20
+    faces = rng.integers(0, len(near.mesh.faces), 500)
+    on = np.round(near.mesh.triangles[faces].mean(axis=1) * 2.0**30) / 2.0**30
+    assert all(((points + shift) - shift == points).all() for points in (ball, free, on))
     directions = rng.normal(size=(99, 3))
-    for leaving in (None, faces):
+    for points, leaving in ((free, None), (on, faces)):
         seen = occlusion(near, points, None, directions, leaving=leaving, packed=True)
         np.testing.assert_array_equal(
             occlusion(far, points + shift, None, directions, leaving=leaving, packed=True), seen
@@ -128,8 +138,8 @@ def test_points_on_faces_are_not_hidden_by_their_own():
     np.testing.assert_array_equal(unpacked(hidden, 200), below)
     from_inside = occlusion(octree, place.points, -place.normals, directions, leaving=place.faces)
     np.testing.assert_array_equal(from_inside, 1.0)
-    # Without its face a point is somewhere near the surface.
-    assert occlusion(octree, place.points, place.normals, directions).mean() > 0.6
+    found = occlusion(octree, place.points, place.normals, directions, packed=True)
+    np.testing.assert_array_equal(found, hidden)
 
 
 def test_whether_points_lie_on_the_surface_is_found_out_and_their_normals_say_the_side():
@@ -264,7 +274,7 @@ def test_bits_of_points_that_are_traced_together(mesh, seed, count, apart, leave
     leaving = None
     if leaves and len(faces):
         leaving = rng.integers(0, len(faces), count)
-        points = octree.mesh.triangles[leaving].mean(axis=1)
+        points = inside_of(octree.mesh.triangles[leaving], rng)
     reach = extent * float(rng.choice([0.5, np.inf]))
     bits = occlusion(octree, points, None, ways, leaving=leaving, packed=True, distance=reach)
     expected = written_down(octree, points, None, ways, leaving, reach)

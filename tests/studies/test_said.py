@@ -181,14 +181,14 @@ def test_threads_are_those_of_the_octree_unless_others_are_asked_for() -> None:
 
 
 def test_nothing_of_the_size_of_points_times_directions_is_made() -> None:
-    """An array of bools would have 40 megabytes; points, results and the memory of two threads have less than 6."""
+    """An array of bools would have 40 megabytes; 15 are reserved for the faces at a corner, on two threads."""
     octree, directions = Octree.from_mesh(box()), fibonacci_sphere(2000).directions
     points = np.random.default_rng(3).uniform(2.0, 3.0, (20_000, 3))
     occlusion(octree, points[:300], None, directions, threads=2)
     tracemalloc.start()
     try:
         occlusion(octree, points, None, directions, threads=2)
-        assert tracemalloc.get_traced_memory()[1] < 6e6
+        assert tracemalloc.get_traced_memory()[1] < 15e6 + 6e6
     finally:
         tracemalloc.stop()
 

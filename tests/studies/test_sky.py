@@ -52,7 +52,7 @@ def test_errors_fall_with_the_number_of_directions():
     octree, exact = trench(2.0, 3.0), np.cos(np.arctan(3.0))
     points = np.stack([np.zeros(40), np.linspace(0.0, 1.0, 40), np.zeros(40)], axis=1)
     counts = np.array([300, 3000, 30000])
-    errors = [abs(sky_view_factor(octree, points, patches=int(k), leaving=0).mean() - exact) for k in counts]
+    errors = [abs(sky_view_factor(octree, points, patches=int(k)).mean() - exact) for k in counts]
     # Faster than by chance, whose slope is 1/2.
     assert errors[2] < errors[0] / np.sqrt(counts[2] / counts[0]), errors
 

@@ -12,6 +12,7 @@ from renderer import BruteForce, Octree
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.trace import batch
 from renderer.trace.hits import Hits
+from renderer.trace.intersect import CORNER
 from renderer.trace.starts.record import EDGE, HEAD, ROW, SLACK
 
 SCALES = (1e-12, 1.0, 1e12)
@@ -111,12 +112,16 @@ def test_starts_are_beyond_the_plane_by_no_more_than_roundings_and_above_the_nea
         points[::3] += 1e-6 * ball.face_normals()[face[::3]] * np.random.default_rng(0).choice([-1, 1], (100, 1))
         rays = moved_off(check_rays(points, directions, 0.0, np.inf)[0], by_faces(face), octree.mesh, 1.0, 1)
         normals = ball.face_normals()[face]
-        edge = rays.starts[HEAD:].view(np.float64).reshape(-1, ROW)[:, SLACK] == EDGE
+        slack = rays.starts[HEAD:].view(np.float64).reshape(-1, ROW)[:, SLACK]
+        edge = slack == EDGE
         assert 0.1 < edge.mean() < (0.3 if offset == 0.0 else 1.0)
         for k in range(len(face)):
             if edge[k]:
                 # Exact signs decide there, from the point itself.
                 np.testing.assert_array_equal(rays.origins[k], points[k])
+                continue
+            if slack[k] == CORNER:
+                assert (rays.origins[k] == vertices[ball.faces[face[k]]]).all(axis=1).any()
                 continue
             side = 1 if directions[k] @ normals[k] >= 0 else -1
             before, square = plane_distance(vertices, ball.faces[face[k]], points[k])

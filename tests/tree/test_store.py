@@ -215,11 +215,11 @@ from renderer.mesh.shapes import icosphere
 def use(octree):
     for _ in range(2):
         for count in (3, 60):
-            octree.closest_hit(RAYS[:count], -RAYS[:count], leaving=np.arange(count))
+            octree.closest_hit(octree.mesh.triangles[:count].mean(axis=1), RAYS[:count], leaving=np.arange(count))
         octree.all_hits(RAYS, -RAYS)
         octree.any_hit(RAYS, -RAYS)
         octree.signed_distance(RAYS)
-        octree.visible(RAYS, -RAYS, np.arange(60), np.arange(60))
+        octree.visible(octree.mesh.triangles[:60].mean(axis=1), -RAYS, np.arange(60))
         visited(octree, RAYS[0], -RAYS[0])
         octree.refit(octree.mesh.vertices * 2.0)
 

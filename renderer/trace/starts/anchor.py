@@ -162,7 +162,8 @@ def _nearest(corners, o, unit):
         return _at_corner(corners, 1, unit)
     if d6[0] >= 0.0 and fall[0] <= 0.0:
         return _at_corner(corners, 2, unit)
-    if _is_beyond(d3, d2, d1, d4) and d1[0] >= 0.0 and d3[0] <= 0.0:
+    # Two corners at one place have no side between them.
+    if aa[0] > 0.0 and _is_beyond(d3, d2, d1, d4) and d1[0] >= 0.0 and d3[0] <= 0.0:
         return _along(corners, 0, 1, quotient(d1, aa), unit)
     if _is_beyond(d1, d6, d5, d2) and d2[0] >= 0.0 and d6[0] <= 0.0:
         return _along(corners, 0, 2, quotient(d2, bb), unit)
