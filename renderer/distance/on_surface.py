@@ -108,7 +108,7 @@ def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
 
 
 def _along_longest(sides: Floats, ways: Floats, room: Floats) -> Floats:
-    """Weights (n, 3) of the points of the longest sides that are nearest to points; within ``room`` of a corner, its."""
+    """Weights (n, 3) of the nearest points of the longest sides; within ``room`` of a corner those of the corner."""
     lengths = np.linalg.norm(sides, axis=2)
     rows, longest = np.arange(len(sides)), lengths.argmax(axis=1)
     first, length = (longest + 1) % 3, lengths[rows, longest]
