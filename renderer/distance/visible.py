@@ -14,7 +14,6 @@ from renderer.trace.query import any_hits, closest_hits
 from renderer.trace.starts.record import BARYCENTRIC
 
 Floats = NDArray[np.float64]
-Faces = NDArray[np.int64]
 # What is nearer to an end than this share of the largest coordinate of both is not looked at: ends that went through
 # more roundings than ``on_surface`` takes.
 _BESIDE = 2.0**-40
