@@ -65,7 +65,14 @@ class PreparedScene:
 
     @lazy
     def touching(self) -> NDArray[np.uint8]:
-        """``SceneArrays.touching`` for any materials."""
+        """``SceneArrays.touching`` for any materials.
+
+        >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, prepare
+        >>> from renderer.mesh.shapes import box
+        >>> cube, eye = SceneObject(mesh=box(), material="grey"), PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+        >>> bool(prepare(Scene(camera=eye, materials={"grey": Phong()}, objects=[cube, cube])).touching.all())
+        True
+        """
         return touching_faces(self.tree, self.arrays, available_threads(), every=True)
 
     def picture(
