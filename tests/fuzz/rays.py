@@ -129,6 +129,19 @@ def _leaving(rng: Random, count: int, faces: int) -> Any:
     return values if rng.random() < 0.7 else next(iter(values), -1)
 
 
+def _starts(
+    rng: Random, leaving: Any, vertices: list[Point], faces: list[list[int]], origins: list[list[float]]
+) -> list[list[float]]:
+    """The origins, those that leave a face on it; any ones for some queries, which are refused."""
+    named = leaving if isinstance(leaving, list) else [leaving] * len(origins)
+    if rng.random() < 0.2 or len(named) != len(origins):
+        return origins
+    return [
+        _on_face(rng, vertices, faces[face]) if type(face) is int and 0 <= face < len(faces) else origin
+        for face, origin in zip(named, origins, strict=True)
+    ]
+
+
 def make_query(seed: int, index: int) -> Values:
     rng = Random(f"query {seed} {index}")
     vertices = _vertices(rng)
@@ -137,18 +150,18 @@ def make_query(seed: int, index: int) -> Values:
         faces = box().faces.tolist()
     count, wild = rng.choice([0, 1, 1, 2, 5, 15, 16, 17, 40]), rng.random() < 0.15
     rays = [_ray(rng, vertices, faces, wild) for _ in range(count)]
-    odd = rng.random() < 0.3
+    odd, leaving = rng.random() < 0.3, _leaving(rng, count, len(faces))
     return {
         "vertices": vertices,
         "faces": faces,
         "single": rng.random() < 0.3,
         "split": rng.choice(["midpoint", "sah"]),
-        "origins": [o for o, _ in rays],
+        "origins": _starts(rng, leaving, vertices, faces, [o for o, _ in rays]),
         "directions": [d for _, d in rays],
         "forms": [rng.choice(list(FORMS)) if odd else "float64" for _ in range(2)],
         "t_min": _bound(rng, count, 0.0),
         "t_max": _bound(rng, count, float("inf")),
-        "leaving": _leaving(rng, count, len(faces)),
+        "leaving": leaving,
     }
 
 
@@ -248,6 +261,6 @@ def prepare_kinds() -> None:
     """Compile the kernels before a clock starts."""
     for accelerator in (Octree.from_mesh(box(), threads=1), BruteForce.from_mesh(box())):
         for count in (1, 40):
+            origins, directions = np.tile(box().triangles[0, 0], (count, 1)), np.ones((count, 3))
             for leaving in (None, 0):
-                _answer(accelerator, {"origins": np.ones((count, 3)), "directions": np.ones((count, 3)),
-                                      "leaving": leaving})  # fmt: skip
+                _answer(accelerator, {"origins": origins, "directions": directions, "leaving": leaving})
