@@ -10,13 +10,16 @@ from validation.oracle.starts import Start, Surface
 
 @dataclass
 class LawfulHits:
-    """What gates read of hits; ``side`` is the side that a ray came from, ``passed`` that it goes on through."""
+    """What gates read of hits; ``side`` is the side that a ray came from, ``passed`` that it goes on through, and
+    ``pile`` the face at which it came upon those that coincide.
+    """
 
     t: np.ndarray
     face: np.ndarray
     u: np.ndarray
     v: np.ndarray
     side: np.ndarray
+    pile: np.ndarray
     corners: np.ndarray
     passed: bool = False
 
@@ -54,8 +57,10 @@ class Lawful:
         count, passed = len(origins), False
         sides = np.zeros(count, int) if side is None else np.asarray(side)
         if isinstance(leaving, LawfulHits):
+            piles = leaving.pile.tolist() if leaving.passed else [None] * count
             starts = [
-                self.surface.start_on(f, u, v) for f, u, v in zip(leaving.face, leaving.u, leaving.v, strict=True)
+                self.surface.start_on(f, u, v)._replace(pile=pile)
+                for f, u, v, pile in zip(leaving.face, leaving.u, leaving.v, piles, strict=True)
             ]
             sides, passed = leaving.side, leaving.passed
         elif leaving is not None:
@@ -71,11 +76,13 @@ class Lawful:
 
     def _row(self, start, direction, first):
         if first.face < 0:
-            return np.inf, -1, np.nan, np.nan, 0
+            return np.inf, -1, np.nan, np.nan, 0, -1
         way, normal = [Fraction(x) for x in direction.tolist()], self.surface.normal(first.face)
         point = [x + first.t * d for x, d in zip(start.place, way, strict=True)]
         side = -1 if sum(n * d for n, d in zip(normal, way, strict=True)) > 0 else 1
-        return float(first.t), first.face, *_barycentrics(self.vertices[self.faces[first.face]].tolist(), point), side
+        pile = first.face if start.pile is None or first.t > 0 else start.pile
+        u, v = _barycentrics(self.vertices[self.faces[first.face]].tolist(), point)
+        return float(first.t), first.face, u, v, side, pile
 
 
 def _barycentrics(corners, point):

@@ -8,8 +8,8 @@ A start is a real point: an exact combination of a face's corners, or the face's
   region on that side of the face. One that leads into its closure is not stopped. Another is stopped at t = 0 by the
   lowest face that holds the start and has the region on one side and the ray's direction on the other.
 - ``through``: the ray came upon the face, and upon those that coincide with it there, and has gone through it to the
-  named side. It passes the others in the order of their numbers, the lowest after the highest; if it leads to the named
-  side, the next one stops it at t = 0.
+  named side. It passes them in the order of their numbers, the lowest after the highest, from the one that it came upon
+  first; if it leads to the named side, the next one stops it at t = 0.
 
 All other faces are met as ``exact`` says. Where faces cross at the start, the face's side may be several regions, and
 each has its answer. A face without area is no face here.
@@ -38,10 +38,14 @@ _RAYS_AT_ONCE = 1024
 
 
 class Start(NamedTuple):
-    """Where a ray starts, and the face that it leaves; -1 where none is named."""
+    """Where a ray starts, and the face that it leaves; -1 where none is named.
+
+    ``pile`` is the face at which it came upon those that coincide with ``face``: None where that is ``face``.
+    """
 
     place: Place
     face: int = -1
+    pile: int | None = None
 
 
 class First(NamedTuple):
@@ -203,7 +207,7 @@ class Surface:
         if side and any(self._normals[start.face]):
             if start.face not in dict(held):
                 raise ValueError(f"start: expected a point of face {start.face}, got {start.place}")
-            stops = stopped(self.regions(held), start.face, way[0], side, through)
+            stops = stopped(self.regions(held), start.face, way[0], side, through, start.pile)
         found = [First(Fraction(0), face, (face,)) for face in stops if face is not None]
         if None in stops:
             left = {face for face, _ in held}
@@ -261,13 +265,18 @@ class Surface:
         return [np.flatnonzero(row) for row in ~missed.reshape(-1, count)]
 
 
-def stopped(regions: Regions | Fan, face: int, way: Whole, side: int, through: bool) -> set[int | None]:
+def stopped(
+    regions: Regions | Fan, face: int, way: Whole, side: int, through: bool, pile: int | None = None
+) -> set[int | None]:
     """The faces that may stop a ray at once; None where none does. More than one only where faces cross there."""
+
+    def rank(other: int) -> tuple[bool, int]:
+        return other < (face if pile is None else pile), other
+
     around, ahead = regions.around(way), through and regions.cones[face].side(way) == side
     found: set[int | None] = set()
     for piece in regions.pieces[face]:
-        # Those of higher numbers come first, then the lowest.
-        later = sorted(piece.faces - {face}, key=lambda other: (other < face, other)) if ahead else []
+        later = sorted((other for other in piece.faces if rank(other) > rank(face)), key=rank) if ahead else []
         here = piece.above if side > 0 else piece.below
         if later:
             found.add(later[0])

@@ -177,8 +177,8 @@ def test_two_cubes_with_a_common_side_have_three_regions_there():
     assert surface.first(Start(point, low), back, -1)[0].t == 2
     assert surface.first(Start(point, low), ahead, 1)[0].t == 2
     assert surface.first(Start(point, low), ahead, 1, True) == [First(ZERO, high, (high,))]
-    assert surface.first(Start(point, high), ahead, -1, True)[0].t == 2
-    assert surface.first(Start(point, high), back, 1, True)[0].t == 2
+    assert surface.first(Start(point, high, low), ahead, -1, True)[0].t == 2
+    assert surface.first(Start(point, high, low), back, 1, True)[0].t == 2
     assert surface.first(Start(point, low), back, -1, True) == [First(ZERO, high, (high,))]
     # Along the common side no face is ahead.
     assert surface.first(Start(point, low), (0, 1, 0), 1, True)[0].face not in (low, high)
@@ -195,7 +195,7 @@ def test_coinciding_faces_come_one_after_the_other_each_once():
             met.append(found.face)
             side = sign * (1 if wound[found.face] in ([0, 1, 2], [2, 0, 1]) else -1)
             assert surface.first(Start(point, found.face), np.array(way) * sign, -side) == [First(ZERO, 0, (0,))]
-            (found,) = surface.first(Start(point, found.face), np.array(way) * sign, side, True)
+            (found,) = surface.first(Start(point, found.face, met[0]), np.array(way) * sign, side, True)
         assert met == [0, 1, 2, 3] and found == far
 
 
