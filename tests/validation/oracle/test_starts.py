@@ -301,8 +301,8 @@ def test_places_are_nearest_and_those_who_hold_them_are_at_no_distance():
         assert squared_distance(found, triangle) == 0
         way = [a - Fraction(b) for a, b in zip(found, given.tolist(), strict=True)]
         assert dot(way, way) == squared_distance(*rational([given.tolist()]), triangle)
-    # Barycentrics that rounding has put outside are those of the nearest point.
-    assert start_on([[0, 0, 0], [4, 0, 0], [0, 4, 0]], 0.75, 0.5) == place(2.5, 1.5, 0)
+    # Of barycentrics that rounding has put outside the two that are left are shares: 3/5 and 2/5.
+    assert start_on([[0, 0, 0], [4, 0, 0], [0, 4, 0]], 0.75, 0.5) == (Fraction(12, 5), Fraction(8, 5), 0)
     vertices, faces = rng.integers(0, 4, (40, 3)).astype(float), rng.integers(0, 40, (120, 3))
     surface, found = Surface(vertices, faces), 0
     flat = [not row.any() for row in normals(vertices, faces)]
