@@ -92,15 +92,12 @@ def _shift(slabs: list[tuple[str, float, float]], height: float) -> float:
             continue
         x += (y - at) * sine / np.sqrt(1.0 - sine * sine)
         y = at
+        before = _INDEX[within[-1]] if within else 1.0
         if enters:
-            before = _INDEX[within[-1]] if within else 1.0
             within.append(name)
-            after = _INDEX[name]
         else:
-            before = _INDEX[name]
             del within[len(within) - 1 - within[::-1].index(name)]
-            after = _INDEX[within[-1]] if within else 1.0
-        sine *= before / after
+        sine *= before / (_INDEX[within[-1]] if within else 1.0)
     return float(x + y * sine / np.sqrt(1.0 - sine * sine) - height * _SLANT)
 
 
