@@ -302,6 +302,11 @@ class TestTouchingFaces:
         assert len(self.found(top, (box(), WATER))) == 4
         assert self.found((box((0, 1, 0), (1, 2, 1)), GROUND), bottom) == []
 
+    def test_a_prepared_scene_finds_them_whatever_they_are_of(self) -> None:
+        what = scene((box((0, 1, 0), (1, 2, 1)), GROUND), (box(), GROUND), eye=EYES[0])
+        prepared = prepare_scene(what, needs_of(what), "octree")
+        assert len(np.flatnonzero(prepared.touching)) == 4 and not prepared.arrays.touching.any()
+
     def test_faces_beside_each_other_do_not_touch(self) -> None:
         assert self.found((box(), GLASS), (box((1, 1, 0), (2, 2, 1)), GLASS)) == []
 
