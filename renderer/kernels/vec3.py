@@ -53,6 +53,12 @@ def largest_component(a):
     return larger(abs(a[0]), larger(abs(a[1]), abs(a[2])))
 
 
+@inlined
+def largest_of_three(a, b, c):
+    """The ``largest_component`` of three vectors."""
+    return larger(largest_component(a), larger(largest_component(b), largest_component(c)))
+
+
 # The reciprocal of a denormal number overflows.
 _SMALL, _RAISE = 2.0**-1000, 2.0**100
 

@@ -12,7 +12,6 @@ from renderer.kernels.simd import (
     get,
     larger,
     load4,
-    load8,
     lowest_bit,
     magnitude,
     movemask,
@@ -20,13 +19,11 @@ from renderer.kernels.simd import (
     put,
     smaller,
     splat4,
-    splat8,
 )
-from renderer.kernels.vec3 import largest_component, length, sub
+from renderer.kernels.vec3 import largest_of_three, length, sub
 from renderer.shade.surface import lets_through, scene_pointers
-from renderer.trace.intersect import round_both
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
+from renderer.trace.leaf import blocks_of, octants_around, push_children, tree_pointers
 from renderer.trace.sides import corner
 from renderer.trace.starts.level import CORNER_ERROR, plane_of
 
@@ -62,19 +59,6 @@ def _range(corners, k):
     return smaller(a, smaller(b, c)), larger(a, larger(b, c))
 
 
-@inlined
-def _octants_around(tree, child, flat):
-    """The bits of the octants of a node whose boxes meet that of a face."""
-    base, bits = child * NODE_WORDS, 0xFF
-    for k in range(3):
-        low, high = _range(flat.corners, k)
-        low, high = round_both(low - flat.room)[0], round_both(high + flat.room)[1]
-        bits &= movemask(
-            (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
-        )
-    return bits
-
-
 class _Flat(NamedTuple):
     """A face: its corners, its normal and the length of that, twice its longest side, its largest coordinate, and the
     room by which its box grows.
@@ -93,8 +77,16 @@ def _flat_at(tree, slot):
     """The ``_Flat`` in a place of a block."""
     p0, p1, p2 = corners = _corners(tree, slot)
     n, side = plane_of(corners)
-    largest = larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    largest = largest_of_three(p0, p1, p2)
     return _Flat(corners, n, length(n), side, largest, _ROOM * largest)
+
+
+@inlined
+def _box_of(flat):
+    """The lowest and the highest corner of a face's box, grown by its room."""
+    (x0, x1), (y0, y1), (z0, z1) = _range(flat.corners, 0), _range(flat.corners, 1), _range(flat.corners, 2)
+    room = flat.room
+    return (x0 - room, y0 - room, z0 - room), (x1 + room, y1 + room, z1 + room)
 
 
 @kernel
@@ -104,6 +96,7 @@ def _mark_touched(tree, slot, face, stack, touching):
     if not tree.has_nodes:
         _mark_touched_in(tree, 0, tree.count, flat, face, touching)
         return
+    low, high = _box_of(flat)
     put(stack, 0, 0)
     while top > 0:
         top -= 1
@@ -112,7 +105,7 @@ def _mark_touched(tree, slot, face, stack, touching):
             first, blocks = blocks_of(child)
             _mark_touched_in(tree, first, blocks, flat, face, touching)
             continue
-        top = push_children(tree, child, _octants_around(tree, child, flat), stack, top)
+        top = push_children(tree, child, octants_around(tree, child, low, high), stack, top)
 
 
 @inlined

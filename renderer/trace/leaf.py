@@ -12,13 +12,16 @@ from renderer.kernels.simd import (
     float64_pointer,
     get,
     int32_pointer,
+    load8,
     lowest_bit,
+    movemask,
     pointer,
     put,
     smaller,
+    splat8,
 )
 from renderer.trace.doubt import settled
-from renderer.trace.intersect import hit_triangles, make_shear
+from renderer.trace.intersect import hit_triangles, make_shear, round_both
 from renderer.trace.layout import (
     BLOCK_COUNT,
     BLOCK_FACES,
@@ -85,6 +88,18 @@ def push_children(tree, node, bits, stack, top):
         bits &= bits - 1
         top += 1
     return top
+
+
+@inlined
+def octants_around(tree, node, low, high):
+    """The bits of the octants of a node whose boxes reach into the one from corner ``low`` to corner ``high``."""
+    base, bits = node * NODE_WORDS, 0xFF
+    for k in range(3):
+        down, up = round_both(low[k])[0], round_both(high[k])[1]
+        bits &= movemask(
+            (load8(tree.nodes, base + 16 * k) <= splat8(up)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(down))
+        )
+    return bits
 
 
 NO_FACE = np.iinfo(np.int32).max

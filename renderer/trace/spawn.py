@@ -16,6 +16,7 @@ from renderer.kernels.vec3 import (
     cross,
     dot,
     largest_component,
+    largest_of_three,
     length,
     normalized,
     row3,
@@ -104,7 +105,7 @@ def has_normal(p0, p1, p2):
     """Whether the corners of a face do not lie on a line, as rounded: its normal is then the same for all rays."""
     side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
     n = cross(side2, sub(p2, p0))
-    side = larger(largest_component(side0), larger(largest_component(side1), largest_component(side2)))
+    side = largest_of_three(side0, side1, side2)
     return largest_component(n) > side * LINE * side
 
 
@@ -137,14 +138,11 @@ def _least_axis(a):
 
 
 @inlined
-def _clearance(p0, p1, p2, double_area, reach):
+def _clearance(side, double_area, reach):
     """The distance from a face's plane beyond which no ray that leads away meets the face.
 
-    ``reach`` is the largest component of a corner relative to the ray's start.
+    ``side`` is the largest component of its sides, ``reach`` that of a corner relative to the ray's start.
     """
-    side = larger(
-        largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2)))
-    )
     if not double_area / side > _THIN * side:
         return 2.0 * _LEAST * reach
     # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
@@ -165,9 +163,9 @@ def offset_distance(p, p0, p1, p2, u, v, n_g):
         reach = larger(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
     one, other = sub(p1, p0), sub(p2, p0)
     double_area = length(cross(one, other))
-    error = _GAMMA7 * distance + _clearance(p0, p1, p2, double_area, reach)
+    side = largest_of_three(one, other, sub(p2, p1))
+    error = _GAMMA7 * distance + _clearance(side, double_area, reach)
     slack = slack_of(p, error)
-    side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
     # A weight times the double area is the distance from its edge times the edge's length.
     inside = smaller(u, smaller(v, w)) * double_area > _INSIDE * slack * side and double_area > side * LINE * side
     inside = inside and error <= _FARTHEST_MOVE * side
@@ -252,8 +250,8 @@ def _plane_near(p0, p1, p2, o):
     n = cross(one, other)
     whole = dot(n, n)
     area = math.sqrt(whole)
-    side = larger(largest_component(one), larger(largest_component(other), largest_component(sub(p2, p1))))
-    reach = larger(largest_component(q), larger(largest_component(sub(p1, o)), largest_component(sub(p2, o))))
+    side = largest_of_three(one, other, sub(p2, p1))
+    reach = largest_of_three(q, sub(p1, o), sub(p2, o))
     share = reach / area * reach
     # The bound of ``_clearance``, a 1024th more because the next test measures from where the point is moved to, and
     # that of the height below.
@@ -325,9 +323,7 @@ def _lies_far(corners, o, unit):
     """Whether a point is farther from a face than points that went through float32 are."""
     p0, p1, p2 = corners
     o = scale(o, unit)
-    most = larger(
-        largest_component(o), larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
-    )
+    most = larger(largest_component(o), largest_of_three(p0, p1, p2))
     return far_from(anchor_of(Start(corners, o, 0, 0)), o) > FARTHEST_START * most
 
 
@@ -335,7 +331,7 @@ def _lies_far(corners, o, unit):
 def _lies_at(corners, weights, o, unit):
     """Whether a point is where the barycentrics of a face say, as near as ``lies_far`` wants it."""
     p0, p1, p2 = corners
-    most = larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
+    most = largest_of_three(p0, p1, p2)
     place = barycentric(p0, p1, p2, weights[0], weights[1])
     return largest_component(sub(place, scale(o, unit))) <= FARTHEST_START * most
 

@@ -19,7 +19,7 @@ from renderer.kernels.pairs import (
     scaled_difference,
 )
 from renderer.kernels.simd import larger
-from renderer.kernels.vec3 import largest_component, sub
+from renderer.kernels.vec3 import largest_component, largest_of_three, sub
 from renderer.trace.starts.record import BARYCENTRIC
 
 _LEAST_NORMAL = 2.0**-1022
@@ -50,9 +50,7 @@ def anchor_of(start):
     Barycentrics below 0, by rounding, count as 0; the two others are scaled to add up to 1.
     """
     p0, p1, p2 = corners = start.corners
-    side = larger(
-        largest_component(sub(p1, p0)), larger(largest_component(sub(p2, p1)), largest_component(sub(p0, p2)))
-    )
+    side = largest_of_three(sub(p1, p0), sub(p2, p1), sub(p0, p2))
     unit = power_below(larger(side, _LEAST_NORMAL))
     if start.code & BARYCENTRIC != 0:
         return _at_weights(corners, start.anchor[0], start.anchor[1], unit)

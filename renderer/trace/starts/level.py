@@ -10,11 +10,10 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, dot_pairs, quotient
-from renderer.kernels.simd import get, larger, load8, movemask, put, smaller, splat8
-from renderer.kernels.vec3 import barycentric, cross, dot, largest_component, length, sub
-from renderer.trace.intersect import round_both
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import blocks_of, push_children
+from renderer.kernels.simd import get, larger, put, smaller
+from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_component, largest_of_three, length, sub
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
+from renderer.trace.leaf import blocks_of, octants_around, push_children
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of
 from renderer.trace.starts.cone import MOST_HOLDERS, NUMBER, PLACE, ZEROS, holder, put_holder
@@ -60,16 +59,10 @@ class _Met(NamedTuple):
 
 
 @inlined
-def _largest(corners):
-    p0, p1, p2 = corners
-    return larger(largest_component(p0), larger(largest_component(p1), largest_component(p2)))
-
-
-@inlined
 def plane_of(corners):
     """The normal of a face, and twice the length of its longest side."""
     one, other, third = sub(corners[1], corners[0]), sub(corners[2], corners[0]), sub(corners[2], corners[1])
-    side = larger(largest_component(one), larger(largest_component(other), largest_component(third)))
+    side = largest_of_three(one, other, third)
     return cross(one, other), 4.0 * side
 
 
@@ -87,7 +80,7 @@ def _is_below(p, q, error):
 @inlined
 def are_level(p, q):
     """Whether two faces are in one plane, but for the rounding of their corners."""
-    error = CORNER_ERROR * larger(_largest(p), _largest(q))
+    error = CORNER_ERROR * larger(largest_of_three(*p), largest_of_three(*q))
     return _is_below(p, q, error) and _is_below(q, p, error)
 
 
@@ -185,18 +178,6 @@ def member_spot(tree, holders, k, spot, met):
     return spot if number == spot.face else _spot_of(tree, holder(holders, k, PLACE), number, met)
 
 
-@inlined
-def _octants_at(tree, child, o, room):
-    """The bits of the octants of a node whose boxes hold a point, with some room."""
-    base, bits = child * NODE_WORDS, 0xFF
-    for k in range(3):
-        low, high = round_both(o[k] - room)[0], round_both(o[k] + room)[1]
-        bits &= movemask(
-            (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
-        )
-    return bits
-
-
 @kernel
 def list_near(tree, surfaces, spot, stack, holders):
     """List the faces that touch others and may hold a spot, as far as float64 tells; returns their number, mostly 1.
@@ -204,7 +185,8 @@ def list_near(tree, surfaces, spot, stack, holders):
     """
     corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
-    room, count, top = 4.0 * CORNER_ERROR * _largest(corners), 0, 1
+    room, count, top = 4.0 * CORNER_ERROR * largest_of_three(*corners), 0, 1
+    low, high = sub(o, (room, room, room)), add(o, (room, room, room))
     if not tree.has_nodes:
         return _list_in(tree, 0, tree.count, surfaces.touching, o, room, holders, count)
     put(stack, 0, 0)
@@ -215,7 +197,7 @@ def list_near(tree, surfaces, spot, stack, holders):
             first, blocks = blocks_of(child)
             count = _list_in(tree, first, blocks, surfaces.touching, o, room, holders, count)
             continue
-        top = push_children(tree, child, _octants_at(tree, child, o, room), stack, top)
+        top = push_children(tree, child, octants_around(tree, child, low, high), stack, top)
     return count
 
 
@@ -241,7 +223,7 @@ def _hold_sign(corners, o, room):
         if o[k] < low - room or o[k] > high + room:
             return -1
     n, (e0, e1, e2) = _areas_at(corners, o)
-    reach = larger(largest_component(sub(a, o)), larger(largest_component(sub(b, o)), largest_component(sub(c, o))))
+    reach = largest_of_three(sub(a, o), sub(b, o), sub(c, o))
     error, least = _BESIDE * largest_component(n) * reach * (reach + room), smaller(e0, smaller(e1, e2))
     return 1 if least > error else (-1 if least < -error else 0)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.kernels.simd import extract, get, larger, load8, lowest_bit, movemask, put, smaller, splat8
-from renderer.kernels.vec3 import largest_component, sub
+from renderer.kernels.simd import extract, get, larger, lowest_bit, put, smaller, splat8
+from renderer.kernels.vec3 import add, largest_component, sub
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import (
     Ray,
@@ -22,13 +22,12 @@ from renderer.trace.intersect import (
     make_shear,
     make_slabs,
     near_planes,
-    round_both,
     round_down,
     see_triangles,
     unsure_sides,
 )
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, blocks_of, is_better, push_children
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
+from renderer.trace.leaf import NO_FACE, blocks_of, is_better, octants_around, push_children
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
@@ -67,22 +66,12 @@ def _box_holds(tree, place, o):
     return holds
 
 
-@inlined
-def _holding_octants(tree, child, o):
-    """The bits of the octants of a node whose boxes, with _ROOM, hold a point."""
-    base, bits, room = child * NODE_WORDS, 0xFF, largest_component(o) * _ROOM
-    for k in range(3):
-        low, high = round_both(o[k] - room)[0], round_both(o[k] + room)[1]
-        bits &= movemask(
-            (load8(tree.nodes, base + 16 * k) <= splat8(high)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(low))
-        )
-    return bits
-
-
 @kernel
 def list_holders(tree, anchor, d, slope, dz, stack, holders):
     """List the faces that hold an anchor, from which a ray leaves in direction d; returns their number."""
     o, count, top = rounded(anchor), 0, 1
+    room = largest_component(o) * _ROOM
+    low, high = sub(o, (room, room, room)), add(o, (room, room, room))
     if not tree.has_nodes:
         return _add_holders(tree, 0, tree.count, anchor, o, d, slope, dz, holders, count)
     put(stack, 0, 0)
@@ -93,7 +82,7 @@ def list_holders(tree, anchor, d, slope, dz, stack, holders):
             first, blocks = blocks_of(child)
             count = _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, count)
             continue
-        top = push_children(tree, child, _holding_octants(tree, child, o), stack, top)
+        top = push_children(tree, child, octants_around(tree, child, low, high), stack, top)
     return count
 
 
