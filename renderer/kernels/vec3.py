@@ -64,27 +64,28 @@ _SMALL, _RAISE = 2.0**-1000, 2.0**100
 
 
 @kernel
-def normalized(a):
-    """a / |a|, scaled first so that no square overflows or vanishes; the zero vector stays."""
-    largest = largest_component(a)
+def unit_and_length(a):
+    """a / |a| and |a|, scaled first so that no square overflows or vanishes; the zero vector stays."""
+    largest, raised = largest_component(a), 1.0
     if largest == 0.0:
-        return a
+        return a, 0.0
     if largest < _SMALL:
-        a, largest = scale(a, _RAISE), largest * _RAISE
+        a, largest, raised = scale(a, _RAISE), largest * _RAISE, _RAISE
     b = scale(a, 1.0 / largest)
-    return scale(b, 1.0 / math.sqrt(dot(b, b)))
+    root = math.sqrt(dot(b, b))
+    return scale(b, 1.0 / root), largest * root / raised
+
+
+@kernel
+def normalized(a):
+    """a / |a|; the zero vector stays."""
+    return unit_and_length(a)[0]
 
 
 @kernel
 def length(a):
-    """|a|, scaled first so that no square overflows or vanishes."""
-    largest, raised = largest_component(a), 1.0
-    if largest == 0.0:
-        return 0.0
-    if largest < _SMALL:
-        a, largest, raised = scale(a, _RAISE), largest * _RAISE, _RAISE
-    b = scale(a, 1.0 / largest)
-    return largest * math.sqrt(dot(b, b)) / raised
+    """|a|."""
+    return unit_and_length(a)[1]
 
 
 @inlined

@@ -60,11 +60,17 @@ def place_at(spot, surface, d):
 
 
 @inlined
+def may_coincide(scene, face):
+    """Whether a face may coincide with another, of which one passes light."""
+    return scene.has_touching and get(scene.touching, face) != 0
+
+
+@inlined
 def faces_together(tree, scene, spot, d, stack, memory):
     """The faces that a ray of direction d meets at a ``Spot``. ``stack`` and ``memory`` as for ``search.depart``: the
     marks there last until the next search.
     """
-    if scene.has_touching and get(scene.touching, spot.face) != 0:
+    if may_coincide(scene, spot.face):
         return _faces_together(tree, scene, spot, d, stack, memory)
     return Together(spot, spot, spot, 0)
 

@@ -10,7 +10,7 @@ from renderer.kernels.simd import get, pointer
 from renderer.kernels.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
-from renderer.trace.spawn import normal_of, offset_distance
+from renderer.trace.spawn import facet_of, offset_distance
 
 # The most media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8
@@ -103,14 +103,13 @@ def surface_at(scene, face, u, v, d):
     """The ``Surface`` at barycentrics u, v of a face that a ray of direction d met."""
     a, b, c = row3(scene.faces, face)
     p0, p1, p2 = row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c)
-    n_g = normal_of(p0, p1, p2, d)
-    p = barycentric(p0, p1, p2, u, v)
-    n_s = n_g
+    facet, p = facet_of(p0, p1, p2, d), barycentric(p0, p1, p2, u, v)
+    n_g = n_s = facet.normal
     if scene.has_smooth and get(scene.smooth, face):
         n = barycentric(row3(scene.normals, a), row3(scene.normals, b), row3(scene.normals, c), u, v)
         # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
         n_s = normalized(n) if largest_component(n) > 0.0 else n_g
-    error, slack = offset_distance(p, p0, p1, p2, u, v, n_g)
+    error, slack = offset_distance(p, p0, p1, p2, u, v, facet)
     return Surface(p, error, n_g, n_s, get(scene.material, face), slack)
 
 

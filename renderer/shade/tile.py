@@ -71,6 +71,7 @@ def _shoot(camera, scene, bundle, place, block):
     """
     x0, y0, x1, y1 = block
     clear(bundle, 0)
+    put_no_start(bundle.starts)
     for k in range(SIZE):
         i, j = _place(k)
         x, y = x0 + i, y0 + j
@@ -79,8 +80,7 @@ def _shoot(camera, scene, bundle, place, block):
             rows = camera.rows
             o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))
             d = add(row3(rows, 3), add(scale(row3(rows, 4), px), scale(row3(rows, 5), py)))
-            row = append(bundle, o, normalized(d), (1.0, 1.0, 1.0), j * SIDE + i, scene.media, scene.media_count)
-            put_no_start(row)
+            append(bundle, o, normalized(d), (1.0, 1.0, 1.0), j * SIDE + i, scene.media, scene.media_count)
 
 
 @inlined

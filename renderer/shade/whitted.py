@@ -23,7 +23,16 @@ from renderer.shade.bundle import (
     count_of,
     depth_of,
 )
-from renderer.shade.crossing import SPARE, Media, cross, faces_together, place_at, surface_together
+from renderer.shade.crossing import (
+    SPARE,
+    Media,
+    Together,
+    cross,
+    faces_together,
+    may_coincide,
+    place_at,
+    surface_together,
+)
 from renderer.shade.direct import (
     BOUND,
     CHANGE,
@@ -171,13 +180,9 @@ def _put_change(scene, bundle, work, i, together, inside):
 
 
 @inlined
-def _meet_surface(tree, scene, bundle, work, i):
-    """Write the surface that ray ``i`` met, and its ambient light, to ``work``."""
-    found, surface = work.found, at(work.surfaces, i * SURFACE_DOUBLES)
-    d, spot = row3(bundle.directions, i), Spot(get(found.face, i), get(found.u, i), get(found.v, i))
-    together = faces_together(tree, scene, spot, d, work.trace.packet_stack, work.trace.holders)
-    put(found.face, i, together.seen.face)
-    met = surface_together(scene, together, d)
+def _put_surface(scene, bundle, work, i, together, met):
+    """Write the surface ``met`` by ray ``i``, where it meets some faces together, and its ambient light to ``work``."""
+    surface, d = at(work.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, met.n_s) > 0.0
     put3(surface, POINT, met.p)
@@ -191,6 +196,26 @@ def _meet_surface(tree, scene, bundle, work, i):
     if passes_light(scene.materials, met.material):
         _put_change(scene, bundle, work, i, together, inside)
     return met.material
+
+
+@kernel
+def _meet_together(tree, scene, bundle, work, i, spot):
+    """Write the surface that ray ``i`` meets at a ``Spot`` where faces may coincide; returns its material."""
+    d = row3(bundle.directions, i)
+    together = faces_together(tree, scene, spot, d, work.trace.packet_stack, work.trace.holders)
+    put(work.found.face, i, together.seen.face)
+    return _put_surface(scene, bundle, work, i, together, surface_together(scene, together, d))
+
+
+@inlined
+def _meet_surface(tree, scene, bundle, work, i):
+    """Write the surface that ray ``i`` meets; returns its material."""
+    found = work.found
+    spot = Spot(get(found.face, i), get(found.u, i), get(found.v, i))
+    if may_coincide(scene, spot.face):
+        return _meet_together(tree, scene, bundle, work, i, spot)
+    met = surface_at(scene, spot.face, spot.u, spot.v, row3(bundle.directions, i))
+    return _put_surface(scene, bundle, work, i, Together(spot, spot, spot, 0), met)
 
 
 @kernel
@@ -259,10 +284,15 @@ def _exit_of(surface):
 @inlined
 def _exit_beyond(scene, surface, d):
     """The ``_Exit`` of a ray that goes through all the faces that a ray of direction d met together."""
-    row = at(surface, LAST)
-    last = Spot(np.int64(get(row, 0)), get(row, 1), get(row, 2))
-    if last.face == np.int64(get(surface, PLACE)):
+    if np.int64(get(surface, LAST)) == np.int64(get(surface, PLACE)):
         return _exit_of(surface)
+    return _exit_at(scene, at(surface, LAST), d)
+
+
+@kernel
+def _exit_at(scene, row, d):
+    """The ``_Exit`` from the ``Spot`` in a row."""
+    last = Spot(np.int64(get(row, 0)), get(row, 1), get(row, 2))
     met = surface_at(scene, last.face, last.u, last.v, d)
     return _Exit(met.p, met.error, met.n_g, place_at(last, met, d))
 
@@ -326,7 +356,8 @@ def _collect_light(scene, bundle, work):
 @inlined
 def meet(tree, scene, bundle, work):
     """Trace the rays of a bundle and write the surfaces that they meet to ``work``, of which none is lit yet."""
-    starts = StartPointers(bundle.starts, ROW, scene.vertices, scene.faces)
+    # Those of camera rays are all alike: they start on no surface.
+    starts = StartPointers(bundle.starts, ROW if depth_of(bundle) > 0 else 0, scene.vertices, scene.faces)
     rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 3, 0, 0, 1.0, starts)
     trace_rays(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
     _meet_surfaces(tree, scene, bundle, work)

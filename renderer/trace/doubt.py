@@ -33,6 +33,7 @@ from renderer.trace.intersect import (
     largest_of,
     longest_axis,
     make_slab,
+    room_of,
     round_down,
     turned,
 )
@@ -172,7 +173,7 @@ def _meet_slab(tree, at, axis, o, d, largest, t0, t1):
     """Narrow [t0, t1] to one axis of a face's own box."""
     row = at + 4 * axis
     near, far = face_range(coordinate(tree, row), coordinate(tree, row + 12), coordinate(tree, row + 24))
-    near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = make_slab(axis, o, d, largest, 0.0)
+    near_row, far_row, near_origin, far_origin, near_inverse, far_inverse = make_slab(axis, o, d, largest, room_of(0.0))
     if near_row > far_row:
         near, far = far, near
     n = np.float32(np.float32(near - near_origin) * near_inverse)

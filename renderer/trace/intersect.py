@@ -32,6 +32,8 @@ FAR_PADDING = np.float32(1.0 + 8.0 * 2.0**-23)
 LARGEST_FLOAT = np.float32(np.finfo(np.float32).max)
 _STEP = np.float32(2.0**-23)
 _TINY = np.float32(2.0**-149)
+# Where room is added to a step, this more covers that the sum and the difference are rounded too.
+_MORE = np.float32(1.0 + 2.0**-9)
 # The errors of the triangle test. Let u = 2^-53, A = ``across``, Z = ``along``, D = A + Z and S the spread of z. Then a
 # sheared coordinate errs by 4 u D, the edge functions together by 9 u A D, the determinant by 10 u A D and the
 # numerator of t by 11 u A D Z. Three limits say when a hit is in doubt.
@@ -83,13 +85,20 @@ def round_down(x):
 
 
 @inlined
-def round_both(x):
-    """A float32 <= x and one >= x, each within three ulp of it or infinite, but never on the wrong side.
+def room_of(slack):
+    """A float32 for ``round_both``, larger than a number >= 0."""
+    return narrow(slack) * _MORE + _TINY
+
+
+@inlined
+def round_both(x, room):
+    """A float32 <= x and one >= x, with the room of ``room_of`` beside it; each is within three ulp of that or
+    infinite, but never on the wrong side.
 
     The least float32 is never above +inf nor the greatest below -inf, so no difference with either is NaN.
     """
     y = larger(-LARGEST_FLOAT, smaller(LARGEST_FLOAT, narrow(x)))
-    step = magnitude(y) * _STEP + _TINY
+    step = magnitude(y) * (_STEP * _MORE) + room
     return y - step, y + step
 
 
@@ -162,15 +171,15 @@ class Slabs(NamedTuple):
 
 
 @inlined
-def make_slab(axis, o, d, largest, slack):
-    """Near row, far row, origins and reciprocals of one axis, each rounded so that the slab only grows, by ``slack`` on
+def make_slab(axis, o, d, largest, room):
+    """Near row, far row, origins and reciprocals of one axis, each rounded so that the slab only grows, by ``room`` on
     both sides.
 
     The sign bit chooses the rows, so -0.0 is a direction like any other. The near reciprocal is finite and never above
     the true one. The far one may be infinite; times a difference of 0 it makes NaN, which ``enter_boxes`` ignores.
     """
     inverse, back = narrow(largest / d), is_negative(d)
-    down, up = round_both(o - slack)[0], round_both(o + slack)[1]
+    down, up = round_both(o, room)
     near_inverse = smaller(larger(inverse, -LARGEST_FLOAT), LARGEST_FLOAT)
     low, high = np.int64(16 * axis), np.int64(16 * axis + 8)
     return (
@@ -183,10 +192,10 @@ def make_slab(axis, o, d, largest, slack):
 def make_slabs(ray, largest):
     """Prepare a ray; ``largest`` is ``largest_of(ray)`` > 0."""
     # Infinite, it says that the ray goes through no box.
-    slack = select(ray.slack < np.inf, ray.slack, 0.0)
-    nx, fx, nox, fox, nix, fix = make_slab(0, ray.ox, ray.dx, largest, slack)
-    ny, fy, noy, foy, niy, fiy = make_slab(1, ray.oy, ray.dy, largest, slack)
-    nz, fz, noz, foz, niz, fiz = make_slab(2, ray.oz, ray.dz, largest, slack)
+    room = room_of(select(ray.slack < np.inf, ray.slack, 0.0))
+    nx, fx, nox, fox, nix, fix = make_slab(0, ray.ox, ray.dx, largest, room)
+    ny, fy, noy, foy, niy, fiy = make_slab(1, ray.oy, ray.dy, largest, room)
+    nz, fz, noz, foz, niz, fiz = make_slab(2, ray.oz, ray.dz, largest, room)
     return Slabs(
         nx, ny, nz, fx, fy, fz, nox, noy, noz, fox, foy, foz, nix, niy, niz, fix, fiy, fiz
     )  # fmt: skip

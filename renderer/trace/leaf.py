@@ -21,7 +21,7 @@ from renderer.kernels.simd import (
     splat8,
 )
 from renderer.trace.doubt import settled
-from renderer.trace.intersect import hit_triangles, make_shear, round_both
+from renderer.trace.intersect import hit_triangles, make_shear, room_of, round_both
 from renderer.trace.layout import (
     BLOCK_COUNT,
     BLOCK_FACES,
@@ -93,9 +93,9 @@ def push_children(tree, node, bits, stack, top):
 @inlined
 def octants_around(tree, node, low, high):
     """The bits of the octants of a node whose boxes reach into the one from corner ``low`` to corner ``high``."""
-    base, bits = node * NODE_WORDS, 0xFF
+    base, bits, room = node * NODE_WORDS, 0xFF, room_of(0.0)
     for k in range(3):
-        down, up = round_both(low[k])[0], round_both(high[k])[1]
+        down, up = round_both(low[k], room)[0], round_both(high[k], room)[1]
         bits &= movemask(
             (load8(tree.nodes, base + 16 * k) <= splat8(up)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(down))
         )

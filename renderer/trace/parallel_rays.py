@@ -28,7 +28,7 @@ from renderer.kernels.simd import (
     splat8,
     store,
 )
-from renderer.trace.intersect import Shear, box_limit, largest_of, round_both
+from renderer.trace.intersect import Shear, box_limit, largest_of, room_of, round_both
 from renderer.trace.layout import CACHE_LINE, CHILDREN, NODE_WORDS, UNUSED, cache_aligned
 from renderer.trace.leaf import NO_FACE, blocks_of, nearest_in_blocks
 from renderer.trace.packet import Beam, enter_beam, highest_origin, lowest_origin, make_beam, meet_box
@@ -50,7 +50,7 @@ from renderer.trace.ray_lanes import (
     prepare_eight,
     shear_of,
 )
-from renderer.trace.rays import ray_at
+from renderer.trace.rays import ray_at, starts8
 from renderer.trace.singly import search_carefully, stack_size
 from renderer.trace.starts.record import EDGE
 from renderer.trace.starts.record import FACE as START_FACE
@@ -123,18 +123,19 @@ def _prepare_origins(rays, prepared, sixteen, limits):
     for r in range(WIDTH):
         put(integers, NUMBER + r, get(live, smaller(first + r, count - 1)))
     for half in range(0, WIDTH, 8):
+        numbers = at(integers, NUMBER + half)
+        slack, leaving = starts8(rays.starts, numbers)
+        room = room_of(slack)
         for axis in range(3):
-            o = gather8(rays.origins, at(integers, NUMBER + half), rays.origin_step, axis) * rays.scale
-            slack = gather8(rays.starts.rows, at(integers, NUMBER + half), rays.starts.step, START_SLACK)
-            far, near = round_both(o - slack)[0], round_both(o + slack)[1]
+            o = gather8(rays.origins, numbers, rays.origin_step, axis) * rays.scale
+            far, near = round_both(o, room)
             if get(floats, NEAR_INVERSE + axis * WIDTH) < 0.0:
                 near, far = far, near
             store(floats, NEAR_ORIGIN + axis * WIDTH + half, near)
             store(floats, FAR_ORIGIN + axis * WIDTH + half, far)
             store(doubles, ORIGIN + (axis + 2 - w) % 3 * WIDTH + half, o)
-        rows, step = rays.starts.rows, rays.starts.step
-        store(doubles, SLACK + half, gather8(rows, at(integers, NUMBER + half), step, START_SLACK))
-        store(doubles, LEAVING + half, gather8(rows, at(integers, NUMBER + half), step, START_FACE))
+        store(doubles, SLACK + half, slack)
+        store(doubles, LEAVING + half, leaving)
         store(doubles, T + half, alike(limits[0], o))
         store(floats, LIMIT + half, splat8(limits[1]))
         store(integers, FACE + half, alike(np.int64(NO_FACE), o))
@@ -159,7 +160,7 @@ def _bounds(rays, live, count, axis):
         o = get(rays.origins, i * rays.origin_step + axis) * rays.scale
         slack = get(rays.starts.rows, i * rays.starts.step + START_SLACK)
         low, high = smaller(low, o - slack), larger(high, o + slack)
-    return round_both(low)[0], round_both(high)[1]
+    return round_both(low, room_of(0.0))[0], round_both(high, room_of(0.0))[1]
 
 
 @inlined

@@ -151,10 +151,22 @@ def eight_rays_at(rays, numbers):
     o, d, s, z = rays.origins, rays.directions, rays.origin_step, rays.direction_step
     origin = gather8(o, numbers, s, 0), gather8(o, numbers, s, 1), gather8(o, numbers, s, 2)
     direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
-    t_min, t_max = gather8(rays.t_min, numbers, rays.min_step, 0), gather8(rays.t_max, numbers, rays.max_step, 0)
-    rows, step = rays.starts.rows, rays.starts.step
-    slack, face = gather8(rows, numbers, step, SLACK), gather8(rows, numbers, step, FACE)
-    return _scaled(origin, direction, t_min, t_max, rays.scale, slack, face)
+    t_min, t_max = _often_one(rays.t_min, numbers, rays.min_step, 0), _often_one(rays.t_max, numbers, rays.max_step, 0)
+    return _scaled(origin, direction, t_min, t_max, rays.scale, *starts8(rays.starts, numbers))
+
+
+@inlined
+def _often_one(base, numbers, step, column):
+    """``gather8`` where often all rays share one row."""
+    first = gather8(base, numbers, 0, column)
+    return gather8(base, numbers, step, column) if step != 0 else first
+
+
+@inlined
+def starts8(starts, numbers):
+    """Slack and face, as of ``Ray``, of the eight rays whose numbers stand at ``numbers``."""
+    rows, step = starts.rows, starts.step
+    return _often_one(rows, numbers, step, SLACK), _often_one(rows, numbers, step, FACE)
 
 
 @inlined

@@ -17,12 +17,12 @@ from renderer.kernels.vec3 import (
     dot,
     largest_component,
     largest_of_three,
-    length,
     normalized,
     row3,
     scale,
     sub,
     three,
+    unit_and_length,
 )
 from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import CORNER, DOUBT, SLANT
@@ -63,11 +63,11 @@ _THIN = DOUBT / 4.0
 # times that from a line, which the face may be LINE wide.
 _LEAST = 2.0 * ROUNDING
 _SMALLEST = 2.0**-1074
-# A start is inside its face where it is farther from the edges than so often its slack: a face beside it, at more than
-# a 64th of a right angle, is farther from it than where it is moved to.
-_INSIDE = 8.0
 # A start that would be moved by more of its face, as of needles, is left to exact signs: t is counted from there.
 _FARTHEST_MOVE = 2.0**-38
+# A start is inside its face where it is farther from the edges than so often the slack of such a move: a face beside
+# it, at more than a 64th of a right angle, is farther from it than where it is moved to.
+_INSIDE = 8.0
 # A ray at a smaller angle to its face is left to exact signs. Of normal . direction 2^-43 is rounding, of a face that
 # is not thinner than 2^-10 of its side.
 LEVEL = 2.0**-20
@@ -100,25 +100,42 @@ class Place(NamedTuple):
     came: float
 
 
+class Facet(NamedTuple):
+    """A face for the rays that start on it: the unit normal, twice the area, and the largest component of a side."""
+
+    normal: Any
+    double_area: float
+    side: float
+
+
 @inlined
-def has_normal(p0, p1, p2):
-    """Whether the corners of a face do not lie on a line, as rounded: its normal is then the same for all rays."""
-    side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
-    n = cross(side2, sub(p2, p0))
-    side = largest_of_three(side0, side1, side2)
+def _extends(n, side):
+    """Whether the corners of a face do not lie on a line, as rounded; n is the product of two of its sides."""
     return largest_component(n) > side * LINE * side
 
 
-@kernel
-def normal_of(p0, p1, p2, d):
-    """The unit normal of a face by its winding.
+@inlined
+def has_normal(p0, p1, p2):
+    """Whether a face has a normal of its own, the same for all rays."""
+    one, other = sub(p1, p0), sub(p2, p0)
+    return _extends(cross(one, other), largest_of_three(one, other, sub(p2, p1)))
 
-    A face whose corners lie on a line, as rounded, has none. It fills a slit between its neighbours, so it is taken for
-    one that looks back along d as far as its longest side allows.
+
+@inlined
+def facet_of(p0, p1, p2, d):
+    """The ``Facet`` of a face that a ray of direction d meets, with its normal by its winding."""
+    one, other = sub(p1, p0), sub(p2, p0)
+    n, side = cross(one, other), largest_of_three(one, other, sub(p2, p1))
+    unit, double_area = unit_and_length(n)
+    return Facet(unit if _extends(n, side) else _normal_of_line(p0, p1, p2, d), double_area, side)
+
+
+@kernel
+def _normal_of_line(p0, p1, p2, d):
+    """The normal of a face that has none: it fills a slit between its neighbours, so it is taken for one that looks
+    back along d as far as its longest side allows.
     """
     side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
-    if has_normal(p0, p1, p2):
-        return normalized(cross(side2, sub(p2, p0)))
     l0, l1, l2 = largest_component(side0), largest_component(side1), largest_component(side2)
     longest = normalized(side2 if l2 >= l0 and l2 >= l1 else (side1 if l1 >= l0 else side0))
     across = normalized(sub(scale(longest, dot(d, longest)), d))
@@ -150,26 +167,29 @@ def _clearance(side, double_area, reach):
 
 
 @inlined
-def offset_distance(p, p0, p1, p2, u, v, n_g):
-    """The distance by which p = (1 - u - v) p0 + u p1 + v p2 must move along n_g to be off the plane for certain; and
-    the slack of a ray that starts there, EDGE near an edge.
+def offset_distance(p, p0, p1, p2, u, v, facet):
+    """The distance by which p = (1 - u - v) p0 + u p1 + v p2 must move along the normal to be off the face's plane for
+    certain; and the slack of a ray that starts there, EDGE near an edge. ``facet`` is the ``Facet`` of the face.
 
     The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
     matters where the first vanishes (on a plane through the origin) and for slivers.
     """
+    n_g, double_area, side = facet
     w, distance, reach = 1.0 - u - v, 0.0, 0.0
     for k in range(3):
         distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
         reach = larger(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
-    one, other = sub(p1, p0), sub(p2, p0)
-    double_area = length(cross(one, other))
-    side = largest_of_three(one, other, sub(p2, p1))
     error = _GAMMA7 * distance + _clearance(side, double_area, reach)
-    slack = slack_of(p, error)
     # A weight times the double area is the distance from its edge times the edge's length.
-    inside = smaller(u, smaller(v, w)) * double_area > _INSIDE * slack * side and double_area > side * LINE * side
-    inside = inside and error <= _FARTHEST_MOVE * side
-    return error, slack if inside else EDGE
+    inside = smaller(u, smaller(v, w)) * double_area > _from_edges(p, side) * side
+    inside = inside and double_area > side * LINE * side and error <= _FARTHEST_MOVE * side
+    return error, slack_of(p, error) if inside else EDGE
+
+
+@inlined
+def _from_edges(p, side):
+    """How far from the edges of its face a start must be, for whatever it may be moved by."""
+    return _INSIDE * slack_of(p, _FARTHEST_MOVE * side)
 
 
 @inlined
@@ -256,13 +276,12 @@ def _plane_near(p0, p1, p2, o):
     # The bound of ``_clearance``, a 1024th more because the next test measures from where the point is moved to, and
     # that of the height below.
     needed = reach * (larger(_LEAST, smaller(_GAMMA264 * share, _MOST)) * (1.0 + 2.0**-10) + _GAMMA336 * share)
-    slack = slack_of(o, needed)
     u, v = dot(cross(q, other), n), dot(cross(one, q), n)
     # A weight is the distance from its edge times the edge's length times the double area.
     least = smaller(u, smaller(v, whole - u - v))
-    inside = least > _INSIDE * slack * side * area and needed <= _FARTHEST_MOVE * side
+    inside = least > _from_edges(o, side) * side * area and needed <= _FARTHEST_MOVE * side
     n_g = scale(n, 1.0 / area)
-    return _Plane(n_g, dot(n_g, q), needed, slack, inside and area > _THIN * side * side)
+    return _Plane(n_g, dot(n_g, q), needed, slack_of(o, needed), inside and area > _THIN * side * side)
 
 
 @inlined

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.shade.shading import fresnel, reflect, refract, specular
-from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule, offset_distance, spawn_origin
+from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule, facet_of, offset_distance, spawn_origin
 
 U = 2.0**-53
 UP = (0.0, 1.0, 0.0)
@@ -266,7 +266,7 @@ def random_hits(scale: float, shift: float, count: int) -> Any:
 def test_a_spawned_ray_starts_beyond_the_exact_plane(scale: float, shift: float) -> None:
     rng = np.random.default_rng(7)
     for p0, p1, p2, n_g, u, v, p in random_hits(scale, shift, 200):
-        error, _ = offset_distance(p, p0, p1, p2, u, v, n_g)
+        error, _ = offset_distance(p, p0, p1, p2, u, v, facet_of(p0, p1, p2, n_g))
         w = vector(rng.normal(size=3))
         start = spawn_origin(p, error, n_g, w, BOUNDED)
         side = exact_side(start, (p0, p1, p2))
@@ -280,7 +280,7 @@ def test_a_spawned_ray_starts_beyond_the_exact_plane(scale: float, shift: float)
 @pytest.mark.parametrize("shift", [0.0, 1.0, 1e6])
 def test_offset_distance_is_a_small_multiple_of_the_rounding(scale: float, shift: float) -> None:
     for p0, p1, p2, n_g, u, v, p in random_hits(scale, shift, 100):
-        error, _ = offset_distance(p, p0, p1, p2, u, v, n_g)
+        error, _ = offset_distance(p, p0, p1, p2, u, v, facet_of(p0, p1, p2, n_g))
         reach = max(np.abs(np.subtract(q, p)).max() for q in (p0, p1, p2))
         weights = (1 - u - v, u, v)
         magnitude = sum(
@@ -296,7 +296,7 @@ def test_offset_distance_is_a_small_multiple_of_the_rounding(scale: float, shift
 def test_offset_does_not_vanish_on_a_plane_through_the_origin() -> None:
     """Every vertex of the floor y = 0 has n . p = 0, so the rounding bound of p alone would be 0."""
     p0, p1, p2 = (-4.0, 0.0, -4.0), (-4.0, 0.0, 4.0), (4.0, 0.0, 4.0)
-    error, _ = offset_distance((-1.0, 0.0, 1.0), p0, p1, p2, 0.25, 0.375, UP)
+    error, _ = offset_distance((-1.0, 0.0, 1.0), p0, p1, p2, 0.25, 0.375, facet_of(p0, p1, p2, UP))
     assert error > 0.0
     assert spawn_origin((-1.0, 0.0, 1.0), error, UP, (0.3, 0.1, 0.2), BOUNDED)[1] >= error
     assert spawn_origin((-1.0, 0.0, 1.0), error, UP, (0.3, -0.1, 0.2), BOUNDED)[1] <= -error
@@ -332,7 +332,7 @@ def test_reflected_rays_never_meet_a_convex_mesh_again(scale: float, shift: floa
         p0, p1, p2 = (vector(q) for q in vertices[faces[hits.face[i]]])
         n, p, d = vector(normals[i]), vector(points[i]), vector(directions[i])
         mirrored = reflect(d, n)
-        error, _ = offset_distance(p, p0, p1, p2, float(hits.u[i]), float(hits.v[i]), n)
+        error, _ = offset_distance(p, p0, p1, p2, float(hits.u[i]), float(hits.v[i]), facet_of(p0, p1, p2, d))
         starts.append(spawn_origin(p, error, n, mirrored, BOUNDED))
         bounces.append(mirrored)
     assert not octree.any_hit(starts, bounces).any()

@@ -391,7 +391,7 @@ PICTURES = (
             "holders, count, n1 = make_holders(memory), media.count, _innermost_ior(scene, media.rows, media.count)",
             "holders, count, n1 = make_holders(memory), media.count, 1.0"),
     _kernel("pictures", "edges count as the inside of their faces", "offset_distance",
-            "return error, slack if inside else EDGE", "return error, slack"),
+            "slack_of(p, error) if inside else EDGE", "slack_of(p, error)"),
 )  # fmt: skip
 
 STUDIES = (

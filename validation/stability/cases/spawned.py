@@ -12,7 +12,7 @@ from renderer.mesh.shapes import icosphere
 from renderer.scene.light import DirectionalLight
 from renderer.scene.material import Phong
 from renderer.shade.shading import reflect, refract
-from renderer.trace.spawn import BOUNDED, OffsetRule, offset_distance, spawn_origin
+from renderer.trace.spawn import BOUNDED, OffsetRule, facet_of, offset_distance, spawn_origin
 from validation.references.mitsuba.whitted import whitted
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.scenes import (
@@ -75,7 +75,7 @@ def self_hits(mesh: Mesh, count: int, offset: OffsetRule = BOUNDED) -> tuple[int
     for i in np.flatnonzero(hits.hit):
         n_g, p, d = vector(normals[i]), vector(points[i]), vector(directions[i])
         p0, p1, p2 = (vector(q) for q in corners[i])
-        error, _ = offset_distance(p, p0, p1, p2, float(hits.u[i]), float(hits.v[i]), n_g)
+        error, _ = offset_distance(p, p0, p1, p2, float(hits.u[i]), float(hits.v[i]), facet_of(p0, p1, p2, d))
         enters = float(np.dot(n_g, d)) < 0.0
         n = n_g if enters else vector(-normals[i])
         shadow = rng.normal(size=3)
