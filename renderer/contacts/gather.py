@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.contacts.candidates import LISTED, TOGETHER, find_blocks, make_candidates
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, extract, get, lowest_bit, pointer, put, smaller, splat8
+from renderer.kernels.simd import at, extract, get, is_negative, lowest_bit, pointer, put, smaller, splat8
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import (
     box_limit,
@@ -25,7 +25,8 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, push_children, tree_pointers
 from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.sides import coordinate, exact_sides
-from renderer.trace.starts.search import counted_from_start, depart, meet_near, near_bits
+from renderer.trace.starts.record import PILE
+from renderer.trace.starts.search import counted_from_start, depart, meet_near, near_bits, stopped_again
 from renderer.trace.traverse import make_scratch
 
 # Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
@@ -157,15 +158,20 @@ def _add_hit(tree, found, count, ray, t_max, hit, number, place, edges):
 
 @kernel
 def _list_from(tree, rays, i, ray, t_max, found, scratch):
-    """``_list_all`` for a ray that leaves the surface. What stops it at its start is its first hit."""
+    """``_list_all`` for a ray that leaves the surface. What stops it at its start are its first hits."""
     stack = scratch.packet_stack
     departure, stopped = depart(tree, rays.starts, i, ray, stack, scratch.holders)
-    ray, count = departure.ray, np.int64(0)
-    if stopped[1] != NO_FACE and t_max >= 0.0:
-        if found.capacity > 0:
+    ray, count, pile = departure.ray, np.int64(0), np.int64(get(at(rays.starts.rows, i * rays.starts.step), PILE))
+    for _ in range(departure.holders):
+        if stopped[1] == NO_FACE or t_max < 0.0:
+            break
+        if count < found.capacity:
             hit = stopped[0], stopped[2], stopped[3], stopped[4]
-            _list_hit(found, 0, hit, stopped[1], 0, np.int64(0))
-        count = np.int64(1)
+            _list_hit(found, count, hit, stopped[1], 0, np.int64(0))
+        count += 1
+        # The sign of 0 tells the next face of the pile from one that begins another.
+        pile = pile if is_negative(stopped[0]) else np.int64(stopped[1])
+        stopped = stopped_again(tree, departure, np.int64(stopped[1]), pile, scratch.holders)
     shear, largest = make_shear(ray), largest_of(ray)
     if not tree.has_nodes:
         return _list_hits_from(tree, rays.starts, i, (0, tree.count), departure, shear, t_max, found, count)

@@ -12,7 +12,7 @@ from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.simd import get, pointer, put, smaller
 from renderer.kernels.vec3 import dot
 from renderer.shade.records import IOR
-from renderer.shade.surface import Surface, lets_through, scene_pointers, surface_at
+from renderer.shade.surface import Look, left_from, lets_through, look_at, scene_pointers
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.spawn import Place
 from renderer.trace.starts.cone import NUMBER, PATH, holder, make_holders, put_holder
@@ -54,9 +54,15 @@ class Change(NamedTuple):
 
 
 @inlined
+def came_from(n_g, d):
+    """The side of a face that a ray of direction d comes from, 1 for that of its normal or -1."""
+    return -1.0 if dot(d, n_g) > 0.0 else 1.0
+
+
+@inlined
 def place_at(spot, surface, d):
     """The ``Place`` for rays that leave the ``Surface`` at a spot, which a ray of direction d met."""
-    return Place(float(spot.face), spot.u, spot.v, surface.slack, -1.0 if dot(d, surface.n_g) > 0.0 else 1.0)
+    return Place(float(spot.face), spot.u, spot.v, surface.slack, came_from(surface.n_g, d))
 
 
 @inlined
@@ -86,27 +92,23 @@ def _faces_together(tree, scene, spot, d, stack, memory):
         return Together(spot, spot, spot, 0)
     for k in range(members.count - 1, -1, -1):
         at_ = member_spot(tree, holders, k, spot, met)
-        surface = surface_at(scene, at_.face, at_.u, at_.v, d)
-        put_holder(holders, k, PATH, _LEFT if dot(d, surface.n_s) > 0.0 else _ENTERED)
-        if not lets_through(scene.materials, surface.material):
+        look = look_at(scene, at_.face, at_.u, at_.v, d)
+        put_holder(holders, k, PATH, _LEFT if dot(d, look.n_s) > 0.0 else _ENTERED)
+        if not lets_through(scene.materials, look.material):
             opaque = k
     seen = member_spot(tree, holders, 0 if opaque == NO_MEMBER else opaque, spot, met)
     return Together(seen, members.near, members.far, members.count if opaque == NO_MEMBER else 0)
 
 
 @inlined
-def surface_together(scene, together, d):
-    """The ``Surface`` that a ray of direction d meets: the look of the face that is seen, where rays leave back."""
+def look_together(scene, together, d):
+    """The ``Look`` of a ray of direction d: that of the face which it sees, at the place where rays leave back."""
     seen, near = together.seen, together.near
-    met = surface_at(scene, seen.face, seen.u, seen.v, d)
-    return met if near.face == seen.face else _moved(scene, met, near, d)
-
-
-@kernel
-def _moved(scene, met, near, d):
-    """A ``Surface`` with the place of another spot."""
-    other = surface_at(scene, near.face, near.u, near.v, d)
-    return Surface(other.p, other.error, other.n_g, met.n_s, met.material, other.slack)
+    look = look_at(scene, seen.face, seen.u, seen.v, d)
+    if near.face == seen.face:
+        return look
+    other = look_at(scene, near.face, near.u, near.v, d)
+    return Look(other.p, other.facet, look.n_s, look.material)
 
 
 @inlined
@@ -194,5 +196,6 @@ def change_of(arrays, together, m, inside, media, beyond, memory):
 
 @kernel
 def surface_together_of(arrays, together, d):
-    """``surface_together``, for Python."""
-    return surface_together(scene_pointers(arrays), together, d)
+    """The ``Surface`` that a ray of direction d meets, for Python."""
+    scene, near = scene_pointers(arrays), together.near
+    return left_from(scene, near.face, near.u, near.v, look_together(scene, together, d))

@@ -11,16 +11,17 @@ from renderer.kernels.vec3 import add, row3, three, times
 from renderer.shade.bundle import SIZE
 from renderer.shade.lights import aim, see_light
 from renderer.shade.records import DIELECTRIC, KIND, MIRROR, UNLIT
-from renderer.shade.surface import phong
+from renderer.shade.surface import bounds_at, phong
 from renderer.trace.rays import RayPointers
-from renderer.trace.spawn import Place, put_start
+from renderer.trace.spawn import Facet, Place, put_start
 from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import search_blocks, trace
 
 # The surface that a ray of a bundle met, for its light and the rays that it spawns: SURFACE_DOUBLES float64 per ray.
-# Where light passes, CHANGE has the ``crossing.Change``, and LAST the ``crossing.Spot`` that a refracted ray leaves.
-POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT, PLACE, CHANGE, LAST = 0, 3, 6, 9, 10, 11, 12, 15, 20, 23
-SURFACE_DOUBLES = 26
+# GEOMETRIC is the first of the ``Facet``. Where light passes, CHANGE has the ``crossing.Change``, and LAST the
+# ``level.Spot`` that a refracted ray leaves.
+POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT, PLACE, CHANGE, LAST = 0, 3, 6, 11, 12, 13, 14, 17, 22, 25
+SURFACE_DOUBLES = 28
 # Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and
 # the row of ``starts.record``.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
@@ -52,12 +53,29 @@ def place_of(surface):
 
 
 @inlined
-def put_place(surface, place):
-    """Write the ``Place`` of a surface."""
+def put_place(surface, spot, came):
+    """Write the ``Place`` of a surface but for the slack, which ``put_bounds`` writes."""
     row = at(surface, PLACE)
-    put3(row, 0, (place.face, place.u, place.v))
-    put(row, 3, place.slack)
-    put(row, 4, place.came)
+    put3(row, 0, (float(spot.face), spot.u, spot.v))
+    put(row, 4, came)
+
+
+@inlined
+def put_facet(surface, facet):
+    """Write the ``Facet`` of a surface."""
+    put3(surface, GEOMETRIC, facet.normal)
+    put(surface, GEOMETRIC + 3, facet.double_area)
+    put(surface, GEOMETRIC + 4, facet.side)
+
+
+@inlined
+def put_bounds(scene, surface):
+    """Write the ``bounds_at`` a surface."""
+    row, area = at(surface, PLACE), at(surface, GEOMETRIC + 3)
+    facet = Facet(three(surface, GEOMETRIC), get(area, 0), get(area, 1))
+    error, slack = bounds_at(scene, np.int64(get(row, 0)), get(row, 1), get(row, 2), three(surface, POINT), facet)
+    put(surface, BOUND, error)
+    put(row, 3, slack)
 
 
 @inlined

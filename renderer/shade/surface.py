@@ -10,7 +10,7 @@ from renderer.kernels.simd import get, pointer
 from renderer.kernels.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
-from renderer.trace.spawn import facet_of, offset_distance
+from renderer.trace.spawn import Facet, facet_of, offset_distance
 
 # The most media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8
@@ -85,9 +85,20 @@ def scene_pointers(scene):
     )
 
 
+class Look(NamedTuple):
+    """What a ray sees of the scene: its point p, the ``Facet`` that it met, the shading normal, and the place at which
+    the material's row begins.
+    """
+
+    p: tuple
+    facet: Facet
+    n_s: tuple
+    material: int
+
+
 class Surface(NamedTuple):
-    """The surface where a ray met the scene: its point p, the ``offset_distance`` of p, the geometric and the shading
-    normal, the place at which its material's row begins, and the slack of rays from there.
+    """The surface where a ray met the scene, for rays that leave it: a ``Look``'s point p, the ``offset_distance`` of
+    p, the geometric and the shading normal and the material; and the slack of rays from there.
     """
 
     p: tuple
@@ -99,18 +110,37 @@ class Surface(NamedTuple):
 
 
 @inlined
-def surface_at(scene, face, u, v, d):
-    """The ``Surface`` at barycentrics u, v of a face that a ray of direction d met."""
+def look_at(scene, face, u, v, d):
+    """The ``Look`` at barycentrics u, v of a face that a ray of direction d met."""
     a, b, c = row3(scene.faces, face)
     p0, p1, p2 = row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c)
-    facet, p = facet_of(p0, p1, p2, d), barycentric(p0, p1, p2, u, v)
-    n_g = n_s = facet.normal
+    facet = facet_of(p0, p1, p2, d)
+    n_s = facet.normal
     if scene.has_smooth and get(scene.smooth, face):
         n = barycentric(row3(scene.normals, a), row3(scene.normals, b), row3(scene.normals, c), u, v)
         # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
-        n_s = normalized(n) if largest_component(n) > 0.0 else n_g
-    error, slack = offset_distance(p, p0, p1, p2, u, v, facet)
-    return Surface(p, error, n_g, n_s, get(scene.material, face), slack)
+        n_s = normalized(n) if largest_component(n) > 0.0 else n_s
+    return Look(barycentric(p0, p1, p2, u, v), facet, n_s, get(scene.material, face))
+
+
+@inlined
+def bounds_at(scene, face, u, v, p, facet):
+    """The ``offset_distance`` and the slack of rays that leave a face at p."""
+    a, b, c = row3(scene.faces, face)
+    return offset_distance(p, row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c), u, v, facet)
+
+
+@inlined
+def left_from(scene, face, u, v, look):
+    """The ``Surface`` of a ``Look`` which rays leave from a face at barycentrics u, v."""
+    error, slack = bounds_at(scene, face, u, v, look.p, look.facet)
+    return Surface(look.p, error, look.facet.normal, look.n_s, look.material, slack)
+
+
+@inlined
+def surface_at(scene, face, u, v, d):
+    """The ``Surface`` at barycentrics u, v of a face that a ray of direction d met."""
+    return left_from(scene, face, u, v, look_at(scene, face, u, v, d))
 
 
 @inlined

@@ -27,11 +27,12 @@ from renderer.shade.crossing import (
     SPARE,
     Media,
     Together,
+    came_from,
     cross,
     faces_together,
+    look_together,
     may_coincide,
     place_at,
-    surface_together,
 )
 from renderer.shade.direct import (
     BOUND,
@@ -50,12 +51,14 @@ from renderer.shade.direct import (
     light_surfaces,
     place_of,
     put3,
+    put_bounds,
+    put_facet,
     put_place,
     trace_rays,
 )
 from renderer.shade.records import AMBIENT, DIELECTRIC, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
-from renderer.shade.surface import lets_through, scene_pointers, surface_at
+from renderer.shade.surface import lets_through, look_at, scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
 from renderer.trace.spawn import OffsetRule, Place, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
@@ -180,42 +183,41 @@ def _put_change(scene, bundle, work, i, together, inside):
 
 
 @inlined
-def _put_surface(scene, bundle, work, i, together, met):
-    """Write the surface ``met`` by ray ``i``, where it meets some faces together, and its ambient light to ``work``."""
+def _put_look(scene, bundle, work, i, together, look):
+    """Write what ray ``i`` sees where it meets some faces together, and its ambient light, to ``work``."""
     surface, d = at(work.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
     # The shading normal faces the eye; a surface without light from behind has two sides.
-    inside = dot(d, met.n_s) > 0.0
-    put3(surface, POINT, met.p)
-    put3(surface, NORMAL, scale(met.n_s, -1.0) if inside else met.n_s)
-    put3(surface, GEOMETRIC, met.n_g)
-    put(surface, BOUND, met.error)
-    put_place(surface, place_at(together.near, met, d))
-    put(surface, MATERIAL, float(met.material))
+    inside = dot(d, look.n_s) > 0.0
+    put3(surface, POINT, look.p)
+    put3(surface, NORMAL, scale(look.n_s, -1.0) if inside else look.n_s)
+    put_facet(surface, look.facet)
+    put_place(surface, together.near, came_from(look.facet.normal, d))
+    put(surface, MATERIAL, float(look.material))
     put(surface, INSIDE, 1.0 if inside else 0.0)
-    put3(surface, LIGHT, times(three(scene.materials, met.material + AMBIENT), row3(scene.colors, 0)))
-    if passes_light(scene.materials, met.material):
+    put3(surface, LIGHT, times(three(scene.materials, look.material + AMBIENT), row3(scene.colors, 0)))
+    if passes_light(scene.materials, look.material):
         _put_change(scene, bundle, work, i, together, inside)
-    return met.material
+    return look.material
 
 
 @kernel
 def _meet_together(tree, scene, bundle, work, i, spot):
-    """Write the surface that ray ``i`` meets at a ``Spot`` where faces may coincide; returns its material."""
+    """Write what ray ``i`` sees at a ``Spot`` where faces may coincide; returns its material."""
     d = row3(bundle.directions, i)
     together = faces_together(tree, scene, spot, d, work.trace.packet_stack, work.trace.holders)
     put(work.found.face, i, together.seen.face)
-    return _put_surface(scene, bundle, work, i, together, surface_together(scene, together, d))
+    return _put_look(scene, bundle, work, i, together, look_together(scene, together, d))
 
 
 @inlined
 def _meet_surface(tree, scene, bundle, work, i):
-    """Write the surface that ray ``i`` meets; returns its material."""
+    """Write what ray ``i`` sees; returns its material."""
     found = work.found
     spot = Spot(get(found.face, i), get(found.u, i), get(found.v, i))
     if may_coincide(scene, spot.face):
         return _meet_together(tree, scene, bundle, work, i, spot)
-    met = surface_at(scene, spot.face, spot.u, spot.v, row3(bundle.directions, i))
-    return _put_surface(scene, bundle, work, i, Together(spot, spot, spot, 0), met)
+    look = look_at(scene, spot.face, spot.u, spot.v, row3(bundle.directions, i))
+    return _put_look(scene, bundle, work, i, Together(spot, spot, spot, 0), look)
 
 
 @kernel
@@ -232,6 +234,10 @@ def _meet_surfaces(tree, scene, bundle, work):
             lit += 1
             put(work.lit, lit, i)
     put(work.lit, 0, lit)
+    # In a loop of their own, as the processor overlaps more of short rounds.
+    for i in range(count_of(bundle)):
+        if get(work.found.face, i) >= 0:
+            put_bounds(scene, at(work.surfaces, i * SURFACE_DOUBLES))
 
 
 @inlined

@@ -305,3 +305,31 @@ def test_the_interval_is_closed_for_a_ray_that_meets_more_than_is_listed(acceler
     assert t == pytest.approx(np.arange(sheets) + 1.7, rel=2.0**-50)
     for first, last in ((0, sheets - 1), (3, sheets - 4), (LISTED, sheets - 2)):
         assert octree.all_hits(*ray, t[first], t[last]).t.tolist() == t[first : last + 1].tolist()
+
+
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+def test_all_faces_of_a_pile_are_hit_where_a_ray_starts_in_their_midst(accelerator):
+    """Four sheets in one plane and two in a lower one, in a mixed order and turned both ways."""
+    sheet = np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]])
+    heights = [0.0, -1.0, 0.0, 0.0, -1.0, 0.0]
+    vertices = np.concatenate([sheet + [0.0, 0.0, z] for z in heights])
+    faces = np.arange(18).reshape(6, 3)
+    faces[::2] = faces[::2, ::-1]
+    queries = accelerator(vertices, faces)
+    down = [[0.25, -0.125, -1.0]]
+    met = queries.closest_hit([[2.0, 3.0, 5.0]], down)
+    assert met.face == [0]
+
+    # One after the other, the lowest first, and each once.
+    def chain(hits):
+        while hits.hit[0]:
+            yield int(hits.face[0])
+            hits = queries.closest_hit(hits.points, down, leaving=hits.through())
+
+    assert list(chain(met)) == [0, 2, 3, 5, 1, 4]
+    # A ray that was turned back and comes again to the pile begins with the one that it left.
+    for hits, expected in ((met, [0, 2, 3, 5, 1, 4]), (met.through(), [2, 3, 5, 1, 4])):
+        found = queries.all_hits(met.points, down, leaving=hits, contacts=False)
+        assert found.face.tolist() == expected
+        np.testing.assert_allclose(found.t, -np.array(heights)[expected], rtol=1e-12)
+        assert queries.count_hits(met.points, down, leaving=hits, contacts=False) == [len(expected)]

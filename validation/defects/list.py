@@ -52,7 +52,7 @@ HITS = (
     _kernel("hits", "boxes rounded to nearest", "round_up",
             "select(widen(y) < x, magnitude(y) * _STEP + _TINY, np.float32(0.0))", "np.float32(0.0)"),
     _kernel("hits", "origins far beyond what boxes tell", "round_both",
-            "magnitude(y) * _STEP + _TINY", "magnitude(y) * np.float32(-(2.0**-12))"),
+            "magnitude(y) * (_STEP * _MORE) + room", "magnitude(y) * np.float32(-(2.0**-12))"),
     _kernel("hits", "eight rays end where the first of them does", "eight_rays_at",
             "rays.max_step", "np.int64(0)"),
     _kernel("hits", "one ray in range vouches for eight", "_are_good",
@@ -160,7 +160,7 @@ HITS = (
             "x = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]\n"
             "sign = 1 if x > 0.0 else (-1 if x < 0.0 else 0)"),
     _kernel("hits", "starts beside an edge are moved as if inside", "_plane_near",
-            "inside = least > _INSIDE * slack * side * area and needed <= _FARTHEST_MOVE * side",
+            "inside = least > _from_edges(o, side) * side * area and needed <= _FARTHEST_MOVE * side",
             "inside = least > -1.0"),
 )  # fmt: skip
 
@@ -352,8 +352,8 @@ PICTURES = (
             "shininess * math.log1p(-short)", "min(shininess, 50.0) * math.log1p(-short)"),
     _kernel("pictures", "highlights left out below R.V = 0.5", "shading.specular",
             "-dot(r, d) <= 0.0", "-dot(r, d) <= 0.5"),
-    _kernel("pictures", "interpolated normals not normalised", "surface_at",
-            "normalized(n) if largest_component(n) > 0.0 else n_g", "n if largest_component(n) > 0.0 else n_g"),
+    _kernel("pictures", "interpolated normals not normalised", "look_at",
+            "normalized(n) if largest_component(n) > 0.0 else n_s", "n if largest_component(n) > 0.0 else n_s"),
     _kernel("pictures", "rays leave a face from its other side", "search._stopped",
             "1 if start.code & ABOVE != 0 else -1", "-1 if start.code & ABOVE != 0 else 1"),
     _kernel("pictures", "rays leave a face by a thousandth of the bound", "spawn._moved",

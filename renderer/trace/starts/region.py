@@ -187,7 +187,7 @@ def stopping_holder(tree, anchor, holders, count, nodes, face, side, d):
     The ray starts in the region beside the cone of ``face``, on one side of it. It is stopped where its direction d
     leads out of that region: by the lowest face that bounds the region and has d behind it.
     """
-    own = _holder_of(holders, count, face)
+    own = holder_of(holders, count, face)
     if own == NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
         return NOT_STOPPED
     last = np.int64(-1)
@@ -207,7 +207,7 @@ def holder_ahead(tree, anchor, holders, count, face, side, pile, d):
     The ray came upon the pile of faces that coincide there at the face ``pile``. From that on it goes through them in
     the order of their numbers, the lowest after the highest, however it leads on to that side.
     """
-    own, best = _holder_of(holders, count, face), NOT_STOPPED
+    own, best = holder_of(holders, count, face), NOT_STOPPED
     if own == NOT_STOPPED or slope_of(cone_of(tree, anchor, holders, own).face, d) != side:
         return NOT_STOPPED
     for j in range(count):
@@ -226,7 +226,7 @@ def _is_after(face, other, pile):
 
 
 @inlined
-def _holder_of(holders, count, face):
+def holder_of(holders, count, face):
     """The holder with the number ``face``."""
     own = NOT_STOPPED
     for k in range(count):

@@ -30,7 +30,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, is_better, octants_around, push_children
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
-from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, holder, make_holders, name_nodes
+from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders, name_nodes
 from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
     HOLDS,
@@ -38,11 +38,12 @@ from renderer.trace.starts.meeting import (
     barycentrics_of,
     meet_face,
     seen_from,
+    slope_of,
     slope_there,
     unit_direction,
 )
 from renderer.trace.starts.record import ABOVE, BARYCENTRIC, EDGE, KNOWN, THROUGH, corners_of, slack_of, start_at
-from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, holder_ahead, stopping_holder
+from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, holder_ahead, holder_of, stopping_holder
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
@@ -99,16 +100,26 @@ def _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, count):
     return count
 
 
+class _Behind(NamedTuple):
+    """The face that a ray has behind it at its start: its number, the side that the ray is on, whether it came through,
+    and the pile of ``holder_ahead``.
+    """
+
+    face: int
+    side: int
+    through: bool
+    pile: int
+
+
 @kernel
-def _stopped(tree, start, anchor, count, d, slope, dz, holders):
+def _stopped(tree, behind, anchor, count, d, slope, dz, holders):
     """The hit (t, face, u, v, w) that stops a ray at its start, which ``count`` faces hold; NO_FACE for none."""
     nodes = name_nodes(tree, anchor, holders, count)
-    side = 1 if start.code & ABOVE != 0 else -1
     k, t = NOT_STOPPED, AHEAD
-    if start.code & THROUGH != 0:
-        k = holder_ahead(tree, anchor, holders, count, start.face, side, np.int64(start.anchor[2]), d)
+    if behind.through:
+        k = holder_ahead(tree, anchor, holders, count, behind.face, behind.side, behind.pile, d)
     if k == NOT_STOPPED:
-        k, t = stopping_holder(tree, anchor, holders, count, nodes, start.face, side, d), 0.0
+        k, t = stopping_holder(tree, anchor, holders, count, nodes, behind.face, behind.side, d), 0.0
     if k == NOT_STOPPED:
         return _NOTHING
     met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, dz)
@@ -117,7 +128,8 @@ def _stopped(tree, start, anchor, count, d, slope, dz, holders):
 
 class Departure(NamedTuple):
     """A ray as it leaves its start: as ``intersect.Ray``, its anchor, its direction scaled by a power of two, the
-    ``slope_there`` of that, and the power; and whether it starts near an edge, from the rounded anchor.
+    ``slope_there`` of that, and the power; whether it starts near an edge, from the rounded anchor; and of a ray that
+    may be stopped how many faces hold the start.
     """
 
     ray: Any
@@ -126,6 +138,7 @@ class Departure(NamedTuple):
     slope: int
     unit: float
     edge: bool
+    holders: int
 
 
 @kernel
@@ -141,12 +154,25 @@ def depart(tree, starts, i, ray, stack, memory):
     edge = ray.slack == EDGE
     if edge:
         ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, slack_of(o, 0.0), ray.leaving)
-    stopped, slope = _NOTHING, slope_there(anchor, d)
+    stopped, slope, count = _NOTHING, slope_there(anchor, d), 0
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
         dz, holders = make_shear(ray).direction_z, make_holders(memory)
         count = list_holders(tree, anchor, d, slope, dz, stack, holders)
-        stopped = _stopped(tree, start, anchor, count, d, slope, dz, holders)
-    return Departure(ray, anchor, d, slope, unit, edge), stopped
+        behind = _Behind(
+            start.face, 1 if start.code & ABOVE != 0 else -1, start.code & THROUGH != 0, np.int64(start.anchor[2])
+        )
+        stopped = _stopped(tree, behind, anchor, count, d, slope, dz, holders)
+    return Departure(ray, anchor, d, slope, unit, edge, count), stopped
+
+
+@kernel
+def stopped_again(tree, departure, face, pile, memory):
+    """The hit that stops a ray at its start once it went through ``face`` there, which stopped it; as of ``depart``,
+    with the same ``memory``. ``pile`` is the first face of those that coincide with it.
+    """
+    anchor, d, holders, dz = departure.anchor, departure.d, make_holders(memory), make_shear(departure.ray).direction_z
+    side = slope_of(cone_of(tree, anchor, holders, holder_of(holders, departure.holders, face)).face, d)
+    return _stopped(tree, _Behind(face, side, True, pile), anchor, departure.holders, d, departure.slope, dz, holders)
 
 
 @inlined
