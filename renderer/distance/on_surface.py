@@ -8,6 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.distance.closest import closest_point
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import pointer, smaller
+from renderer.kernels.vec3 import (
+    barycentric,
+    cross,
+    dot,
+    largest_component,
+    largest_of_three,
+    length,
+    row3,
+    scale,
+    sub,
+)
 from renderer.mesh.mesh import Mesh
 from renderer.trace.hits import points_on
 from renderer.trace.layout import Tree
@@ -42,8 +55,7 @@ def on_surface(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64],
     if len(unknown) and len(mesh.faces):
         faces[unknown] = closest_point(tree, mesh, points[unknown], room[unknown], threads).face
     anchors = np.zeros((len(points), 3))
-    known = np.flatnonzero(faces >= 0)
-    anchors[known, :2] = _barycentrics(mesh.vertices[mesh.faces[faces[known]]], points[known], room[known])
+    _weigh_all(mesh.vertices, mesh.faces, points, faces, room, anchors)
     return SurfacePoints(faces, anchors)
 
 
@@ -58,10 +70,9 @@ def places_of(mesh: Mesh, points: Floats, places: SurfacePoints) -> Floats:
 
 def distances_from(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> Floats:
     """How far points (n, 3) are from faces (n,), along the axis where they are farthest."""
-    corners = mesh.vertices[mesh.faces[faces]]
-    u, v = _barycentrics(corners, points, np.zeros(len(points))).T
-    with np.errstate(over="ignore"):
-        return np.abs(points - points_on(mesh, faces, u, v)).max(axis=1, initial=0.0)
+    distances = np.empty(len(points))
+    _measure_all(mesh.vertices, mesh.faces, points, faces, distances)
+    return distances
 
 
 def are_on(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -76,48 +87,103 @@ def _room(points: Floats) -> Floats:
     return np.where(single, _SINGLE, _DOUBLE) * np.abs(points).max(axis=1, initial=0.0)
 
 
-def _barycentrics(corners: Floats, points: Floats, room: Floats) -> Floats:
-    """u and v (n, 2) of the nearest points of faces; nearer to an edge than ``room`` its weight is 0."""
-    sides = np.stack(
-        [corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 0]], axis=1
-    )
-    ways = points[:, None] - corners
-    with np.errstate(all="ignore"):
-        # In units of the face, so that no product overflows or vanishes.
-        size = np.abs(sides).max(axis=(1, 2), initial=0.0)[:, None, None]
-        sides, ways, room = sides / size, ways / size, room / size[:, 0, 0]
-        normals = np.cross(sides[:, 2], -sides[:, 1])
-        areas = np.linalg.norm(normals, axis=1)
-        # The double areas of the point with each side, by the two corners of that side.
-        parts = [np.cross(sides[:, k], ways[:, (k + 1) % 3]) for k in range(3)]
-        parts = np.stack([np.einsum("nx,nx->n", part, normals) for part in parts], axis=1) / areas[:, None]
-        near = parts <= room[:, None] * np.linalg.norm(sides, axis=2)
-    weights = np.where(near | ~(parts > 0.0), 0.0, parts)
-    lost = ~(weights.sum(axis=1) > 0.0)
-    # A face without area is its longest side.
-    weights[lost] = _along_longest(sides[lost], ways[lost], room[lost])
-    weights /= weights.sum(axis=1, keepdims=True)
-    single = np.count_nonzero(weights, axis=1) == 1
-    weights[single] = np.where(weights[single] > 0.0, 1.0, 0.0)
-    # On the side opposite to the first corner 1 in all: what is left of one is exact if that is at least a half.
-    u, v = weights[:, 1], weights[:, 2]
-    opposite = weights[:, 0] == 0.0
-    v = np.where(opposite & (u >= 0.5), 1.0 - u, v)
-    u = np.where(opposite & (u < 0.5), 1.0 - v, u)
-    return np.stack([u, v], axis=1)
+@kernel
+def _weigh_all(vertices, faces, points, chosen, room, anchors):
+    """Write u and v (n, 2) of the points of faces ``chosen`` (n,) that are nearest to ``points``; of face -1 nothing.
+
+    Nearer to an edge than its ``room`` (n,), a point has no weight beside that.
+    """
+    for i in range(len(points)):
+        if chosen[i] >= 0:
+            corners = _corners(pointer(vertices), pointer(faces), chosen[i])
+            anchors[i, 0], anchors[i, 1] = _weights_of(corners, row3(pointer(points), i), room[i])
 
 
-def _along_longest(sides: Floats, ways: Floats, room: Floats) -> Floats:
-    """Weights (n, 3) of the nearest points of the longest sides; within ``room`` of a corner those of the corner."""
-    lengths = np.linalg.norm(sides, axis=2)
-    rows, longest = np.arange(len(sides)), lengths.argmax(axis=1)
-    first, length = (longest + 1) % 3, lengths[rows, longest]
-    with np.errstate(all="ignore"):
-        along = np.einsum("nx,nx->n", sides[rows, longest], ways[rows, first]) / length
-        share = np.where(along > 0.0, np.minimum(along / length, 1.0), 0.0)
-        apart = np.linalg.norm(ways, axis=2)
-    weights = np.zeros((len(sides), 3))
-    weights[rows, first], weights[rows, (longest + 2) % 3] = 1.0 - share, share
-    at = ~(apart.min(axis=1) > room)
-    weights[at] = np.eye(3)[apart[at].argmin(axis=1)]
-    return weights
+@kernel
+def _measure_all(vertices, faces, points, chosen, distances):
+    """Write how far points are from faces, along the axis where they are farthest."""
+    for i in range(len(points)):
+        o, (p0, p1, p2) = row3(pointer(points), i), _corners(pointer(vertices), pointer(faces), chosen[i])
+        u, v = _weights_of((p0, p1, p2), o, 0.0)
+        distances[i] = largest_component(sub(o, barycentric(p0, p1, p2, u, v)))
+
+
+@inlined
+def _corners(vertices, faces, face):
+    a, b, c = row3(faces, face)
+    return row3(vertices, a), row3(vertices, b), row3(vertices, c)
+
+
+@inlined
+def _over(a, size):
+    return a[0] / size, a[1] / size, a[2] / size
+
+
+@kernel
+def _weights_of(corners, o, room):
+    """u and v of the point of a face that is nearest to o, as ``_weigh_all`` says."""
+    p0, p1, p2 = corners
+    sides = sub(p2, p1), sub(p0, p2), sub(p1, p0)
+    size = largest_of_three(sides[0], sides[1], sides[2])
+    if size == 0.0:
+        return 0.0, 0.0
+    # In units of the face, so that no product overflows or vanishes.
+    s0, s1, s2 = _over(sides[0], size), _over(sides[1], size), _over(sides[2], size)
+    w0, w1, w2, room = _over(sub(o, p0), size), _over(sub(o, p1), size), _over(sub(o, p2), size), room / size
+    n = cross(s2, scale(s1, -1.0))
+    area = length(n)
+    # The double areas of the point with each side.
+    a = _beyond(dot(cross(s0, w1), n) / area, room * length(s0))
+    b = _beyond(dot(cross(s1, w2), n) / area, room * length(s1))
+    c = _beyond(dot(cross(s2, w0), n) / area, room * length(s2))
+    if not a + b + c > 0.0:
+        # A face without area is its longest side.
+        a, b, c = _along_longest((s0, s1, s2), (w0, w1, w2), room)
+    return _exact_shares(a, b, c)
+
+
+@inlined
+def _beyond(part, room):
+    """A number where it is more than some room, else 0; also of NaN."""
+    return part if part > room else 0.0
+
+
+@inlined
+def _exact_shares(a, b, c):
+    """u and v of three weights >= 0, whose sum is not 0: at corners 0 or 1, on the side opposite to the first corner 1
+    in all.
+    """
+    whole = a + b + c
+    if b == whole or c == whole:
+        return (1.0 if b == whole else 0.0), (1.0 if c == whole else 0.0)
+    u, v = b / whole, c / whole
+    # What is left of 1 is exact if that is at least a half.
+    if a == 0.0:
+        return (u, 1.0 - u) if u >= 0.5 else (1.0 - v, v)
+    return u, v
+
+
+@kernel
+def _along_longest(sides, ways, room):
+    """Weights of the nearest point of the longest side; within ``room`` of a corner those of the corner."""
+    (s0, s1, s2), (w0, w1, w2) = sides, ways
+    l0, l1, l2 = length(s0), length(s1), length(s2)
+    d0, d1, d2 = length(w0), length(w1), length(w2)
+    least = smaller(d0, smaller(d1, d2))
+    if not least > room:
+        return (1.0, 0.0, 0.0) if d0 == least else ((0.0, 1.0, 0.0) if d1 == least else (0.0, 0.0, 1.0))
+    if l0 >= l1 and l0 >= l2:
+        share = _share_along(s0, w1, l0)
+        return 0.0, 1.0 - share, share
+    if l1 >= l2:
+        share = _share_along(s1, w2, l1)
+        return share, 0.0, 1.0 - share
+    share = _share_along(s2, w0, l2)
+    return 1.0 - share, share, 0.0
+
+
+@inlined
+def _share_along(side, way, size):
+    """How far along a side of some length its point lies that is nearest to the end of a way from its first corner."""
+    along = dot(side, way) / size
+    return smaller(along / size, 1.0) if along > 0.0 else 0.0

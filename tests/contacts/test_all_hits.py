@@ -312,7 +312,7 @@ def test_all_faces_of_a_pile_are_hit_where_a_ray_starts_in_their_midst(accelerat
     """Four sheets in one plane and two in a lower one, in a mixed order and turned both ways."""
     sheet = np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]])
     heights = [0.0, -1.0, 0.0, 0.0, -1.0, 0.0]
-    vertices = np.concatenate([sheet + [0.0, 0.0, z] for z in heights])
+    vertices = np.concatenate([sheet + np.array([0.0, 0.0, z]) for z in heights])
     faces = np.arange(18).reshape(6, 3)
     faces[::2] = faces[::2, ::-1]
     queries = accelerator(vertices, faces)
@@ -321,15 +321,15 @@ def test_all_faces_of_a_pile_are_hit_where_a_ray_starts_in_their_midst(accelerat
     assert met.face == [0]
 
     # One after the other, the lowest first, and each once.
-    def chain(hits):
-        while hits.hit[0]:
-            yield int(hits.face[0])
-            hits = queries.closest_hit(hits.points, down, leaving=hits.through())
+    def chain(met):
+        while met.hit[0]:
+            yield int(met.face[0])
+            met = queries.closest_hit(met.points, down, leaving=met.through())
 
     assert list(chain(met)) == [0, 2, 3, 5, 1, 4]
     # A ray that was turned back and comes again to the pile begins with the one that it left.
-    for hits, expected in ((met, [0, 2, 3, 5, 1, 4]), (met.through(), [2, 3, 5, 1, 4])):
-        found = queries.all_hits(met.points, down, leaving=hits, contacts=False)
+    for left, expected in ((met, [0, 2, 3, 5, 1, 4]), (met.through(), [2, 3, 5, 1, 4])):
+        found = queries.all_hits(met.points, down, leaving=left, contacts=False)
         assert found.face.tolist() == expected
         np.testing.assert_allclose(found.t, -np.array(heights)[expected], rtol=1e-12)
-        assert queries.count_hits(met.points, down, leaving=hits, contacts=False) == [len(expected)]
+        assert queries.count_hits(met.points, down, leaving=left, contacts=False) == [len(expected)]
