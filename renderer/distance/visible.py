@@ -5,13 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.distance.on_surface import SurfacePoints, are_on, on_surface, places_of
+from renderer.distance.on_surface import SurfacePoints, are_on, check_on, on_surface, places_of
 from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
 from renderer.trace.batch import Leaving, RayBatch, broadcast_shape, check_faces, moved_off
 from renderer.trace.layout import Tree
 from renderer.trace.query import any_hits, closest_hits
-from renderer.trace.starts.record import BARYCENTRIC
 
 Floats = NDArray[np.float64]
 # What is nearer to an end than this share of the largest coordinate of both is not looked at: ends that went through
@@ -43,6 +42,8 @@ def visible(
     a, b = np.broadcast_to(a, (*shape, 3)).reshape(-1, 3), np.broadcast_to(b, (*shape, 3)).reshape(-1, 3)
     on_a = check_faces("leaving", -1 if faces[0] is None else faces[0], shape, most)
     on_b = check_faces("reaching", -1 if faces[1] is None else faces[1], shape, most)
+    check_on(mesh, "points", a, on_a)
+    check_on(mesh, "targets", b, on_b)
     apart = np.flatnonzero((a != b).any(axis=1))
     start, stop = (_end(tree, mesh, points[apart], on[apart], threads) for points, on in ((a, on_a), (b, on_b)))
     # Ends that are as near to each other as rounding may lie at one place of the surface.
@@ -72,7 +73,9 @@ def _are_open(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -
 
 
 def _picked(end: _Ends, rows: NDArray[np.int64]) -> _Ends:
-    return _Ends(end.points[rows], SurfacePoints(end.places.faces[rows], end.places.anchors[rows]))
+    return _Ends(
+        end.points[rows], SurfacePoints(end.places.faces[rows], end.places.codes[rows], end.places.anchors[rows])
+    )
 
 
 def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> RayBatch:
@@ -85,7 +88,7 @@ def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) ->
     rays = RayBatch(
         start.points, directions, t_min, np.where(stop.places.faces < 0, np.maximum(reach - room, 0.0), reach)
     )
-    leaving = Leaving(start.places.faces, np.full(1, BARYCENTRIC), start.places.anchors)
+    leaving = Leaving(*start.places)
     return moved_off(rays, leaving, mesh, tree.scale, threads) if (leaving.faces >= 0).any() else rays
 
 

@@ -192,10 +192,10 @@ def _closest(prepared: PreparedScene, origin: Vector, direction: Vector, t_max: 
     return closest_hits(prepared.tree, rays, prepared.mesh, 1)
 
 
-def _start(place: Place, n_g: Vector, direction: Vector) -> Floats:
-    """The row of the start of a ray that leaves a surface of normal n_g."""
+def _start(place: Place, n_g: Vector, direction: Vector, came: Vector) -> Floats:
+    """The row of the start of a ray that leaves a surface of normal n_g, where one in direction ``came`` ended."""
     row = np.empty(ROW)
-    start_row(row, place, n_g, direction)
+    start_row(row, place, n_g, direction, came)
     return row
 
 
@@ -248,7 +248,7 @@ def _aim(prepared: PreparedScene, ray: _Ray, met: _Met) -> list[_Aim]:
         end = _beyond(prepared, o, way) if seen.directional else seen.place
         share = phong_of(prepared.arrays, met.row, met.n, ray.direction, seen.towards)
         radiance = times(ray.weight, times(share, seen.arriving))
-        aims.append(_Aim(o, way, float(t_max), end, radiance, _start(met.place, met.surface.n_g, way)))
+        aims.append(_Aim(o, way, float(t_max), end, radiance, _start(met.place, met.surface.n_g, way, ray.direction)))
     return aims
 
 
@@ -287,5 +287,5 @@ def _child(
     media: tuple[int, ...],
 ) -> _Ray:
     w, (p, error, n_g, *_) = normalized(direction), surface
-    start = _start(place, n_g, w)
+    start = _start(place, n_g, w, ray.direction)
     return _Ray(kind, ray.depth + 1, own, spawn_origin(p, error, n_g, w, BOUNDED), w, weight, media, start)

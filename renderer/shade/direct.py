@@ -86,7 +86,7 @@ def is_lit(materials, m):
 
 
 @kernel
-def _aim_all(scene, surfaces, lit, count, light, offset, shadows):
+def _aim_all(scene, bundle, surfaces, lit, count, light, offset, shadows):
     """Aim shadow rays from the surfaces of the ``count`` rays in ``lit`` at a light.
 
     Returns the number of surfaces that face it; their rays go to ``lit`` from SIZE on.
@@ -102,7 +102,8 @@ def _aim_all(scene, surfaces, lit, count, light, offset, shadows):
             put3(shadows, _ORIGIN + 3 * aimed, ray.origin)
             put3(shadows, _DIRECTION + 3 * aimed, ray.direction)
             put(shadows, _T_MAX + aimed, ray.t_max)
-            put_start(at(shadows, _START + ROW * aimed), place_of(surface), n_g, ray.direction, offset)
+            start, d = at(shadows, _START + ROW * aimed), row3(bundle.directions, i)
+            put_start(start, place_of(surface), n_g, ray.direction, d, offset)
             put3(shadows, _TOWARDS + 3 * aimed, seen.towards)
             put3(shadows, _ARRIVING + 3 * aimed, seen.arriving)
             put(lit, SIZE + aimed, i)
@@ -142,7 +143,7 @@ def light_surfaces(tree, scene, bundle, surfaces, lit, settings, work):
     count, lit = get(lit, 0), at(lit, 1)
     shadows = work.shadows
     for light in range(scene.light_count):
-        aimed = _aim_all(scene, surfaces, lit, count, light, settings.offset, shadows)
+        aimed = _aim_all(scene, bundle, surfaces, lit, count, light, settings.offset, shadows)
         if settings.shadows:
             _trace_shadows(tree, scene, bundle, lit, aimed, work)
         for k in range(aimed):

@@ -304,12 +304,12 @@ def _exit_at(scene, row, d):
 
 
 @inlined
-def _spawn(leaving, pixel, w, weight, children, media, count, settings):
-    """Add the ray in direction ``w`` from an ``_Exit``, of a ray of ``pixel``, to ``children``."""
+def _spawn(leaving, pixel, d, w, weight, children, media, count, settings):
+    """Add the ray in direction w from an ``_Exit``, of a ray of ``pixel`` in direction d, to ``children``."""
     w = normalized(w)
     o = spawn_origin(leaving.p, leaving.error, leaving.n_g, w, settings.offset)
     row = append(children, o, w, weight, pixel, media, count)
-    put_start(row, leaving.place, leaving.n_g, w, settings.offset)
+    put_start(row, leaving.place, leaving.n_g, w, d, settings.offset)
 
 
 @inlined
@@ -338,11 +338,11 @@ def _bounce(scene, bundle, settings, work, refracted, reflected):
             w, passes, k_r, k_t = _refract(scene, m, d, n, n1, n2)
             if passes and _may_leave(work, pixel, times(weight, k_t), settings):
                 leaving, beyond = _exit_beyond(scene, surface, d), _beyond(work, bundle.limit, i)
-                _spawn(leaving, pixel, w, times(weight, k_t), refracted, beyond, np.int64(left), settings)
+                _spawn(leaving, pixel, d, w, times(weight, k_t), refracted, beyond, np.int64(left), settings)
         if _may_leave(work, pixel, times(weight, k_r), settings):
             media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
             w = reflect(d, n)
-            _spawn(_exit_of(surface), pixel, w, times(weight, k_r), reflected, media, count, settings)
+            _spawn(_exit_of(surface), pixel, d, w, times(weight, k_r), reflected, media, count, settings)
 
 
 @inlined

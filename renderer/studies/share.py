@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arrays import flag_argument, real_argument
-from renderer.distance.on_surface import distances_from, on_surface
+from renderer.distance.on_surface import check_on, on_surface
 from renderer.errors import expect
 from renderer.limits import LONGEST, SHORTEST
-from renderer.mesh.mesh import Mesh
 from renderer.points.argument import check_points, farthest_of
 from renderer.points.curve import order_along_curve
 from renderer.process.parallel import checked_threads, for_chunks
@@ -21,7 +20,6 @@ from renderer.queries import Queries
 from renderer.studies.density import are_dense
 from renderer.studies.sweep import TILE, Answers, Places, Sky, make_sweep_memory, sweep
 from renderer.trace.batch import check_faces
-from renderer.trace.spawn import FARTHEST_START
 
 Floats = NDArray[np.float64]
 
@@ -52,21 +50,10 @@ def check_asked(
     expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
     rows, shape = check_points("points", points, farthest_of(octree.tree.scale))
     faces = check_faces("leaving", -1 if leaving is None else leaving, shape, len(octree.mesh.faces))
-    _check_places(octree.mesh, rows, faces)
+    check_on(octree.mesh, "points", rows, faces)
     workers = octree.threads if threads is None else checked_threads(threads)
-    places = Places(rows, _check_normals(normals, shape), faces, np.empty((0, 3)))
+    places = Places(rows, _check_normals(normals, shape), faces, np.empty(0, np.int64), np.empty((0, 3)))
     return Asked(places, shape, workers, flag_argument("progress", progress))
-
-
-def _check_places(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> None:
-    """Raise ``ValueError`` naming the row of a point that is farther from its face than points of float32 are."""
-    named = np.flatnonzero(faces >= 0)
-    largest = np.maximum(np.abs(points[named]).max(axis=1, initial=0.0), np.abs(mesh.vertices).max(initial=0.0))
-    far = distances_from(mesh, points[named], faces[named]) > FARTHEST_START * largest
-    if far.any():
-        row = int(named[far.argmax()])
-        expected = f"points on the faces that they leave, within {FARTHEST_START:.1g} of the largest coordinate"
-        expect(False, "points", expected, f"{points[row].tolist()} and face {faces[row]} in row {row}")
 
 
 def _check_normals(normals: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
@@ -142,8 +129,8 @@ def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
     mesh, tree = octree._built
     count = len(asked.places.points)
     arrays = mesh.vertices, mesh.faces
-    faces, anchors = on_surface(tree, mesh, asked.places.points, asked.places.leaving, asked.threads)
-    places = asked.places._replace(leaving=faces, anchors=anchors)
+    faces, codes, anchors = on_surface(tree, mesh, asked.places.points, asked.places.leaving, asked.threads)
+    places = asked.places._replace(leaving=faces, codes=codes, anchors=anchors)
     with progress_bar(count, "point", asked.progress) as update:
         for first in range(0, count, _BLOCK):
             block = asked.places.points[first : first + _BLOCK]

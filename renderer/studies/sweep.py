@@ -32,6 +32,7 @@ from renderer.trace.starts.fan import FAN_HEAD, OPEN, STOPPED, UNSURE, has_fan, 
 from renderer.trace.starts.record import (
     ABOVE,
     ANCHOR,
+    BACK,
     BARYCENTRIC,
     CODE,
     EDGE,
@@ -39,6 +40,7 @@ from renderer.trace.starts.record import (
     KNOWN,
     ROW,
     SLACK,
+    WAY,
     StartPointers,
     corners_of,
     start_at,
@@ -78,12 +80,13 @@ class Places(NamedTuple):
     """Where rays start. normals has one row for all, or none where there is no horizon.
 
     points (n, 3), normals (n, 3), (1, 3) or (0, 3) float64, not zero; leaving (n,) int64, -1 for a point that is on no
-    face; anchors (n, 3) float64, its barycentrics there and 0
+    face; codes (n,) int64 and anchors (n, 3) float64, as of ``on_surface.SurfacePoints``
     """
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     leaving: NDArray[np.int64]
+    codes: NDArray[np.int64]
     anchors: NDArray[np.float64]
 
 
@@ -213,24 +216,25 @@ def _begin_tile(tree, mesh, places, rows, begin, count, work):
             _put3(work.points, _FRAME + 9 * i + 6, third)
         if face >= 0:
             _put3(start, ANCHOR, row3(pointer(places.anchors), row))
-            _begin_on_face(tree, mesh, work, i, o, face, len(places.normals) > 0)
+            _begin_on_face(tree, mesh, work, i, o, face, places.codes[row], len(places.normals) > 0)
         put(work.points, _SUM + i, 0.0)
         put(work.points, _WHOLE + i, 0.0)
 
 
 @kernel
-def _begin_on_face(tree, mesh, work, i, o, face, has_horizon):
+def _begin_on_face(tree, mesh, work, i, o, face, code, has_horizon):
     """Prepare where the rays of a tile's ``i``-th point start, which lies on a face; its normal says on which side."""
     start, n = at(work.points, _START + ROW * i), three(work.points, _FRAME + 9 * i + 6)
     starts = StartPointers(start, 0, pointer(mesh[0]), pointer(mesh[1]))
-    corners, slack, code = corners_of(starts.vertices, starts.faces, face, tree.scale), EDGE, BARYCENTRIC
+    corners, slack = corners_of(starts.vertices, starts.faces, face, tree.scale), EDGE
     if has_normal(corners[0], corners[1], corners[2]):
         normal, above, below, slack = leave_to_both_sides(corners, o, tree.scale)
         _put3(work.points, _FACING + 3 * i, normal)
         _put3(work.points, _ABOVE + 3 * i, above)
         _put3(work.points, _BELOW + 3 * i, below)
         if has_horizon and slack != EDGE and dot(normal, n) != 0.0:
-            code |= KNOWN | (ABOVE if dot(normal, n) > 0.0 else 0)
+            code |= KNOWN | BACK | (ABOVE if dot(normal, n) > 0.0 else 0)
+    _put3(start, WAY, n)
     put(start, FACE, np.float64(face))
     put(start, SLACK, slack)
     put(start, CODE, np.float64(code))
@@ -253,10 +257,13 @@ def _begin_on_edge(tree, starts, work, i, n, has_horizon):
             put(work.numbers, _TABLE + i, begin)
             put(work.numbers, _TABLES, begin + size_of_fan(table))
         if side.face >= 0:
-            # The side is that of a face that may be another one, which then is the one that the rays leave.
-            put(own, FACE, np.float64(side.face))
-            put(own, CODE, np.float64(side.code))
-            _put3(own, ANCHOR, (side.u, side.v, 0.0))
+            code = np.int64(get(own, CODE))
+            if side.face != np.int64(get(own, FACE)):
+                # The side is that of another face, which then is the one that the rays leave.
+                put(own, FACE, np.float64(side.face))
+                _put3(own, ANCHOR, (side.u, side.v, 0.0))
+                code = np.int64(BARYCENTRIC)
+            put(own, CODE, np.float64(code | side.code))
 
 
 @kernel
@@ -290,7 +297,7 @@ def _start_on_edge(work, i, d, row):
             stop = stop_of(at(work.points, _FAN + begin), d, make_holders(work.scratch.holders))
     if stop == OPEN:
         # Nothing is left to be decided at the start.
-        put(row, CODE, np.float64(BARYCENTRIC))
+        put(row, CODE, np.float64(np.int64(get(row, CODE)) & BARYCENTRIC))
         if get(work.numbers, _CORNER + i) != 0:
             put(row, SLACK, CORNER)
     return stop != STOPPED

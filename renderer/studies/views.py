@@ -22,7 +22,10 @@ from renderer.studies.share import check_directions, lengths_of, limits_of
 from renderer.trace.batch import Leaving, check_rays, moved_off
 from renderer.trace.hits import Hits, points_on
 from renderer.trace.query import closest_hits
-from renderer.trace.starts.record import ABOVE, BARYCENTRIC, KNOWN
+from renderer.trace.singly import stack_size
+from renderer.trace.starts.cone import HOLDERS_WORDS
+from renderer.trace.starts.record import ANCHOR, BARYCENTRIC, CODE, FACE, HEAD, ROW, WAY
+from renderer.trace.starts.search import Side, side_of
 
 Floats = NDArray[np.float64]
 
@@ -189,14 +192,35 @@ def _first_hits(octree: Queries, place: Floats, ways: Floats, reach: Floats, nor
     """The first hits of rays from one place, which may lie on the surface."""
     mesh, tree = octree._built
     rays, _ = check_rays(place, ways, 0.0, reach)
-    faces, anchors = on_surface(tree, mesh, place[None], np.full(1, -1), octree.threads)
-    if faces[0] >= 0:
-        outer = face_normals(mesh.vertices[mesh.faces[faces]])[0]
-        code = BARYCENTRIC | KNOWN | (ABOVE if normal is None or float(outer @ normal) >= 0.0 else 0)
+    face, code, anchor = (part[0] for part in on_surface(tree, mesh, place[None], np.full(1, -1), octree.threads))
+    if face >= 0:
+        outer = face_normals(mesh.vertices[mesh.faces[face : face + 1]])[0] if normal is None else normal
+        side = _side_at(octree, face, code, anchor, outer)
         count = len(ways)
-        leaving = Leaving(np.repeat(faces, count), np.full(1, code), np.repeat(anchors, count, axis=0))
+        leaving = Leaving(np.full(count, side.face), np.full(1, side.code), np.tile(side.anchor, (count, 1)))
         rays = moved_off(rays, leaving, mesh, tree.scale, octree.threads)
+        rays.starts[HEAD:].view(np.float64).reshape(count, ROW)[:, WAY:] = outer
     return closest_hits(tree, rays, mesh, octree.threads)
+
+
+class _Place(NamedTuple):
+    """Where a scanner stands: on a face, with a code and an anchor of ``starts.record``."""
+
+    face: int
+    code: int
+    anchor: Floats
+
+
+def _side_at(octree: Queries, face: int, code: int, anchor: Floats, normal: Floats) -> _Place:
+    """The place on a face, on the side of a normal: of another face where none of its sides is in the region there."""
+    mesh, tree = octree._built
+    row = np.zeros(ROW)
+    row[FACE], row[CODE], row[ANCHOR : ANCHOR + 3] = face, code, anchor
+    stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
+    found = Side(*side_of(tree.words, mesh.vertices, mesh.faces, row, tuple(normal.tolist()), stack, memory))
+    if found.face in (face, -1):
+        return _Place(face, code | found.code, anchor)
+    return _Place(found.face, BARYCENTRIC | found.code, np.array([found.u, found.v, 0.0]))
 
 
 def _expect_octree(octree: Queries) -> None:

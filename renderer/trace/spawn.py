@@ -30,6 +30,7 @@ from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
     ABOVE,
     ANCHOR,
+    BACK,
     BARYCENTRIC,
     CODE,
     EDGE,
@@ -38,6 +39,7 @@ from renderer.trace.starts.record import (
     PILE,
     SLACK,
     THROUGH,
+    WAY,
     Start,
     corners_of,
     slack_of,
@@ -221,13 +223,14 @@ def spawn_origin(p, error, n_g, w, offset):
 
 
 @inlined
-def put_start(row, place, n_g, w, offset):
-    """Write the row of ``starts.record`` for a ray in direction w from a ``Place``. It is on the side of the face that
-    it leads to: where that is not the one that the ray before it came from, it has gone through the face.
+def put_start(row, place, n_g, w, d, offset):
+    """Write the row of ``starts.record`` for a ray in direction w from a ``Place``, where one of direction d came. It
+    is on the side of the face that it leads to: where that is not the one that the ray before it came from, it has gone
+    through the face.
     """
     slope = dot(n_g, w)
     side = 1.0 if slope >= 0.0 else -1.0
-    code = KNOWN | BARYCENTRIC | (ABOVE if side > 0.0 else 0) | (THROUGH if side != place.came else 0)
+    code = KNOWN | BARYCENTRIC | (ABOVE if side > 0.0 else 0) | (THROUGH if side != place.came else BACK)
     slack = place.slack if abs(slope) > LEVEL * largest_component(w) else EDGE
     put(row, SLACK, slack if offset.bounded else 0.0)
     put(row, FACE, place.face if offset.bounded else -1.0)
@@ -236,12 +239,14 @@ def put_start(row, place, n_g, w, offset):
     put(row, ANCHOR + 1, place.v)
     # Of faces that coincide those from the first one on are passed: pictures cross all at once.
     put(row, PILE, 0.0)
+    for k in range(3):
+        put(row, WAY + k, -d[k])
 
 
 @kernel
-def start_row(row, place, n_g, w):
+def start_row(row, place, n_g, w, d):
     """For Python: ``put_start`` to an array (starts.record.ROW,), by the bounded offset."""
-    put_start(pointer(row), place, n_g, w, BOUNDED)
+    put_start(pointer(row), place, n_g, w, d, BOUNDED)
 
 
 @inlined
@@ -370,7 +375,7 @@ def leave_faces(vertices, faces, rays, leaving, code, anchors, starts, rows, bou
 
     rays     origins and directions, each with one row a ray or one for all
     code     (n,) or (1,) int64, the bits of ``starts.record``
-    anchors  (n, 3) float64 of barycentrics, or no row where origins are the anchors
+    anchors  (n, 3) float64 of barycentrics, where the code says so, or no row; else origins are the anchors
     rows     (n, starts.record.ROW) float64, which is written too
     bounds   begin, end, and the tree's scale, in whose units no product overflows or vanishes
 
@@ -384,18 +389,19 @@ def leave_faces(vertices, faces, rays, leaving, code, anchors, starts, rows, bou
     for i in range(begin, end):
         face, o, w = leaving[i], three(points, i * step), three(ways, i * way_step)
         own, slack, bits = o, 0.0, code[i * code_step]
+        anchor = row3(pointer(anchors), i) if bits & BARYCENTRIC != 0 else o
         if face >= 0:
             around = corners_of(corners, pointer(faces), face, unit)
             own, slack = leave_face(around, o, w, unit, bits)
-            if len(anchors) > 0 and not _lies_at(around, row3(pointer(anchors), i), o, unit):
-                return i
+            if bits & BARYCENTRIC != 0:
+                if not _lies_at(around, anchor, o, unit):
+                    return i
             # A point inside its face may only be above or below.
-            if len(anchors) == 0 and (slack == EDGE or _lies_above(own, o)) and _lies_far(around, o, unit):
+            elif (slack == EDGE or _lies_above(own, o)) and _lies_far(around, o, unit):
                 return i
             if slack == EDGE and bits & KNOWN == 0:
-                given = scale(o, unit) if len(anchors) == 0 else row3(pointer(anchors), i)
+                given = anchor if bits & BARYCENTRIC != 0 else scale(o, unit)
                 own, slack = _at_corner(Start(around, given, face, bits), o, unit)
-        anchor = o if len(anchors) == 0 else row3(pointer(anchors), i)
         row = at(pointer(starts), 3 * i)
         for k in range(3):
             put(row, k, own[k])

@@ -17,14 +17,17 @@ from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
 from renderer.trace.starts.meeting import lean_sign, seen_from, turn_sign
 
-# The most faces that may hold a start; of more, those beyond are left out. Memory that is not used is not taken.
-MOST_HOLDERS = 1 << 16
+# The most faces that may hold a start, with the arcs that they are cut into; of more, those beyond are left out. Memory
+# that is not used is not taken.
+MOST_HOLDERS = 1 << 14
 # The words of a holder: its place in the blocks, its face, the bits of the corners of weight 0, its two nodes, the
-# parities of two paths, and that of the second where it is FREE.
-PLACE, NUMBER, ZEROS, FIRST_NODE, SECOND_NODE, PATH, OTHER_PATH, FREE_PATH, _HOLDER_WORDS = range(9)
+# parities of two paths, and that of the second where it is FREE; whether it is an arc of its cone, and then the two
+# ways from which to which it goes, in order of the normal, as pairs.
+PLACE, NUMBER, ZEROS, FIRST_NODE, SECOND_NODE, PATH, OTHER_PATH, FREE_PATH, _IS_ARC, FIRST_WAY = range(10)
+SECOND_WAY, HOLDER_WORDS = FIRST_WAY + 6, FIRST_WAY + 12
 # Then for each node: the place of a corner in that direction, its parent in the forest, and the parity to it.
 NODE_PLACE, PARENT, PARITY, _NODE_WORDS = 0, 1, 2, 3
-HOLDERS_WORDS = MOST_HOLDERS * (_HOLDER_WORDS + 2 * _NODE_WORDS)
+HOLDERS_WORDS = MOST_HOLDERS * (HOLDER_WORDS + 2 * _NODE_WORDS)
 NO_NODE = -1
 # Parities: crossed or not; FREE where the path ends on the cone itself; and no answer.
 FREE, UNKNOWN = 2, -1
@@ -40,17 +43,17 @@ class Holders(NamedTuple):
 @inlined
 def make_holders(words):
     """``Holders`` in HOLDERS_WORDS int64."""
-    return Holders(words, at(words, MOST_HOLDERS * _HOLDER_WORDS))
+    return Holders(words, at(words, MOST_HOLDERS * HOLDER_WORDS))
 
 
 @inlined
 def holder(holders, k, word):
-    return get(holders.holders, k * _HOLDER_WORDS + word)
+    return get(holders.holders, k * HOLDER_WORDS + word)
 
 
 @inlined
 def put_holder(holders, k, word, value):
-    put(holders.holders, k * _HOLDER_WORDS + word, np.int64(value))
+    put(holders.holders, k * HOLDER_WORDS + word, np.int64(value))
 
 
 @inlined
@@ -71,7 +74,47 @@ def add_holder(tree, holders, count, place, face, zeros):
     put_holder(holders, count, PLACE, place)
     put_holder(holders, count, NUMBER, face)
     put_holder(holders, count, ZEROS, zeros)
+    put_holder(holders, count, _IS_ARC, 0)
     return count + 1
+
+
+@inlined
+def put_way(holders, k, word, a):
+    """Write a way, a vector of pairs, to a holder."""
+    for i in range(3):
+        put(holders.holders, k * HOLDER_WORDS + word + 2 * i, np.float64(a[i][0]).view(np.int64))
+        put(holders.holders, k * HOLDER_WORDS + word + 2 * i + 1, np.float64(a[i][1]).view(np.int64))
+
+
+@inlined
+def _number(holders, k, word):
+    return np.int64(holder(holders, k, word)).view(np.float64)
+
+
+@inlined
+def way_of(holders, k, word):
+    """A way of a holder."""
+    return (
+        (_number(holders, k, word), _number(holders, k, word + 1)),
+        (_number(holders, k, word + 2), _number(holders, k, word + 3)),
+        (_number(holders, k, word + 4), _number(holders, k, word + 5)),
+    )
+
+
+@inlined
+def negative(a):
+    """A vector of pairs the other way."""
+    return (-a[0][0], -a[0][1]), (-a[1][0], -a[1][1]), (-a[2][0], -a[2][1])
+
+
+@kernel
+def put_arc(holders, k, i, first, second):
+    """Let the k-th holder be an arc of the i-th one's cone."""
+    for word in (PLACE, NUMBER, ZEROS):
+        put_holder(holders, k, word, holder(holders, i, word))
+    put_holder(holders, k, _IS_ARC, 1)
+    put_way(holders, k, FIRST_WAY, first)
+    put_way(holders, k, SECOND_WAY, second)
 
 
 @inlined
@@ -189,6 +232,8 @@ class Cone(NamedTuple):
 def cone_of(tree, anchor, holders, k):
     """The cone of the k-th holder."""
     place, zeros = holder(holders, k, PLACE), holder(holders, k, ZEROS)
+    if holder(holders, k, _IS_ARC) != 0:
+        return Cone(seen_from(tree, place, anchor), way_of(holders, k, FIRST_WAY), way_of(holders, k, SECOND_WAY), 2)
     kind = count_zeros(zeros)
     own = _corner_of(zeros) if kind == 2 else _opposite(zeros)
     p, q = corner(tree, place + 12 * own), corner(tree, place + 12 * _after(own))

@@ -6,20 +6,21 @@ import numpy as np
 
 from renderer.kernels.jit import inlined
 from renderer.kernels.simd import address, at, float64_pointer, get, int32_pointer, pointer
-from renderer.kernels.vec3 import largest_component, row3, scale
+from renderer.kernels.vec3 import largest_component, row3, scale, three
 
 # The head of an array of starts, int64: the float64 of a row that each ray is after the one before, 0 where no ray
 # starts on the surface; and the addresses of the mesh's vertices and faces.
 ROW_STEP, VERTICES, FACES, HEAD = 0, 1, 2, 8
 # The columns of a row, float64: the slack of ``intersect.Ray``, EDGE where the start is on an edge, or stopped at once;
-# the face, -1 for none; the code; and the anchor: the point as given, or the barycentrics u and v and, of a ray that
-# came through the face, PILE: the face at which it came upon those that coincide there.
-SLACK, FACE, CODE, ANCHOR, PILE, ROW = 0, 1, 2, 3, 5, 6
+# the face, -1 for none; the code; the anchor: the point as given, or the barycentrics u and v and, of a ray that came
+# through the face, PILE: the face at which it came upon those that coincide there; and the way back, a direction that
+# is on the side where the ray starts.
+SLACK, FACE, CODE, ANCHOR, PILE, WAY, ROW = 0, 1, 2, 3, 5, 6, 9
 # The slack of a ray that no search takes as it is: ``search.search_from`` decides.
 EDGE = np.inf
 # The bits of a code: the side of the face that the ray starts on is known, and is that of its normal; the ray came
-# through the face; the anchor has barycentrics.
-KNOWN, ABOVE, THROUGH, BARYCENTRIC = 1, 2, 4, 8
+# through the face; the anchor has barycentrics; there is a way back.
+KNOWN, ABOVE, THROUGH, BARYCENTRIC, BACK = 1, 2, 4, 8, 16
 
 
 class StartPointers(NamedTuple):
@@ -65,6 +66,12 @@ def start_at(starts, i, unit):
     if code & BARYCENTRIC == 0:
         anchor = scale(anchor, unit)
     return Start(corners_of(starts.vertices, starts.faces, face, unit), anchor, face, code)
+
+
+@inlined
+def way_back(starts, i):
+    """The way back of ray ``i``, whose code has BACK."""
+    return three(starts.rows, i * starts.step + WAY)
 
 
 @inlined

@@ -6,6 +6,8 @@ then; that is so where the parities of its crossings are differences of one bit 
 Alexander's duality). A forest of the nodes with the parities to their parents tells in one pass over the arcs.
 """
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
@@ -180,24 +182,64 @@ def _bounds_region(tree, anchor, holders, count, nodes, k, side, j, facing):
     return False
 
 
-@kernel
-def stopping_holder(tree, anchor, holders, count, nodes, face, side, d):
-    """The holder that stops a ray at its start, or NOT_STOPPED.
-
-    The ray starts in the region beside the cone of ``face``, on one side of it. It is stopped where its direction d
-    leads out of that region: by the lowest face that bounds the region and has d behind it.
+class Behind(NamedTuple):
+    """The face that a ray has behind it at its start: its number, the side of it that the ray is on, whether the ray
+    came through it, and the pile of ``holder_ahead``. Where the side is known to be that of a direction, that is
+    ``back``.
     """
-    own = holder_of(holders, count, face)
-    if own == NOT_STOPPED or _is_open(tree, anchor, holders, count, nodes, own, side, d):
+
+    face: int
+    side: int
+    through: bool
+    pile: int
+    has_back: bool
+    back: Any
+
+
+@kernel
+def stopping_holder(tree, anchor, arcs, count, nodes, behind, d):
+    """The arc that stops a ray at its start, or NOT_STOPPED.
+
+    The ray starts in the region beside the arcs of a face, on one side of it. Where these bound several regions it is
+    the one with ``back`` in it, else any of them. The ray is stopped where its direction d leads out of that region: by
+    the lowest face that bounds it, and not on both sides, and has d behind it.
+    """
+    own, is_open = _own_arc(tree, anchor, arcs, count, nodes, behind, d, behind.has_back)
+    if own == NOT_STOPPED:
+        own, is_open = _own_arc(tree, anchor, arcs, count, nodes, behind, d, False)
+    if own == NOT_STOPPED or is_open:
         return NOT_STOPPED
     last = np.int64(-1)
-    for _ in range(count):
-        j = _next_face(holders, count, last)
-        last = holder(holders, j, NUMBER)
-        behind = slope_of(cone_of(tree, anchor, holders, j).face, d)
-        if behind != 0 and _bounds_region(tree, anchor, holders, count, nodes, own, side, j, -behind):
-            return j
-    return NOT_STOPPED
+    while True:
+        j = _next_face(arcs, count, last)
+        if j == NOT_STOPPED:
+            return NOT_STOPPED
+        last = holder(arcs, j, NUMBER)
+        facing = -slope_of(cone_of(tree, anchor, arcs, j).face, d)
+        for k in range(count):
+            if (
+                facing != 0
+                and holder(arcs, k, NUMBER) == last
+                and _bounds_region(tree, anchor, arcs, count, nodes, own, behind.side, k, facing)
+                and not _bounds_region(tree, anchor, arcs, count, nodes, own, behind.side, k, -facing)
+            ):
+                return k
+
+
+@kernel
+def _own_arc(tree, anchor, arcs, count, nodes, behind, d, has_back):
+    """An arc of the face behind a ray, beside which it is, and whether d is in a region beside one of them. With
+    ``has_back`` only those count beside which ``back`` is; NOT_STOPPED for none.
+    """
+    own = NOT_STOPPED
+    for k in range(count):
+        if holder(arcs, k, NUMBER) == behind.face and (
+            not has_back or _is_open(tree, anchor, arcs, count, nodes, k, behind.side, behind.back)
+        ):
+            if _is_open(tree, anchor, arcs, count, nodes, k, behind.side, d):
+                return k, True
+            own = k if own == NOT_STOPPED else own
+    return own, False
 
 
 @kernel
@@ -265,28 +307,45 @@ def coincide(tree, anchor, holders, k, j):
 
 
 @kernel
-def bounding_holder(tree, anchor, holders, count, nodes, n):
-    """The holder that bounds the region with direction n in it, the one that n is most across, lower ones first; and
-    the side of it. NOT_STOPPED for none.
+def bounding_holder(tree, anchor, arcs, count, nodes, n, face):
+    """The arc that bounds the region with direction n in it, and the side of it: of ``face`` if one does, else the one
+    that n is most across, lower ones first. NOT_STOPPED for none.
     """
     most, last = np.inf, NOT_STOPPED
     for _ in range(count):
-        most, last = _next_across(tree, anchor, holders, count, n, most, last)
-        own = slope_of(cone_of(tree, anchor, holders, last).face, n)
+        most, last = _next_across(tree, anchor, arcs, count, n, most, last)
+        own = slope_of(cone_of(tree, anchor, arcs, last).face, n)
         for side in (own, -own) if own != 0 else (1, -1):
-            if _is_open(tree, anchor, holders, count, nodes, last, side, n):
-                return last, side
+            if _is_open(tree, anchor, arcs, count, nodes, last, side, n):
+                return _of_face(tree, anchor, arcs, count, nodes, last, side, face)
     return NOT_STOPPED, 0
 
 
 @kernel
-def _next_across(tree, anchor, holders, count, n, most, last):
-    """The holder that n is most across after the one ``last``, whose product is ``most``; returns its product, too."""
+def _of_face(tree, anchor, arcs, count, nodes, k, side, face):
+    """An arc of a face beside the region of another arc, and its side; that other one where there is none."""
+    for j in range(count):
+        if holder(arcs, j, NUMBER) == face:
+            for facing in (1, -1):
+                if _bounds_region(tree, anchor, arcs, count, nodes, k, side, j, facing):
+                    return j, facing
+    return k, side
+
+
+@kernel
+def _next_across(tree, anchor, arcs, count, n, most, last):
+    """The arc that n is most across after the one ``last``, whose product is ``most``; returns its product, too."""
     best, found = -1.0, NOT_STOPPED
     for k in range(count):
-        across = abs(dot(normalized(heads(cone_of(tree, anchor, holders, k).face.normal)), n))
-        number = holder(holders, k, NUMBER)
-        after = across < most or (across == most and number > holder(holders, last, NUMBER))
-        if after and (across > best or (across == best and number < holder(holders, found, NUMBER))):
+        across = abs(dot(normalized(heads(cone_of(tree, anchor, arcs, k).face.normal)), n))
+        after = across < most or (across == most and _comes_after(arcs, k, last))
+        if after and (across > best or (across == best and _comes_after(arcs, found, k))):
             best, found = across, k
     return best, found
+
+
+@inlined
+def _comes_after(arcs, k, j):
+    """Whether an arc is of a higher face than another, or later in the list."""
+    number, other = holder(arcs, k, NUMBER), holder(arcs, j, NUMBER)
+    return number > other or (number == other and k > j)

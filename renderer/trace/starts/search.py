@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.kernels.simd import extract, get, larger, lowest_bit, put, smaller, splat8
+from renderer.kernels.simd import extract, get, larger, local_doubles, lowest_bit, pointer, put, smaller, splat8
 from renderer.kernels.vec3 import add, largest_component, sub
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import (
@@ -27,10 +27,11 @@ from renderer.trace.intersect import (
     unsure_sides,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import NO_FACE, blocks_of, is_better, octants_around, push_children
+from renderer.trace.leaf import NO_FACE, blocks_of, is_better, octants_around, push_children, tree_pointers
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
-from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders, name_nodes
+from renderer.trace.starts.arcs import arcs_of
+from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
 from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
     HOLDS,
@@ -42,8 +43,19 @@ from renderer.trace.starts.meeting import (
     slope_there,
     unit_direction,
 )
-from renderer.trace.starts.record import ABOVE, BARYCENTRIC, EDGE, KNOWN, THROUGH, corners_of, slack_of, start_at
-from renderer.trace.starts.region import NOT_STOPPED, bounding_holder, holder_ahead, holder_of, stopping_holder
+from renderer.trace.starts.record import (
+    ABOVE,
+    BACK,
+    EDGE,
+    KNOWN,
+    THROUGH,
+    StartPointers,
+    corners_of,
+    slack_of,
+    start_at,
+    way_back,
+)
+from renderer.trace.starts.region import NOT_STOPPED, Behind, bounding_holder, holder_ahead, holder_of, stopping_holder
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
@@ -100,26 +112,15 @@ def _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, count):
     return count
 
 
-class _Behind(NamedTuple):
-    """The face that a ray has behind it at its start: its number, the side that the ray is on, whether it came through,
-    and the pile of ``holder_ahead``.
-    """
-
-    face: int
-    side: int
-    through: bool
-    pile: int
-
-
 @kernel
 def _stopped(tree, behind, anchor, count, d, slope, dz, holders):
     """The hit (t, face, u, v, w) that stops a ray at its start, which ``count`` faces hold; NO_FACE for none."""
-    nodes = name_nodes(tree, anchor, holders, count)
     k, t = NOT_STOPPED, AHEAD
     if behind.through:
         k = holder_ahead(tree, anchor, holders, count, behind.face, behind.side, behind.pile, d)
     if k == NOT_STOPPED:
-        k, t = stopping_holder(tree, anchor, holders, count, nodes, behind.face, behind.side, d), 0.0
+        holders, number, nodes = arcs_of(tree, anchor, holders, count)
+        k, t = stopping_holder(tree, anchor, holders, number, nodes, behind, d), 0.0
     if k == NOT_STOPPED:
         return _NOTHING
     met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, dz)
@@ -158,9 +159,10 @@ def depart(tree, starts, i, ray, stack, memory):
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
         dz, holders = make_shear(ray).direction_z, make_holders(memory)
         count = list_holders(tree, anchor, d, slope, dz, stack, holders)
-        behind = _Behind(
-            start.face, 1 if start.code & ABOVE != 0 else -1, start.code & THROUGH != 0, np.int64(start.anchor[2])
-        )
+        behind = Behind(
+            start.face, 1 if start.code & ABOVE != 0 else -1, start.code & THROUGH != 0, np.int64(start.anchor[2]),
+            start.code & BACK != 0, way_back(starts, i),
+        )  # fmt: skip
         stopped = _stopped(tree, behind, anchor, count, d, slope, dz, holders)
     return Departure(ray, anchor, d, slope, unit, edge, count), stopped
 
@@ -172,7 +174,8 @@ def stopped_again(tree, departure, face, pile, memory):
     """
     anchor, d, holders, dz = departure.anchor, departure.d, make_holders(memory), make_shear(departure.ray).direction_z
     side = slope_of(cone_of(tree, anchor, holders, holder_of(holders, departure.holders, face)).face, d)
-    return _stopped(tree, _Behind(face, side, True, pile), anchor, departure.holders, d, departure.slope, dz, holders)
+    behind = Behind(face, side, True, pile, False, d)
+    return _stopped(tree, behind, anchor, departure.holders, d, departure.slope, dz, holders)
 
 
 @inlined
@@ -288,20 +291,27 @@ class Side(NamedTuple):
 
 @kernel
 def side_of_normal(tree, start, n, stack, memory, table, room):
-    """The ``Side`` of a start whose normal n says in which region it is; and its ``fan`` in
-    ``table``, if ``room`` float64 hold it.
+    """The ``Side`` of a start whose normal n says in which region it is; and its ``fan`` in ``table``, if ``room``
+    float64 hold it.
     """
     anchor, holders = anchor_of(start), make_holders(memory)
     d, _ = unit_direction(n)
     slope = slope_there(anchor, d)
     count = list_holders(tree, anchor, d, slope, 1.0, stack, holders)
-    nodes = name_nodes(tree, anchor, holders, count)
-    k, side = bounding_holder(tree, anchor, holders, count, nodes, d)
+    arcs, number, nodes = arcs_of(tree, anchor, holders, count)
+    k, side = bounding_holder(tree, anchor, arcs, number, nodes, d, start.face)
     clear_fan(table)
     if k == NOT_STOPPED:
         return Side(-1, 0, 0.0, 0.0)
-    write_fan(tree, anchor, holders, count, nodes, k, side, table, room)
-    met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, 1.0)
-    code = KNOWN | BARYCENTRIC | (ABOVE if side > 0 else 0)
+    write_fan(tree, anchor, arcs, number, nodes, k, side, table, room)
+    met = meet_face(seen_from(tree, holder(arcs, k, PLACE), anchor), anchor, d, slope, 1.0)
     u, v = barycentrics_of(met)
-    return Side(holder(holders, k, NUMBER), code, u, v)
+    return Side(holder(arcs, k, NUMBER), KNOWN | BACK | (ABOVE if side > 0 else 0), u, v)
+
+
+@kernel
+def side_of(words, vertices, faces, row, n, stack, memory):
+    """For Python: ``side_of_normal`` of the start in a row of ``starts.record``."""
+    tree, table = tree_pointers(words), local_doubles()
+    start = start_at(StartPointers(pointer(row), 0, pointer(vertices), pointer(faces)), 0, tree.scale)
+    return side_of_normal(tree, start, n, pointer(stack), pointer(memory), table, 0)

@@ -1,0 +1,123 @@
+"""Where on a face a point lies, as barycentrics that are exact at edges and corners; and how far it is from there."""
+
+from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.simd import pointer, smaller
+from renderer.kernels.vec3 import (
+    barycentric,
+    cross,
+    dot,
+    largest_component,
+    largest_of_three,
+    length,
+    row3,
+    scale,
+    sub,
+)
+from renderer.trace.starts.record import BARYCENTRIC
+
+
+@kernel
+def anchor_all(vertices, faces, points, chosen, room, codes, anchors):
+    """Write codes and anchors of points on faces ``chosen`` (n,); of face -1 nothing.
+
+    Nearer to an edge than its ``room`` (n,), a point is on it. Inside a face it stays as it is: it may lie exactly on
+    other faces, as at the foot of a wall.
+    """
+    for i in range(len(points)):
+        if chosen[i] >= 0:
+            o = row3(pointer(points), i)
+            u, v = _weights_of(_corners(pointer(vertices), pointer(faces), chosen[i]), o, room[i])
+            inside = u > 0.0 and v > 0.0 and 1.0 - u - v > 0.0
+            codes[i] = 0 if inside else BARYCENTRIC
+            for k in range(3):
+                anchors[i, k] = o[k] if inside else (u, v, 0.0)[k]
+
+
+@kernel
+def measure_all(vertices, faces, points, chosen, distances):
+    """Write how far points are from faces, along the axis where they are farthest."""
+    for i in range(len(points)):
+        o, (p0, p1, p2) = row3(pointer(points), i), _corners(pointer(vertices), pointer(faces), chosen[i])
+        u, v = _weights_of((p0, p1, p2), o, 0.0)
+        distances[i] = largest_component(sub(o, barycentric(p0, p1, p2, u, v)))
+
+
+@inlined
+def _corners(vertices, faces, face):
+    a, b, c = row3(faces, face)
+    return row3(vertices, a), row3(vertices, b), row3(vertices, c)
+
+
+@inlined
+def _over(a, size):
+    return a[0] / size, a[1] / size, a[2] / size
+
+
+@kernel
+def _weights_of(corners, o, room):
+    """u and v of the point of a face that is nearest to o; nearer to an edge than ``room``, one on it."""
+    p0, p1, p2 = corners
+    sides = sub(p2, p1), sub(p0, p2), sub(p1, p0)
+    size = largest_of_three(sides[0], sides[1], sides[2])
+    if size == 0.0:
+        return 0.0, 0.0
+    # In units of the face, so that no product overflows or vanishes.
+    s0, s1, s2 = _over(sides[0], size), _over(sides[1], size), _over(sides[2], size)
+    w0, w1, w2, room = _over(sub(o, p0), size), _over(sub(o, p1), size), _over(sub(o, p2), size), room / size
+    n = cross(s2, scale(s1, -1.0))
+    area = length(n)
+    # The double areas of the point with each side.
+    a = _beyond(dot(cross(s0, w1), n) / area, room * length(s0))
+    b = _beyond(dot(cross(s1, w2), n) / area, room * length(s1))
+    c = _beyond(dot(cross(s2, w0), n) / area, room * length(s2))
+    if not a + b + c > 0.0:
+        # A face without area is its longest side.
+        a, b, c = _along_longest((s0, s1, s2), (w0, w1, w2), room)
+    return _exact_shares(a, b, c)
+
+
+@inlined
+def _beyond(part, room):
+    """A number where it is more than some room, else 0; also of NaN."""
+    return part if part > room else 0.0
+
+
+@inlined
+def _exact_shares(a, b, c):
+    """u and v of three weights >= 0, whose sum is not 0: at corners 0 or 1, on the side opposite to the first corner 1
+    in all.
+    """
+    whole = a + b + c
+    if b == whole or c == whole:
+        return (1.0 if b == whole else 0.0), (1.0 if c == whole else 0.0)
+    u, v = b / whole, c / whole
+    # What is left of 1 is exact if that is at least a half.
+    if a == 0.0:
+        return (u, 1.0 - u) if u >= 0.5 else (1.0 - v, v)
+    return u, v
+
+
+@kernel
+def _along_longest(sides, ways, room):
+    """Weights of the nearest point of the longest side; within ``room`` of a corner those of the corner."""
+    (s0, s1, s2), (w0, w1, w2) = sides, ways
+    l0, l1, l2 = length(s0), length(s1), length(s2)
+    d0, d1, d2 = length(w0), length(w1), length(w2)
+    least = smaller(d0, smaller(d1, d2))
+    if not least > room:
+        return (1.0, 0.0, 0.0) if d0 == least else ((0.0, 1.0, 0.0) if d1 == least else (0.0, 0.0, 1.0))
+    if l0 >= l1 and l0 >= l2:
+        share = _share_along(s0, w1, l0)
+        return 0.0, 1.0 - share, share
+    if l1 >= l2:
+        share = _share_along(s1, w2, l1)
+        return share, 0.0, 1.0 - share
+    share = _share_along(s2, w0, l2)
+    return 1.0 - share, share, 0.0
+
+
+@inlined
+def _share_along(side, way, size):
+    """How far along a side of some length its point lies that is nearest to the end of a way from its first corner."""
+    along = dot(side, way) / size
+    return smaller(along / size, 1.0) if along > 0.0 else 0.0
