@@ -35,6 +35,9 @@ from renderer.trace.traverse import make_scratch
 _T, _U, _V, _W, OUT_T, OUT_U, OUT_V, DOUBLE_ROWS = range(8)
 _FACE, _AT, _EDGES, _ORDER, OUT_FACE, OUT_SIDE, INTEGER_ROWS = range(7)
 _MERGED = -1
+# The place of the first hit at a ray's start, which is in no block; those after it follow. They are in the order in
+# which the ray passes them, before all others.
+_FIRST = -(1 << 40)
 # The hits and rounds of rays in a call, some 10 ms, so that Ctrl-C need not wait for long.
 _WORK = 1 << 16
 
@@ -167,7 +170,7 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
             break
         if count < found.capacity:
             hit = stopped[0], stopped[2], stopped[3], stopped[4]
-            _list_hit(found, count, hit, stopped[1], 0, np.int64(0))
+            _list_hit(found, count, hit, stopped[1], _FIRST + count, np.int64(0))
         count += 1
         # The sign of 0 tells the next face of the pile from one that begins another.
         pile = pile if is_negative(stopped[0]) else np.int64(stopped[1])
@@ -300,6 +303,9 @@ def _precedes(tree, found, i, j, by_place):
         if compared != 0:
             return compared < 0
     ti, tj = get(found.doubles, _row(found, _T, i)), get(found.doubles, _row(found, _T, j))
+    place, other = get(found.integers, _row(found, _AT, i)), get(found.integers, _row(found, _AT, j))
+    if place < 0 or other < 0:
+        return place < other
     face, other = get(found.integers, _row(found, _FACE, i)), get(found.integers, _row(found, _FACE, j))
     return ti < tj or (ti == tj and face < other)
 

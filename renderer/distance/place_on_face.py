@@ -1,6 +1,7 @@
 """Where on a face a point lies, as barycentrics that are exact at edges and corners; and how far it is from there."""
 
 from renderer.kernels.jit import inlined, kernel
+from renderer.kernels.pairs import cross_pairs, heads, power_below, scaled_difference
 from renderer.kernels.simd import pointer, smaller
 from renderer.kernels.vec3 import (
     barycentric,
@@ -15,22 +16,45 @@ from renderer.kernels.vec3 import (
 )
 from renderer.trace.starts.record import BARYCENTRIC
 
+# A point is exactly on an edge where the product of the ways along it and to the point is less, of ways of about 1.
+_EXACT = 2.0**-80
+
 
 @kernel
 def anchor_all(vertices, faces, points, chosen, room, codes, anchors):
     """Write codes and anchors of points on faces ``chosen`` (n,); of face -1 nothing.
 
-    Nearer to an edge than its ``room`` (n,), a point is on it. Inside a face it stays as it is: it may lie exactly on
-    other faces, as at the foot of a wall.
+    Nearer to an edge than its ``room`` (n,), a point is on it. A point inside a face, or exactly on an edge, stays as
+    it is: it may lie exactly on other faces, as at the foot of a wall.
     """
     for i in range(len(points)):
         if chosen[i] >= 0:
-            o = row3(pointer(points), i)
-            u, v = _weights_of(_corners(pointer(vertices), pointer(faces), chosen[i]), o, room[i])
-            inside = u > 0.0 and v > 0.0 and 1.0 - u - v > 0.0
-            codes[i] = 0 if inside else BARYCENTRIC
+            corners, o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
+            u, v = _weights_of(corners, o, room[i])
+            stays = _is_exact(corners, u, v, o)
+            codes[i] = 0 if stays else BARYCENTRIC
             for k in range(3):
-                anchors[i, k] = o[k] if inside else (u, v, 0.0)[k]
+                anchors[i, k] = o[k] if stays else (u, v, 0.0)[k]
+
+
+@kernel
+def _is_exact(corners, u, v, o):
+    """Whether a point with barycentrics u and v is inside a face, or exactly on the edge where these are."""
+    p0, p1, p2 = corners
+    w = 1.0 - u - v
+    if w == 0.0:
+        return u > 0.0 and v > 0.0 and _is_between(p1, p2, o)
+    if u == 0.0:
+        return v > 0.0 and _is_between(p0, p2, o)
+    return v > 0.0 or _is_between(p0, p1, o)
+
+
+@inlined
+def _is_between(p, q, o):
+    """Whether a point is on the line of two others, told with twice the digits."""
+    unit = 1.0 / power_below(largest_component(sub(q, p)))
+    across = cross_pairs(scaled_difference(q, p, unit), scaled_difference(o, p, unit))
+    return largest_component(heads(across)) <= _EXACT
 
 
 @kernel

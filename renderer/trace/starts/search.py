@@ -14,6 +14,7 @@ from renderer.kernels.simd import extract, get, larger, local_doubles, lowest_bi
 from renderer.kernels.vec3 import add, largest_component, sub
 from renderer.trace.doubt import settled
 from renderer.trace.intersect import (
+    CORNER,
     Ray,
     box_limit,
     enter_boxes,
@@ -153,7 +154,7 @@ def depart(tree, starts, i, ray, stack, memory):
     anchor = anchor_of(start)
     o, (d, unit) = rounded(anchor), unit_direction((ray.dx, ray.dy, ray.dz))
     edge = ray.slack == EDGE
-    if edge:
+    if edge or ray.slack == CORNER:
         ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, slack_of(o, 0.0), ray.leaving)
     stopped, slope, count = _NOTHING, slope_there(anchor, d), 0
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
