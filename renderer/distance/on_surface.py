@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.distance.closest import closest_point
-from renderer.distance.place_on_face import anchor_all, measure_all
+from renderer.distance.place_on_face import DOUBLE, anchor_all, measure_all
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.trace.hits import points_on
@@ -18,9 +18,9 @@ from renderer.trace.starts.record import BARYCENTRIC
 
 Floats = NDArray[np.float64]
 
-# How far a point of the surface may be from it, as a share of its largest coordinate: 64 roundings of float32 where all
-# coordinates are numbers of float32, else 32 of float64.
-_SINGLE, _DOUBLE = 2.0**-18, 2.0**-48
+# How far a point of the surface may be from it, as a share of its largest coordinate, where all coordinates are numbers
+# of float32: 64 roundings of these. Else it is DOUBLE.
+_SINGLE = 2.0**-18
 
 
 class SurfacePoints(NamedTuple):
@@ -86,11 +86,11 @@ def distances_from(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> Floa
 
 def are_on(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether points (n, 3) lie on faces (n,), within the roundings of float64."""
-    return distances_from(mesh, points, faces) <= _DOUBLE * np.abs(points).max(axis=1, initial=0.0)
+    return distances_from(mesh, points, faces) <= DOUBLE * np.abs(points).max(axis=1, initial=0.0)
 
 
 def _room(points: Floats) -> Floats:
     """How far each point may be from the surface that it lies on."""
     with np.errstate(over="ignore", invalid="ignore"):
         single = (points == points.astype(np.float32)).all(axis=1)
-    return np.where(single, _SINGLE, _DOUBLE) * np.abs(points).max(axis=1, initial=0.0)
+    return np.where(single, _SINGLE, DOUBLE) * np.abs(points).max(axis=1, initial=0.0)

@@ -16,6 +16,8 @@ from renderer.kernels.vec3 import (
 )
 from renderer.trace.starts.record import BARYCENTRIC
 
+# 32 roundings of float64.
+DOUBLE = 2.0**-48
 # A point is exactly on an edge where the product of the ways along it and to the point is less, of ways of about 1.
 _EXACT = 2.0**-80
 
@@ -24,14 +26,14 @@ _EXACT = 2.0**-80
 def anchor_all(vertices, faces, points, chosen, room, codes, anchors):
     """Write codes and anchors of points on faces ``chosen`` (n,); of face -1 nothing.
 
-    Nearer to an edge than its ``room`` (n,), a point is on it. A point inside a face, or exactly on an edge, stays as
-    it is: it may lie exactly on other faces, as at the foot of a wall.
+    Nearer to an edge than its ``room`` (n,), a point is on it. A point that lies inside a face, within roundings of
+    float64, or exactly on an edge, stays as it is: it may lie exactly on other faces, as at the foot of a wall.
     """
     for i in range(len(points)):
         if chosen[i] >= 0:
             corners, o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
             u, v = _weights_of(corners, o, room[i])
-            stays = _is_exact(corners, u, v, o)
+            stays = _is_exact(corners, u, v, o) and _is_near(corners, u, v, o)
             codes[i] = 0 if stays else BARYCENTRIC
             for k in range(3):
                 anchors[i, k] = o[k] if stays else (u, v, 0.0)[k]
@@ -47,6 +49,13 @@ def _is_exact(corners, u, v, o):
     if u == 0.0:
         return v > 0.0 and _is_between(p0, p2, o)
     return v > 0.0 or _is_between(p0, p1, o)
+
+
+@inlined
+def _is_near(corners, u, v, o):
+    """Whether a point is as near to its place on a face as roundings of float64."""
+    place = barycentric(corners[0], corners[1], corners[2], u, v)
+    return largest_component(sub(place, o)) <= DOUBLE * largest_component(o)
 
 
 @inlined
