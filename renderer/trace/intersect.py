@@ -404,13 +404,13 @@ def _left(tree, base, edges, ray):
 
 @inlined
 def near_planes(edges, slack):
-    """The bits of the triangles whose planes are within a ray's ``slack`` of its origin, with those of room."""
+    """The bits of the triangles whose planes are within a ray's ``slack`` of its origin, or of rounding."""
     x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, _, _, _ = edges
     wide = magnitude(x0) + magnitude(x1) + magnitude(x2)
     across = wide + (magnitude(y0) + magnitude(y1) + magnitude(y2))
     along = magnitude(z0) + magnitude(z1) + magnitude(z2)
     height = magnitude(e0 * z0 + e1 * z1 + e2 * z2)
-    return movemask(height <= across * (across + along) * splat4(slack))
+    return movemask(height <= across * (across + along) * (splat4(slack) + along * splat4(ERROR)))
 
 
 @inlined

@@ -1,8 +1,8 @@
 """Bodies for rays that start on surfaces: convex and not, wedges of all angles, rasters, needles, seams, coinciding."""
 
 import math
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,9 @@ def bodies() -> Iterator[Body]:
         yield Body("needles", turned(needle(2.0**-power)), True)
     for mesh in (stack(), boxes_side_by_side(), soup(stack()), turned(stack())):
         yield Body("coinciding faces", mesh, False)
+    for mesh in standing():
+        yield Body("walls that stand on faces", mesh, False)
+        yield Body("walls that stand on faces", soup(mesh), False)
     for scale, offset in PLACES:
         for mesh in (sound[0], sound[2], notched(), prism(60.0), prism(300.0)):
             yield Body("places", Mesh(mesh.vertices * scale + offset * _AWAY, mesh.faces), True)
@@ -110,6 +113,28 @@ def stack() -> Mesh:
     corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 3], [2, 1, -3], [-3, -1, 0]], float)
     faces = [[0, 3, 1], [1, 0, 2], [0, 1, 2], [1, 4, 2], [2, 0, 1], [0, 5, 1], [0, 2, 1], [3, 2, 1]]
     return Mesh(corners, np.array(faces, np.int32))
+
+
+def standing() -> list[Mesh]:
+    """Walls whose feet lie within other faces: edges and corners there are no corners of those."""
+    ground = np.array([[-10, -10, 0], [30, -10, 0], [-10, 30, 0]], float), np.array([[0, 1, 2]])
+    wall = np.array([[0, -2, 0], [0, 2, 0], [0, 2, 4], [0, -2, 4]], float), np.array([[0, 1, 2], [0, 2, 3]])
+    house = (_box()[0] * [4.0, 4.0, 8.0] + [2.0, 2.0, 0.0], _box()[1])
+    higher = (_box()[0] * [8.0, 8.0, 12.0] + [6.0, 2.0, 0.0], _box()[1])
+    # A prism balanced on its edge, and a fin that touches a fan of four faces with a corner.
+    edge = np.array([[0, -1, 0], [0, 1, 0], [-1, -1, 1], [-1, 1, 1], [1, -1, 1], [1, 1, 1]], float)
+    balanced = edge, np.array([[0, 1, 3], [0, 3, 2], [0, 4, 5], [0, 5, 1], [2, 3, 5], [2, 5, 4], [0, 2, 4], [1, 5, 3]])
+    tips = np.array([[0, 0, 0], [0, 1, 1], [0, 1, 2], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], float)
+    fin = Mesh(tips, np.array([[0, 1, 2], [0, 3, 4], [0, 4, 5], [0, 5, 6], [0, 6, 3]], np.int32))
+    together = ([ground, wall], [wall, ground], [ground, house], [house, ground], [house, higher], [higher, house])
+    return [fin, *(_joined(parts) for parts in (*together, [ground, balanced], [balanced, ground]))]
+
+
+def _joined(parts: Sequence[tuple[Floats, NDArray[Any]]]) -> Mesh:
+    """One mesh of the vertices and faces of some."""
+    firsts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+    faces = [faces + first for (_, faces), first in zip(parts, firsts, strict=True)]
+    return Mesh(np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces).astype(np.int32))
 
 
 def boxes_side_by_side() -> Mesh:

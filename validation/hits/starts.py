@@ -32,6 +32,9 @@ _SIGN_ROUNDINGS = 8 * 2.0**-53
 # t of the sample, relative and in units of the largest coordinate over the direction's part along the normal: an answer
 # beyond is another hit. A start inside a face is moved by up to 2^-38 of the face. How exact t is, other gates judge.
 _RELATIVE, _ABSOLUTE = 1e-9, 2.0**-37
+# As such a ray may pass any edge on either side, starts are left out that are nearer than this, by the size of their
+# face, to an edge of another face, and farther from those of their own than from where rays start exactly.
+_MOVE, _EXACTLY = 2.0**-36, 2.0**-30
 # Near its start, by the size of the face, a ray is judged exactly, but for what is beyond the pairs of float64 that
 # decide: edge functions of less than this share of their terms. Farther off, as any ray, it may pass an edge on either
 # side that it passes by no more than its start is moved.
@@ -224,9 +227,10 @@ def judged_at_once(surface: Surface, batch: Batch) -> tuple[Bools, Bools]:
     wrong, goes_on = np.zeros((2, len(batch.t)), np.bool_)
     order = np.argsort(batch.which, kind="stable")
     ends = np.searchsorted(batch.which[order], np.arange(len(batch.starts) + 1))
+    beside = [_is_beside_another(surface, start) for start in batch.starts]
     for number, start in enumerate(batch.starts):
         rows = order[ends[number] : ends[number + 1]]
-        if not len(rows) or _is_beside_an_edge(surface, start):
+        if not len(rows) or _is_beside_an_edge(surface, start) or beside[number]:
             continue
         held = surface.holding(start.place)
         regions = surface.regions(held)
@@ -265,6 +269,24 @@ def _is_beside_an_edge(surface: Surface, start: Start) -> bool:
         if 0 < dot(normal, cross(along, difference(start.place, corners[k]))) <= _CLOSEST * dot(normal, normal):
             return True
     return False
+
+
+def _is_beside_another(surface: Surface, start: Start) -> bool:
+    """Whether a start inside its face, far from its edges, is as near to an edge of another as the ray may be moved."""
+    if start.face < 0:
+        return False
+    place, size = np.array([float(x) for x in start.place]), surface.size(start.face)
+    if _from_edges(np.array([surface.corners(start.face)]), place).min() <= _EXACTLY * size:
+        return False
+    return bool(_from_edges(surface.triangles, place).min() <= _MOVE * size)
+
+
+def _from_edges(triangles: Floats, place: Floats) -> Floats:
+    """How far a place is from the edges of triangles (n, 3, 3), (n, 3)."""
+    along, way = np.roll(triangles, -1, axis=1) - triangles, place - triangles
+    share = np.einsum("nex,nex->ne", along, way) / np.maximum(np.einsum("nex,nex->ne", along, along), 2.0**-1000)
+    distances: Floats = np.linalg.norm(way - np.clip(share, 0.0, 1.0)[..., None] * along, axis=2)
+    return distances
 
 
 def _stops(surface: Surface, regions: Any, start: Start, ray: tuple[Any, int, bool]) -> set[int | None]:

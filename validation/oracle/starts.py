@@ -6,7 +6,7 @@ A start is a real point: an exact combination of a face's corners, or the face's
 - A face is named: the faces that hold the start do not stop the ray.
 - A face and a side are named: the faces that hold the start cut the directions into regions. The ray starts in the
   region on that side of the face. One that leads into its closure is not stopped. Another is stopped at t = 0 by the
-  lowest face that holds the start and has the region on one side and the ray's direction on the other.
+  lowest face that holds the start and has the region on one side alone and the ray's direction on the other.
 - ``through``: the ray came upon the face, and upon those that coincide with it there, and has gone through it to the
   named side. It passes them in the order of their numbers, the lowest after the highest, from the one that it came upon
   first; if it leads to the named side, the next one stops it at t = 0.
@@ -149,6 +149,11 @@ class Surface:
         found: list[list[float]] = self._corners[face].tolist()
         return found
 
+    @property
+    def triangles(self) -> Floats:
+        """The corners of all faces, (n, 3, 3)."""
+        return self._corners
+
     def size(self, face: int) -> float:
         """A face's largest extent along an axis."""
         return float(np.ptp(self._corners[face], axis=0).max())
@@ -288,11 +293,15 @@ def stopped(
 
 
 def _behind(regions: Regions | Fan, region: int, way: Whole) -> set[int]:
-    """The lowest face that lies between a region and a direction: more than one where only parts of a face do."""
+    """The lowest face that lies between a region and a direction: more than one where only parts of a face do.
+
+    A face with the region on both sides, as a fin has, is not between.
+    """
     some: set[int] = set()
     for face in sorted(regions.cones):
         leads = regions.cones[face].side(way)
-        between = [leads != 0 and (p.below if leads > 0 else p.above) == region for p in regions.pieces[face]]
+        ends = [(p.below, p.above) if leads > 0 else (p.above, p.below) for p in regions.pieces[face]]
+        between = [leads != 0 and here == region and beyond != region for here, beyond in ends]
         if any(between):
             some.add(face)
         if all(between):

@@ -138,22 +138,17 @@ def are_even(holders, count, nodes):
 def _is_connected(tree, anchor, holders, count, nodes):
     """Whether the ends of both paths are in one region, or the second end is on its outline.
 
-    A path that ends on an arc crosses it or not, as it comes from one side or the other: alone, as where two arcs meet,
-    or with all that lie upon each other there.
+    A path that ends on an arc crosses it or not, as it comes from one side or the other: with those that coincide with
+    it, but without others that meet it there.
     """
     for j in range(count):
         put_holder(holders, j, FREE_PATH, 0)
     if are_even(holders, count, nodes):
         return True
     for j in range(count):
-        if holder(holders, j, OTHER_PATH) != FREE:
-            continue
-        own = cone_of(tree, anchor, holders, j)
-        for together in range(2):
+        if holder(holders, j, OTHER_PATH) == FREE:
             for k in range(count):
-                face = cone_of(tree, anchor, holders, k).face
-                level = lean_sign(face, own.first) == 0 and lean_sign(face, own.second) == 0
-                put_holder(holders, k, FREE_PATH, k == j or (together == 1 and level))
+                put_holder(holders, k, FREE_PATH, k == j or coincide(tree, anchor, holders, j, k))
             if are_even(holders, count, nodes):
                 return True
     return False
@@ -184,7 +179,7 @@ def _bounds_region(tree, anchor, holders, count, nodes, k, side, j, facing):
 
 class Behind(NamedTuple):
     """The face that a ray has behind it at its start: its number, the side of it that the ray is on, whether the ray
-    came through it, and the pile of ``holder_ahead``. Where the side is known to be that of a direction, that is
+    came through it, and the pile of ``_arc_ahead``. Where the side is known to be that of a direction, that is
     ``back``.
     """
 
@@ -198,7 +193,7 @@ class Behind(NamedTuple):
 
 @kernel
 def stopping_holder(tree, anchor, arcs, count, nodes, behind, d):
-    """The arc that stops a ray at its start, or NOT_STOPPED.
+    """The arc that stops a ray at its start, or NOT_STOPPED; and whether it is the next one of a pile.
 
     The ray starts in the region beside the arcs of a face, on one side of it. Where these bound several regions it is
     the one with ``back`` in it, else any of them. The ray is stopped where its direction d leads out of that region: by
@@ -207,13 +202,19 @@ def stopping_holder(tree, anchor, arcs, count, nodes, behind, d):
     own, is_open = _own_arc(tree, anchor, arcs, count, nodes, behind, d, behind.has_back)
     if own == NOT_STOPPED:
         own, is_open = _own_arc(tree, anchor, arcs, count, nodes, behind, d, False)
-    if own == NOT_STOPPED or is_open:
-        return NOT_STOPPED
+    if own == NOT_STOPPED:
+        return NOT_STOPPED, False
+    if behind.through:
+        ahead = _arc_ahead(tree, anchor, arcs, count, own, behind, d)
+        if ahead != NOT_STOPPED:
+            return ahead, True
+    if is_open:
+        return NOT_STOPPED, False
     last = np.int64(-1)
     while True:
         j = _next_face(arcs, count, last)
         if j == NOT_STOPPED:
-            return NOT_STOPPED
+            return NOT_STOPPED, False
         last = holder(arcs, j, NUMBER)
         facing = -slope_of(cone_of(tree, anchor, arcs, j).face, d)
         for k in range(count):
@@ -223,7 +224,7 @@ def stopping_holder(tree, anchor, arcs, count, nodes, behind, d):
                 and _bounds_region(tree, anchor, arcs, count, nodes, own, behind.side, k, facing)
                 and not _bounds_region(tree, anchor, arcs, count, nodes, own, behind.side, k, -facing)
             ):
-                return k
+                return k, False
 
 
 @kernel
@@ -243,19 +244,19 @@ def _own_arc(tree, anchor, arcs, count, nodes, behind, d, has_back):
 
 
 @kernel
-def holder_ahead(tree, anchor, holders, count, face, side, pile, d):
-    """The next holder that coincides with ``face``, which a ray has just gone through to one side, or NOT_STOPPED.
+def _arc_ahead(tree, anchor, arcs, count, own, behind, d):
+    """The next arc that coincides with the one behind a ray, which has just gone through it, or NOT_STOPPED.
 
     The ray came upon the pile of faces that coincide there at the face ``pile``. From that on it goes through them in
     the order of their numbers, the lowest after the highest, however it leads on to that side.
     """
-    own, best = holder_of(holders, count, face), NOT_STOPPED
-    if own == NOT_STOPPED or slope_of(cone_of(tree, anchor, holders, own).face, d) != side:
+    best = NOT_STOPPED
+    if slope_of(cone_of(tree, anchor, arcs, own).face, d) != behind.side:
         return NOT_STOPPED
     for j in range(count):
-        number = holder(holders, j, NUMBER)
-        sooner = best == NOT_STOPPED or _is_after(holder(holders, best, NUMBER), number, pile)
-        if _is_after(number, face, pile) and sooner and coincide(tree, anchor, holders, own, j):
+        number = holder(arcs, j, NUMBER)
+        sooner = best == NOT_STOPPED or _is_after(holder(arcs, best, NUMBER), number, behind.pile)
+        if _is_after(number, behind.face, behind.pile) and sooner and coincide(tree, anchor, arcs, own, j):
             best = j
     return best
 

@@ -56,7 +56,7 @@ from renderer.trace.starts.record import (
     start_at,
     way_back,
 )
-from renderer.trace.starts.region import NOT_STOPPED, Behind, bounding_holder, holder_ahead, holder_of, stopping_holder
+from renderer.trace.starts.region import NOT_STOPPED, Behind, bounding_holder, holder_of, stopping_holder
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
@@ -116,16 +116,12 @@ def _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, count):
 @kernel
 def _stopped(tree, behind, anchor, count, d, slope, dz, holders):
     """The hit (t, face, u, v, w) that stops a ray at its start, which ``count`` faces hold; NO_FACE for none."""
-    k, t = NOT_STOPPED, AHEAD
-    if behind.through:
-        k = holder_ahead(tree, anchor, holders, count, behind.face, behind.side, behind.pile, d)
-    if k == NOT_STOPPED:
-        holders, number, nodes = arcs_of(tree, anchor, holders, count)
-        k, t = stopping_holder(tree, anchor, holders, number, nodes, behind, d), 0.0
+    arcs, number, nodes = arcs_of(tree, anchor, holders, count)
+    k, ahead = stopping_holder(tree, anchor, arcs, number, nodes, behind, d)
     if k == NOT_STOPPED:
         return _NOTHING
-    met = meet_face(seen_from(tree, holder(holders, k, PLACE), anchor), anchor, d, slope, dz)
-    return t, np.int32(holder(holders, k, NUMBER)), met.u, met.v, met.w
+    met = meet_face(seen_from(tree, holder(arcs, k, PLACE), anchor), anchor, d, slope, dz)
+    return AHEAD if ahead else 0.0, np.int32(holder(arcs, k, NUMBER)), met.u, met.v, met.w
 
 
 class Departure(NamedTuple):
