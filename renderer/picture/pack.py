@@ -102,6 +102,9 @@ def _winding(mesh: Mesh, point: tuple[float, float, float]) -> float:
         dots = [np.einsum("nk,nk->n", v, w) for v, w in ((a, b), (b, c), (c, a))]
         denominator = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
         volume = np.einsum("nk,nk->n", a, np.cross(b, c))
+        if ((volume == 0.0) & (denominator <= 0.0)).any():
+            # On the surface: rays from there into the mesh enter it, and others leave what they were never in.
+            return 0.0
         return float(2.0 * np.arctan2(volume, denominator).sum() / (4.0 * np.pi))
 
 

@@ -21,7 +21,8 @@ from renderer.kernels.pairs import (
 )
 from renderer.kernels.simd import get, larger, pointer, put, smaller
 from renderer.kernels.vec3 import dot, largest_component, row3, scale, sub, three
-from renderer.trace.intersect import ROOM
+from renderer.trace.intersect import CORNER, ROOM
+from renderer.trace.starts.record import EDGE, SLACK, slack_of, start_pointers
 
 # A product of pairs errs by 7 * 2^-106 of itself, a sum by 3 * 2^-106. So a component of the normal errs by 2^-102 of
 # its two products, and its scalar product with a vector by 2^-100 of all; the rest is room for what adds these up.
@@ -41,10 +42,11 @@ _LEAST_NORMAL = 2.0**-1022
 def bound_errors(vertices, faces, rays, t, face, errors, bounds):
     """Write the bounds of the errors of the hits begin:end to ``errors``; NaN where a ray hits nothing.
 
-    ``rays`` are origins, directions, each with one row for all or one each, and the ray of each hit, or no row where it
-    is the hit's own. ``bounds`` are begin, end, and the tree's scale, in whose units no product overflows.
+    ``rays`` are origins, directions, each with one row for all or one each, starts as of ``RayBatch``, and the ray of
+    each hit, or no row where it is the hit's own. ``bounds`` are begin, end, and the tree's scale, in whose units no product overflows.
     """
-    origins, directions, rows = rays
+    origins, directions, given, rows = rays
+    starts = start_pointers(given)
     origin_step, direction_step = 3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1)
     corners, own = pointer(vertices), len(rows) == 0
     begin, end, unit = bounds
@@ -57,15 +59,26 @@ def bound_errors(vertices, faces, rays, t, face, errors, bounds):
             a, b, c = row3(pointer(faces), row)
             p0, p1, p2 = row3(corners, a), row3(corners, b), row3(corners, c)
             p0, p1, p2, at = scale(p0, unit), scale(p1, unit), scale(p2, unit), get(pointer(t), i) * unit
-            plane, box = _plane_error(p0, p1, p2, o, d, at), _box_error(sub(p0, o), sub(p1, o), sub(p2, o), d, at)
+            off = _off(o, get(starts.rows, ray * starts.step + SLACK))
+            plane = _plane_error(p0, p1, p2, o, d, at, off)
+            box = _box_error(sub(p0, o), sub(p1, o), sub(p2, o), d, at, off)
             # False for NaN too, of a plane of which nothing is known.
             error = ((plane if plane < box else box) * _MORE + _LEAST) / unit + _LEAST
         put(pointer(errors), i, error)
 
 
+@inlined
+def _off(o, slack):
+    """How far a ray's origin o is from its start on the surface at most, along each axis: from an edge it is rounded,
+    else moved by less than the slack; from a corner it starts exactly.
+    """
+    return slack_of(o, 0.0) if slack == EDGE else (0.0 if slack == CORNER else slack)
+
+
 @kernel
-def _plane_error(p0, p1, p2, o, d, t):
-    """How far t may be from where a ray meets a face's plane, inf where rounding may have made that.
+def _plane_error(p0, p1, p2, o, d, t, off):
+    """How far t may be from where a ray meets a face's plane, inf where rounding may have made that. The ray may start
+    ``off`` its origin.
 
     With n the plane's normal, t is off by (n . (p0 - o) - t n . d) / (n . d). Sides, distances and the direction are
     scaled by powers of two to less than 4, so that no product overflows.
@@ -82,6 +95,8 @@ def _plane_error(p0, p1, p2, o, d, t):
     vanished = _VANISHED / smaller(1.0, smaller(far, side))
     slope_error = _PAIRS * dot(sizes, _sizes(d)) + vanished
     left_error = _PAIRS * dot(sizes, _sizes(heads(corner))) + vanished + t * slope_error
+    x, y, z = _sizes(heads(normal))
+    left_error += off / far * (x + y + z)
     least = abs(slope[0]) - slope_error
     return ((abs(left) + left_error) / least * far + _LEAST) / unit if least > 0.0 else np.inf
 
@@ -99,7 +114,7 @@ def _cross_sizes(a, b):
 
 
 @kernel
-def _box_error(q0, q1, q2, d, t):
+def _box_error(q0, q1, q2, d, t, off):
     """How far t may be from where a ray meets a face, whose corners are relative to the origin, by the face's box.
 
     The box is wider than the face by ROOM, so that a ray that passes a face by only by rounding meets its plane within,
@@ -107,7 +122,8 @@ def _box_error(q0, q1, q2, d, t):
     """
     largest, first, last, before, behind = 0.0, -np.inf, np.inf, -np.inf, np.inf
     for k in range(3):
-        near, far = _meet_slab(smaller(q0[k], smaller(q1[k], q2[k])), larger(q0[k], larger(q1[k], q2[k])), d[k])
+        low, high = smaller(q0[k], smaller(q1[k], q2[k])) - off, larger(q0[k], larger(q1[k], q2[k])) + off
+        near, far = _meet_slab(low, high, d[k])
         if abs(d[k]) > largest:
             largest, before, behind = abs(d[k]), near, far
         first, last = larger(first, near), smaller(last, far)
