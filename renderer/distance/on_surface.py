@@ -18,9 +18,8 @@ from renderer.trace.starts.record import BARYCENTRIC
 
 Floats = NDArray[np.float64]
 
-# How far a point of the surface may be from it, as a share of its largest coordinate, where all coordinates are numbers
-# of float32: 64 roundings of these. Else it is DOUBLE.
-_SINGLE = 2.0**-18
+# How far a point that went through float32 may be off along each axis, as a share of its coordinate: 8 roundings.
+_SINGLE = 2.0**-21
 
 
 class SurfacePoints(NamedTuple):
@@ -28,7 +27,7 @@ class SurfacePoints(NamedTuple):
 
     faces    (n,) int64, the face that each lies on, -1 for a point that lies on none
     codes    (n,) int64, BARYCENTRIC of ``starts.record`` or 0: how the anchors are given
-    anchors  (n, 3) float64: at edges and corners barycentrics u and v, where exactly 0 or 1, and 0; else the point
+    anchors  (n, 3) float64: the place, if it is one of float64, else its barycentrics u and v, and 0
     """
 
     faces: NDArray[np.int64]
@@ -38,26 +37,49 @@ class SurfacePoints(NamedTuple):
 
 def on_surface(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64], threads: int) -> SurfacePoints:
     """The places of points (n, 3) on the surface: on ``faces`` (n,), or where these are -1 on the nearest face, if it
-    is as near as a rounding.
+    is as near as DOUBLE of the point's largest coordinate; or, for a point of float32 numbers, if no coordinate is
+    farther off than _SINGLE of itself.
 
     A point as near to an edge or corner is taken for one on it.
     """
-    room = _room(points)
-    faces = faces.copy()
+    room, faces = DOUBLE * np.abs(points).max(axis=1, initial=0.0), faces.copy()
+    rough, named = _are_single(points), np.flatnonzero(faces >= 0)
+    # Of those on their faces to float64, nothing was lost.
+    rough[named] &= distances_from(mesh, points[named], faces[named]) > room[named]
     unknown = np.flatnonzero(faces < 0)
     if len(unknown) and len(mesh.faces):
         faces[unknown] = closest_point(tree, mesh, points[unknown], room[unknown], threads).face
+        rough[unknown] &= faces[unknown] < 0
+        unknown = unknown[rough[unknown]]
+        faces[unknown] = _near_faces(tree, mesh, points[unknown], threads)
+    room[rough] = _SINGLE * np.abs(points[rough]).max(axis=1, initial=0.0)
     anchors, codes = np.zeros((len(points), 3)), np.zeros(len(points), np.int64)
     anchor_all(mesh.vertices, mesh.faces, points, faces, room, codes, anchors)
     return SurfacePoints(faces, codes, anchors)
 
 
+def _are_single(points: Floats) -> NDArray[np.bool_]:
+    """Whether all coordinates of points are numbers of float32."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return (points == points.astype(np.float32)).all(axis=1)
+
+
+def _near_faces(tree: Tree, mesh: Mesh, points: Floats, threads: int) -> NDArray[np.int64]:
+    """The faces that points lie on but for _SINGLE of each coordinate, -1 for none."""
+    room = _SINGLE * np.abs(points)
+    near = closest_point(tree, mesh, points, 2.0 * room.max(axis=1, initial=0.0), threads)
+    # How far the way to the nearest point is along itself, against what the roundings may be along it.
+    way = np.abs(points - near.points)
+    return np.where((way * way).sum(axis=1) <= (way * room).sum(axis=1), near.face, -1)
+
+
 def places_of(mesh: Mesh, points: Floats, places: SurfacePoints) -> Floats:
-    """Points (n, 3), those at edges and corners moved to their places there."""
-    found = points.copy()
-    on = np.flatnonzero(places.codes == BARYCENTRIC)
-    u, v = places.anchors[on, :2].T
-    found[on] = points_on(mesh, places.faces[on], u, v)
+    """Points (n, 3), those on the surface moved to their places there."""
+    found, on = points.copy(), places.faces >= 0
+    found[on] = places.anchors[on]
+    rounded = np.flatnonzero(on & (places.codes == BARYCENTRIC))
+    u, v = places.anchors[rounded, :2].T
+    found[rounded] = points_on(mesh, places.faces[rounded], u, v)
     return found
 
 
@@ -87,10 +109,3 @@ def distances_from(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> Floa
 def are_on(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether points (n, 3) lie on faces (n,), within the roundings of float64."""
     return distances_from(mesh, points, faces) <= DOUBLE * np.abs(points).max(axis=1, initial=0.0)
-
-
-def _room(points: Floats) -> Floats:
-    """How far each point may be from the surface that it lies on."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        single = (points == points.astype(np.float32)).all(axis=1)
-    return np.where(single, _SINGLE, DOUBLE) * np.abs(points).max(axis=1, initial=0.0)

@@ -1,10 +1,11 @@
 """Where on a face a point lies, as barycentrics that are exact at edges and corners; and how far it is from there."""
 
+import numpy as np
+
 from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, heads, power_below, scaled_difference
 from renderer.kernels.simd import pointer, smaller
 from renderer.kernels.vec3 import (
-    barycentric,
     cross,
     dot,
     largest_component,
@@ -14,7 +15,8 @@ from renderer.kernels.vec3 import (
     scale,
     sub,
 )
-from renderer.trace.starts.record import BARYCENTRIC
+from renderer.trace.starts.anchor import anchor_of, far_from
+from renderer.trace.starts.record import BARYCENTRIC, Start
 
 # 32 roundings of float64.
 DOUBLE = 2.0**-48
@@ -26,17 +28,22 @@ _EXACT = 2.0**-80
 def anchor_all(vertices, faces, points, chosen, room, codes, anchors):
     """Write codes and anchors of points on faces ``chosen`` (n,); of face -1 nothing.
 
-    Nearer to an edge than its ``room`` (n,), a point is on it. A point that lies inside a face, within roundings of
-    float64, or exactly on an edge, stays as it is: it may lie exactly on other faces, as at the foot of a wall.
+    Nearer to an edge than its ``room`` (n,), a point is on it. At a corner the anchor is the corner. A point that lies
+    inside a face, within roundings of float64, or exactly on an edge, is its own anchor: it may lie exactly on other
+    faces, as at the foot of a wall. Else the anchor has barycentrics.
     """
     for i in range(len(points)):
         if chosen[i] >= 0:
-            corners, o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
-            u, v = _weights_of(corners, o, room[i])
-            stays = _is_exact(corners, u, v, o) and _is_near(corners, u, v, o)
-            codes[i] = 0 if stays else BARYCENTRIC
+            (p0, p1, p2), o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
+            u, v = _weights_of((p0, p1, p2), o, room[i])
+            code, anchor = np.int64(0), o
+            if u == 1.0 or v == 1.0 or (u == 0.0 and v == 0.0):
+                anchor = p1 if u == 1.0 else (p2 if v == 1.0 else p0)
+            elif not (_is_exact((p0, p1, p2), u, v, o) and _distance((p0, p1, p2), o) <= DOUBLE * largest_component(o)):
+                code, anchor = np.int64(BARYCENTRIC), (u, v, 0.0)
+            codes[i] = code
             for k in range(3):
-                anchors[i, k] = o[k] if stays else (u, v, 0.0)[k]
+                anchors[i, k] = anchor[k]
 
 
 @kernel
@@ -52,13 +59,6 @@ def _is_exact(corners, u, v, o):
 
 
 @inlined
-def _is_near(corners, u, v, o):
-    """Whether a point is as near to its place on a face as roundings of float64."""
-    place = barycentric(corners[0], corners[1], corners[2], u, v)
-    return largest_component(sub(place, o)) <= DOUBLE * largest_component(o)
-
-
-@inlined
 def _is_between(p, q, o):
     """Whether a point is on the line of two others, told with twice the digits."""
     unit = 1.0 / power_below(largest_component(sub(q, p)))
@@ -70,9 +70,14 @@ def _is_between(p, q, o):
 def measure_all(vertices, faces, points, chosen, distances):
     """Write how far points are from faces, along the axis where they are farthest."""
     for i in range(len(points)):
-        o, (p0, p1, p2) = row3(pointer(points), i), _corners(pointer(vertices), pointer(faces), chosen[i])
-        u, v = _weights_of((p0, p1, p2), o, 0.0)
-        distances[i] = largest_component(sub(o, barycentric(p0, p1, p2, u, v)))
+        corners = _corners(pointer(vertices), pointer(faces), chosen[i])
+        distances[i] = _distance(corners, row3(pointer(points), i))
+
+
+@kernel
+def _distance(corners, o):
+    """How far a point is from a face, along the axis where it is farthest, with twice the digits."""
+    return far_from(anchor_of(Start(corners, o, 0, 0)), o)
 
 
 @inlined

@@ -35,8 +35,9 @@ def occlusion(
     directions  (k, 3), the same for all points, of any length as those of rays
     weights     (k,) >= 0, not all 0: what each direction counts; None: all the same
     leaving     the face that each point lies on, (...) or one for all, -1 where that is not known; None: -1 for all. A
-                point is then on the surface where it is as near as 64 roundings of float32, if all its coordinates are
-                numbers of float32, else 32 of float64. Rays start at the point of the face that is nearest: no epsilon
+                point is then on the surface where it is as near as 32 roundings of float64 of its largest coordinate;
+                or, if all its coordinates are numbers of float32, where each is as near as 8 of its own roundings to
+                float32. Rays start at the point of the face that is nearest: no epsilon
                 is needed. The normal says on which side of the faces there the point is: directions that lead through
                 them to another side are hidden. Without a normal the faces that hold the point hide nothing
     packed      True: (..., ceil(k / 8)) uint8 with a set bit for each hidden direction, in the order of

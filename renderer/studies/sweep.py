@@ -259,10 +259,10 @@ def _begin_on_edge(tree, starts, work, i, n, has_horizon):
         if side.face >= 0:
             code = np.int64(get(own, CODE))
             if side.face != np.int64(get(own, FACE)):
-                # The side is that of another face, which then is the one that the rays leave.
+                # The side is that of another face, which then is the one that the rays leave. A point is on both.
                 put(own, FACE, np.float64(side.face))
-                _put3(own, ANCHOR, (side.u, side.v, 0.0))
-                code = np.int64(BARYCENTRIC)
+                if code & BARYCENTRIC != 0:
+                    _put3(own, ANCHOR, (side.u, side.v, 0.0))
             put(own, CODE, np.float64(code | side.code))
 
 

@@ -218,9 +218,9 @@ def _side_at(octree: Queries, face: int, code: int, anchor: Floats, normal: Floa
     row[FACE], row[CODE], row[ANCHOR : ANCHOR + 3] = face, code, anchor
     stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
     found = Side(*side_of(tree.words, mesh.vertices, mesh.faces, row, tuple(normal.tolist()), stack, memory))
-    if found.face in (face, -1):
-        return _Place(face, code | found.code, anchor)
-    return _Place(found.face, BARYCENTRIC | found.code, np.array([found.u, found.v, 0.0]))
+    if found.face >= 0 and found.face != face and code & BARYCENTRIC:
+        anchor = np.array([found.u, found.v, 0.0])
+    return _Place(face if found.face < 0 else found.face, code | found.code, anchor)
 
 
 def _expect_octree(octree: Queries) -> None:

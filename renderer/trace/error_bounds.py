@@ -43,7 +43,8 @@ def bound_errors(vertices, faces, rays, t, face, errors, bounds):
     """Write the bounds of the errors of the hits begin:end to ``errors``; NaN where a ray hits nothing.
 
     ``rays`` are origins, directions, each with one row for all or one each, starts as of ``RayBatch``, and the ray of
-    each hit, or no row where it is the hit's own. ``bounds`` are begin, end, and the tree's scale, in whose units no product overflows.
+    each hit, or no row where it is the hit's own. ``bounds`` are begin, end, and the tree's scale, in whose units no
+    product overflows.
     """
     origins, directions, given, rows = rays
     starts = start_pointers(given)

@@ -310,8 +310,12 @@ def coincide(tree, anchor, holders, k, j):
 @kernel
 def bounding_holder(tree, anchor, arcs, count, nodes, n, face):
     """The arc that bounds the region with direction n in it, and the side of it: of ``face`` if one does, else the one
-    that n is most across, lower ones first. NOT_STOPPED for none.
+    that n is most across, lower ones first. NOT_STOPPED for none. Where n lies along faces it is on the side of the
+    lowest one's normal.
     """
+    along = _arc_along(tree, anchor, arcs, count, n)
+    if along != NOT_STOPPED:
+        return _of_face(tree, anchor, arcs, count, nodes, along, 1, face)
     most, last = np.inf, NOT_STOPPED
     for _ in range(count):
         most, last = _next_across(tree, anchor, arcs, count, n, most, last)
@@ -320,6 +324,17 @@ def bounding_holder(tree, anchor, arcs, count, nodes, n, face):
             if _is_open(tree, anchor, arcs, count, nodes, last, side, n):
                 return _of_face(tree, anchor, arcs, count, nodes, last, side, face)
     return NOT_STOPPED, 0
+
+
+@kernel
+def _arc_along(tree, anchor, arcs, count, n):
+    """The arc of the lowest face that a direction lies on, or NOT_STOPPED."""
+    found = NOT_STOPPED
+    for k in range(count):
+        cone = cone_of(tree, anchor, arcs, k)
+        if slope_of(cone.face, n) == 0 and within_cone(cone, as_pairs(n)) >= 0:
+            found = _lower(arcs, found, k)
+    return found
 
 
 @kernel
