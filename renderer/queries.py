@@ -232,7 +232,7 @@ class Queries:
         mesh, tree = built
         rays, shape = check_rays(origins, directions, t_min, t_max)
         if leaving is None:
-            expect(side is None, "side", "None without leaving", "an array")
+            expect(side is None, "side", "None without leaving", repr(side)[:40])
             return rays, shape
         left = check_leaving(leaving, side, shape, len(mesh.faces))
         return moved_off(rays, left, mesh, tree.scale, self.threads), shape

@@ -74,8 +74,8 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
 
     A face that is seen only between these points counts as hidden; one that counts as seen is seen there. Rays leave
     the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
-    only what looks to the eye. An eye on the surface is not hidden by the faces that hold it; see ``octree.visible``,
-    which this calls. A face without area is not seen, and neither is one whose plane the eye lies in,
+    an eye outside sees only what looks to it. The faces that hold an eye hide nothing, so an eye on a closed mesh sees
+    it from inside, too; see ``octree.visible``, which this calls. A face without area is not seen, and neither is one whose plane the eye lies in,
     which no rounding tells. Raises ``ValueError`` naming the argument.
 
     >>> from renderer import Octree
@@ -174,7 +174,7 @@ def scan(
     place = _one_place("origin", origin, octree)
     ways = _ways(pattern)
     reach = limits_of(distance, ways)
-    towards = None if normal is None else check_directions("normal", np.reshape(normal, (1, -1)))[0]
+    towards = None if normal is None else _one_direction("normal", normal)
     parts: list[Scan] = []
     with progress_bar(len(ways), "ray", flag_argument("progress", progress)) as update:
         for begin in range(0, len(ways), _ROWS):
@@ -231,6 +231,11 @@ def _one_place(argument: str, place: ArrayLike, octree: Queries) -> Floats:
     rows, shape = check_points(argument, place, farthest_of(octree.tree.scale))
     expect(shape == (), argument, "shape (3,)", f"shape {(*shape, 3)}")
     return rows[0]
+
+
+def _one_direction(argument: str, direction: ArrayLike) -> Floats:
+    expect(np.shape(direction) == (3,), argument, "shape (3,)", f"shape {np.shape(direction)}")
+    return check_directions(argument, np.reshape(direction, (1, 3)))[0]
 
 
 def _rows_of(camera: Camera, width: int, height: int) -> Floats:

@@ -26,7 +26,7 @@ def check_leaving(
 
 
 def _by_hits(leaving: Hits | Passage, side: ArrayLike | None, shape: tuple[int, ...], most: int) -> Leaving:
-    expect(side is None, "side", "None, as the hits say it", "an array")
+    expect(side is None, "side", "None, as the hits say it", repr(side)[:40])
     expect(leaving.face.shape == shape, "leaving", f"hits of shape {shape}", f"shape {leaving.face.shape}")
     faces = check_faces("leaving", leaving.face, shape, most)
     anchors = np.zeros((len(faces), 3))
