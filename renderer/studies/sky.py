@@ -56,9 +56,7 @@ def sky_view_factor(
     ``points``, ``leaving``, ``distance``, ``threads`` and ``progress`` as for ``occlusion``. Each patch is open or not
     as one ray to its middle says. Sums over open patches are divided by sums over all: for "cosine" of weight times
     |d . n|, as the patches and their opposites cover the sphere. So rounding apart a level point in the open has 1
-    whatever the patches, and a wall 1/2 by "cosine" with Tregenza's or Reinhart's, which come in opposite pairs. A
-    patch whose middle is in the plane of a wall is hidden by it: by "geometric" a wall that is across an axis has
-    .45 with Tregenza's, and 1/2 with many patches of ``fibonacci_hemisphere``.
+    whatever the patches, and a wall 1/2 by "cosine" with Tregenza's or Reinhart's, which come in opposite pairs.
     Raises ``ValueError`` naming argument and row.
 
     Sources: Johnson, Watson, The determination of view-factors in urban canyons, 1984; Oke, Boundary Layer Climates,

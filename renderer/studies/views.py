@@ -73,10 +73,10 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
           centroid alone
 
     A face that is seen only between these points counts as hidden; one that counts as seen is seen there. Rays leave
-    the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed
-    mesh an eye outside sees only what looks to it. The faces that hold an eye hide nothing, so an eye on a closed
-    mesh sees it from inside, too; see ``octree.visible``, which this calls. A face without area is not seen, and
-    neither is one whose plane the eye lies in, which no rounding tells. Raises ``ValueError`` naming the argument.
+    the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
+    only what looks to the eye. An eye on the surface is not hidden by the faces that hold it; see ``octree.visible``,
+    which this calls. A face without area is not seen, and neither is one whose plane the eye lies in,
+    which no rounding tells. Raises ``ValueError`` naming the argument.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
