@@ -152,7 +152,7 @@ HITS = (
             "met.kind == IS_HIT", "met.kind >= IS_HIT"),
     _kernel("hits", "a ray passes faces that coincide all at once", "_arc_ahead",
             "_is_after(number, behind.face, behind.pile) and sooner and coincide(tree, anchor, arcs, own, j)", "False"),
-    _kernel("hits", "the foot of a wall does not part the face that it stands on", "_cut",
+    _kernel("hits", "the foot of a wall does not part the face that it stands on", "arcs._cut",
             "not _are_cut(tree, anchor, holders, count)", "True"),
     _kernel("hits", "a fin stops rays that start beside it", "stopping_holder",
             "not _bounds_region(tree, anchor, arcs, count, nodes, own, behind.side, k, -facing)", "True"),
