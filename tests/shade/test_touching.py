@@ -98,6 +98,14 @@ class TestOnTheGround:
         image = render(what, resolution=(1, 1), max_depth=3)
         assert image.radiance[0, 0, 2] == pytest.approx(1000 * 0.9 * 0.96**2, rel=REL)
 
+    @pytest.mark.parametrize("order", [1, -1])
+    def test_of_two_grounds_in_one_plane_the_earlier_one_is_seen_through_glass(self, order: int) -> None:
+        red, green = (Phong(diffuse=0.0, ambient=color) for color in ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0)))
+        grounds = [(level(0.0), red), (level(0.0, turned=True), green)][::order]
+        image = picture(scene((cube(0.0), clear(1.5)), *grounds, eye=(0.1, 5.0, 0.2), target=(0.1, 0.0, 0.0), fov=2))
+        seen = image.radiance.reshape(-1, 3).astype(np.float64)
+        assert (seen[:, 0 if order == 1 else 1] > 0.4).all() and (seen[:, 1 if order == 1 else 0] == 0.0).all()
+
     def test_in_a_corner_of_walls(self) -> None:
         walls = [
             (box((-2.0, -1.0, -2.0), (2.0, 0.0, 2.0)), GROUND),
@@ -149,6 +157,22 @@ class TestGlassOnGlass:
         assert passed(50, 1, 1.5, 1) == pytest.approx(0.888, abs=5e-4)
 
     @pytest.mark.parametrize("iors", [(1.5, 1.33, 1.8), (1.2, 2.4, 1.2), (1.33, 1.5, 1.33), (1.5, 1.5, 1.7)])
+    @pytest.mark.parametrize("eye", [(0.3, 1.0, 0.2), (0.5, 1.0, 0.5), (-1.0, 0.25, 0.1), (0.2, 0.0, 0.3)])
+    def test_an_eye_on_glass_that_looks_in_is_outside(self, eye: Any) -> None:
+        """Straight through two sides, each of which passes 96 %, whichever triangle the eye is on."""
+        body = box((-1, 0, -1), (1, 1, 1))
+        target = {1.0: (eye[0], -5, eye[2]), 0.0: (eye[0], 5, eye[2])}.get(eye[1], (5, eye[1], eye[2]))
+        image = picture(scene((body, clear(1.5)), eye=eye, target=target, fov=0.001), 1, max_depth=12)
+        assert image.radiance[0, 0, 2] == pytest.approx(1000.0 * 0.96**2, rel=1e-6)
+
+    @pytest.mark.parametrize("target", [(0.31, 3, 0.2), (5, 0.7, 0.1), (-5, 0.7, 0.1)])
+    def test_an_eye_where_two_boxes_touch_sees_what_it_sees_in_one(self, target: Any) -> None:
+        pair = [(box((-1, 0.5, -1), (0.3, 1, 1)), clear(1.5)), (box((0.3, 0.5, -1), (1, 1, 1)), clear(1.5))]
+        one = [(box((-1, 0.5, -1), (1, 1, 1)), clear(1.5))]
+        for eye in ((0.3, 0.6, 0.2), (0.3, 0.75, 0.0)):
+            seen = [picture(scene(*parts, eye=eye, target=target, fov=0.01), 1, max_depth=12) for parts in (pair, one)]
+            assert seen[0].radiance[0, 0, 2] == pytest.approx(float(seen[1].radiance[0, 0, 2]), rel=1e-6)
+
     @pytest.mark.parametrize("angle", [0.0, 33.0, 65.0])
     def test_three_media(self, iors: tuple[float, ...], angle: float) -> None:
         parts = [(slab(-k, 1 - k), clear(ior)) for k, ior in enumerate(iors)]

@@ -1,11 +1,14 @@
 """Starts where faces stand on others: the feet of walls, roofs at facades, seams with more corners, fins and piles."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
 from renderer import BruteForce, Octree
 from renderer.mesh.shapes import box
 from renderer.studies import fibonacci_sphere, occlusion, scan, sky_view_factor, sun_hours
+from validation.oracle.distance import cross, difference, dot
 
 BOTH = pytest.mark.parametrize("accelerator", [Octree, BruteForce])
 GROUND = np.array([[-10, -10, 0], [30, -10, 0], [-10, 30, 0]], float), np.array([[0, 1, 2]])
@@ -189,3 +192,28 @@ def test_ends_that_are_not_on_the_faces_they_name_are_errors():
         argument = ("points", "targets")[place]
         with pytest.raises(ValueError, match=rf"^{argument}: expected points on the faces that they name.* in row 0$"):
             octree.visible(*ends, **{name: 10})
+
+
+def test_how_far_off_a_point_may_be_follows_the_largest_coordinate_of_the_mesh():
+    octree = Octree([[-1000, -1000, 0], [1000, -1000, 0], [0, 1000, 0]], [[0, 1, 2]])
+    assert occlusion(octree, [0, 0, 1e-3], [0, 0, 1], [[0.1, 0.2, 1.0]], leaving=0) == 0.0
+    with pytest.raises(ValueError, match=r"^points: .* in row 0$"):
+        occlusion(octree, [[0, 0, 1e-2]], [0, 0, 1], [[0.1, 0.2, 1.0]], leaving=0)
+
+
+@BOTH
+def test_origins_a_rounding_beside_a_slanted_face_are_on_the_side_that_is_exact(accelerator):
+    """Nothing is named: a ray hits where its exact t is 0 or more."""
+    corners, rng = np.array([[0.1, 0.2, 0.35], [1.3, 0.15, 0.9], [0.25, 1.2, -0.4]]), np.random.default_rng(4)
+    origins, ways = rng.dirichlet(np.full(3, 5.0), 2000) @ corners, rng.normal(size=(2000, 3))
+    exact = [[Fraction(x) for x in corner] for corner in corners.tolist()]
+    normal = cross(difference(exact[1], exact[0]), difference(exact[2], exact[0]))
+    slopes = np.array([float(dot(normal, [Fraction(x) for x in way])) for way in ways.tolist()])
+    heights = [dot(normal, difference(exact[0], [Fraction(x) for x in origin])) for origin in origins.tolist()]
+    ahead = np.array(
+        [height == 0 or (height > 0) == (slope > 0) for height, slope in zip(heights, slopes, strict=True)]
+    )
+    steep = np.abs(slopes) > 0.01 * np.linalg.norm(ways, axis=1) * np.linalg.norm([float(x) for x in normal])
+    hit = accelerator(corners, [[0, 1, 2]]).closest_hit(origins, ways).hit
+    np.testing.assert_array_equal(hit[steep], ahead[steep])
+    assert 0.3 < hit.mean() < 0.7
