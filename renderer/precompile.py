@@ -36,7 +36,7 @@ from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene, SceneObject
 from renderer.shade.tile import render_tile
 from renderer.studies.hidden import occlusion
-from renderer.studies.views import visible_faces
+from renderer.studies.views import scan, visible_faces
 
 _TRIANGLE = Mesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 # An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.
@@ -108,8 +108,9 @@ def _wind() -> None:
 def _study() -> None:
     octree = Octree.from_mesh(_TRIANGLE)
     occlusion(octree, [0.1, 0.1, 1.0], None, [[0.0, 0.0, -1.0]])
-    # The face is seen edge-on.
+    # The face is seen edge-on, and the scanner stands on it.
     visible_faces(octree, [9.0, 0.1, 0.0])
+    scan(octree, [0.1, 0.1, 0.0], [[0.0, 0.0, 1.0]])
 
 
 def _search() -> None:
