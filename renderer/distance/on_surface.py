@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.distance.closest import closest_point
-from renderer.distance.place_on_face import DOUBLE, anchor_all, measure_all
+from renderer.distance.place_on_face import DOUBLE, SINGLE, anchor_all, measure_all
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.trace.hits import points_on
@@ -17,9 +17,6 @@ from renderer.trace.spawn import FARTHEST_START
 from renderer.trace.starts.record import BARYCENTRIC
 
 Floats = NDArray[np.float64]
-
-# How far a point that went through float32 may be off along each axis, as a share of its coordinate: 8 roundings.
-_SINGLE = 2.0**-21
 
 
 class SurfacePoints(NamedTuple):
@@ -38,23 +35,18 @@ class SurfacePoints(NamedTuple):
 def on_surface(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64], threads: int) -> SurfacePoints:
     """The places of points (n, 3) on the surface: on ``faces`` (n,), or where these are -1 on the nearest face, if it
     is as near as DOUBLE of the point's largest coordinate; or, for a point of float32 numbers, if no coordinate is
-    farther off than _SINGLE of itself.
+    farther off than SINGLE of itself.
 
     A point as near to an edge or corner is taken for one on it.
     """
-    room, faces = DOUBLE * np.abs(points).max(axis=1, initial=0.0), faces.copy()
-    rough, named = _are_single(points), np.flatnonzero(faces >= 0)
-    # Of those on their faces to float64, nothing was lost.
-    rough[named] &= distances_from(mesh, points[named], faces[named]) > room[named]
-    unknown = np.flatnonzero(faces < 0)
+    faces, rough, unknown = faces.copy(), _are_single(points), np.flatnonzero(faces < 0)
     if len(unknown) and len(mesh.faces):
-        faces[unknown] = closest_point(tree, mesh, points[unknown], room[unknown], threads).face
-        rough[unknown] &= faces[unknown] < 0
-        unknown = unknown[rough[unknown]]
+        room = DOUBLE * np.abs(points[unknown]).max(axis=1, initial=0.0)
+        faces[unknown] = closest_point(tree, mesh, points[unknown], room, threads).face
+        unknown = unknown[rough[unknown] & (faces[unknown] < 0)]
         faces[unknown] = _near_faces(tree, mesh, points[unknown], threads)
-    room[rough] = _SINGLE * np.abs(points[rough]).max(axis=1, initial=0.0)
     anchors, codes = np.zeros((len(points), 3)), np.zeros(len(points), np.int64)
-    anchor_all(mesh.vertices, mesh.faces, points, faces, room, codes, anchors)
+    anchor_all(mesh.vertices, mesh.faces, points, faces, rough, codes, anchors)
     return SurfacePoints(faces, codes, anchors)
 
 
@@ -65,8 +57,8 @@ def _are_single(points: Floats) -> NDArray[np.bool_]:
 
 
 def _near_faces(tree: Tree, mesh: Mesh, points: Floats, threads: int) -> NDArray[np.int64]:
-    """The faces that points lie on but for _SINGLE of each coordinate, -1 for none."""
-    room = _SINGLE * np.abs(points)
+    """The faces that points lie on but for SINGLE of each coordinate, -1 for none."""
+    room = SINGLE * np.abs(points)
     near = closest_point(tree, mesh, points, 2.0 * room.max(axis=1, initial=0.0), threads)
     # How far the way to the nearest point is along itself, against what the roundings may be along it.
     way = np.abs(points - near.points)
@@ -92,20 +84,20 @@ def check_on(mesh: Mesh, argument: str, points: Floats, faces: NDArray[np.int64]
     if not len(named):
         return
     largest = np.maximum(np.abs(points[named]).max(axis=1, initial=0.0), np.abs(mesh.vertices).max(initial=0.0))
-    far = distances_from(mesh, points[named], faces[named]) > FARTHEST_START * largest
+    far = _are_farther(mesh, points[named], faces[named], FARTHEST_START * largest)
     if far.any():
         row = int(named[far.argmax()])
         expected = f"points on the faces that they name, within {FARTHEST_START:.1g} times the largest coordinate"
         expect(False, argument, expected, f"{points[row].tolist()} and face {faces[row]} in row {row}")
 
 
-def distances_from(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> Floats:
-    """How far points (n, 3) are from faces (n,), along the axis where they are farthest."""
-    distances = np.empty(len(points))
-    measure_all(mesh.vertices, mesh.faces, points, faces, distances)
-    return distances
-
-
 def are_on(mesh: Mesh, points: Floats, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether points (n, 3) lie on faces (n,), within the roundings of float64."""
-    return distances_from(mesh, points, faces) <= DOUBLE * np.abs(points).max(axis=1, initial=0.0)
+    return ~_are_farther(mesh, points, faces, DOUBLE * np.abs(points).max(axis=1, initial=0.0))
+
+
+def _are_farther(mesh: Mesh, points: Floats, faces: NDArray[np.int64], most: Floats) -> NDArray[np.bool_]:
+    """Whether points (n, 3) are farther from faces (n,) than ``most`` (n,) along some axis."""
+    distances = np.empty(len(points))
+    measure_all(mesh.vertices, mesh.faces, points, faces, most, distances)
+    return distances > most

@@ -6,6 +6,7 @@ from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import cross_pairs, heads, power_below, scaled_difference
 from renderer.kernels.simd import pointer, smaller
 from renderer.kernels.vec3 import (
+    barycentric,
     cross,
     dot,
     largest_component,
@@ -18,32 +19,47 @@ from renderer.kernels.vec3 import (
 from renderer.trace.starts.anchor import anchor_of, far_from
 from renderer.trace.starts.record import BARYCENTRIC, Start
 
-# 32 roundings of float64.
-DOUBLE = 2.0**-48
+# 32 roundings of float64, and 8 of float32.
+DOUBLE, SINGLE = 2.0**-48, 2.0**-21
 # A point is exactly on an edge where the product of the ways along it and to the point is less, of ways of about 1.
 _EXACT = 2.0**-80
 
 
 @kernel
-def anchor_all(vertices, faces, points, chosen, room, codes, anchors):
+def anchor_all(vertices, faces, points, chosen, rough, codes, anchors):
     """Write codes and anchors of points on faces ``chosen`` (n,); of face -1 nothing.
 
-    Nearer to an edge than its ``room`` (n,), a point is on it. At a corner the anchor is the corner. A point that lies
-    inside a face, within roundings of float64, or exactly on an edge, is its own anchor: it may lie exactly on other
-    faces, as at the foot of a wall. Else the anchor has barycentrics.
+    Nearer to an edge than DOUBLE, a point is on it; one that is farther from its face, and ``rough`` (n,), if it is
+    nearer than SINGLE, both of its largest coordinate. At a corner the anchor is the corner. A point that lies inside a
+    face, within DOUBLE, or exactly on an edge, is its own anchor: it may lie exactly on other faces, as at the foot of
+    a wall. Else the anchor has barycentrics.
     """
     for i in range(len(points)):
         if chosen[i] >= 0:
-            (p0, p1, p2), o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
-            u, v = _weights_of((p0, p1, p2), o, room[i])
+            corners, o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
+            largest = largest_component(o)
+            u, v = _weights_of(corners, o, DOUBLE * largest)
+            near = _measured(corners, u, v, o, DOUBLE * largest) <= DOUBLE * largest
+            if rough[i] and not near:
+                u, v = _weights_of(corners, o, SINGLE * largest)
             code, anchor = np.int64(0), o
             if u == 1.0 or v == 1.0 or (u == 0.0 and v == 0.0):
-                anchor = p1 if u == 1.0 else (p2 if v == 1.0 else p0)
-            elif not (_is_exact((p0, p1, p2), u, v, o) and _distance((p0, p1, p2), o) <= DOUBLE * largest_component(o)):
+                anchor = corners[1] if u == 1.0 else (corners[2] if v == 1.0 else corners[0])
+            elif not (near and _is_exact(corners, u, v, o)):
                 code, anchor = np.int64(BARYCENTRIC), (u, v, 0.0)
             codes[i] = code
             for k in range(3):
                 anchors[i, k] = anchor[k]
+
+
+@inlined
+def _measured(corners, u, v, o, enough):
+    """How far a point is from a face, along the axis where it is farthest: with twice the digits, if it is not as near
+    as ``enough`` to the place of barycentrics u and v.
+    """
+    p0, p1, p2 = corners
+    distance = largest_component(sub(o, barycentric(p0, p1, p2, u, v)))
+    return distance if distance <= enough else far_from(anchor_of(Start(corners, o, 0, 0)), o)
 
 
 @kernel
@@ -67,17 +83,14 @@ def _is_between(p, q, o):
 
 
 @kernel
-def measure_all(vertices, faces, points, chosen, distances):
-    """Write how far points are from faces, along the axis where they are farthest."""
+def measure_all(vertices, faces, points, chosen, enough, distances):
+    """Write how far points are from faces, along the axis where they are farthest, but for rounding where that is no
+    more than ``enough`` (n,).
+    """
     for i in range(len(points)):
-        corners = _corners(pointer(vertices), pointer(faces), chosen[i])
-        distances[i] = _distance(corners, row3(pointer(points), i))
-
-
-@kernel
-def _distance(corners, o):
-    """How far a point is from a face, along the axis where it is farthest, with twice the digits."""
-    return far_from(anchor_of(Start(corners, o, 0, 0)), o)
+        corners, o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
+        u, v = _weights_of(corners, o, 0.0)
+        distances[i] = _measured(corners, u, v, o, enough[i])
 
 
 @inlined
