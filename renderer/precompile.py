@@ -66,7 +66,9 @@ def _trace(count: int) -> None:
 
 
 def _leave() -> None:
-    Octree.from_mesh(_TRIANGLE).any_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
+    octree = Octree.from_mesh(_TRIANGLE)
+    octree.any_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
+    octree.visible([0.1, 0.1, 0.0], [0.1, 0.1, 1.0], leaving=0)
 
 
 def _cut() -> None:

@@ -501,8 +501,8 @@ STUDIES = (
         "studies",
         "points that rounding put off the surface are not on it",
         "on_surface.on_surface",
-        "closest_point(tree, mesh, points[unknown], room[unknown], threads).face",
-        "closest_point(tree, mesh, points[unknown], 0.0 * room[unknown], threads).face",
+        "closest_point(tree, mesh, points[unknown], room, threads).face",
+        "closest_point(tree, mesh, points[unknown], 0.0 * room, threads).face",
     ),
     _python(
         "studies",
