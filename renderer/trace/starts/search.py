@@ -126,7 +126,7 @@ def _stopped(tree, behind, anchor, count, d, slope, dz, holders):
 
 class Departure(NamedTuple):
     """A ray as it leaves its start: as ``intersect.Ray``, its anchor, its direction scaled by a power of two, the
-    ``slope_there`` of that, and the power; whether it starts near an edge, from the rounded anchor; and of a ray that
+    ``slope_there`` of that, and the power; whether its origin is off the anchor; and of a ray that
     may be stopped how many faces hold the start.
     """
 
@@ -135,7 +135,7 @@ class Departure(NamedTuple):
     d: Any
     slope: int
     unit: float
-    edge: bool
+    is_off: bool
     holders: int
 
 
@@ -149,8 +149,8 @@ def depart(tree, starts, i, ray, stack, memory):
     start = start_at(starts, i, tree.scale)
     anchor = anchor_of(start)
     o, (d, unit) = rounded(anchor), unit_direction((ray.dx, ray.dy, ray.dz))
-    edge = ray.slack == EDGE
-    if edge or ray.slack == CORNER:
+    at_corner = ray.slack == CORNER
+    if at_corner or ray.slack == EDGE:
         ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, slack_of(o, 0.0), ray.leaving)
     stopped, slope, count = _NOTHING, slope_there(anchor, d), 0
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
@@ -161,7 +161,7 @@ def depart(tree, starts, i, ray, stack, memory):
             start.code & BACK != 0, way_back(starts, i),
         )  # fmt: skip
         stopped = _stopped(tree, behind, anchor, count, d, slope, dz, holders)
-    return Departure(ray, anchor, d, slope, unit, edge, count), stopped
+    return Departure(ray, anchor, d, slope, unit, not at_corner, count), stopped
 
 
 @kernel
@@ -177,14 +177,14 @@ def stopped_again(tree, departure, face, pile, memory):
 
 @inlined
 def near_bits(tree, block, departure, shear, seen):
-    """The bits of the faces of a block that are met from the exact start: of a ray from an edge those of which rounding
-    may have made the side that it passes on or the sign of t, of others those near the start.
+    """The bits of the faces of a block that are met from the exact start: those near it, and where the origin is off it
+    those of which that may have made the side that the ray passes on. So all are judged from one start.
     """
-    if not departure.edge and seen == 0:
+    if not departure.is_off and seen == 0:
         return np.int64(0)
     edges, _ = see_triangles(tree, block * BLOCK_WORDS, shear)
     near = seen & near_planes(edges, departure.ray.slack)
-    return near | unsure_sides(edges, departure.ray.slack) if departure.edge else near
+    return near | unsure_sides(edges, departure.ray.slack) if departure.is_off else near
 
 
 @inlined
