@@ -10,7 +10,15 @@ import numpy as np
 
 from renderer.kernels.expansions import OUT_OF_RANGE, PARTS, expand_area, expand_volume, pair_of
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, dot_pairs, length_pair, power_below, quotient, scaled_difference
+from renderer.kernels.pairs import (
+    cross_pairs,
+    dot_pairs,
+    length_pair,
+    negative,
+    power_below,
+    quotient,
+    scaled_difference,
+)
 from renderer.kernels.signs import UNDECIDED, lies_within, volume_sign
 from renderer.kernels.simd import larger, put
 
@@ -152,7 +160,7 @@ def _distance_to_edge(a, b, p, seen, edge, parts):
     """The distance of the point from the edge from a to b, in units of its reach, and the share of the way from a."""
     pa, pb, ab = edge
     if _precedes(b, a):
-        d, t = _distance_to_ordered(b, a, p, seen, (pb, pa, _negative(ab)), parts)
+        d, t = _distance_to_ordered(b, a, p, seen, (pb, pa, negative(ab)), parts)
         return d, 1.0 - t
     return _distance_to_ordered(a, b, p, seen, edge, parts)
 
@@ -189,8 +197,3 @@ def _rounded(pair):
 def _precedes(a, b):
     """The order of two corners, by x, then y, then z."""
     return a[0] < b[0] or (a[0] == b[0] and (a[1] < b[1] or (a[1] == b[1] and a[2] < b[2])))
-
-
-@inlined
-def _negative(a):
-    return (-a[0][0], -a[0][1]), (-a[1][0], -a[1][1]), (-a[2][0], -a[2][1])

@@ -17,7 +17,7 @@ from renderer.kernels.vec3 import (
     sub,
 )
 from renderer.trace.starts.anchor import anchor_of, far_from
-from renderer.trace.starts.record import BARYCENTRIC, Start
+from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
 
 # 32 roundings of float64, and 8 of float32.
 DOUBLE, SINGLE = 2.0**-48, 2.0**-21
@@ -36,7 +36,7 @@ def anchor_all(vertices, faces, points, chosen, rough, codes, anchors):
     """
     for i in range(len(points)):
         if chosen[i] >= 0:
-            corners, o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
+            corners, o = corners_of(pointer(vertices), pointer(faces), chosen[i], 1.0), row3(pointer(points), i)
             largest = largest_component(o)
             u, v = _weights_of(corners, o, DOUBLE * largest)
             near = _measured(corners, u, v, o, DOUBLE * largest) <= DOUBLE * largest
@@ -88,15 +88,9 @@ def measure_all(vertices, faces, points, chosen, enough, distances):
     more than ``enough`` (n,).
     """
     for i in range(len(points)):
-        corners, o = _corners(pointer(vertices), pointer(faces), chosen[i]), row3(pointer(points), i)
+        corners, o = corners_of(pointer(vertices), pointer(faces), chosen[i], 1.0), row3(pointer(points), i)
         u, v = _weights_of(corners, o, 0.0)
         distances[i] = _measured(corners, u, v, o, enough[i])
-
-
-@inlined
-def _corners(vertices, faces, face):
-    a, b, c = row3(faces, face)
-    return row3(vertices, a), row3(vertices, b), row3(vertices, c)
 
 
 @inlined

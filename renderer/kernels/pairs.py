@@ -121,6 +121,12 @@ def length_pair(a):
 
 
 @kernel
+def negative(a):
+    """A vector of pairs the other way."""
+    return (-a[0][0], -a[0][1]), (-a[1][0], -a[1][1]), (-a[2][0], -a[2][1])
+
+
+@kernel
 def heads(a):
     """A vector of pairs, rounded to float64."""
     return a[0][0], a[1][0], a[2][0]

@@ -11,6 +11,7 @@ from renderer.kernels.vec3 import add, barycentric, dot, largest_component, norm
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
 from renderer.trace.spawn import Facet, facet_of, offset_distance
+from renderer.trace.starts.record import corners_of
 
 # The most media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8
@@ -126,8 +127,8 @@ def look_at(scene, face, u, v, d):
 @inlined
 def bounds_at(scene, face, u, v, p, facet):
     """The ``offset_distance`` and the slack of rays that leave a face at p."""
-    a, b, c = row3(scene.faces, face)
-    return offset_distance(p, row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c), u, v, facet)
+    p0, p1, p2 = corners_of(scene.vertices, scene.faces, face, 1.0)
+    return offset_distance(p, p0, p1, p2, u, v, facet)
 
 
 @inlined

@@ -45,7 +45,7 @@ from renderer.trace.starts.record import (
     corners_of,
     start_at,
 )
-from renderer.trace.starts.search import side_of_normal
+from renderer.trace.starts.search import take_side
 from renderer.trace.traverse import Memory, Scratch, make_memory, make_scratch, search_blocks, trace
 
 TILE = 256
@@ -245,25 +245,17 @@ def _begin_on_face(tree, mesh, work, i, o, face, code, has_horizon):
 @kernel
 def _begin_on_edge(tree, starts, work, i, n, has_horizon):
     """``_begin_on_face`` for a point on or near an edge."""
-    own, begin = at(work.points, _START + ROW * i), get(work.numbers, _TABLES)
+    begin = get(work.numbers, _TABLES)
     anchor = anchor_of(start_at(starts, 0, tree.scale))
     put(work.numbers, _CORNER + i, np.int64(anchor.zeros & (anchor.zeros - 1) != 0))
     _put3(work.points, _ABOVE + 3 * i, scale(rounded(anchor), 1.0 / tree.scale))
     put(work.numbers, _TABLE + i, -1)
     if has_horizon and _FANS - begin >= _LEAST_FAN:
         stack, holders, table = work.scratch.packet_stack, work.scratch.holders, at(work.points, _FAN + begin)
-        side = side_of_normal(tree, start_at(starts, 0, tree.scale), n, stack, holders, table, _FANS - begin)
+        take_side(tree, starts, n, stack, holders, table, _FANS - begin)
         if has_fan(table):
             put(work.numbers, _TABLE + i, begin)
             put(work.numbers, _TABLES, begin + size_of_fan(table))
-        if side.face >= 0:
-            code = np.int64(get(own, CODE))
-            if side.face != np.int64(get(own, FACE)):
-                # The side is that of another face, which then is the one that the rays leave. A point is on both.
-                put(own, FACE, np.float64(side.face))
-                if code & BARYCENTRIC != 0:
-                    _put3(own, ANCHOR, (side.u, side.v, 0.0))
-            put(own, CODE, np.float64(code | side.code))
 
 
 @kernel

@@ -24,8 +24,8 @@ from renderer.trace.hits import Hits, points_on
 from renderer.trace.query import closest_hits
 from renderer.trace.singly import stack_size
 from renderer.trace.starts.cone import HOLDERS_WORDS
-from renderer.trace.starts.record import ANCHOR, BARYCENTRIC, CODE, FACE, HEAD, ROW, WAY
-from renderer.trace.starts.search import Side, side_of
+from renderer.trace.starts.record import ANCHOR, CODE, FACE, HEAD, ROW, WAY
+from renderer.trace.starts.search import side_taken
 
 Floats = NDArray[np.float64]
 
@@ -195,32 +195,22 @@ def _first_hits(octree: Queries, place: Floats, ways: Floats, reach: Floats, nor
     face, code, anchor = (part[0] for part in on_surface(tree, mesh, place[None], np.full(1, -1), octree.threads))
     if face >= 0:
         outer = face_normals(mesh.vertices[mesh.faces[face : face + 1]])[0] if normal is None else normal
-        side = _side_at(octree, face, code, anchor, outer)
-        count = len(ways)
-        leaving = Leaving(np.full(count, side.face), np.full(1, side.code), np.tile(side.anchor, (count, 1)))
+        row = _row_on_side(octree, face, code, anchor, outer)
+        count, (face, code) = len(ways), row[[FACE, CODE]].astype(np.int64)
+        leaving = Leaving(np.full(count, face), np.full(1, code), np.tile(row[ANCHOR : ANCHOR + 3], (count, 1)))
         rays = moved_off(rays, leaving, mesh, tree.scale, octree.threads)
         rays.starts[HEAD:].view(np.float64).reshape(count, ROW)[:, WAY:] = outer
     return closest_hits(tree, rays, mesh, octree.threads)
 
 
-class _Place(NamedTuple):
-    """Where a scanner stands: on a face, with a code and an anchor of ``starts.record``."""
-
-    face: int
-    code: int
-    anchor: Floats
-
-
-def _side_at(octree: Queries, face: int, code: int, anchor: Floats, normal: Floats) -> _Place:
-    """The place on a face, on the side of a normal: of another face where none of its sides is in the region there."""
+def _row_on_side(octree: Queries, face: int, code: int, anchor: Floats, normal: Floats) -> Floats:
+    """The row of ``starts.record`` of a start on a face, on the side of a normal."""
     mesh, tree = octree._built
     row = np.zeros(ROW)
     row[FACE], row[CODE], row[ANCHOR : ANCHOR + 3] = face, code, anchor
     stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
-    found = Side(*side_of(tree.words, mesh.vertices, mesh.faces, row, tuple(normal.tolist()), stack, memory))
-    if found.face >= 0 and found.face != face and code & BARYCENTRIC:
-        anchor = np.array([found.u, found.v, 0.0])
-    return _Place(face if found.face < 0 else found.face, code | found.code, anchor)
+    side_taken(tree.words, mesh.vertices, mesh.faces, row, tuple(normal.tolist()), stack, memory)
+    return row
 
 
 def _expect_octree(octree: Queries) -> None:

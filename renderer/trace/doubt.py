@@ -24,7 +24,7 @@ from renderer.kernels.pairs import (
 )
 from renderer.kernels.signs import UNDECIDED, lies_within, slope_sign, volume_sign
 from renderer.kernels.simd import larger, local_doubles, smaller
-from renderer.kernels.vec3 import add, cross, dot, largest_component, length, normalized, scale, sub
+from renderer.kernels.vec3 import add, cross, dot, largest_component, largest_of_three, length, normalized, scale, sub
 from renderer.trace.intersect import (
     FAR_PADDING,
     LARGEST_FLOAT,
@@ -232,7 +232,7 @@ def _meet_face(tree, at, ray, least, most):
 def _meet_side(a, b, c, o, d, bounds):
     """t, within bounds, and the weights of b and c of a face whose longest side is from a to b."""
     qa, qb, qc = sub(a, o), sub(b, o), sub(c, o)
-    reach = larger(largest_component(qa), larger(largest_component(qb), largest_component(qc)))
+    reach = largest_of_three(qa, qb, qc)
     far, d_unit, side = power_below(reach), power_below(largest_component(d)), power_below(largest_component(sub(b, a)))
     face = _Face(
         scaled_difference(a, o, 1.0 / far),

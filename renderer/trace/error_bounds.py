@@ -20,7 +20,7 @@ from renderer.kernels.pairs import (
     scaled_difference,
 )
 from renderer.kernels.simd import get, larger, pointer, put, smaller
-from renderer.kernels.vec3 import dot, largest_component, row3, scale, sub, three
+from renderer.kernels.vec3 import dot, largest_component, largest_of_three, row3, scale, sub, three
 from renderer.trace.intersect import CORNER, ROOM
 from renderer.trace.starts.record import EDGE, SLACK, slack_of, start_pointers
 
@@ -84,7 +84,7 @@ def _plane_error(p0, p1, p2, o, d, t, off):
     With n the plane's normal, t is off by (n . (p0 - o) - t n . d) / (n . d). Sides, distances and the direction are
     scaled by powers of two to less than 4, so that no product overflows.
     """
-    reach = larger(largest_component(sub(p0, o)), larger(largest_component(sub(p1, o)), largest_component(sub(p2, o))))
+    reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o))
     side = larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
     far, side = power_below(larger(reach, _LEAST_NORMAL)), power_below(larger(side, _LEAST_NORMAL))
     unit = power_below(largest_component(d))

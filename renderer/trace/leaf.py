@@ -112,8 +112,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
     """The better of ``best`` = (t, face, u, v, w) and the sure hits in ``count`` blocks: smallest t, then lowest face.
 
     The barycentrics are u / w and v / w; only those of the final hit are divided. Also returns whether a hit was in
-    doubt. A call here that settles it would cost every
-    ray its registers, so that is left to ``nearest_carefully``.
+    doubt. A call here that settles it would cost every ray its registers, so that is left to ``nearest_carefully``.
     """
     t, face, u, v, w = best
     doubtful = np.int64(0)

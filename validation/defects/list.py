@@ -486,7 +486,7 @@ STUDIES = (
     _kernel(
         "studies",
         "at a corner the other side of the normal's region is taken",
-        "side_of_normal",
+        "take_side",
         "ABOVE if side > 0 else 0",
         "ABOVE if side < 0 else 0",
     ),

@@ -6,7 +6,7 @@ Such is the foot of a wall within a floor. Arcs are holders too, behind those of
 import numpy as np
 
 from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, power_below
+from renderer.kernels.pairs import cross_pairs, heads, negative, power_below
 from renderer.kernels.simd import at
 from renderer.kernels.vec3 import largest_component
 from renderer.trace.starts.cone import (
@@ -19,8 +19,8 @@ from renderer.trace.starts.cone import (
     SECOND_WAY,
     Holders,
     cone_of,
+    is_one_way,
     name_nodes,
-    negative,
     node,
     put_arc,
     put_holder,
@@ -165,16 +165,11 @@ def _name_ends(arcs, count):
             x, named = way_of(arcs, k, SECOND_WAY if end else FIRST_WAY), np.int64(-1)
             for i in range(nodes):
                 place = node(arcs, i, NODE_PLACE)
-                if named < 0 and _is_one(x, way_of(arcs, place >> 1, SECOND_WAY if place & 1 else FIRST_WAY)):
+                other = way_of(arcs, place >> 1, SECOND_WAY if place & 1 else FIRST_WAY)
+                if named < 0 and is_one_way(x, other, _ONE):
                     named = i
             if named < 0:
                 put_node(arcs, nodes, NODE_PLACE, 2 * k + end)
                 named, nodes = nodes, nodes + 1
             put_holder(arcs, k, SECOND_NODE if end else FIRST_NODE, named)
     return nodes
-
-
-@kernel
-def _is_one(a, b):
-    """Whether two ways, of largest component 1 to 2, are one direction."""
-    return largest_component(heads(cross_pairs(a, b))) <= _ONE and dot_pairs(a, b)[0] > 0.0

@@ -101,12 +101,6 @@ def way_of(holders, k, word):
     )
 
 
-@inlined
-def negative(a):
-    """A vector of pairs the other way."""
-    return (-a[0][0], -a[0][1]), (-a[1][0], -a[1][1]), (-a[2][0], -a[2][1])
-
-
 @kernel
 def put_arc(holders, k, i, first, second):
     """Let the k-th holder be an arc of the i-th one's cone."""
@@ -196,9 +190,13 @@ def _node_corner(tree, holders, k):
 def _one_direction(anchor, p, q):
     """Whether two points are in one direction from the anchor."""
     a, b = _unit_way(anchor, p), _unit_way(anchor, q)
-    across = cross_pairs(a, b)
-    error = 2.0**-86 + 2.0**-94 * anchor.unit * (1.0 / _size(anchor, p) + 1.0 / _size(anchor, q))
-    return largest_component(heads(across)) <= error and dot_pairs(a, b)[0] > 0.0
+    return is_one_way(a, b, 2.0**-86 + 2.0**-94 * anchor.unit * (1.0 / _size(anchor, p) + 1.0 / _size(anchor, q)))
+
+
+@inlined
+def is_one_way(a, b, error):
+    """Whether two ways, of largest component 1 to 2, are one direction but for an error."""
+    return largest_component(heads(cross_pairs(a, b))) <= error and dot_pairs(a, b)[0] > 0.0
 
 
 @inlined

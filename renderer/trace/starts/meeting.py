@@ -13,7 +13,7 @@ from renderer.kernels.jit import inlined, kernel
 from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, power_below, quotient, scaled_difference
 from renderer.kernels.signs import UNDECIDED, slope_sign, volume_sign
 from renderer.kernels.simd import larger, local_doubles
-from renderer.kernels.vec3 import largest_component, scale, sub
+from renderer.kernels.vec3 import largest_component, largest_of_three, scale, sub
 from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import from_anchor
 
@@ -80,7 +80,7 @@ def seen_from(tree, place, anchor):
     """The face at a place of a block, as ``SeenFace``."""
     p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
     o = anchor.base
-    reach = larger(largest_component(sub(p0, o)), larger(largest_component(sub(p1, o)), largest_component(sub(p2, o))))
+    reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o))
     factor = 1.0 / power_below(larger(reach, _LEAST_NORMAL))
     one, other = scaled_difference(p1, p0, factor), scaled_difference(p2, p0, factor)
     sides = largest_component(heads(one)) * largest_component(heads(other))

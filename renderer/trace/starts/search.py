@@ -46,8 +46,12 @@ from renderer.trace.starts.meeting import (
 )
 from renderer.trace.starts.record import (
     ABOVE,
+    ANCHOR,
     BACK,
+    BARYCENTRIC,
+    CODE,
     EDGE,
+    FACE,
     KNOWN,
     THROUGH,
     StartPointers,
@@ -277,38 +281,38 @@ def counted_from_start(tree, starts, i, ray, largest, hit, face):
     return hit
 
 
-class Side(NamedTuple):
-    """The side of a face that a start is on: the face, -1 for none, its code, and the start's barycentrics."""
-
-    face: int
-    code: int
-    u: float
-    v: float
-
-
 @kernel
-def side_of_normal(tree, start, n, stack, memory, table, room):
-    """The ``Side`` of a start whose normal n says in which region it is; and its ``fan`` in ``table``, if ``room``
-    float64 hold it.
+def take_side(tree, starts, n, stack, memory, table, room):
+    """Write to the row of a start on which side of its face it is, whose normal n says in which region; or on which
+    side of another face, if its own does not bound that. And write its ``fan`` to ``table``, if ``room`` float64 hold
+    it. Where n says nothing, the row stays.
     """
-    anchor, holders = anchor_of(start), make_holders(memory)
-    d, _ = unit_direction(n)
+    start, holders = start_at(starts, 0, tree.scale), make_holders(memory)
+    anchor, (d, _) = anchor_of(start), unit_direction(n)
     slope = slope_there(anchor, d)
     count = list_holders(tree, anchor, d, slope, 1.0, stack, holders)
     arcs, number, nodes = arcs_of(tree, anchor, holders, count)
     k, side = bounding_holder(tree, anchor, arcs, number, nodes, d, start.face)
     clear_fan(table)
     if k == NOT_STOPPED:
-        return Side(-1, 0, 0.0, 0.0)
+        return
     write_fan(tree, anchor, arcs, number, nodes, k, side, table, room)
-    met = meet_face(seen_from(tree, holder(arcs, k, PLACE), anchor), anchor, d, slope, 1.0)
-    u, v = barycentrics_of(met)
-    return Side(holder(arcs, k, NUMBER), KNOWN | BACK | (ABOVE if side > 0 else 0), u, v)
+    row = starts.rows
+    put(row, CODE, np.float64(start.code | KNOWN | BACK | (ABOVE if side > 0 else 0)))
+    if holder(arcs, k, NUMBER) == start.face:
+        return
+    put(row, FACE, np.float64(holder(arcs, k, NUMBER)))
+    # A point is on both faces, but barycentrics are those of one.
+    if start.code & BARYCENTRIC != 0:
+        met = meet_face(seen_from(tree, holder(arcs, k, PLACE), anchor), anchor, d, slope, 1.0)
+        u, v = barycentrics_of(met)
+        put(row, ANCHOR, u)
+        put(row, ANCHOR + 1, v)
+        put(row, ANCHOR + 2, 0.0)
 
 
 @kernel
-def side_of(words, vertices, faces, row, n, stack, memory):
-    """For Python: ``side_of_normal`` of the start in a row of ``starts.record``."""
-    tree, table = tree_pointers(words), local_doubles()
-    start = start_at(StartPointers(pointer(row), 0, pointer(vertices), pointer(faces)), 0, tree.scale)
-    return side_of_normal(tree, start, n, pointer(stack), pointer(memory), table, 0)
+def side_taken(words, vertices, faces, row, n, stack, memory):
+    """For Python: ``take_side`` of the start in a row of ``starts.record``."""
+    starts = StartPointers(pointer(row), 0, pointer(vertices), pointer(faces))
+    take_side(tree_pointers(words), starts, n, pointer(stack), pointer(memory), local_doubles(), 0)
