@@ -14,6 +14,7 @@ from renderer.cluster.tasks import Task, results
 from renderer.cluster.workers import SentScene, render_rows
 from renderer.errors import expect
 from renderer.picture.image import PLANES, check_picture_path
+from renderer.picture.prepare import MediaRule
 from renderer.picture.render import check_tree, checked_view
 from renderer.process.files import are_apart, as_path, write_atomically
 from renderer.process.terminal import progress_bar
@@ -37,7 +38,7 @@ def render_on(
     """``renderer.render`` on the workers of ``client``, a ``distributed.Client``: bands of rows as parts in ``folder``.
 
     band     rows of a part; None chooses. It changes no bit
-    options  ``accelerator``, ``split``, ``offset``, ``planes`` and the settings, as ``render`` takes them
+    options  ``accelerator``, ``split``, ``offset``, ``media``, ``planes`` and the settings, as ``render`` takes them
 
     Returns the run, whose ``image()`` is the picture and whose ``remove()`` removes the folder, to be called when the
     picture is saved. The scene goes to each worker once. Parts that a killed run left are not rendered again, and a
@@ -128,13 +129,14 @@ class _Sender:
         self._split: Literal["midpoint", "sah"] = settings.pop("split", "midpoint")
         check_tree(self._accelerator, self._split)
         self._offset, self._planes = settings.pop("offset", "bounded"), settings.pop("planes", PLANES)
+        self._media: MediaRule = settings.pop("media", "stack")
         self._settings = settings
         self._latest: SentScene | None = None
 
     def picture(self, scene: Scene, camera: Camera | None = None) -> tuple[SentScene, Picture]:
         """The scene as it is sent, the one before where it differs in the camera alone, and the picture of it."""
         expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
-        view = checked_view(scene, camera, self._offset, self._planes, self._settings)
+        view = checked_view(scene, camera, self._offset, self._planes, self._settings, self._media)
         needs = needs_of(scene, view.chosen.max_depth)
         latest = self._latest
         if latest is None or latest.needs != needs or not _same_but_for_camera(scene, latest.scene):

@@ -27,6 +27,10 @@ from renderer.trace.layout import Tree, cache_aligned
 from renderer.trace.query import rays_against_blocks
 from renderer.trace.spawn import OffsetRule
 
+# The rule by which a ray knows the media on both sides of a surface: from the stack of those that it is in, or from the
+# side of the normal alone.
+MediaRule = Literal["stack", "normal"]
+
 # The side of a tile in pixels: 256 tiles share a 512 x 512 picture, and neighbouring rays find their nodes in the
 # cache.
 TILE = 32
@@ -63,6 +67,19 @@ class PreparedScene:
         """Copies and pickles make the kernels' arrays anew, so that they are of the types that kernels know."""
         return _restored, (self.scene, self.octree, self.needs, self.build_seconds)
 
+    def arrays_for(self, camera: Camera, offset: OffsetRule, media: MediaRule) -> SceneArrays:
+        """The kernel's arrays for pictures by ``camera``: with the media around it, and without the faces that are
+        crossed together where the rules cross each face by itself.
+        """
+        arrays = self.arrays
+        if self.needs.refraction and camera is not self.scene.camera:
+            arrays = arrays._replace(media=media_around(self.scene, camera))
+        if media == "normal":
+            arrays = arrays._replace(media=arrays.media[:0])
+        if media == "normal" or not offset.bounded:
+            arrays = arrays._replace(touching=arrays.touching[:0])
+        return arrays
+
     @lazy
     def touching(self) -> NDArray[np.uint8]:
         """``SceneArrays.touching`` for any materials.
@@ -84,6 +101,7 @@ class PreparedScene:
         finished: Callable[[int], object] | None = None,
         planes: Collection[str] = PLANES,
         band: tuple[int, int] | None = None,
+        media: MediaRule = "stack",
     ) -> Image:
         """The picture that ``camera`` takes, by checked settings; see ``render``. Of a ``band`` of rows, first and
         end, only these: with the bits that they have in the whole picture, and in little more memory than their own
@@ -96,11 +114,8 @@ class PreparedScene:
         width, height = chosen.resolution
         first_row, end_row = (0, height) if band is None else band
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
-        settings, arrays = kernel_settings_of(self.needs, chosen, offset), self.arrays
-        if self.needs.refraction and camera is not self.scene.camera:
-            arrays = arrays._replace(media=media_around(self.scene, camera))
-        if not offset.bounded:
-            arrays = arrays._replace(touching=arrays.touching[:0])
+        settings = kernel_settings_of(self.needs, chosen, offset, media)
+        arrays = self.arrays_for(camera, offset, media)
         across, cut = -(-width // TILE), np.zeros(tiles((width, end_row - first_row)), np.int64)
 
         def render_in(film: Film, first: int) -> Iterator[None]:
@@ -179,11 +194,17 @@ def _widened(tree: Tree) -> Tree:
     return replace(tree, blocks=blocks)
 
 
-def kernel_settings_of(needs: Needs, chosen: RenderSettings, offset: OffsetRule) -> Settings:
+def kernel_settings_of(
+    needs: Needs, chosen: RenderSettings, offset: OffsetRule, media: MediaRule = "stack"
+) -> Settings:
     """The kernel's settings: no bounces where nothing bounces, and no media where nothing refracts."""
     bounces = chosen.max_depth if needs.reflection or needs.refraction else 0
-    media = MAX_MEDIA if needs.refraction else 0
-    return Settings(bounces, chosen.min_weight, offset, media, chosen.shadows, chosen.max_rays)
+    return Settings(bounces, chosen.min_weight, offset, media_limit(needs, media), chosen.shadows, chosen.max_rays)
+
+
+def media_limit(needs: Needs, media: MediaRule) -> int:
+    """The most media that a ray remembers. One that remembers none is inside where it looks along the normal."""
+    return MAX_MEDIA if needs.refraction and media == "stack" else 0
 
 
 def _film_from(row: int, film: Film) -> Film:

@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 from renderer.errors import expect
 from renderer.picture.image import PLANES, CutWarning, Image
-from renderer.picture.prepare import PreparedScene, prepare_scene, tiles
+from renderer.picture.prepare import MediaRule, PreparedScene, prepare_scene, tiles
 from renderer.process.parallel import checked_threads
 from renderer.process.terminal import progress_bar
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
@@ -25,6 +25,7 @@ def render(
     split: Literal["midpoint", "sah"] = "midpoint",
     needs: Needs | None = None,
     offset: Literal["bounded", "mitsuba"] | float = "bounded",
+    media: MediaRule = "stack",
     planes: Collection[str] = PLANES,
     threads: int | None = None,
     progress: bool = False,
@@ -43,6 +44,9 @@ def render(
                  no bit of radiance, depth, normal or face, and cost time and memory
     offset       the rule by which spawned rays leave a surface: "bounded" by their rounding error, or Mitsuba's with
                  its epsilon ("mitsuba") or with the one given
+    media        the rule for the media on both sides of glass. "stack": a ray remembers the bodies that it is in, the
+                 innermost holds, and faces that coincide are crossed together. "normal": the body is behind each of
+                 its faces and air in front, as in Mitsuba. They differ where glass is open, overlaps or touches
     planes       the arrays of the ``Image`` to keep, of "depth", "normal", "face" and "rays": 28 of 40 bytes per pixel;
                  "radiance" is always kept
     threads      None takes all processors
@@ -61,14 +65,14 @@ def render(
     threads = checked_threads(threads)
     expect(isinstance(scene, Scene | PreparedScene), "scene", "a Scene or a PreparedScene", type(scene).__name__)
     source = scene.scene if isinstance(scene, PreparedScene) else scene
-    view = checked_view(source, camera, offset, planes, settings)
+    view = checked_view(source, camera, offset, planes, settings, media)
     if isinstance(scene, PreparedScene):
         _expect_usual(accelerator, split, needs)
         prepared = scene
     else:
         prepared = _prepared(scene, view.chosen.max_depth, accelerator, split, needs, threads)
     with progress_bar(tiles(view.chosen.resolution), "tile", progress) as update:
-        image = prepared.picture(view.camera, view.chosen, view.offset, threads, update, view.planes)
+        image = prepared.picture(view.camera, view.chosen, view.offset, threads, update, view.planes, media=view.media)
     if image.cut:
         warnings.warn(image.cut_message(view.chosen.max_rays), CutWarning, stacklevel=2)
     return image
@@ -102,16 +106,24 @@ def prepare(
 
 
 class View(NamedTuple):
-    """What a picture shows of its scene: a camera, settings, the offset rule and the planes to keep, all checked."""
+    """What a picture shows of its scene: a camera, settings, the rules of offsets and media, and the planes that are
+    kept, all checked.
+    """
 
     camera: Camera
     chosen: RenderSettings
     offset: OffsetRule
     planes: tuple[str, ...]
+    media: MediaRule
 
 
 def checked_view(
-    source: Scene, camera: Camera | None, offset: str | float, planes: Collection[str], settings: dict[str, Any]
+    source: Scene,
+    camera: Camera | None,
+    offset: str | float,
+    planes: Collection[str],
+    settings: dict[str, Any],
+    media: MediaRule = "stack",
 ) -> View:
     """The view that ``render`` is asked for. Raises ``ValueError`` naming the argument."""
     eye = source.camera if camera is None else camera
@@ -123,7 +135,9 @@ def checked_view(
         kept = (None,)
     known = not isinstance(planes, str) and all(isinstance(p, str) and p in PLANES for p in kept)
     expect(known, "planes", f"some of {', '.join(PLANES)}", repr(planes))
-    return View(eye, chosen, _offset(offset), kept)
+    named = isinstance(media, str) and media in ("stack", "normal")
+    expect(named, "media", "'stack' or 'normal'", repr(media))
+    return View(eye, chosen, _offset(offset), kept, media)
 
 
 def check_tree(accelerator: object, split: object) -> None:

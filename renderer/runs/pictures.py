@@ -39,7 +39,9 @@ class Picture:
     def rows(self, prepared: PreparedScene, begin: int, end: int, threads: int) -> NDArray[np.uint8]:
         """Some rows (n, bytes of a row), which have the same bits whatever other rows are rendered, and where."""
         view = self.view
-        image = prepared.picture(view.camera, view.chosen, view.offset, threads, None, view.planes, (begin, end))
+        image = prepared.picture(
+            view.camera, view.chosen, view.offset, threads, None, view.planes, (begin, end), view.media
+        )
         rows = np.zeros(end - begin, self.row())
         for name in self.planes():
             rows[name] = getattr(image, name)
@@ -64,8 +66,8 @@ class Picture:
         view = self.view
         made_of = {
             "kind": "picture", "scene": self.scene, "camera": view.camera.model_dump(),
-            "settings": view.chosen.model_dump(), "offset": list(view.offset), "planes": self.planes(),
-            "version": sys.modules["renderer"].__version__,
+            "settings": view.chosen.model_dump(), "offset": list(view.offset), "media": view.media,
+            "planes": self.planes(), "version": sys.modules["renderer"].__version__,
         }  # fmt: skip
         return Plan(view.chosen.resolution[1], band, self.row().itemsize, "|u1", made_of)
 

@@ -9,7 +9,7 @@ from renderer.kernels.simd import get
 from renderer.kernels.vec3 import dot, normalized, scale, sub, three
 from renderer.shade.records import DIRECTIONAL, LIGHT_COLUMNS
 from renderer.shade.surface import scene_pointers
-from renderer.trace.spawn import BOUNDED, spawn_origin
+from renderer.trace.spawn import spawn_origin
 
 # A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
 # covers angles down to 2^-12.
@@ -74,7 +74,7 @@ def aim(seen, p, n_g, error, offset):
 
 
 @kernel
-def aim_from(arrays, surface, n, light):
-    """For Python: a light as a ``Surface`` with the normal n sees it, and the shadow ray by the bounded offset."""
+def aim_from(arrays, surface, n, light, offset):
+    """For Python: a light as a ``Surface`` with the normal n sees it, and the shadow ray by an offset rule."""
     seen = see_light(scene_pointers(arrays).lights, light, surface.p, n, surface.error)
-    return seen, aim(seen, surface.p, surface.n_g, surface.error, BOUNDED)
+    return seen, aim(seen, surface.p, surface.n_g, surface.error, offset)

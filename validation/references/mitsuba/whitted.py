@@ -34,11 +34,11 @@ def _context(component: int | None = None) -> mi.BSDFContext:
     return context
 
 
-_ALL, _REFLECTION, _REFRACTION = _context(), _context(0), _context(1)
+_ALL, _REFLECTION, REFRACTION = _context(), _context(0), _context(1)
 
 
 @dataclass(frozen=True)
-class _Lobe:
+class Lobe:
     """A direction in which a ray is followed; a ``weight`` that is given replaces the BSDF's own."""
 
     bsdf: mi.BSDF
@@ -47,57 +47,66 @@ class _Lobe:
 
 
 @dataclass(frozen=True)
-class _Surface:
+class Surface:
     """One material's surface: ambient light k_a I_a, the BSDF and highlight that scatter the lights, and the lobes."""
 
     ambient: mi.Color3f
     diffuse: mi.BSDF | None
     specular: mi.Color3f | None
     shininess: float
-    lobes: tuple[_Lobe, ...]
+    lobes: tuple[Lobe, ...]
 
 
 @dataclass(frozen=True)
-class _Whitted:
+class Recursion:
     scene: mi.Scene
-    surfaces: dict[mi.Mesh, _Surface]
+    surfaces: dict[mi.Mesh, Surface]
     lights: tuple[mi.Emitter, ...]
     background: mi.Color3f
     max_depth: int
     shadows: bool
 
     def radiance(self, ray: mi.Ray3f, depth: int) -> mi.Color3f:
-        si = self.scene.ray_intersect(ray)
+        return self.leaving(self.scene.ray_intersect(ray), depth)
+
+    def leaving(self, si: mi.SurfaceInteraction3f, depth: int) -> mi.Color3f:
+        """The radiance that leaves what a ray hit, against the ray."""
         if not si.is_valid():
             return self.background
         surface = self.surfaces[si.shape]
         result = surface.ambient
         if surface.diffuse is not None or surface.specular is not None:
-            result = result + self._direct(si, surface)
+            for light in range(len(self.lights)):
+                result = result + self.lit(si, surface, light)
         if depth < self.max_depth:
             for lobe in surface.lobes:
-                result = result + self._follow(si, lobe, depth)
+                result = result + self.follow(si, lobe, depth)
         return result
 
-    def _direct(self, si: mi.SurfaceInteraction3f, surface: _Surface) -> mi.Color3f:
-        result = mi.Color3f(0.0)
-        for light in self.lights:
-            sample, irradiance = light.sample_direction(si, _ANY_POINT)
-            wo = si.to_local(sample.d)
-            same_side = wo.z * si.wi.z > 0.0
-            if same_side and not (self.shadows and self.scene.ray_test(si.spawn_ray_to(sample.p))):
-                result = result + irradiance * _scattered(si, surface, wo)
-        return result
+    def lit(self, si: mi.SurfaceInteraction3f, surface: Surface, light: int) -> mi.Color3f:
+        sample, irradiance = self.lights[light].sample_direction(si, _ANY_POINT)
+        wo = si.to_local(sample.d)
+        if not wo.z * si.wi.z > 0.0 or self.hides(si, sample):
+            return mi.Color3f(0.0)
+        return irradiance * scattered(si, surface, wo)
 
-    def _follow(self, si: mi.SurfaceInteraction3f, lobe: _Lobe, depth: int) -> mi.Color3f:
+    def hides(self, si: mi.SurfaceInteraction3f, sample: mi.DirectionSample3f) -> bool:
+        """Whether a surface hides the light that was sampled."""
+        return self.shadows and self.scene.ray_test(si.spawn_ray_to(sample.p))
+
+    def follow(self, si: mi.SurfaceInteraction3f, lobe: Lobe, depth: int) -> mi.Color3f:
         sample, weight = lobe.bsdf.sample(lobe.context, si, _ANY_NUMBER, _ANY_POINT)
         if max(weight) == 0.0:  # total internal reflection, or a black lobe
             return mi.Color3f(0.0)
-        spawned = si.spawn_ray(si.to_world(sample.wo))
-        return (weight if lobe.weight is None else lobe.weight) * self.radiance(spawned, depth + 1)
+        share = weight if lobe.weight is None else lobe.weight
+        return self.spawn(lobe, share, si.spawn_ray(si.to_world(sample.wo)), depth + 1)
+
+    def spawn(self, lobe: Lobe, share: mi.Color3f, ray: mi.Ray3f, depth: int) -> mi.Color3f:
+        """The share of the radiance along a ray that a lobe of a surface spawned."""
+        return share * self.radiance(ray, depth)
 
 
-def _scattered(si: mi.SurfaceInteraction3f, surface: _Surface, wo: mi.Vector3f) -> mi.Color3f:
+def scattered(si: mi.SurfaceInteraction3f, surface: Surface, wo: mi.Vector3f) -> mi.Color3f:
     """k_d N.L + k_s (R.V)^n, over pi because the lights are multiplied by it.
 
     R.V is a float32 number: above a shininess of about 1e4 its rounding (6e-8, times n) begins to show.
@@ -112,15 +121,15 @@ def _scattered(si: mi.SurfaceInteraction3f, surface: _Surface, wo: mi.Vector3f) 
     return result
 
 
-def _surface(material: Material, ambient_light: mitsuba_scene.Rgb) -> _Surface:
+def _surface(material: Material, ambient_light: mitsuba_scene.Rgb) -> Surface:
     black = mi.Color3f(0.0)
     if isinstance(material, Mirror):
-        return _Surface(black, None, None, 0.0, (_Lobe(mitsuba_scene.mirror(material.reflectance), _ALL),))
+        return Surface(black, None, None, 0.0, (Lobe(mitsuba_scene.mirror(material.reflectance), _ALL),))
     if isinstance(material, Dielectric):
         glass = mitsuba_scene.dielectric(material.ior, material.reflectance, material.transmittance)
-        return _Surface(black, None, None, 0.0, (_Lobe(glass, _REFLECTION), _Lobe(glass, _REFRACTION)))
+        return Surface(black, None, None, 0.0, (Lobe(glass, _REFLECTION), Lobe(glass, REFRACTION)))
     ambient = material.diffuse if material.ambient is None else material.ambient
-    return _Surface(
+    return Surface(
         mi.Color3f(*ambient) * mi.Color3f(*ambient_light),
         mitsuba_scene.diffuse(material.diffuse) if any(material.diffuse) else None,
         mi.Color3f(*material.specular) if any(material.specular) else None,
@@ -129,23 +138,26 @@ def _surface(material: Material, ambient_light: mitsuba_scene.Rgb) -> _Surface:
     )
 
 
-def _phong_lobes(material: Phong) -> tuple[_Lobe, ...]:
+def _phong_lobes(material: Phong) -> tuple[Lobe, ...]:
     """The constant shares; clear glass gives the refracted direction, and weight 0 under total internal reflection."""
     lobes = []
     if any(material.reflectance):
-        lobes.append(_Lobe(mitsuba_scene.mirror(material.reflectance), _ALL))
+        lobes.append(Lobe(mitsuba_scene.mirror(material.reflectance), _ALL))
     if any(material.transmittance):
         glass = mitsuba_scene.dielectric(material.ior, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
-        lobes.append(_Lobe(glass, _REFRACTION, mi.Color3f(*material.transmittance)))
+        lobes.append(Lobe(glass, REFRACTION, mi.Color3f(*material.transmittance)))
     return tuple(lobes)
 
 
-def _whitted(scene: Scene, max_depth: int) -> _Whitted:
+def recursion_of(
+    scene: Scene, max_depth: int, kind: type[Recursion] = Recursion
+) -> tuple[Recursion, dict[mi.Mesh, int]]:
+    """The recursion over a scene, and its shapes with the indices of their instances."""
     surfaces = [_surface(scene.materials[i.material], scene.ambient) for i in scene.instances]
     # Mitsuba requires a BSDF for each shape, but only the surfaces' own lobes are sampled, so any will do.
     shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
     lights = tuple(mitsuba_scene.emitter(light) for light in scene.lights)
-    return _Whitted(
+    recursion = kind(
         mitsuba_scene.assemble(shapes, lights),
         {shape: surfaces[index] for shape, index in shapes.items()},
         lights,
@@ -153,6 +165,7 @@ def _whitted(scene: Scene, max_depth: int) -> _Whitted:
         max_depth,
         scene.render.shadows,
     )
+    return recursion, shapes
 
 
 def can_judge(scene: Scene) -> str | None:
@@ -181,7 +194,7 @@ def whitted(
     rays : origins and unit directions, (height * width, 3) each, instead of the camera's; ``samples`` is then unused.
     progress : called with the number of finished rows and of all rows.
     """
-    tracer = _whitted(scene, max_depth)
+    tracer, _ = recursion_of(scene, max_depth)
     bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
     result = np.zeros((height, width, 3))
     for number, bundle in enumerate(bundles):

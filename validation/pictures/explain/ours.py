@@ -1,0 +1,94 @@
+"""Our tree of rays behind a pixel, by the steps of the kernel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.inspect.ray_step import Aim, Met, Ray, Steps
+from renderer.trace.batch import check_rays
+from renderer.trace.query import closest_hits
+from validation.references.ray_tree import Node, Shadow, Vector
+
+_WHOLE = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Ours:
+    """A prepared scene under the rules of one picture, with ``max_depth`` bounces."""
+
+    steps: Steps
+    max_depth: int
+    shadows: bool
+
+    def tree(self, origin: Vector, direction: Vector) -> Node:
+        """The tree of a camera ray."""
+        return self._follow(self.steps.camera_ray(_tuple(origin), _tuple(direction)), np.ones(3))
+
+    def step(self, node: Node) -> Node:
+        """What a ray hits, and the rays that leave there: the children have hit nothing, and no shadow is traced.
+
+        The ray is that of ``node``. It starts on no surface and is in no medium.
+        """
+        ray = Ray(node.kind, node.depth, _tuple(node.origin), _tuple(node.direction), _WHOLE, (), np.empty(0))
+        made, met = self._node(ray, node.share)
+        if met is not None:
+            for aim in self.steps.aims(ray, met):
+                made.shadows[aim.light] = _shadow(aim, hidden=False)
+            if node.depth < self.max_depth:
+                made.children = {child.kind: _node(child) for child in self._children(ray, met)}
+        return made
+
+    def first_faces(self, origins: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The faces that rays hit first, -1 for none; the rays start on no surface."""
+        rays, _ = check_rays(origins, directions, 0.0, np.inf)
+        return np.asarray(closest_hits(self.steps.prepared.tree, rays, self.steps.prepared.mesh, 1).face)
+
+    def hidden(self, origins: NDArray[np.float64], directions: NDArray[np.float64], length: float) -> NDArray[np.bool_]:
+        """Whether rays hit anything within a length."""
+        rays, _ = check_rays(origins, directions, 0.0, length)
+        return np.asarray(closest_hits(self.steps.prepared.tree, rays, self.steps.prepared.mesh, 1).hit)
+
+    def _follow(self, ray: Ray, share: Vector) -> Node:
+        node, met = self._node(ray, share)
+        if met is None:
+            return node
+        for aim in self.steps.aims(ray, met):
+            hides = self.shadows and self.steps.closest(aim.origin, aim.direction, aim.t_max, aim.start).hit[0]
+            node.shadows[aim.light] = _shadow(aim, bool(hides))
+        if ray.depth < self.max_depth:
+            for child in self._children(ray, met):
+                node.children[child.kind] = self._follow(child._replace(weight=_WHOLE), np.array(child.weight))
+        return node
+
+    def _children(self, ray: Ray, met: Met) -> list[Ray]:
+        return [child for child in self.steps.bounce(ray, met) if max(child.weight) > 0.0]
+
+    def _node(self, ray: Ray, share: Vector) -> tuple[Node, Met | None]:
+        node = _node(ray, share)
+        met = self.steps.meet(ray)
+        if met is None:
+            node.own = np.array(self.steps.background(ray))
+            return node, None
+        node.face, node.t = int(met.together.seen.face), met.t
+        surface = met.surface
+        node.point, node.normal, node.shading = np.array(surface.p), np.array(surface.n_g), np.array(surface.n_s)
+        node.own = np.array(self.steps.ambient(ray, met))
+        return node, met
+
+
+def _node(ray: Ray, share: Vector | None = None) -> Node:
+    """A ray that has hit nothing yet; the share is its weight where none is given."""
+    share = np.array(ray.weight) if share is None else share
+    return Node(ray.kind, ray.depth, np.array(ray.origin), np.array(ray.direction), share)
+
+
+def _shadow(aim: Aim, hidden: bool) -> Shadow:
+    direction = np.array(aim.direction)
+    length = float(np.linalg.norm(direction))
+    return Shadow(np.array(aim.origin), direction / length, aim.t_max * length, np.array(aim.radiance), hidden)
+
+
+def _tuple(vector: Vector) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z

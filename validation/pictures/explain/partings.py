@@ -1,0 +1,61 @@
+"""Where two trees of rays part: the first rays, from the camera on, that do not do the same."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from validation.references.ray_tree import Node
+
+# How near two hits of one ray are the same, whatever face each renderer names at an edge: relative to the coordinates,
+# and for unit normals. More than offsets of 1e-4 make of a ray on its way through glass.
+_NEAR = 1e-3
+
+What = Literal["hit", "shadow", "faces the light", "spawned"]
+
+
+@dataclass(frozen=True)
+class Parting:
+    """A place at which two trees part.
+
+    what    rays hit different places; a light is hidden for one; one surface faces a light, or spawns a ray, alone
+    where   the way there, as "camera, reflected, refracted", and which light or ray it is
+    ours, theirs  the nodes there
+    light   the number of the light of a shadow
+    """
+
+    what: What
+    where: str
+    ours: Node
+    theirs: Node
+    light: int = -1
+
+
+def partings(ours: Node, theirs: Node, where: str = "camera") -> list[Parting]:
+    """All the first places at which two trees part."""
+    if not _same_hit(ours, theirs):
+        return [Parting("hit", where, ours, theirs)]
+    found = []
+    for light in sorted(ours.shadows.keys() | theirs.shadows.keys()):
+        one, other = ours.shadows.get(light), theirs.shadows.get(light)
+        if one is None or other is None:
+            found.append(Parting("faces the light", f"{where}, light {light}", ours, theirs, light))
+        elif one.hidden != other.hidden:
+            found.append(Parting("shadow", f"{where}, light {light}", ours, theirs, light))
+    for kind in sorted(ours.children.keys() | theirs.children.keys()):
+        below = f"{where}, {kind}"
+        if kind in ours.children and kind in theirs.children:
+            found += partings(ours.children[kind], theirs.children[kind], below)
+        else:
+            found.append(Parting("spawned", below, ours, theirs))
+    return found
+
+
+def _same_hit(ours: Node, theirs: Node) -> bool:
+    if ours.face == theirs.face:
+        return True
+    if ours.face < 0 or theirs.face < 0:
+        return False
+    near = np.abs(ours.point - theirs.point).max() <= _NEAR * (1.0 + np.abs(theirs.point).max())
+    alike = np.abs(ours.shading - theirs.shading).max() <= _NEAR
+    return bool(near and alike and np.array_equal(np.float32(ours.own), np.float32(theirs.own)))
