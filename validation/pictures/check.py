@@ -4,6 +4,7 @@ import hashlib
 import math
 import re
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -17,7 +18,7 @@ from validation.job import Job
 from validation.pictures import compare
 from validation.pictures.compare import ImageComparison, Picture
 from validation.pictures.files import write_failed, write_shown
-from validation.thresholds import REASONS, Pictures
+from validation.thresholds import REASONS
 
 # Half a step of an 8-bit picture is the rounding to whole numbers; the rest is float64's rounding of that half.
 _STEPS = 0.5 + 1e-9
@@ -35,15 +36,20 @@ class Pair(NamedTuple):
     fragile: NDArray[np.bool_]
 
 
-def check(subject: str, pair: Pair, job: Job, *, shown: bool) -> tuple[dict[str, Any], list[Gate]]:
-    """Compare a pair; returns the record and the gates.
+def check(
+    subject: str, pair: Pair, job: Job, *, shown: bool, verdict: Sequence[Gate] = ()
+) -> tuple[dict[str, Any], list[Gate]]:
+    """Compare a pair; returns the record and the gates, among them those of a verdict on the pair.
+
+    The thresholds are those of the suite's own scenes. On others they bound what a user's file moved, and the rest is a
+    figure of the record alone.
 
     shown : whether the report shows the pair, so that its PNGs are written even if it passes. A failing pair leaves its
         PNGs and EXRs in ``job.folder``/failed.
     """
     ours, hit = pair.ours.radiance, pair.ours.face >= 0
     result = compare.compare(ours, pair.reference, pair.fragile, hit if hit.any() else None)
-    found = [*_gates(subject, pair.rule, result, job.thresholds.pictures), _encoding(subject, pair)]
+    found = [*_gates(subject, pair, result, job), _encoding(subject, pair), *verdict]
     stem = re.sub(r"\W+", "-", subject)
     record: dict[str, Any] = {
         "subject": subject,
@@ -58,18 +64,21 @@ def check(subject: str, pair: Pair, job: Job, *, shown: bool) -> tuple[dict[str,
     return record, found
 
 
-def _gates(subject: str, rule: Rule, result: ImageComparison, pictures: Pictures) -> list[Gate]:
-    limits = pictures.matched if rule == "matched" else pictures.own
-    found = []
+def _gates(subject: str, pair: Pair, result: ImageComparison, job: Job) -> list[Gate]:
+    pictures, moved = job.thresholds.pictures, job.thresholds.moved()
+    limits = pictures.matched if pair.rule == "matched" else pictures.own
+    # A picture without foreground shows nothing of the scene and must not pass.
+    shown = Gate("images", subject, "pixels with a surface", float((pair.ours.face >= 0).sum()), "at least", 1.0,
+                 "a picture of nothing shows no error")  # fmt: skip
+    found = [shown]
     for quantity, limit in limits.model_dump().items():
-        if limit is None:
+        if limit is None or not (job.own or f"pictures.{pair.rule}.{quantity}" in moved):
             continue
         value = getattr(result, quantity)
         bound: Literal["at least", "at most"] = "at least" if quantity.startswith("ssim") else "at most"
-        # A picture without foreground shows nothing of the scene and must not pass.
         number = math.nan if value is None else value
         found.append(Gate("images", subject, quantity, number, bound, limit, REASONS[quantity]))
-    if limits.max_error is not None:
+    if job.own and limits.max_error is not None:
         reason = "the maximum is judged outside these pixels, so they must stay few"
         share = result.fragile_share
         found.append(Gate("images", subject, "fragile_share", share, "at most", pictures.fragile_share, reason))

@@ -1,9 +1,11 @@
 """The section on pictures: ours against Mitsuba's, scene by scene and rung by rung, primary hits first, then radiance.
 
 We render each rung of ``ladder`` under two rules for the start of spawned rays, Mitsuba's ("matched") and ours ("own"),
-and compare it with every reference that can judge it. A rung that none can judge fails a gate.
+and compare it with every reference that can judge it. A rung that none can judge fails a gate. On any scene each pixel
+that differs must have a reason (``verdict``); on the suite's own, thresholds bound the pictures too.
 """
 
+import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -12,12 +14,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from renderer.picture.image import Image, srgb
 from renderer.picture.render import render
 from renderer.scene.scene import UNLIMITED_RAYS, Scene, load_scene
 from validation.gates import Gate
 from validation.job import Job, Task
-from validation.pictures import aovs, check, ladder, monte_carlo, placement, unseen
+from validation.pictures import aovs, check, ladder, monte_carlo, placement, unseen, verdict
 from validation.pictures.check import Pair, Rule
 from validation.pictures.compare import Picture, fragile_pixels
 from validation.pictures.files import write_png
@@ -32,6 +37,11 @@ from validation.scenes import SCENE_CASES
 WHITTED = "Whitted recursion over Mitsuba's scene, BSDFs and rays (scalar_rgb)"
 AOVS = "Mitsuba's primary hits (scalar_rgb)"
 
+# Colours of the map of pixels: none, then ``verdict.MAPPED`` in order. Only the last two are faults.
+_COLORS = np.array(
+    [(24, 26, 32), (90, 160, 250), (70, 90, 140), (240, 200, 70), (190, 110, 240), (255, 40, 40), (255, 120, 40)],
+    np.uint8,
+)
 # SSIM's window.
 _SMALLEST = 11
 _Offset = Literal["bounded", "mitsuba"] | float
@@ -75,6 +85,11 @@ class _Task(NamedTuple):
     references: tuple[Reference, ...]
     left_out: dict[str, str]
 
+    @property
+    def explained(self) -> bool:
+        """Whether a reference's rays can be walked."""
+        return any(reference.key == "whitted" for reference in self.references)
+
 
 class _Plan(NamedTuple):
     """The tasks of a scene, whether random paths judge it, why rungs are left out, and why Mitsuba cannot hold it."""
@@ -86,7 +101,8 @@ class _Plan(NamedTuple):
 
     @property
     def steps(self) -> int:
-        return (self.fault is None) + self.paths + sum(1 + len(task.references) for task in self.tasks)
+        judged = sum(task.explained for task in self.tasks)
+        return (self.fault is None) + self.paths + judged + sum(1 + len(task.references) for task in self.tasks)
 
 
 def steps(job: Job) -> int:
@@ -138,9 +154,11 @@ def check_scene(
     if plan.fault is None:
         record["aovs"], passed = _check_aovs(name, scene, plan.tasks[-1].resolution, job, theirs[AOVS])
         found += passed
+    drawn = {task.rung.name: _draw(name, task, job) for task in plan.tasks}
+    verdicts = _verdicts(name, plan, drawn, theirs, job)
     record["rungs"] = []
     for task in plan.tasks:
-        rung, passed = _check_rung(name, task, job, theirs)
+        rung, passed = _check_rung(name, task, job, drawn[task.rung.name], theirs, verdicts.get(task.rung.name))
         record["rungs"].append(rung)
         found += passed
     if plan.paths:
@@ -232,26 +250,87 @@ def _check_aovs(
     return told | record, [camera, *found]
 
 
-def _check_rung(name: str, task: _Task, job: Job, theirs: Mapping[Any, Any]) -> tuple[dict[str, Any], list[Gate]]:
-    """Compare one rung under both rules with its references' pictures."""
-    scene, size, subject = task.rung.scene, task.resolution, f"{name}, {task.rung.name}"
-    job.step(f"pictures: {subject}, ours")
+class _Drawn(NamedTuple):
+    """Our pictures of a rung: by rule for offsets, the same under the media of normals, and the fragile pixels."""
+
+    images: dict[Rule, Image]
+    normal: dict[Rule, Picture]
+    fragile: NDArray[np.bool_]
+
+
+def _draw(name: str, task: _Task, job: Job) -> _Drawn:
+    scene, size = task.rung.scene, task.resolution
+    job.step(f"pictures: {name}, {task.rung.name}, ours")
     images = {rule: _ours(scene, size, offset) for rule, offset in _RULES.items()}
-    fragile = fragile_pixels(lambda offset, shift: _ours(shifted(scene, shift), size, offset).radiance)
+    normal = {rule: _ours(scene, size, offset, media="normal").radiance for rule, offset in _RULES.items()}
+    # They bound the largest error on the suite's own scenes alone.
+    fragile = np.zeros(size[::-1], np.bool_)
+    if job.own:
+        fragile = fragile_pixels(lambda offset, shift: _ours(shifted(scene, shift), size, offset).radiance)
+    return _Drawn(images, normal, fragile)
+
+
+def _verdicts(
+    name: str, plan: _Plan, drawn: Mapping[str, _Drawn], theirs: Mapping[Any, Any], job: Job
+) -> dict[str, dict[str, Any]]:
+    """The verdict on each rung that reference B judges, by the rung's name."""
+    tasks = {}
+    for task in reversed(plan.tasks):
+        if task.explained:
+            key, ours = task.rung.name, drawn[task.rung.name]
+            pictures = verdict.Pictures(ours.normal, ours.images["own"].radiance, theirs[key, "whitted"][0])
+            tasks[key] = Task(
+                f"pictures: {name}, {key}, why pixels differ", partial(verdict.judge, task.rung.scene, pictures)
+            )
+    return dict(zip(tasks, job.each([*tasks.values()]), strict=True))
+
+
+def _check_rung(
+    name: str,
+    task: _Task,
+    job: Job,
+    drawn: _Drawn,
+    theirs: Mapping[Any, Any],
+    judged: dict[str, Any] | None,
+) -> tuple[dict[str, Any], list[Gate]]:
+    """Compare one rung under both rules with its references' pictures."""
+    subject = f"{name}, {task.rung.name}"
     reason = "a rung that nobody judges is not passed"
     found = [Gate("images", subject, "references that judge it", len(task.references), "at least", 1.0, reason)]
     comparisons = []
     for reference in task.references:
         radiance, seconds = theirs[task.rung.name, reference.key]
         made = {"reference": reference.key, "reference_name": reference.name, "reference_seconds": seconds}
-        for rule, image in images.items():
+        for rule, image in drawn.images.items():
             # The report shows our own rule, which users get, beside the first reference.
             shown = rule == "own" and reference is task.references[0]
             against = f"{subject} against {reference.key}, {rule} offset"
-            record, passed = check.check(against, Pair(image, rule, radiance, fragile), job, shown=shown)
+            gates = _path_gates(against, drawn.normal[rule], theirs, task) if reference.key == "path" else []
+            record, passed = check.check(
+                against, Pair(image, rule, radiance, drawn.fragile), job, shown=shown, verdict=gates
+            )
             comparisons.append(made | {"offset": rule} | record)
             found += passed
-    return _rung_record(task, images["own"], comparisons), found
+    record = _rung_record(task, drawn.images["own"], comparisons)
+    if judged is not None:
+        found += verdict.gates(subject, judged)
+        record["verdict"] = _kept(subject, judged, job)
+    return record, found
+
+
+def _path_gates(against: str, ours: Picture, theirs: Mapping[Any, Any], task: _Task) -> list[Gate]:
+    """The native integrator records no rays: what it draws otherwise than reference B nobody has explained."""
+    path, whitted = (theirs[task.rung.name, key][0] for key in ("path", "whitted"))
+    value = float((verdict.differs(ours, path) & verdict.differs(path, whitted)).sum())
+    reason = "reference B draws the same, and the rays of its pixels were walked"
+    return [Gate("images", against, "pixels that differ without a reason", value, "at most", 0.0, reason)]
+
+
+def _kept(subject: str, judged: dict[str, Any], job: Job) -> dict[str, Any]:
+    """A verdict for the record, with its map as a picture."""
+    name = re.sub(r"\W+", "-", subject) + "-reasons.png"
+    write_png(job.folder / name, _COLORS[judged["map"]])
+    return {key: value for key, value in judged.items() if key != "map"} | {"file": name}
 
 
 def _rung_record(task: _Task, own: Image, comparisons: list[dict[str, Any]]) -> dict[str, Any]:
@@ -267,8 +346,12 @@ def _rung_record(task: _Task, own: Image, comparisons: list[dict[str, Any]]) -> 
     }
 
 
-def _ours(scene: Scene, resolution: tuple[int, int], offset: _Offset) -> Image:
-    return render(scene, resolution=resolution, samples=1, min_weight=0.0, max_rays=UNLIMITED_RAYS, offset=offset)
+def _ours(
+    scene: Scene, resolution: tuple[int, int], offset: _Offset, media: Literal["stack", "normal"] = "stack"
+) -> Image:
+    return render(
+        scene, resolution=resolution, samples=1, min_weight=0.0, max_rays=UNLIMITED_RAYS, offset=offset, media=media
+    )
 
 
 def costs_of(scenes: list[dict[str, Any]]) -> dict[str, float]:

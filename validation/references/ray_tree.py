@@ -31,6 +31,7 @@ class Node:
     face       that it hit, in the order of the scene's instances; -1 on a miss
     t          the distance to it; inf on a miss
     point      where it hit; normal and shading are the unit normals there, on the side of the winding
+    indices    of refraction before and beyond the surface, where a renderer says so and light passes
     own        radiance without lights: ambient light, or the background on a miss
     shadows    by the light's number, where the surface faces the light
     children   by kind
@@ -46,6 +47,7 @@ class Node:
     point: Vector = field(default_factory=lambda: np.full(3, np.nan))
     normal: Vector = field(default_factory=lambda: np.full(3, np.nan))
     shading: Vector = field(default_factory=lambda: np.full(3, np.nan))
+    indices: tuple[float, float] | None = None
     own: Vector = field(default_factory=lambda: np.zeros(3))
     shadows: dict[int, Shadow] = field(default_factory=dict)
     children: dict[Kind, "Node"] = field(default_factory=dict)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.inspect.ray_step import Aim, Met, Ray, Steps
+from renderer.shade.records import DIELECTRIC, KIND, TRANSMITTANCE
 from renderer.trace.batch import check_rays
 from renderer.trace.query import closest_hits
 from validation.references.ray_tree import Node, Shadow, Vector
@@ -74,6 +75,8 @@ class Ours:
         surface = met.surface
         node.point, node.normal, node.shading = np.array(surface.p), np.array(surface.n_g), np.array(surface.n_s)
         node.own = np.array(self.steps.ambient(ray, met))
+        if met.material[KIND] == DIELECTRIC or max(met.material[TRANSMITTANCE : TRANSMITTANCE + 3]) > 0.0:
+            node.indices = float(met.change.n1), float(met.change.n2)
         return node, met
 
 

@@ -1,7 +1,7 @@
 """Where two trees of rays part: the first rays, from the camera on, that do not do the same."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -49,6 +49,31 @@ def partings(ours: Node, theirs: Node, where: str = "camera") -> list[Parting]:
         else:
             found.append(Parting("spawned", below, ours, theirs))
     return found
+
+
+def way(ours: Node, theirs: Node) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Both ways from the camera to the first place at which two trees part, or to their ends, a ray after another."""
+    nodes = [(ours, theirs)]
+    while True:
+        one, other = nodes[-1]
+        below = [k for k in one.children if k in other.children and partings(one.children[k], other.children[k])]
+        if not _same_hit(one, other) or not below:
+            return [_ray(mine) for mine, _ in nodes], [_ray(its) for _, its in nodes]
+        nodes.append((one.children[below[0]], other.children[below[0]]))
+
+
+def _ray(node: Node) -> dict[str, Any]:
+    """A ray as plain values."""
+    return {
+        "kind": node.kind,
+        "origin": node.origin.tolist(),
+        "direction": node.direction.tolist(),
+        "face": node.face,
+        "t": node.t if node.face >= 0 else None,
+        "share": node.share.tolist(),
+        "spawned": sorted(node.children),
+        "lights": {str(light): "hidden" if shadow.hidden else "seen" for light, shadow in node.shadows.items()},
+    }
 
 
 def _same_hit(ours: Node, theirs: Node) -> bool:

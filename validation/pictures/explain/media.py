@@ -1,0 +1,171 @@
+"""Pixels that the rule for media decides: a stack of the bodies that a ray is in, or the side of the normal.
+
+The rule for the stack is written here a second time, in plain Python. A ray enters a body where it meets a face from in
+front, and leaves it from behind. The body that it entered last holds, and of those entered at one place the one that is
+later in the scene. Faces that coincide are crossed together: bodies are entered before others are left, and an opaque
+face among them stops the ray. A body that the ray never entered is left from its own index.
+"""
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.inspect.ray_step import steps_of
+from renderer.picture.prepare import PreparedScene
+from renderer.scene.camera import primary_rays
+from renderer.scene.material import Mirror
+from renderer.scene.scene import Scene
+from validation.oracle.inside import winding_number
+from validation.pictures.explain.ours import Ours
+from validation.references.ray_tree import Node
+
+# Faces coincide up to roundings of their corners: some 2^10 float64 roundings of the coordinates.
+_NEAR = 2.0**-42
+
+# Why the rules may differ: what lets a ray be in a body twice, or in two of them. A mesh may overlap itself.
+OPEN, OVERLAPPING, COINCIDING = "open glass", "overlapping glass", "coinciding faces"
+INTERPOLATED = "an interpolated normal turned away from the ray"
+WHYS = (OPEN, OVERLAPPING, COINCIDING, INTERPOLATED)
+
+
+class Ruled(NamedTuple):
+    """A pixel that differs between the rules: why it may, or None where no geometry lets it; and what is wrong."""
+
+    row: int
+    column: int
+    why: str | None
+    wrong: str | None
+
+
+class _Body(NamedTuple):
+    """A body that a ray is in: the number of its instance, its index of refraction, and its material."""
+
+    instance: int
+    ior: float
+    material: str
+
+
+class MediaJudge:
+    """Judges the pixels that differ between both rules, on a scene with one ray a pixel."""
+
+    def __init__(self, prepared: PreparedScene, resolution: tuple[int, int]) -> None:
+        scene = prepared.scene
+        self._scene, self._width = scene, resolution[0]
+        self._rays = primary_rays(scene.camera, *resolution)
+        self._ours = Ours(steps_of(prepared), scene.render.max_depth, shadows=False)
+        triangles = [i.mesh.vertices[i.mesh.faces] for i in scene.instances]
+        self._corners = np.concatenate([*triangles, np.zeros((0, 3, 3))])
+        self._owner = np.repeat(np.arange(len(triangles)), [len(one) for one in triangles])
+        self._low, self._high = self._corners.min(axis=1), self._corners.max(axis=1)
+
+    def judge(self, pixels: Sequence[tuple[int, int]]) -> list[Ruled]:
+        """The geometry that lets each pixel differ, and where our stack is not that of the rule."""
+        found = []
+        for row, column in pixels:
+            origin, direction = (rays[row * self._width + column] for rays in self._rays)
+            tree = self._ours.tree(origin, direction)
+            said = list(self._walk(tree, self._around(origin)))
+            wrong = next((text for text in said if text not in WHYS), None)
+            found.append(Ruled(row, column, next(iter(said), None) if wrong is None else None, wrong))
+        return found
+
+    def _walk(self, node: Node, media: tuple[_Body, ...], turned: bool = False) -> Iterator[str]:
+        """What lets the rules differ along a tree, and what is wrong there.
+
+        turned : whether an interpolated normal has shown the ray the other side of its face before.
+        """
+        after = media
+        if node.face >= 0 and node.indices is not None:
+            met = self._together(node)
+            after, indices = _crossed(media, [(self._body(face), self._enters(node, face)) for face in met])
+            if indices != node.indices:
+                yield f"face {node.face}: by the rule the indices are {indices}, and ours took {node.indices}"
+            body, enters = self._body(node.face), self._enters(node, node.face)
+            turned = turned or enters != (float(node.direction @ node.normal) <= 0.0)
+            if len(met) > 1:
+                yield COINCIDING
+            elif indices != ((1.0, body.ior) if enters else (body.ior, 1.0)):
+                is_open = len(self._scene.instances[body.instance].mesh.open_edges) > 0
+                yield OPEN if is_open else INTERPOLATED if turned else OVERLAPPING
+        for kind, child in node.children.items():
+            yield from self._walk(child, after if kind == "refracted" else media, turned)
+
+    def _together(self, node: Node) -> list[int]:
+        """The faces at the place of a hit and in the plane of the face that was hit, ascending."""
+        room = _NEAR * (1.0 + float(np.abs(node.point).max()))
+        boxes = (self._low <= node.point + room) & (self._high >= node.point - room)
+        found = [node.face]
+        for face in np.flatnonzero(boxes.all(axis=1)).tolist():
+            if face != node.face and _holds(self._corners[face], node, room):
+                found.append(face)
+        return sorted(found)
+
+    def _enters(self, node: Node, face: int) -> bool:
+        if face == node.face:
+            return float(node.direction @ node.shading) <= 0.0
+        a, b, c = self._corners[face]
+        return float(node.direction @ np.cross(b - a, c - a)) <= 0.0
+
+    def _body(self, face: int) -> _Body:
+        instance = int(self._owner[face])
+        name = self._scene.instances[instance].material
+        material = self._scene.materials[name]
+        return _Body(instance, 1.0 if isinstance(material, Mirror) else float(material.ior), name)
+
+    def _around(self, eye: NDArray[np.float64]) -> tuple[_Body, ...]:
+        """The closed glass around the eye, the largest first."""
+        around = []
+        for number, instance in enumerate(self._scene.instances):
+            corners = instance.mesh.vertices[instance.mesh.faces]
+            glass = self._scene.materials[instance.material].passes_light
+            if not glass or not len(corners) or (eye < corners.min((0, 1))).any() or (eye > corners.max((0, 1))).any():
+                continue
+            exactly = [[[Fraction(x) for x in corner] for corner in triangle] for triangle in corners.tolist()]
+            if winding_number([Fraction(x) for x in eye.tolist()], exactly):
+                volume = abs(np.linalg.det(corners).sum())
+                around.append((volume, number, self._body(int(np.flatnonzero(self._owner == number)[0]))))
+        return tuple(body for _, _, body in sorted(around, reverse=True))
+
+
+def _crossed(
+    media: tuple[_Body, ...], faces: Sequence[tuple[_Body, bool]]
+) -> tuple[tuple[_Body, ...], tuple[float, float]]:
+    """The media beyond some faces, which are entered or left; and the indices of refraction before and beyond."""
+    after, before = [*media, *(body for body, enters in faces if enters)], _index(media)
+    for body, enters in faces:
+        if not enters:
+            last = max((k for k, one in enumerate(after) if one.material == body.material), default=None)
+            if last is None:
+                before = body.ior
+            else:
+                del after[last]
+    return tuple(after), (before, _index(after))
+
+
+def _index(media: Sequence[_Body]) -> float:
+    return media[-1].ior if media else 1.0
+
+
+def _holds(corners: NDArray[np.float64], node: Node, room: float) -> bool:
+    """Whether a face is in the plane of the one that was hit, and has the point strictly within."""
+    a, b, c = corners
+    normal = np.cross(b - a, c - a)
+    area = float(np.linalg.norm(normal))
+    if area == 0.0 or abs(float(normal @ node.normal)) < area * (1.0 - 1e-9):
+        return False
+    if abs(float(normal @ (node.point - a))) > area * room:
+        return False
+    sides = [float(normal @ np.cross(q - p, node.point - p)) for p, q in ((a, b), (b, c), (c, a))]
+    return min(sides) > 0.0
+
+
+def open_glass(scene: Scene) -> dict[str, int]:
+    """The number of open edges of each instance of glass that has some, by its mesh and number."""
+    found: dict[str, int] = {}
+    for number, instance in enumerate(scene.instances):
+        if scene.materials[instance.material].passes_light and len(instance.mesh.open_edges):
+            found[f"{instance.mesh.name or 'mesh'} ({number})"] = len(instance.mesh.open_edges)
+    return found

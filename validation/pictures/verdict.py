@@ -1,0 +1,138 @@
+"""The verdict on our pictures of a rung: the reason of each pixel that differs visibly from Mitsuba's.
+
+Under the media of normals, Mitsuba's rule, each pixel that differs is explained. Pixels in which our own rule for media
+draws another picture are judged by that rule. Of the pixels that agree some are walked too: a fault that is too small
+to be seen in a picture is seen in the steps of its rays.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.picture.prepare import PreparedScene
+from renderer.picture.render import prepare
+from renderer.scene.scene import Scene
+from validation.gates import Gate
+from validation.pictures.check import Rule
+from validation.pictures.compare import VISIBLE, Picture, srgb
+from validation.pictures.explain.media import MediaJudge
+from validation.pictures.explain.partings import way
+from validation.pictures.explain.pixels import RED, Explained, Explainer, Pixel
+
+# Pixels that agree and are walked all the same: a fault of all pixels is seen in each, one of a hundredth of them is
+# missed by 64 with probability 1/2.
+_SAMPLE = 64
+_SEED = 45
+# Pixels of one rung that the rule for media is judged in, spread over all of them.
+_RULED = 200
+# Pixels whose rays a record tells, those against us first.
+_TOLD = 100
+
+# The reasons in a map of pixels: 0 is no difference, and these follow in order.
+MAPPED = ("rounding", "offset", "media", "reference wrong", "ours wrong", "unexplained")
+
+
+class Pictures(NamedTuple):
+    """Pictures (h, w, 3) of one scene: ours by rule for offsets under the media of normals, ours under its own rules,
+    and the reference.
+    """
+
+    ours: dict[Rule, Picture]
+    stack: Picture
+    reference: Picture
+
+
+def judge(scene: Scene, pictures: Pictures) -> dict[str, Any]:
+    """The verdict on the pictures of a scene, as plain values but for its ``map``, (h, w) uint8."""
+    height, width, _ = pictures.reference.shape
+    prepared = prepare(scene)
+    explainer = Explainer(prepared, (width, height))
+    reasons = np.zeros((height, width), np.uint8)
+    told: list[dict[str, Any]] = []
+    record: dict[str, Any] = {"offsets": {}, "sample": _sampled(explainer, pictures)}
+    for rule, ours in pictures.ours.items():
+        found = explainer.explain(rule, ours, _pixels(differs(ours, pictures.reference)))
+        record["offsets"][rule] = found.counts()
+        told += [_told(rule, pixel, pictures) for pixel in _worst_first(found)]
+        if rule == "own":
+            for pixel in found.pixels:
+                reasons[pixel.row, pixel.column] = 1 + MAPPED.index(pixel.reason)
+    record["media"] = _ruled(prepared, pictures, reasons)
+    return record | {"pixels": told, "map": reasons}
+
+
+def differs(one: Picture, other: Picture) -> NDArray[np.bool_]:
+    """The pixels (h, w) in which two pictures differ visibly."""
+    return np.asarray(np.abs(srgb(one) - srgb(other)).max(axis=2) > VISIBLE)
+
+
+def _pixels(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    return [(row, column) for row, column in np.argwhere(mask).tolist()]
+
+
+def _sampled(explainer: Explainer, pictures: Pictures) -> dict[str, int]:
+    """The verdict on some pixels that do not differ."""
+    alike = _pixels(~differs(pictures.ours["own"], pictures.reference))
+    chosen = np.random.default_rng(_SEED).permutation(len(alike))[:_SAMPLE]
+    found = explainer.explain("own", pictures.ours["own"], [alike[k] for k in chosen])
+    return {"pixels": len(chosen), "red": sum(found.counts()[reason] for reason in RED)}
+
+
+def _worst_first(found: Explained) -> list[Pixel]:
+    return sorted(found.pixels, key=lambda pixel: pixel.reason not in RED)[:_TOLD]
+
+
+def _told(rule: Rule, pixel: Pixel, pictures: Pictures) -> dict[str, Any]:
+    """A pixel for the report: its reason, both colours, and both ways to where the trees part."""
+    at = pixel.row, pixel.column
+    ours, theirs = way(*pixel.trees)
+    return {
+        "offset": rule,
+        "row": pixel.row,
+        "column": pixel.column,
+        "reason": pixel.reason,
+        "found": pixel.found,
+        "colors": [pictures.ours[rule][at].tolist(), pictures.reference[at].tolist()],
+        "ours": ours,
+        "theirs": theirs,
+    }
+
+
+def _ruled(prepared: PreparedScene, pictures: Pictures, reasons: NDArray[np.uint8]) -> dict[str, Any]:
+    """The verdict on the pixels that the rule for media decides, which are marked where no other reason is."""
+    decided = differs(pictures.stack, pictures.ours["own"])
+    pixels = _pixels(decided)
+    chosen = [pixels[k] for k in np.linspace(0, len(pixels) - 1, min(_RULED, len(pixels))).astype(int)]
+    height, width = decided.shape
+    found = MediaJudge(prepared, (width, height)).judge(chosen) if chosen else []
+    reasons[decided & (reasons == 0)] = 1 + MAPPED.index("media")
+    why = [one.why for one in found if one.wrong is None and one.why is not None]
+    return {
+        "share": float(decided.mean()),
+        "judged": len(found),
+        "why": {reason: why.count(reason) for reason in sorted(set(why))},
+        "wrong": [f"row {one.row}, column {one.column}: {one.wrong or 'nothing lets the rules differ'}" for one in found
+                  if one.wrong is not None or one.why is None][:_TOLD],
+    }  # fmt: skip
+
+
+def gates(subject: str, record: dict[str, Any]) -> list[Gate]:
+    """The gates of a verdict, which all are at most 0."""
+    found = []
+    for rule, counts in record["offsets"].items():
+        against, total = f"{subject} against whitted, {rule} offset", sum(counts.values())
+        reason = f"of {total:,} that differ visibly; both trees of rays were walked to where they part"
+        found.append(_none(against, "pixels that differ without a reason", counts["unexplained"], reason))
+        reason = f"of {total:,} that differ visibly: a hit against exact arithmetic, or a picture against its own rays"
+        found.append(_none(against, "pixels in which ours is wrong", counts["ours wrong"], reason))
+    sample, media = record["sample"], record["media"]
+    reason = f"of {sample['pixels']} that agree: each step of their rays is ours but for float32's rounding"
+    found.append(_none(subject, "pixels whose rays take other steps", sample["red"], reason))
+    reason = f"of {media['judged']} that differ between the rules for media: the stack of bodies, written a second time"
+    found.append(_none(subject, "pixels against the rule for media", len(media["wrong"]), reason))
+    return found
+
+
+def _none(subject: str, quantity: str, value: int, reason: str) -> Gate:
+    return Gate("images", subject, quantity, float(value), "at most", 0.0, reason)
