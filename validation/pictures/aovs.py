@@ -16,8 +16,11 @@ from validation.thresholds import AovLimits
 _NONE = 0.0
 
 
-def compare(name: str, scene: Scene, ours: Image, theirs: Aovs, limits: AovLimits) -> tuple[dict[str, Any], list[Gate]]:
-    """Shares of pixels whose distance, position, geometric or shading normal is off, and the largest errors.
+def compare(
+    name: str, scene: Scene, ours: Image, theirs: Aovs, limits: AovLimits
+) -> tuple[dict[str, Any], list[Gate], NDArray[np.bool_]]:
+    """Shares of pixels whose distance, position, geometric or shading normal is off, and the largest errors; the gates
+    on these shares; and the pixels (h, w) that are off.
 
     ours : a picture of one sample a pixel, of the same size as ``theirs``.
 
@@ -26,15 +29,18 @@ def compare(name: str, scene: Scene, ours: Image, theirs: Aovs, limits: AovLimit
     hit, other = ours.face >= 0, theirs.instance >= 0
     errors = _errors(scene, ours, theirs, hit & other)
     shares = {"pixels that only one of us hits": float(np.mean(hit != other))}
+    off = hit != other
     for quantity, (error, limit) in _limited(errors, limits).items():
-        shares[f"pixels whose {quantity} is off"] = float(np.sum(~(error <= limit)) / hit.size)
+        beyond = ~(error <= limit)
+        off[hit & other] |= beyond
+        shares[f"pixels whose {quantity} is off"] = float(np.sum(beyond) / hit.size)
     reason = f"{limits.depth} of the distance, normals {limits.normal} rad; a float32 ray may flip an edge pixel"
     found = [
         Gate("images", f"{name}, AOVs", quantity, share, "at most", limits.share, reason)
         for quantity, share in shares.items()
     ]
     largest = {quantity: float(np.nanmax(error, initial=_NONE)) for quantity, error in errors.items()}
-    return {"shares": shares, "largest": largest}, found
+    return {"shares": shares, "largest": largest}, found, off
 
 
 def _limited(errors: dict[str, NDArray[np.float64]], limits: AovLimits) -> dict[str, tuple[NDArray[np.float64], float]]:

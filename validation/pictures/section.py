@@ -173,7 +173,7 @@ def _theirs(name: str, scene: Scene, plan: _Plan, job: Job) -> dict[Any, Any]:
     """
     tasks: dict[Any, Task] = {}
     if plan.paths:
-        whole = partial(monte_carlo.run, scene, name, job.quick)
+        whole = partial(monte_carlo.run, scene, name, job.quick, job.own)
         tasks[monte_carlo.PATHS] = Task(f"monte carlo: {name}, random paths", whole)
     for task in reversed(plan.tasks):
         for reference in task.references:
@@ -245,7 +245,9 @@ def _check_aovs(
     camera = Gate("images", f"{name}, camera", "pixels between rays", shift, "at most", limit, reason)
     theirs, seconds = made
     ours = render(scene, resolution=resolution, samples=1, max_depth=0)
-    record, found = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
+    record, found, off = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
+    if not job.own:
+        found = [verdict.primary_gate(f"{name}, AOVs", scene, ours, off)]
     told = {"reference_name": AOVS, "reference_seconds": seconds, "size": list(resolution), "camera_pixels": shift}
     return told | record, [camera, *found]
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.picture.image import Image
 from renderer.picture.prepare import PreparedScene
 from renderer.picture.render import prepare
 from renderer.scene.scene import Scene
@@ -60,6 +61,15 @@ def judge(scene: Scene, pictures: Pictures) -> dict[str, Any]:
                 reasons[pixel.row, pixel.column] = 1 + MAPPED.index(pixel.reason)
     record["media"] = _ruled(prepared, pictures, reasons)
     return record | {"pixels": told, "map": reasons}
+
+
+def primary_gate(subject: str, scene: Scene, image: Image, off: NDArray[np.bool_]) -> Gate:
+    """The gate on the first hits of ``image``, a picture without bounces, in the pixels that are off, (h, w)."""
+    height, width = off.shape
+    explainer = Explainer(prepare(scene), (width, height))
+    bad = sum(not explainer.explains_primary(image, row, column) for row, column in _pixels(off))
+    reason = f"of {int(off.sum()):,} that differ; a float32 ray may hit the other face at an edge"
+    return _none(subject, "pixels whose first hit differs without a reason", bad, reason)
 
 
 def differs(one: Picture, other: Picture) -> NDArray[np.bool_]:

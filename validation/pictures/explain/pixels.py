@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.inspect.ray_step import steps_of
+from renderer.picture.image import Image
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import primary_rays
 from renderer.scene.scene import Scene
@@ -93,6 +94,17 @@ class Explainer:
             if sum(pixel.reason in RED for pixel in looked) >= SETTLED:
                 break
         return Explained(looked, len(pixels) - len(looked))
+
+    def explains_primary(self, image: Image, row: int, column: int) -> bool:
+        """Whether the first hit of a pixel is as the picture has it, and Mitsuba's but for rounding."""
+        at = row * self._width + column
+        hit = self._ours["matched"].step(Node("camera", 0, self._origins[at], self._directions[at], np.ones(3)))
+        # The ray's unit direction was rounded once more than the picture's.
+        same = hit.face == image.face[row, column] and bool(
+            np.isclose(hit.t, image.depth[row, column], rtol=2.0**-48, atol=0.0)
+        )
+        shading = hit.face < 0 or np.abs(hit.shading - image.normal[row, column]).max() <= _STORED
+        return bool(same and shading) and not faults(self._their_tree(row, column), self._ours["matched"])
 
     def _explain(
         self, rule: Literal["own", "matched"], picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]
