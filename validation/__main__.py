@@ -64,6 +64,10 @@ def make_parser() -> argparse.ArgumentParser:
             f"--{name}", type=Path, action="append", default=[], metavar="FILE",
             help=f"judge this {name} and not the suite's own, in the section {section}; may be given again",
         )  # fmt: skip
+    parser.add_argument(
+        "--random", type=_seed, metavar="SEED",
+        help="draw the scenes and meshes of the section random from this seed; default: 1",
+    )  # fmt: skip
     parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about half an hour")
     parser.add_argument(
         "--mutants", type=_count, metavar="N",
@@ -107,7 +111,7 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
     if given:
         alone = given[0]
         others = [f"--{kind}" for kind in sorted(kinds)] + ["--gate"] * (options.gate is not None)
-        others += ["--only"] * (options.only != NAMES) + given[1:]
+        others += ["--only"] * (options.only != NAMES) + ["--random"] * (options.random is not None) + given[1:]
         others += ["--quick"] * (options.quick and not options.defects)
         if others:
             fitting = {"--defects": "--output and --quick", "--mutants": "--output, --of and --seed"}
@@ -118,6 +122,8 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
     if not chosen:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
         parser.error(f"no section is left to run ({reasons})")
+    if options.random is not None and "random" in left_out:
+        parser.error(f"--random is of the section random, which does not run: {left_out['random']}")
 
 
 def _run(options: argparse.Namespace, command: str) -> int:
@@ -128,7 +134,14 @@ def _run(options: argparse.Namespace, command: str) -> int:
         print(f"validation: wrote {suite.write_baseline(options.output)}")
         return 0
     request = suite.Request(
-        command, options.quick, options.only, options.output, options.gate, tuple(options.scene), tuple(options.mesh)
+        command,
+        options.quick,
+        options.only,
+        options.output,
+        options.gate,
+        tuple(options.scene),
+        tuple(options.mesh),
+        1 if options.random is None else options.random,
     )
     if options.defects:
         return _defects_verdict(suite.run_defects(request), request)

@@ -30,6 +30,7 @@ class Job:
     step        called with the name of each step as it begins; a section's ``steps(job)`` is the number of calls
     scenes      a user's scene files, to be judged instead of the suite's own
     meshes      a user's mesh files, to be judged instead of the suite's own
+    seed        of what the section of random scenes draws
     workers     the processes for tasks whose time is at most reported, as a cost
     """
 
@@ -39,6 +40,7 @@ class Job:
     step: Callable[[str], None]
     scenes: tuple[Path, ...] = ()
     meshes: tuple[Path, ...] = ()
+    seed: int = 1
     workers: Workers = field(default_factory=Workers)
 
     @property

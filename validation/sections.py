@@ -24,6 +24,7 @@ SECTIONS = (
     Section("studies", "validation.studies.section"),
     Section("promises", "validation.promises.section"),
     Section("stability", "validation.stability.section"),
+    Section("random", "validation.random.section"),
     Section("efficiency", "validation.efficiency.section"),
 )
 NAMES = tuple(section.name for section in SECTIONS)

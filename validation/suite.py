@@ -40,6 +40,7 @@ class Request:
     gate: Path | None = None
     scenes: tuple[Path, ...] = ()
     meshes: tuple[Path, ...] = ()
+    seed: int = 1
 
 
 def run(request: Request) -> dict[str, Any]:
@@ -65,7 +66,8 @@ def run(request: Request) -> dict[str, Any]:
     with TemporaryDirectory(dir=request.output, prefix=".run-") as folder, Workers(_processes()) as workers:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()
-        job = Job(request.quick, thresholds, pictures, lambda _: None, request.scenes, request.meshes, workers)
+        scenes, meshes, seed = request.scenes, request.meshes, request.seed
+        job = Job(request.quick, thresholds, pictures, lambda _: None, scenes, meshes, seed, workers)
         records, gates = _sections(chosen, job)
 
         # Collect the metrics and write the report.

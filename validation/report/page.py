@@ -29,6 +29,7 @@ PARTIALS = {
     "studies": ("Studies", "studies.html"),
     "promises": ("Promises", "promises.html"),
     "stability": ("Stability", "stability.html"),
+    "random": ("Scenes that nobody chose", "random.html"),
     "efficiency": ("Efficiency", "efficiency.html"),
 }
 

@@ -102,6 +102,7 @@ class Metrics(_Strict):
     studies: SectionRecord | None = None
     promises: SectionRecord | None = None
     stability: SectionRecord | None = None
+    random: SectionRecord | None = None
     efficiency: SectionRecord | None = None
     defects: dict[str, Any] | None = None
     mutants: dict[str, Any] | None = None
