@@ -31,6 +31,7 @@ class Job:
     scenes      a user's scene files, to be judged instead of the suite's own
     meshes      a user's mesh files, to be judged instead of the suite's own
     seed        of what the section of random scenes draws
+    say         called with a line that a user should read before the report
     workers     the processes for tasks whose time is at most reported, as a cost
     """
 
@@ -42,6 +43,7 @@ class Job:
     meshes: tuple[Path, ...] = ()
     seed: int = 1
     workers: Workers = field(default_factory=Workers)
+    say: Callable[[str], None] = lambda _: None
 
     @property
     def own(self) -> bool:

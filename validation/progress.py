@@ -36,6 +36,16 @@ def steps(total: int | None = None) -> Iterator[Callable[[str], None]]:
         yield _lines(total)
 
 
+def say(line: str) -> None:
+    """Print a line, above the bar where there is one."""
+    from tqdm import tqdm  # as above
+
+    if on_terminal():
+        tqdm.write(line)
+    else:
+        print(line, flush=True)
+
+
 def _lines(total: int | None) -> Callable[[str], None]:
     """A function that prints each step with its number and the seconds since the start."""
     began, number = time.perf_counter(), 0

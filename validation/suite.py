@@ -19,7 +19,7 @@ from validation import environment
 from validation.gates import Gate
 from validation.job import Job
 from validation.processes import Workers
-from validation.progress import steps
+from validation.progress import say, steps
 from validation.report import baseline, junit, page, schema, summary
 from validation.scenes import SCENES
 from validation.sections import Section, choose
@@ -67,7 +67,7 @@ def run(request: Request) -> dict[str, Any]:
         pictures = Path(folder) / "pictures"
         pictures.mkdir()
         scenes, meshes, seed = request.scenes, request.meshes, request.seed
-        job = Job(request.quick, thresholds, pictures, lambda _: None, scenes, meshes, seed, workers)
+        job = Job(request.quick, thresholds, pictures, lambda _: None, scenes, meshes, seed, workers, say)
         records, gates = _sections(chosen, job)
 
         # Collect the metrics and write the report.

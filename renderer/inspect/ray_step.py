@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from renderer.kernels.vec3 import add, dot, normalized, scale, times
 from renderer.picture.pack import media_around
-from renderer.picture.prepare import MediaRule, PreparedScene, media_limit
+from renderer.picture.prepare import MediaRule, PreparedScene, arrays_for, media_limit
 from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at, surface_together_of, together_of
 from renderer.shade.lights import aim_from
 from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG
@@ -99,8 +99,11 @@ class Steps:
         hits = self.closest(ray.origin, ray.direction, np.inf, ray.start)
         if not hits.hit[0]:
             return None
-        spot, d, arrays = Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0])), ray.direction, self.arrays
-        tree = self.prepared.tree
+        return self.meet_at(ray, Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0])), float(hits.t[0]))
+
+    def meet_at(self, ray: Ray, spot: Spot, t: float) -> Met:
+        """What the ray meets at t, where it hits a face at barycentrics."""
+        d, arrays, tree = ray.direction, self.arrays, self.prepared.tree
         stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
         together = together_of(tree.words, arrays, spot, d, stack, memory)
         surface = Surface(*surface_together_of(arrays, together, d))
@@ -111,7 +114,7 @@ class Steps:
             change = change_of(arrays, together, row, inside, media, beyond, memory)
         n, columns = scale(surface.n_s, -1.0) if inside else surface.n_s, arrays.materials[row // MATERIAL_COLUMNS]
         place = place_at(Spot(*together.near), surface, d)
-        left, t = tuple(beyond[: change.left].tolist()), float(hits.t[0])
+        left = tuple(beyond[: change.left].tolist())
         return Met(t, together, place, surface, n, inside, row, columns, change, left)
 
     def background(self, ray: Ray) -> Vector:
@@ -194,7 +197,7 @@ class Steps:
 
 def steps_of(prepared: PreparedScene, offset: OffsetRule = BOUNDED, media: MediaRule = "stack") -> Steps:
     """The steps of rays in a prepared scene, under rules as of ``render``."""
-    arrays = prepared.arrays_for(prepared.scene.camera, offset, media)
+    arrays = arrays_for(prepared, prepared.scene.camera, offset, media)
     return Steps(prepared, arrays, offset, media_limit(prepared.needs, media))
 
 

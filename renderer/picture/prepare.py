@@ -67,19 +67,6 @@ class PreparedScene:
         """Copies and pickles make the kernels' arrays anew, so that they are of the types that kernels know."""
         return _restored, (self.scene, self.octree, self.needs, self.build_seconds)
 
-    def arrays_for(self, camera: Camera, offset: OffsetRule, media: MediaRule) -> SceneArrays:
-        """The kernel's arrays for pictures by ``camera``: with the media around it, and without the faces that are
-        crossed together where the rules cross each face by itself.
-        """
-        arrays = self.arrays
-        if self.needs.refraction and camera is not self.scene.camera:
-            arrays = arrays._replace(media=media_around(self.scene, camera))
-        if media == "normal":
-            arrays = arrays._replace(media=arrays.media[:0])
-        if media == "normal" or not offset.bounded:
-            arrays = arrays._replace(touching=arrays.touching[:0])
-        return arrays
-
     @lazy
     def touching(self) -> NDArray[np.uint8]:
         """``SceneArrays.touching`` for any materials.
@@ -115,7 +102,7 @@ class PreparedScene:
         first_row, end_row = (0, height) if band is None else band
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
         settings = kernel_settings_of(self.needs, chosen, offset, media)
-        arrays = self.arrays_for(camera, offset, media)
+        arrays = arrays_for(self, camera, offset, media)
         across, cut = -(-width // TILE), np.zeros(tiles((width, end_row - first_row)), np.int64)
 
         def render_in(film: Film, first: int) -> Iterator[None]:
@@ -200,6 +187,20 @@ def kernel_settings_of(
     """The kernel's settings: no bounces where nothing bounces, and no media where nothing refracts."""
     bounces = chosen.max_depth if needs.reflection or needs.refraction else 0
     return Settings(bounces, chosen.min_weight, offset, media_limit(needs, media), chosen.shadows, chosen.max_rays)
+
+
+def arrays_for(prepared: PreparedScene, camera: Camera, offset: OffsetRule, media: MediaRule) -> SceneArrays:
+    """The kernel's arrays for pictures by ``camera``: with the media around it, and without the faces that are crossed
+    together where the rules cross each face by itself.
+    """
+    arrays = prepared.arrays
+    if prepared.needs.refraction and camera is not prepared.scene.camera:
+        arrays = arrays._replace(media=media_around(prepared.scene, camera))
+    if media == "normal":
+        arrays = arrays._replace(media=arrays.media[:0])
+    if media == "normal" or not offset.bounded:
+        arrays = arrays._replace(touching=arrays.touching[:0])
+    return arrays
 
 
 def media_limit(needs: Needs, media: MediaRule) -> int:

@@ -22,6 +22,8 @@ from validation.thresholds import REASONS
 
 # Half a step of an 8-bit picture is the rounding to whole numbers; the rest is float64's rounding of that half.
 _STEPS = 0.5 + 1e-9
+# The quantity of the gate on pictures of nothing.
+SHOWN = "pixels with a surface"
 _MAPS = ("difference", "flip_map")
 
 Rule = Literal["matched", "own"]
@@ -68,7 +70,7 @@ def _gates(subject: str, pair: Pair, result: ImageComparison, job: Job) -> list[
     pictures, moved = job.thresholds.pictures, job.thresholds.moved()
     limits = pictures.matched if pair.rule == "matched" else pictures.own
     # A picture without foreground shows nothing of the scene and must not pass.
-    shown = Gate("images", subject, "pixels with a surface", float((pair.ours.face >= 0).sum()), "at least", 1.0,
+    shown = Gate("images", subject, SHOWN, float((pair.ours.face >= 0).sum()), "at least", 1.0,
                  "a picture of nothing shows no error")  # fmt: skip
     found = [shown]
     for quantity, limit in limits.model_dump().items():

@@ -186,7 +186,7 @@ def _glass(scene: Scene) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
 def _explained(
     scene: Scene, size: int, ours: NDArray[np.float64], rows: NDArray[np.intp]
 ) -> tuple[int, NDArray[np.bool_]]:
-    """How many of some pixels differ from reference B without a reason; and which do not differ, whose paths tell more.
+    """How many of some pixels differ from reference B without a reason; and which are judged: all that differ for none.
 
     One pixel that a float32 rounding decides weighs more than the scatter of its group where Fresnel's share is small.
     """
@@ -199,7 +199,8 @@ def _explained(
     explainer = Explainer(prepare(scene), (size, size))
     normal = _picture(scene, size, media="normal")
     found = explainer.explain("matched", normal, [divmod(int(row), size) for row in rows[other]])
-    return sum(found.counts()[reason] for reason in RED), ~other
+    reasoned = {pixel.row * size + pixel.column for pixel in found.pixels if pixel.reason not in RED}
+    return sum(found.counts()[reason] for reason in RED), ~np.isin(rows, list(reasoned))
 
 
 def _picture(

@@ -25,6 +25,7 @@ from validation.job import Job, Task
 from validation.pictures import aovs, check, ladder, monte_carlo, placement, unseen, verdict
 from validation.pictures.check import Pair, Rule
 from validation.pictures.compare import Picture, fragile_pixels
+from validation.pictures.explain.media import open_glass
 from validation.pictures.files import write_png
 from validation.pictures.ladder import Rung
 from validation.pictures.shifted_film import shifted
@@ -39,7 +40,16 @@ AOVS = "Mitsuba's primary hits (scalar_rgb)"
 
 # Colours of the map of pixels: none, then ``verdict.MAPPED`` in order. Only the last two are faults.
 _COLORS = np.array(
-    [(24, 26, 32), (90, 160, 250), (70, 90, 140), (240, 200, 70), (190, 110, 240), (255, 40, 40), (255, 120, 40)],
+    [
+        (24, 26, 32),
+        (90, 160, 250),
+        (70, 90, 140),
+        (60, 200, 180),
+        (240, 200, 70),
+        (190, 110, 240),
+        (255, 40, 40),
+        (255, 120, 40),
+    ],
     np.uint8,
 )
 # SSIM's window.
@@ -150,11 +160,12 @@ def check_scene(
         "fault": plan.fault,
         "objects": objects,
     }
+    drawn = {task.rung.name: _draw(name, task, job) for task in plan.tasks}
+    record["media"] = _announced(name, scene, drawn[plan.tasks[-1].rung.name], job)
     theirs = _theirs(name, scene, plan, job)
     if plan.fault is None:
         record["aovs"], passed = _check_aovs(name, scene, plan.tasks[-1].resolution, job, theirs[AOVS])
         found += passed
-    drawn = {task.rung.name: _draw(name, task, job) for task in plan.tasks}
     verdicts = _verdicts(name, plan, drawn, theirs, job)
     record["rungs"] = []
     for task in plan.tasks:
@@ -272,6 +283,17 @@ def _draw(name: str, task: _Task, job: Job) -> _Drawn:
     return _Drawn(images, normal, fragile)
 
 
+def _announced(name: str, scene: Scene, drawn: _Drawn, job: Job) -> list[str]:
+    """What is said of the scene before references see it: where the rule for media decides."""
+    share = float(verdict.differs(drawn.images["own"].radiance, drawn.normal["own"]).mean())
+    lines = [f"glass {mesh} is open at {edges:,} edges" for mesh, edges in open_glass(scene).items()]
+    if share > 0.0:
+        lines.append(f"{100.0 * share:.2g} % of the picture depends on the rule for media: a stack, or the normal")
+    for line in lines:
+        job.say(f"{name}: {line}")
+    return lines
+
+
 def _verdicts(
     name: str, plan: _Plan, drawn: Mapping[str, _Drawn], theirs: Mapping[Any, Any], job: Job
 ) -> dict[str, dict[str, Any]]:
@@ -332,7 +354,10 @@ def _kept(subject: str, judged: dict[str, Any], job: Job) -> dict[str, Any]:
     """A verdict for the record, with its map as a picture."""
     name = re.sub(r"\W+", "-", subject) + "-reasons.png"
     write_png(job.folder / name, _COLORS[judged["map"]])
-    return {key: value for key, value in judged.items() if key != "map"} | {"file": name}
+    red = any(not gate.passed for gate in verdict.gates(subject, judged))
+    colors = {reason: "#{:02x}{:02x}{:02x}".format(*_COLORS[1 + k]) for k, reason in enumerate(verdict.MAPPED)}
+    kept = {key: value for key, value in judged.items() if key != "map"}
+    return kept | {"file": name, "red": red, "colors": colors}
 
 
 def _rung_record(task: _Task, own: Image, comparisons: list[dict[str, Any]]) -> dict[str, Any]:

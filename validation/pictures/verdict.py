@@ -27,11 +27,11 @@ _SAMPLE = 64
 _SEED = 45
 # Pixels of one rung that the rule for media is judged in, spread over all of them.
 _RULED = 200
-# Pixels whose rays a record tells, those against us first.
-_TOLD = 100
+# Pixels whose rays a record tells: all that are against us, and some of the others.
+_TOLD = 32
 
 # The reasons in a map of pixels: 0 is no difference, and these follow in order.
-MAPPED = ("rounding", "offset", "media", "reference wrong", "ours wrong", "unexplained")
+MAPPED = ("rounding", "offset", "coinciding faces", "media", "reference wrong", "ours wrong", "unexplained")
 
 
 class Pictures(NamedTuple):
@@ -55,7 +55,7 @@ def judge(scene: Scene, pictures: Pictures) -> dict[str, Any]:
     for rule, ours in pictures.ours.items():
         found = explainer.explain(rule, ours, _pixels(differs(ours, pictures.reference)))
         record["offsets"][rule] = found.counts()
-        told += [_told(rule, pixel, pictures) for pixel in _worst_first(found)]
+        told += [_told(rule, pixel, pictures) for pixel in _shown(found)]
         if rule == "own":
             for pixel in found.pixels:
                 reasons[pixel.row, pixel.column] = 1 + MAPPED.index(pixel.reason)
@@ -89,8 +89,12 @@ def _sampled(explainer: Explainer, pictures: Pictures) -> dict[str, int]:
     return {"pixels": len(chosen), "red": sum(found.counts()[reason] for reason in RED)}
 
 
-def _worst_first(found: Explained) -> list[Pixel]:
-    return sorted(found.pixels, key=lambda pixel: pixel.reason not in RED)[:_TOLD]
+def _shown(found: Explained) -> list[Pixel]:
+    """The pixels against us, and others spread over all."""
+    red = [pixel for pixel in found.pixels if pixel.reason in RED]
+    others = [pixel for pixel in found.pixels if pixel.reason not in RED]
+    spread = np.linspace(0, len(others) - 1, min(_TOLD, len(others))).astype(int)
+    return [*red, *(others[k] for k in spread)]
 
 
 def _told(rule: Rule, pixel: Pixel, pictures: Pictures) -> dict[str, Any]:
@@ -123,7 +127,7 @@ def _ruled(prepared: PreparedScene, pictures: Pictures, reasons: NDArray[np.uint
         "judged": len(found),
         "why": {reason: why.count(reason) for reason in sorted(set(why))},
         "wrong": [f"row {one.row}, column {one.column}: {one.wrong or 'nothing lets the rules differ'}" for one in found
-                  if one.wrong is not None or one.why is None][:_TOLD],
+                  if one.wrong is not None or one.why is None],
     }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from numpy.random import Generator
 
 from renderer.mesh.load import save_ply
 from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import box
 from validation.random.meshes import draw_mesh
 
 Table = dict[str, Any]
@@ -51,10 +52,25 @@ def draw_scene(rng: Generator) -> Drawn:
         "lights": [_light(rng) for _ in range(int(rng.integers(0, 4)))],
         "objects": [_object(rng, name, mesh, f"m{k}", kinds[f"m{k}"]) for k, (name, mesh) in enumerate(meshes.items())],
     }
+    if rng.random() < 0.15:
+        _add_touching(rng, table, meshes)
     if rng.random() < 0.7:
         table["materials"] |= {"light": {"diffuse": 0.6}, "dark": {"diffuse": 0.15, "reflectance": 0.2}}
         table["floor"] = _floor(rng)
     return Drawn(table, meshes)
+
+
+def _add_touching(rng: Generator, table: Table, meshes: dict[str, Mesh]) -> None:
+    """Two boxes side by side, of materials of the scene: a face of one is within a face of the other."""
+    meshes["box.ply"] = box()
+    scale, place = rng.uniform(0.3, 0.9, 3), rng.uniform([-1.0, 0.0, -1.0], [0.5, 0.4, 0.5])
+    beside = scale * np.array([rng.uniform(0.3, 1.0), rng.uniform(0.3, 1.0), rng.uniform(0.3, 1.0)])
+    axis = int(rng.integers(3))
+    for size, at in ((scale, place), (beside, place + np.eye(3)[axis] * scale)):
+        material = str(rng.choice(list(table["materials"])))
+        table["objects"].append(
+            {"mesh": "box.ply", "material": material, "scale": size.tolist(), "translate": at.tolist()}
+        )
 
 
 def _camera(rng: Generator) -> Table:

@@ -80,6 +80,9 @@ def _near(
 ) -> bool:
     """Whether rounding permits the hit, or a ray from where the start may really be has it."""
     if isinstance(said, Node):
+        if said.face >= 0 and said.t <= _OFF and _has_another(said, points[faces]):
+            # By the law of starts a ray stops at once at the next of the faces that coincide where it starts.
+            return True
         view = RayView(points, faces, tuple(ray.origin.tolist()), tuple(ray.direction.tolist()), FLOAT64_ROUNDOFF)
         answer = (said.t, said.face) if said.face >= 0 else (None, None)
         if view.is_permitted(*answer):
@@ -87,3 +90,17 @@ def _near(
     reach = said.t if isinstance(said, Node) and np.isfinite(said.t) else 1.0
     origins, directions = moved_ray(ray.origin, ray.direction, reach, _START, _TRIES)
     return any(_fits(said, hit, length) for hit in exact.closest_hits(points, faces, origins, directions))
+
+
+def _has_another(node: Node, corners: NDArray[np.float64]) -> bool:
+    """Whether another face is in the plane of the one that was hit, and has its point."""
+    room = _OFF * (1.0 + float(np.abs(node.point).max()))
+    boxes = (corners.min(axis=1) <= node.point + room) & (corners.max(axis=1) >= node.point - room)
+    for face in np.flatnonzero(boxes.all(axis=1)).tolist():
+        a, b, c = corners[face]
+        normal = np.cross(b - a, c - a)
+        area = float(np.linalg.norm(normal))
+        level = abs(float(normal @ node.normal)) >= (1.0 - _OFF) * area
+        if face != node.face and level and abs(float(normal @ (node.point - a))) <= room * area:
+            return True
+    return False

@@ -78,30 +78,45 @@ class MediaJudge:
         turned : whether an interpolated normal has shown the ray the other side of its face before.
         """
         after = media
-        if node.face >= 0 and node.indices is not None:
-            met = self._together(node)
-            after, indices = _crossed(media, [(self._body(face), self._enters(node, face)) for face in met])
-            if indices != node.indices:
-                yield f"face {node.face}: by the rule the indices are {indices}, and ours took {node.indices}"
-            body, enters = self._body(node.face), self._enters(node, node.face)
-            turned = turned or enters != (float(node.direction @ node.normal) <= 0.0)
-            if len(met) > 1:
+        if node.face >= 0:
+            met, sure = self._together(node)
+            glass = [face for face in met if self._scene.materials[self._body(face).material].passes_light]
+            if len(met) > 1 and glass:
                 yield COINCIDING
-            elif indices != ((1.0, body.ior) if enters else (body.ior, 1.0)):
-                is_open = len(self._scene.instances[body.instance].mesh.open_edges) > 0
-                yield OPEN if is_open else INTERPOLATED if turned else OVERLAPPING
+            if node.indices is not None and sure:
+                crossed = [(self._body(face), self._enters(node, face)) for face in met]
+                after, indices = _crossed(media, crossed)
+                yield from self._compared(node, indices, len(met) > 1, turned)
+                turned = turned or self._enters(node, node.face) != (float(node.direction @ node.normal) <= 0.0)
+            elif node.indices is not None:
+                # At an edge of a face that coincides: whether the ray is within that one float64 may not know.
+                return
         for kind, child in node.children.items():
             yield from self._walk(child, after if kind == "refracted" else media, turned)
 
-    def _together(self, node: Node) -> list[int]:
-        """The faces at the place of a hit and in the plane of the face that was hit, ascending."""
+    def _compared(self, node: Node, indices: tuple[float, float], together: bool, turned: bool) -> Iterator[str]:
+        """Whether our indices are those of the rule, and what lets them differ from those of the normal."""
+        if indices != node.indices:
+            yield f"face {node.face}: by the rule the indices are {indices}, and ours took {node.indices}"
+        body, enters = self._body(node.face), self._enters(node, node.face)
+        turned = turned or enters != (float(node.direction @ node.normal) <= 0.0)
+        if not together and indices != ((1.0, body.ior) if enters else (body.ior, 1.0)):
+            is_open = len(self._scene.instances[body.instance].mesh.open_edges) > 0
+            yield OPEN if is_open else INTERPOLATED if turned else OVERLAPPING
+
+    def _together(self, node: Node) -> tuple[list[int], bool]:
+        """The faces at the place of a hit and in the plane of the face that was hit, ascending; and whether the place
+        is within all of them, and not at an edge.
+        """
         room = _NEAR * (1.0 + float(np.abs(node.point).max()))
         boxes = (self._low <= node.point + room) & (self._high >= node.point - room)
-        found = [node.face]
+        found, sure = [node.face], True
         for face in np.flatnonzero(boxes.all(axis=1)).tolist():
-            if face != node.face and _holds(self._corners[face], node, room):
+            inside = -np.inf if face == node.face else _depth(self._corners[face], node, room)
+            if inside >= -room:
                 found.append(face)
-        return sorted(found)
+                sure = sure and inside > room
+        return sorted(found), sure
 
     def _enters(self, node: Node, face: int) -> bool:
         if face == node.face:
@@ -149,17 +164,19 @@ def _index(media: Sequence[_Body]) -> float:
     return media[-1].ior if media else 1.0
 
 
-def _holds(corners: NDArray[np.float64], node: Node, room: float) -> bool:
-    """Whether a face is in the plane of the one that was hit, and has the point strictly within."""
+def _depth(corners: NDArray[np.float64], node: Node, room: float) -> float:
+    """How far the point of a hit is within a face, negative outside, and in another plane too."""
     a, b, c = corners
     normal = np.cross(b - a, c - a)
     area = float(np.linalg.norm(normal))
     if area == 0.0 or abs(float(normal @ node.normal)) < area * (1.0 - 1e-9):
-        return False
+        return -np.inf
     if abs(float(normal @ (node.point - a))) > area * room:
-        return False
-    sides = [float(normal @ np.cross(q - p, node.point - p)) for p, q in ((a, b), (b, c), (c, a))]
-    return min(sides) > 0.0
+        return -np.inf
+    sides = ((a, b), (b, c), (c, a))
+    return min(
+        float(normal @ np.cross(q - p, node.point - p)) / (area * float(np.linalg.norm(q - p))) for p, q in sides
+    )
 
 
 def open_glass(scene: Scene) -> dict[str, int]:

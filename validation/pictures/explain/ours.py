@@ -9,6 +9,7 @@ from renderer.inspect.ray_step import Aim, Met, Ray, Steps
 from renderer.shade.records import DIELECTRIC, KIND, TRANSMITTANCE
 from renderer.trace.batch import check_rays
 from renderer.trace.query import closest_hits
+from renderer.trace.starts.level import Spot
 from validation.references.ray_tree import Node, Shadow, Vector
 
 _WHOLE = (1.0, 1.0, 1.0)
@@ -31,14 +32,14 @@ class Ours:
 
         The ray is that of ``node``. It starts on no surface and is in no medium.
         """
-        ray = Ray(node.kind, node.depth, _tuple(node.origin), _tuple(node.direction), _WHOLE, (), np.empty(0))
-        made, met = self._node(ray, node.share)
-        if met is not None:
-            for aim in self.steps.aims(ray, met):
-                made.shadows[aim.light] = _shadow(aim, hidden=False)
-            if node.depth < self.max_depth:
-                made.children = {child.kind: _node(child) for child in self._children(ray, met)}
-        return made
+        ray = _ray(node)
+        return self._spawn(node, ray, self.steps.meet(ray))
+
+    def step_at(self, node: Node) -> Node:
+        """As ``step``, where the ray hits the face that ``node`` says, at the point that it says."""
+        ray, (a, b, c) = _ray(node), self.steps.prepared.mesh.triangles[node.face]
+        u, v = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), node.point - a, rcond=None)[0].tolist()
+        return self._spawn(node, ray, self.steps.meet_at(ray, Spot(node.face, u, v), node.t))
 
     def first_faces(self, origins: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.int64]:
         """The faces that rays hit first, -1 for none; the rays start on no surface."""
@@ -51,7 +52,8 @@ class Ours:
         return np.asarray(closest_hits(self.steps.prepared.tree, rays, self.steps.prepared.mesh, 1).hit)
 
     def _follow(self, ray: Ray, share: Vector) -> Node:
-        node, met = self._node(ray, share)
+        met = self.steps.meet(ray)
+        node = self._made(ray, share, met)
         if met is None:
             return node
         for aim in self.steps.aims(ray, met):
@@ -65,19 +67,32 @@ class Ours:
     def _children(self, ray: Ray, met: Met) -> list[Ray]:
         return [child for child in self.steps.bounce(ray, met) if max(child.weight) > 0.0]
 
-    def _node(self, ray: Ray, share: Vector) -> tuple[Node, Met | None]:
+    def _spawn(self, node: Node, ray: Ray, met: Met | None) -> Node:
+        made = self._made(ray, node.share, met)
+        if met is not None:
+            for aim in self.steps.aims(ray, met):
+                made.shadows[aim.light] = _shadow(aim, hidden=False)
+            if node.depth < self.max_depth:
+                made.children = {child.kind: _node(child) for child in self._children(ray, met)}
+        return made
+
+    def _made(self, ray: Ray, share: Vector, met: Met | None) -> Node:
         node = _node(ray, share)
-        met = self.steps.meet(ray)
         if met is None:
             node.own = np.array(self.steps.background(ray))
-            return node, None
+            return node
         node.face, node.t = int(met.together.seen.face), met.t
         surface = met.surface
         node.point, node.normal, node.shading = np.array(surface.p), np.array(surface.n_g), np.array(surface.n_s)
         node.own = np.array(self.steps.ambient(ray, met))
         if met.material[KIND] == DIELECTRIC or max(met.material[TRANSMITTANCE : TRANSMITTANCE + 3]) > 0.0:
             node.indices = float(met.change.n1), float(met.change.n2)
-        return node, met
+        return node
+
+
+def _ray(node: Node) -> Ray:
+    """The ray of a node, which starts on no surface and is in no medium."""
+    return Ray(node.kind, node.depth, _tuple(node.origin), _tuple(node.direction), _WHOLE, (), np.empty(0))
 
 
 def _node(ray: Ray, share: Vector | None = None) -> Node:

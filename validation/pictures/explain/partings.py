@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from validation.references.ray_tree import Node
+from validation.references.ray_tree import Node, Vector
 
 # How near two hits of one ray are the same, whatever face each renderer names at an edge: relative to the coordinates,
 # and for unit normals. More than offsets of 1e-4 make of a ray on its way through glass.
@@ -63,17 +63,21 @@ def way(ours: Node, theirs: Node) -> tuple[list[dict[str, Any]], list[dict[str, 
 
 
 def _ray(node: Node) -> dict[str, Any]:
-    """A ray as plain values."""
+    """A ray as plain values, of nine digits, which float32 has no more of."""
     return {
         "kind": node.kind,
-        "origin": node.origin.tolist(),
-        "direction": node.direction.tolist(),
+        "origin": _digits(node.origin),
+        "direction": _digits(node.direction),
         "face": node.face,
-        "t": node.t if node.face >= 0 else None,
-        "share": node.share.tolist(),
+        "t": float(f"{node.t:.9g}") if node.face >= 0 else None,
+        "share": _digits(node.share),
         "spawned": sorted(node.children),
         "lights": {str(light): "hidden" if shadow.hidden else "seen" for light, shadow in node.shadows.items()},
     }
+
+
+def _digits(vector: Vector) -> list[float]:
+    return [float(f"{x:.9g}") for x in vector.tolist()]
 
 
 def _same_hit(ours: Node, theirs: Node) -> bool:

@@ -1,4 +1,7 @@
-"""The reason of each pixel that differs: rounding, the offset rule, a fault of ours, or none that is known."""
+"""The reason of each pixel that differs: rounding, a rule, a fault of the reference or of ours, or none that is known.
+
+Where faces coincide each renderer takes one of them by a rule of its own: ours the lowest, Mitsuba's any.
+"""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -19,11 +22,12 @@ from validation.oracle import exact
 from validation.pictures.explain import exactly
 from validation.pictures.explain.ours import Ours
 from validation.pictures.explain.partings import Parting, partings
-from validation.pictures.explain.step import Fault, faults
+from validation.pictures.explain.step import Fault, coincide, compare
 from validation.references.mitsuba.recorded import Trees
 from validation.references.ray_tree import Node
 
-Reason = Literal["rounding", "offset", "reference wrong", "ours wrong", "unexplained"]
+Reason = Literal["rounding", "offset", "coinciding faces", "reference wrong", "ours wrong", "unexplained"]
+Rule = Literal["own", "matched"]
 REASONS: tuple[Reason, ...] = get_args(Reason)
 _WRONG: Reason = "ours wrong"
 RED: tuple[Reason, ...] = (_WRONG, "unexplained")
@@ -77,6 +81,7 @@ class Explainer:
         scene = prepared.scene
         self._scene, self._width = scene, resolution[0]
         self._origins, self._directions = primary_rays(scene.camera, *resolution)
+        self._rows = scene.camera.rows(*resolution)
         self._mesh = _mesh_of(scene)
         self._theirs = Trees(scene, scene.render.max_depth)
         self._ours = {
@@ -84,9 +89,7 @@ class Explainer:
             for rule, offset in (("own", BOUNDED), ("matched", _MITSUBA))
         }
 
-    def explain(
-        self, rule: Literal["own", "matched"], picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]
-    ) -> Explained:
+    def explain(self, rule: Rule, picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]) -> Explained:
         """The reasons of some pixels, (row, column), of our ``picture`` (h, w, 3) under an offset rule."""
         looked: list[Pixel] = []
         for begin in range(0, len(pixels), _AT_ONCE):
@@ -104,11 +107,9 @@ class Explainer:
             np.isclose(hit.t, image.depth[row, column], rtol=2.0**-48, atol=0.0)
         )
         shading = hit.face < 0 or np.abs(hit.shading - image.normal[row, column]).max() <= _STORED
-        return bool(same and shading) and not faults(self._their_tree(row, column), self._ours["matched"])
+        return bool(same and shading) and not compare(self._their_tree(row, column), self._ours["matched"]).faults
 
-    def _explain(
-        self, rule: Literal["own", "matched"], picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]
-    ) -> list[Pixel]:
+    def _explain(self, rule: Rule, picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]) -> list[Pixel]:
         pairs = [(self._tree(rule, row, column), self._their_tree(row, column)) for row, column in pixels]
         parted = [partings(*pair) for pair in pairs]
         # Exact arithmetic turns the mesh into whole numbers once for all.
@@ -117,13 +118,14 @@ class Explainer:
         for (row, column), pair, places in zip(pixels, pairs, parted, strict=True):
             wrong = [place for place in places if next(judged)]
             faulty = list(self._ours_wrong(rule, pair[0], picture[row, column], wrong))
-            reason, said = self._reason(rule, row, column, pair[1]) if not faulty else (_WRONG, faulty)
+            reason, said = self._reason(rule, row, column, pair[1], places) if not faulty else (_WRONG, faulty)
             found.append(Pixel(row, column, reason, [*said, *map(_parted, places)], pair))
         return found
 
-    def _tree(self, rule: Literal["own", "matched"], row: int, column: int) -> Node:
-        at = row * self._width + column
-        return self._ours[rule].tree(self._origins[at], self._directions[at])
+    def _tree(self, rule: Rule, row: int, column: int) -> Node:
+        # To the bit as the kernel has them.
+        rows, x, y = self._rows, column + 0.5, row + 0.5
+        return self._ours[rule].tree(rows[0] + (x * rows[1] + y * rows[2]), rows[3] + (x * rows[4] + y * rows[5]))
 
     def _their_tree(self, row: int, column: int) -> Node:
         at = row * self._width + column
@@ -141,22 +143,28 @@ class Explainer:
         for place in wrong:
             yield f"{place.where}: no ray from there has our hit, face {place.ours.face} at {place.ours.t!r}"
 
-    def _reason(self, rule: Literal["own", "matched"], row: int, column: int, theirs: Node) -> tuple[Reason, list[str]]:
+    def _reason(
+        self, rule: Rule, row: int, column: int, theirs: Node, parted: Sequence[Parting]
+    ) -> tuple[Reason, list[str]]:
         reason, found = self._steps(theirs)
         if reason is not None:
             return reason, found
+        if any(place.what == "hit" and coincide(place.ours, place.theirs) for place in parted):
+            return "coinciding faces", []
         # Under Mitsuba's rule for offsets our tree does not part from theirs.
         follows = rule == "own" and not partings(self._tree("matched", row, column), theirs)
         return "offset" if follows else "rounding", []
 
     def _steps(self, theirs: Node) -> tuple[Reason | None, list[str]]:
         """The reason that lies in a step of theirs, None where each is ours but for rounding."""
+        coinciding = []
         for where, node in _nodes(theirs, "camera"):
-            found = faults(node, self._ours["matched"])
+            found, another = compare(node, self._ours["matched"])
             if found:
                 reference = all(self._is_theirs(fault, node) for fault in found)
                 return "reference wrong" if reference else "unexplained", [_said(where, fault) for fault in found]
-        return None, []
+            coinciding += [f"{where}: theirs hits face {node.face} of those that coincide"] if another else []
+        return ("coinciding faces", coinciding) if coinciding else (None, [])
 
     def _is_theirs(self, fault: Fault, node: Node) -> bool:
         """Whether exact arithmetic gives our hit for their ray, which float32 holds exactly."""

@@ -31,25 +31,44 @@ class Fault(NamedTuple):
     allowed: float
 
 
-def faults(theirs: Node, ours: Ours) -> list[Fault]:
-    """What differs in one step by more than rounding."""
-    mine = _same_hit(theirs, ours)
-    if mine is None:
-        return [Fault("face", ours.step(theirs).face, theirs.face, 0.0)]
-    found = [*_missing(theirs, mine), *_beyond(theirs, mine, [])]
-    if found:
-        near = [step for step in map(ours.step, around(theirs)) if step.face == mine.face]
-        alike = [step for step in near if not list(_missing(theirs, step))]
-        mine = mine if not list(_missing(theirs, mine)) else alike[0] if alike else mine
-        found = [*_missing(theirs, mine), *_beyond(theirs, mine, near)]
-    return [*found, *_hidden(theirs, ours)]
+class Compared(NamedTuple):
+    """What differs in one step by more than rounding; and whether faces coincide there, of which each renderer took
+    another.
+    """
+
+    faults: list[Fault]
+    coinciding: bool = False
 
 
-def _same_hit(theirs: Node, ours: Ours) -> Node | None:
-    """Our step, from their ray or a moved one, that hits the face that they hit."""
-    made = ours.step(theirs)
-    if made.face == theirs.face or _coincide(made, theirs):
-        return made
+def compare(theirs: Node, ours: Ours) -> Compared:
+    """One step of theirs against ours from the same ray."""
+    mine = ours.step(theirs)
+    coinciding = mine.face != theirs.face and coincide(mine, theirs)
+    if mine.face != theirs.face and at_one_place(mine, theirs):
+        mine = ours.step_at(theirs)
+    elif mine.face != theirs.face:
+        found = _moved_to(theirs, ours)
+        if found is None:
+            return Compared([Fault("face", mine.face, theirs.face, 0.0)])
+        mine = found
+    return Compared([*_differing(theirs, mine, ours), *_hidden(theirs, ours)], coinciding)
+
+
+def at_one_place(one: Node, other: Node) -> bool:
+    """Whether two hits are at one place but for rounding."""
+    if one.face < 0 or other.face < 0:
+        return False
+    size = _FLOOR * (1.0 + float(np.abs(other.point).max()))
+    return float(np.abs(one.point - other.point).max()) <= size
+
+
+def coincide(one: Node, other: Node) -> bool:
+    """Whether two rays hit faces at one place and in one plane."""
+    return at_one_place(one, other) and abs(float(one.normal @ other.normal)) >= 1.0 - _FLOOR
+
+
+def _moved_to(theirs: Node, ours: Ours) -> Node | None:
+    """Our step from a moved ray that hits the face that they hit."""
     for origins, directions in searched(theirs):
         rows = np.flatnonzero(ours.first_faces(origins, directions) == theirs.face)
         if len(rows):
@@ -58,14 +77,14 @@ def _same_hit(theirs: Node, ours: Ours) -> Node | None:
     return None
 
 
-def _coincide(mine: Node, theirs: Node) -> bool:
-    """Whether two faces are hit at one place, and have one normal and one material."""
-    if mine.face < 0 or theirs.face < 0:
-        return False
-    size = _FLOOR * (1.0 + float(np.abs(theirs.point).max()))
-    near = float(np.abs(mine.point - theirs.point).max()) <= size
-    alike = float(np.abs(mine.shading - theirs.shading).max()) <= _FLOOR
-    return near and alike and np.array_equal(np.float32(mine.own), np.float32(theirs.own))
+def _differing(theirs: Node, mine: Node, ours: Ours) -> list[Fault]:
+    """What differs beyond the floors, and beyond what steps from moved rays differ by."""
+    if not [*_missing(theirs, mine), *_beyond(theirs, mine, [])]:
+        return []
+    near = [step for step in map(ours.step, around(theirs)) if step.face == mine.face]
+    if any(_missing(theirs, mine)):
+        mine = next((step for step in near if not any(_missing(theirs, step))), mine)
+    return [*_missing(theirs, mine), *_beyond(theirs, mine, near)]
 
 
 def _missing(theirs: Node, mine: Node) -> Iterator[Fault]:
