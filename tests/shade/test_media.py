@@ -27,11 +27,12 @@ def slab(low: float, high: float) -> Mesh:
 
 
 def test_two_slabs_that_touch() -> None:
-    """By the stack no air is between them; by the normals each body stands in air."""
+    """By the stack no air is between them. By Mitsuba's rules a ray meets one of the faces that coincide, the lower."""
     scene = straight_down((slab(0.0, 1.0), WATER), (slab(1.0, 2.0), GLASS))
-    stack, normal = (render(scene, resolution=(3, 3), max_depth=6, media=m).radiance for m in ("stack", "normal"))
+    stack = render(scene, resolution=(3, 3), max_depth=6).radiance
+    normal = render(scene, resolution=(3, 3), max_depth=6, media="normal", offset="mitsuba").radiance
     np.testing.assert_allclose(stack, passed(0.0, 1.0, 1.5, 1.33, 1.0), rtol=STORED)
-    np.testing.assert_allclose(normal, passed(0.0, 1.0, 1.5, 1.0, 1.33, 1.0), rtol=STORED)
+    np.testing.assert_allclose(normal, passed(0.0, 1.0, 1.5) * passed(0.0, 1.0, 1.33, 1.0), rtol=STORED)
 
 
 def test_glass_without_a_back_wall() -> None:

@@ -21,7 +21,7 @@ from validation.mutants.equivalent import EQUIVALENT
 from validation.mutants.verdict import Verdict
 from validation.report import page as report
 from validation.report import schema
-from validation.sections import SECTIONS
+from validation.sections import NAMES, SECTIONS
 from validation.stability import section as stability
 
 SCENE = Path(__file__).parents[2] / "scenes" / "stairs.toml"
@@ -70,11 +70,12 @@ def test_all_gates_hold(tmp_path: Path, sections: dict[str, Fake], capsys: pytes
     assert command.main(["--output", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     # Two steps and one gate a section.
-    assert [line[:7] for line in lines[:-1]] == [f"[{k:2}/14]" for k in range(1, 15)]
-    assert lines[-1].startswith("validation: PASS, 7 of 7 gates in ")
-    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": 7, "failed": 0}
+    count = len(NAMES)
+    assert [line[:7] for line in lines[:-1]] == [f"[{k:2}/{2 * count}]" for k in range(1, 2 * count + 1)]
+    assert lines[-1].startswith(f"validation: PASS, {count} of {count} gates in ")
+    assert metrics(tmp_path)["verdict"] == {"passed": True, "gates": count, "failed": 0}
     assert ET.parse(tmp_path / "junit.xml").getroot().get("failures") == "0"
-    assert "7 of 7 gates hold" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert f"{count} of {count} gates hold" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
@@ -109,14 +110,23 @@ class TestUserFiles:
         assert [name for name, fake in sections.items() if fake.jobs] == ["images"]
         left_out = metrics(tmp_path)["left_out"]
         assert left_out["hits"] == "no file was given by --mesh"
-        assert left_out.keys() == {"hits", "queries", "studies", "promises", "stability", "efficiency"}
+        assert left_out.keys() == set(NAMES) - {"images"}
         page = (tmp_path / "index.html").read_text(encoding="utf-8")
         assert all(reason in page for reason in left_out.values())
 
     def test_scene_and_mesh(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
         assert command.main(["--scene", str(SCENE), "--mesh", str(MESH), "--output", str(tmp_path)]) == 0
         assert sections["hits"].jobs[0].meshes == (MESH,)
-        assert metrics(tmp_path)["left_out"].keys() == {"queries", "studies", "promises", "stability", "efficiency"}
+        assert metrics(tmp_path)["left_out"].keys() == set(NAMES) - {"images", "hits"}
+
+    def test_the_seed_of_random_scenes_is_theirs_alone(
+        self, tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert command.main(["--only", "random", "--random", "7", "--output", str(tmp_path)]) == 0
+        assert sections["random"].jobs[0].seed == 7
+        with pytest.raises(SystemExit):
+            command.main(["--scene", str(SCENE), "--random", "7", "--output", str(tmp_path)])
+        assert "--random is of the section random, which does not run" in capsys.readouterr().err
 
     @pytest.mark.parametrize(
         ("option", "text"), [("--scene", "camera = 3"), ("--mesh", "ply?"), ("--gate", "[hits]\nmagic = 1")]

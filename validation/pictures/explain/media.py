@@ -86,7 +86,7 @@ class MediaJudge:
             if node.indices is not None and sure:
                 crossed = [(self._body(face), self._enters(node, face)) for face in met]
                 after, indices = _crossed(media, crossed)
-                yield from self._compared(node, indices, len(met) > 1, turned)
+                yield from self._compared(node, media, indices, together=len(met) > 1, turned=turned)
                 turned = turned or self._enters(node, node.face) != (float(node.direction @ node.normal) <= 0.0)
             elif node.indices is not None:
                 # At an edge of a face that coincides: whether the ray is within that one float64 may not know.
@@ -94,14 +94,17 @@ class MediaJudge:
         for kind, child in node.children.items():
             yield from self._walk(child, after if kind == "refracted" else media, turned)
 
-    def _compared(self, node: Node, indices: tuple[float, float], together: bool, turned: bool) -> Iterator[str]:
+    def _compared(
+        self, node: Node, media: tuple[_Body, ...], indices: tuple[float, float], *, together: bool, turned: bool
+    ) -> Iterator[str]:
         """Whether our indices are those of the rule, and what lets them differ from those of the normal."""
         if indices != node.indices:
             yield f"face {node.face}: by the rule the indices are {indices}, and ours took {node.indices}"
         body, enters = self._body(node.face), self._enters(node, node.face)
         turned = turned or enters != (float(node.direction @ node.normal) <= 0.0)
         if not together and indices != ((1.0, body.ior) if enters else (body.ior, 1.0)):
-            is_open = len(self._scene.instances[body.instance].mesh.open_edges) > 0
+            meshes = [self._scene.instances[one.instance].mesh for one in (*media, body)]
+            is_open = any(len(mesh.open_edges) for mesh in meshes)
             yield OPEN if is_open else INTERPOLATED if turned else OVERLAPPING
 
     def _together(self, node: Node) -> tuple[list[int], bool]:
