@@ -100,12 +100,8 @@ class Explainer:
 
     def explains_primary(self, image: Image, row: int, column: int) -> bool:
         """Whether the first hit of a pixel is as the picture has it, and Mitsuba's but for rounding."""
-        at = row * self._width + column
-        hit = self._ours["matched"].step(Node("camera", 0, self._origins[at], self._directions[at], np.ones(3)))
-        # The ray's unit direction was rounded once more than the picture's.
-        same = hit.face == image.face[row, column] and bool(
-            np.isclose(hit.t, image.depth[row, column], rtol=2.0**-48, atol=0.0)
-        )
+        hit = self._tree("own", row, column)
+        same = hit.face == image.face[row, column] and hit.t == image.depth[row, column]
         shading = hit.face < 0 or np.abs(hit.shading - image.normal[row, column]).max() <= _STORED
         return bool(same and shading) and not compare(self._their_tree(row, column), self._ours["matched"]).faults
 
