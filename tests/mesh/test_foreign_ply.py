@@ -116,7 +116,7 @@ def element(name: str, columns: list[Column]) -> tuple[str, list[str], list[list
 
 
 @given(st.data())
-@settings(max_examples=150)
+@settings(max_examples=100)
 def test_a_mesh_is_what_was_put_into_the_file(data: st.DataObject) -> None:
     columns, attributes = data.draw(vertices())
     count = len(attributes["vertices"])
