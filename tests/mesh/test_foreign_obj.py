@@ -15,8 +15,9 @@ HAS_TEXCOORD, HAS_NORMAL = {"{0}/{1}", "{0}/{1}/{2}", "{0}/{1}/"}, {"{0}//{2}", 
 
 @dataclass
 class File:
-    """Lines of a file, and what they hold."""
+    """Lines of a file, all alike or not, and what they hold."""
 
+    alike: bool
     lines: list[str] = field(default_factory=list)
     positions: list[Any] = field(default_factory=list)
     texcoords: list[Any] = field(default_factory=list)
@@ -30,13 +31,19 @@ def add_values(file: File, draw: Any, colors: bool) -> None:
     for _ in range(draw(st.integers(3, 5))):
         k = len(file.positions)
         file.positions.append([k / 2, k * k / 4, -k / 2])
-        more = f" {k % 5 / 4} {k % 3 / 2} {k % 2}" if colors else draw(st.sampled_from(["", "", " 1.0"]))
+        more = (
+            f" {k % 5 / 4} {k % 3 / 2} {k % 2}"
+            if colors
+            else draw(st.sampled_from([""] if file.alike else ["", " 1.0"]))
+        )
         file.lines.append(f"v {k / 2} {k * k / 4} {-k / 2}{more}")
     for _ in range(draw(st.integers(1, 3))):
         k = len(file.texcoords)
-        one = draw(st.sampled_from([False, False, True]))
+        one = not file.alike and draw(st.booleans())
         file.texcoords.append([k / 8, 0.0 if one else 1 - k / 8])
-        file.lines.append(f"vt {k / 8}" if one else f"vt {k / 8} {1 - k / 8}{draw(st.sampled_from(['', ' 0.5']))}")
+        file.lines.append(
+            f"vt {k / 8}" if one else f"vt {k / 8} {1 - k / 8}{draw(st.sampled_from(['', ' 0.5'])) * (not file.alike)}"
+        )
         file.normals.append([0.0, k - 1.0, 2.0])
         file.lines.append(f"vn 0 {k - 1.0} 2")
 
@@ -55,8 +62,9 @@ def add_face(file: File, draw: Any, form: str | None, negative: bool | None) -> 
             one.format(*(k - len(rows_) if b else k + 1 for k, rows_, b in zip(rows, kinds, back, strict=True)))
         )
         corners.append([position, rows[1] if one in HAS_TEXCOORD else None, rows[2] if one in HAS_NORMAL else None])
-    gap = draw(st.sampled_from([" ", " ", "  ", "\t", " \\\n "]))
-    file.lines.append("f" + gap + gap.join(words) + draw(st.sampled_from(["", "", " ", " # a face"])))
+    gap = " " if file.alike else draw(st.sampled_from([" ", "  ", "\t", " \\\n "]))
+    end = "" if file.alike else draw(st.sampled_from(["", " ", " # a face"]))
+    file.lines.append("f" + gap + gap.join(words) + end)
     file.corners += [[corners[0], corners[i], corners[i + 1]] for i in range(1, count - 1)]
 
 
@@ -65,16 +73,16 @@ OTHER = ["# v 1 2 3", "", "g part one", "o thing", "usemtl red", "mtllib a.mtl",
 
 @st.composite
 def files(draw: Any) -> tuple[File, bool]:
-    """A file, and whether its vertices have colours. Half of them have corners of one form, counted in one way."""
-    file, colors = File(), draw(st.booleans())
-    form = draw(st.one_of(st.none(), st.sampled_from(FORMS)))
-    negative = draw(st.sampled_from([None, False, True]))
+    """A file, and whether its vertices have colours."""
+    file, colors = File(draw(st.booleans())), draw(st.booleans())
+    form = draw(st.sampled_from(FORMS)) if file.alike else draw(st.one_of(st.none(), st.sampled_from(FORMS)))
+    negative = draw(st.sampled_from([False, True] if file.alike else [None, False, True]))
     for _ in range(draw(st.integers(1, 3))):
         add_values(file, draw, colors)
         for _ in range(draw(st.integers(1, 3))):
             add_face(file, draw, form, negative)
             file.lines += draw(st.lists(st.sampled_from(OTHER), max_size=1))
-    indent = draw(st.sampled_from(["", "", "  "]))
+    indent = draw(st.sampled_from(["", "  "] if not file.alike else [""]))
     file.lines = [indent + line for line in file.lines]
     return file, colors
 
