@@ -678,6 +678,14 @@ def test_stl_text_of_two_solids_with_foreign_names(tmp_path: Path) -> None:
     assert "truncated" in fault(tmp_path, content[:-20], "a.stl")
 
 
+def test_stl_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    """Text in any case; and binary, whose header is any bytes, lost its first three."""
+    binary, text = foreign_box().export(file_type="stl"), foreign_box().export(file_type="stl_ascii").encode()
+    for content in (text, text.upper(), b"solid".ljust(77) + binary[80:]):
+        mesh = load_bytes(tmp_path, b"\xef\xbb\xbf" + content, "a.stl")
+        assert np.array_equal(mesh.triangles, foreign_box().triangles)
+
+
 def test_stl_faults(tmp_path: Path) -> None:
     binary, text = foreign_box().export(file_type="stl"), foreign_box().export(file_type="stl_ascii").encode()
     assert "expected text that starts with 'solid', or binary of 684 bytes" in fault(tmp_path, binary[:-1], "a.stl")
