@@ -35,7 +35,7 @@ def parse_stl(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     if len(content) == binary_size:
         corners = np.frombuffer(content, _RECORD, offset=_HEADER_BYTES)["corners"]
     elif (text := content.removeprefix(BOM_UTF8)).lstrip()[:5].lower() == b"solid":
-        corners = _text_corners(text.decode("latin-1").lower())
+        corners = _text_corners(text.decode("latin-1").lower().replace("\r", "\n"))
     else:
         raise MeshError(
             f"expected text that starts with 'solid', or binary of {binary_size} bytes for its {face_count}"

@@ -678,6 +678,14 @@ def test_stl_text_of_two_solids_with_foreign_names(tmp_path: Path) -> None:
     assert "truncated" in fault(tmp_path, content[:-20], "a.stl")
 
 
+def test_stl_lines_may_end_in_a_carriage_return(tmp_path: Path) -> None:
+    """As those of PLY and OBJ may; it was called truncated."""
+    text = foreign_box().export(file_type="stl_ascii").encode()
+    for newline in (b"\r", b"\r\n"):
+        mesh = load_bytes(tmp_path, text.replace(b"\n", newline), "a.stl")
+        assert np.array_equal(mesh.triangles, foreign_box().triangles)
+
+
 def test_stl_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
     """Text in any case; and binary, whose header is any bytes, lost its first three."""
     binary, text = foreign_box().export(file_type="stl"), foreign_box().export(file_type="stl_ascii").encode()
