@@ -23,6 +23,7 @@ from renderer import (
     SceneObject,
     prepare,
 )
+from renderer.inside.moments import moments_of
 from renderer.inspect.face_phong import face_colors
 from renderer.mesh.polygons import triangulate
 from renderer.mesh.shapes import box, icosphere
@@ -32,6 +33,10 @@ from renderer.trimesh_ray import distances
 
 BALL = icosphere(3)
 RNG = np.random.default_rng(5)
+# Which float32 holds, but for the last vertex.
+ROUND = Mesh(np.append(BALL.vertices.astype(np.float32)[:-1], BALL.vertices[-1:] + 2.0**-40, axis=0), BALL.faces)
+# Whose answers no other query has left in memory.
+OTHER = Mesh(BALL.vertices * [1.5, 1.25, 0.75], BALL.faces)
 POINTS, WAYS = RNG.uniform(-1.5, 1.5, (500, 3)), RNG.normal(size=(500, 3))
 TREES = [Octree.from_mesh(BALL, threads=2), BruteForce.from_mesh(BALL, threads=2)]
 
@@ -115,16 +120,17 @@ SIZES: list[tuple[str, str, int, Callable[[], list[Any]]]] = [
     ("distance.closest", "_LEAST", 7, asked(lambda tree: [tree.closest_point(POINTS, 0.5).u])),
     ("inside.contains", "_LEAST", 7, inside),
     ("inside.winding", "_LEAST", 7, inside),
-    ("inside.moments", "_NODES", 3, inside),
+    ("inside.moments", "_NODES", 3, lambda: [moments_of(Octree.from_mesh(OTHER).tree, 2)]),
     ("points.order", "_MOST", 7, inside),
     ("tree.build", "_SUBTREE", 50, lambda: hits_of(Octree.from_mesh(BALL, threads=2).all_hits(POINTS, WAYS))),
     ("tree.build", "_BOXES", 7, built),
     ("tree.blocks", "_VERTICES", 7, built),
     ("tree.blocks", "_BLOCKS", 7, built),
+    ("tree.blocks", "_VERTICES", 7, lambda: [Octree.from_mesh(ROUND).closest_hit(POINTS, WAYS).t]),
     ("tree.refit", "_NODES", 3, refitted),
     ("octree", "_ROWS", 7, too_small),
     ("mesh.polygons", "_BLOCK_CORNERS", 12, polygons),
-    ("picture.touching", "_CHUNK", 4, lambda: [crowded().touching]),
+    ("picture.touching", "_CHUNK", 1, lambda: [crowded().touching]),
     ("inspect.face_phong", "_CHUNK", 7, lambda: [face_colors(crowded().arrays, (0.0, 2.0, 9.0))]),
     ("trimesh_ray.facing", "_TOGETHER", 3, nearest_of_trimesh),
     ("studies.views", "_ROWS", 7, lambda: [visible_faces(TREES[0], (0.0, 2.0, 3.0))]),
@@ -143,7 +149,10 @@ def flat(answers: Any) -> list[bytes]:
 def test_some_at_a_time_are_all_at_once(
     monkeypatch: pytest.MonkeyPatch, module: str, name: str, few: int, done: Callable[[], list[Any]]
 ) -> None:
-    expected, where = flat(done()), import_module(f"renderer.{module}")
-    assert getattr(where, name) > few and len(expected[0]) > 0
-    monkeypatch.setattr(where, name, few)
-    assert flat(done()) == expected
+    where = import_module(f"renderer.{module}")
+    assert getattr(where, name) > few
+    with monkeypatch.context() as patched:
+        patched.setattr(where, name, few)
+        # First, or what a chunk left out would find the right answers in memory that is used again.
+        found = flat(done())
+    assert found == flat(done()) and len(found[0]) > 0
