@@ -67,6 +67,7 @@ PREPARED: dict[str, Callable[[], PreparedScene]] = {
     "an octree of few faces": lambda: prepare(scene((box(), "grey", "flat")), accelerator="octree", split="sah"),
     "few faces": lambda: prepare(scene((box(), "grey", "flat"), floor=FLOOR)),
     "no faces": lambda: prepare(scene()),
+    "touching glass": lambda: prepare(scene((box(), "glass", "flat"), (box(), "glass", "flat"))),
     "no light": lambda: prepare(scene((FULL, "grey", "smooth"), lights=[], camera=OrthographicCamera(
         eye=(0, 0, 6), target=(0, 0, 0), height=3))),
     "more than it needs": lambda: prepare(scene((BALL, "grey", "flat")), needs=dataclasses.replace(
@@ -126,7 +127,9 @@ def content(thing: Any) -> Any:
     if isinstance(thing, PreparedScene):
         pictures = [render(thing, resolution=(9, 7), max_depth=depth) for depth in {0, thing.scene.render.max_depth}]
         shown = [content([getattr(image, plane) for plane in PLANES]) for image in pictures]
-        return content([thing.scene, thing.octree, thing.needs, list(thing.arrays), thing.touching]), shown
+        return content(
+            [thing.scene, thing.octree, thing.needs, list(thing.arrays), thing.touching, thing.tree.blocks]
+        ), shown
     if isinstance(thing, BaseModel):
         return type(thing), {name: content(getattr(thing, name)) for name in type(thing).model_fields}
     if isinstance(thing, BaseException):
