@@ -70,7 +70,7 @@ PREPARED: dict[str, Callable[[], PreparedScene]] = {
     "touching glass": lambda: prepare(scene((box(), "glass", "flat"), (box(), "glass", "flat"))),
     "no light": lambda: prepare(scene((FULL, "grey", "smooth"), lights=[], camera=OrthographicCamera(
         eye=(0, 0, 6), target=(0, 0, 0), height=3))),
-    "more than it needs": lambda: prepare(scene((BALL, "grey", "flat")), needs=dataclasses.replace(
+    "more than it needs": lambda: prepare(scene((box(), "grey", "flat")), needs=dataclasses.replace(
         needs_of(MIXED), float64_vertices=True)),
 }  # fmt: skip
 

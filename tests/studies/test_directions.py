@@ -45,7 +45,7 @@ def test_directions_are_unit_vectors_that_share_the_whole(name):
 @pytest.mark.parametrize("m", [1, 2, 3, 7])
 def test_tregenza_has_its_rows(m):
     """Rows from the horizon up, in each clockwise from +y; weights are the solid angles of their parts of the rows."""
-    pattern, azimuths, heights, areas = reinhart(m), [], [], []
+    pattern, azimuths, heights, areas = reinhart(subdivision=m), [], [], []
     step = 90.0 / (7 * m + 0.5)
     for row, count in enumerate(np.repeat([30, 30, 24, 24, 18, 12, 6], m) * m):
         azimuths += [360.0 * i / count for i in range(count)]
