@@ -73,9 +73,9 @@ def parse_mesh(content: bytes, suffix: str, repairs: list[Repairs] | None = None
 
     Raises ``MeshError`` as ``load_mesh`` does, without the file's name.
     """
-    # Some editors begin a text with a byte order mark, which is no part of it.
-    if content.startswith(BOM_UTF8) and (suffix != ".stl" or content[len(BOM_UTF8) :].lstrip().startswith(b"solid")):
-        content = content[len(BOM_UTF8) :]
+    # Some editors begin a text with a byte order mark, which is no part of it. In STL only its length tells what it is.
+    if suffix != ".stl":
+        content = content.removeprefix(BOM_UTF8)
     mesh = _PARSERS[suffix](content, repairs)
     if len(mesh.faces) == 0:
         raise MeshError(f"holds no good faces: {_total(repairs)}" if repairs and any(repairs) else "holds no faces")

@@ -7,6 +7,7 @@ a normal is malformed. The format: 3D Systems, "StereoLithography Interface Spec
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 
 import numpy as np
 
@@ -33,8 +34,8 @@ def parse_stl(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     binary_size = _HEADER_BYTES + face_count * _RECORD.itemsize
     if len(content) == binary_size:
         corners = np.frombuffer(content, _RECORD, offset=_HEADER_BYTES)["corners"]
-    elif content.lstrip()[:5].lower() == b"solid":
-        corners = _text_corners(content.decode("latin-1").lower())
+    elif (text := content.removeprefix(BOM_UTF8)).lstrip()[:5].lower() == b"solid":
+        corners = _text_corners(text.decode("latin-1").lower().replace("\r", "\n"))
     else:
         raise MeshError(
             f"expected text that starts with 'solid', or binary of {binary_size} bytes for its {face_count}"

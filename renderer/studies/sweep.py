@@ -354,7 +354,8 @@ def _end_tile(answers, work, count):
         return
     for i in range(count):
         total, whole = get(work.points, _SUM + i), get(work.points, _WHOLE + i)
-        answers.sums[get(work.numbers, _ROW + i)] = total / whole if answers.share else total
+        # Nothing counts where all directions lie in the horizon of a point that weighs them by the cosine.
+        answers.sums[get(work.numbers, _ROW + i)] = total / whole if answers.share and whole > 0.0 else total
 
 
 @inlined

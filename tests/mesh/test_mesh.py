@@ -97,6 +97,28 @@ def test_the_docstrings_examples_hold() -> None:
     assert results.attempted > 0 and results.failed == 0
 
 
+def test_a_mesh_that_views_arrays_has_them_and_checks_their_values() -> None:
+    """Of each name its own, nothing copied, and none that is not given."""
+    arrays: dict[str, Any] = {
+        "vertices": np.eye(3), "faces": np.array([[0, 1, 2]], np.int32), "normals": np.full((3, 3), 2.0),
+        "colors": np.full((3, 3), 0.5, np.float32), "texcoords": np.zeros((3, 2)),
+    }  # fmt: skip
+    mesh = Mesh.viewing(arrays, "seen")
+    assert all(np.shares_memory(getattr(mesh, name), array) for name, array in arrays.items()) and mesh.name == "seen"
+    assert not mesh.colors.flags.writeable  # type: ignore[union-attr]
+    bare = Mesh.viewing({name: arrays[name] for name in ("vertices", "faces")}, "")
+    assert bare.normals is bare.colors is bare.texcoords is None
+    for name, value in (
+        ("vertices", np.nan),
+        ("faces", 3),
+        ("normals", np.inf),
+        ("colors", 1.5),
+        ("texcoords", np.nan),
+    ):
+        with pytest.raises(MeshError, match=f"^seen: {name}: expected"):
+            Mesh.viewing(arrays | {name: np.full_like(arrays[name], value)}, "seen")
+
+
 def test_may_be_empty() -> None:
     nothing = Mesh([], [])
     assert nothing.vertices.shape == nothing.faces.shape == (0, 3) and nothing.triangles.shape == (0, 3, 3)

@@ -15,6 +15,7 @@ import pytest
 import trimesh
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from ply_bytes import FORMATS, Rows, ply
 
 from renderer.errors import MeshError
 from renderer.mesh import load as mesh_io
@@ -26,33 +27,6 @@ from renderer.mesh.ply import format_ply, parse_ply
 from renderer.mesh.shapes import box, torus
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-FORMATS = ["ascii", "binary_little_endian", "binary_big_endian"]
-CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
-
-Rows = list[list[Any]]
-
-
-def ply(form: str, *elements: tuple[str, list[str], Rows], trailing: bytes = b"") -> bytes:
-    """A PLY file of elements (name, properties like 'float x' or 'list uchar int i', rows of numbers and lists)."""
-    header = ["ply", f"format {form} 1.0", "comment made for a test"]
-    body = b""
-    for name, properties, rows in elements:
-        header += [f"element {name} {len(rows)}", *(f"property {p}" for p in properties)]
-        for row in rows:
-            words: list[str] = []
-            for text, value in zip(properties, row, strict=True):
-                types = text.split()
-                values = [len(value), *value] if types[0] == "list" else [value]
-                codes = [types[1], *[types[2]] * len(value)] if types[0] == "list" else [types[0]]
-                words += map(str, values)
-                if form != "ascii":
-                    order = "<" if form == "binary_little_endian" else ">"
-                    body += b"".join(struct.pack(order + CODES[c], v) for c, v in zip(codes, values, strict=True))
-            if form == "ascii":
-                body += " ".join(words).encode() + b"\n"
-    return "\n".join([*header, "end_header", ""]).encode() + body + trailing
-
-
 XYZ = ["float x", "float y", "float z"]
 INDICES = ["list uchar int vertex_indices"]
 
@@ -702,6 +676,22 @@ def test_stl_text_of_two_solids_with_foreign_names(tmp_path: Path) -> None:
     content = (one.format(1, 1) + one.format(2, 2)).encode("latin-1")
     assert load_bytes(tmp_path, content, "a.stl").vertices[:, 2].tolist() == [1, 0, 0, 2, 0, 0]
     assert "truncated" in fault(tmp_path, content[:-20], "a.stl")
+
+
+def test_stl_lines_may_end_in_a_carriage_return(tmp_path: Path) -> None:
+    """As those of PLY and OBJ may; it was called truncated."""
+    text = foreign_box().export(file_type="stl_ascii").encode()
+    for newline in (b"\r", b"\r\n"):
+        mesh = load_bytes(tmp_path, text.replace(b"\n", newline), "a.stl")
+        assert np.array_equal(mesh.triangles, foreign_box().triangles)
+
+
+def test_stl_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    """Text in any case; and binary, whose header is any bytes, lost its first three."""
+    binary, text = foreign_box().export(file_type="stl"), foreign_box().export(file_type="stl_ascii").encode()
+    for content in (text, text.upper(), b"solid".ljust(77) + binary[80:]):
+        mesh = load_bytes(tmp_path, b"\xef\xbb\xbf" + content, "a.stl")
+        assert np.array_equal(mesh.triangles, foreign_box().triangles)
 
 
 def test_stl_faults(tmp_path: Path) -> None:

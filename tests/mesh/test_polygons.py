@@ -281,6 +281,15 @@ def test_polygons_of_very_many_corners_end() -> None:
     assert time.process_time() - start < 60
 
 
+def test_polygons_of_so_many_corners_that_each_is_cut_alone() -> None:
+    """Above 2048 corners; each as if there were no other."""
+    shapes = [placed(star(1025, inner)) for inner in (0.4, 0.5, 0.6)]
+    triangles, size = np.array(cut(*shapes)), len(shapes[0]) - 2
+    for k, points in enumerate(shapes):
+        own = triangles[k * size : (k + 1) * size] - k * len(points)
+        assert own.tolist() == cut(points) != fan(len(points))
+
+
 def test_a_million_squares_in_two_seconds() -> None:
     """Quiet, it takes 0.5 s."""
     count = 1_000_000

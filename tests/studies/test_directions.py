@@ -42,15 +42,26 @@ def test_directions_are_unit_vectors_that_share_the_whole(name):
     assert len(np.unique(pattern.directions, axis=0)) == len(pattern.weights)
 
 
-def test_tregenza_has_its_rows():
-    pattern = tregenza()
-    heights, counts = np.unique(np.degrees(np.arcsin(pattern.directions[:, 2])).round(9), return_counts=True)
-    assert heights.tolist() == [6.0, 18.0, 30.0, 42.0, 54.0, 66.0, 78.0, 90.0]
-    assert counts.tolist() == [30, 30, 24, 24, 18, 12, 6, 1]
-    assert pattern.directions[0, 0] == 0.0 and pattern.directions[1, 0] > 0.0  # to +y, then clockwise
-    for low, high, row in [(0, 12, slice(0, 30)), (72, 84, slice(138, 144)), (84, 90, slice(144, 145))]:
-        band = 2.0 * np.pi * (np.sin(np.radians(high)) - np.sin(np.radians(low)))
-        assert abs(pattern.weights[row].sum() - band) < 1e-14
+@pytest.mark.parametrize("m", [1, 2, 3, 7])
+def test_tregenza_has_its_rows(m):
+    """Rows from the horizon up, in each clockwise from +y; weights are the solid angles of their parts of the rows."""
+    pattern, azimuths, heights, areas = reinhart(subdivision=m), [], [], []
+    step = 90.0 / (7 * m + 0.5)
+    for row, count in enumerate(np.repeat([30, 30, 24, 24, 18, 12, 6], m) * m):
+        azimuths += [360.0 * i / count for i in range(count)]
+        heights += [step * (row + 0.5)] * count
+        zone = np.sin(np.radians(step * (row + 1))) - np.sin(np.radians(step * row))
+        areas += [2.0 * np.pi * zone / count] * count
+    cap = 2.0 * np.pi * (1.0 - np.sin(np.radians(90.0 - step / 2)))
+    a, h = np.radians([*azimuths, 0.0]), np.radians([*heights, 90.0])
+    ways = np.stack([np.cos(h) * np.sin(a), np.cos(h) * np.cos(a), np.sin(h)], axis=1)
+    # Of angles in radians up to 6, and their sines.
+    np.testing.assert_allclose(pattern.directions, ways, rtol=0, atol=4e-15)
+    np.testing.assert_allclose(pattern.weights, [*areas, cap], rtol=0, atol=1e-14)
+    if m == 1:
+        np.testing.assert_array_equal(tregenza().directions, pattern.directions)
+        np.testing.assert_array_equal(tregenza().weights, pattern.weights)
+        assert (step, len(ways)) == (12.0, 145)
 
 
 @pytest.mark.parametrize("pattern", [tregenza(), reinhart()])

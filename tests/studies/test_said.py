@@ -22,7 +22,6 @@ from renderer.studies import (
     scan,
     sky_view_factor,
     sun_hours,
-    tregenza,
     visible_faces,
 )
 from renderer.studies.share import check_asked
@@ -77,27 +76,6 @@ def test_spirals_have_equal_steps_of_height_or_of_its_square(count: int) -> None
         golden = 2.0 * np.pi * (np.sqrt(1.25) - 0.5)
         # 1e-10: the fraction of up to 1e3 turns, over the sine of the angle to a pole, 0.03 at least.
         np.testing.assert_allclose(np.mod(turn, 2.0 * np.pi), golden, rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize("m", [1, 2, 3, 7])
-def test_reinharts_rows_are_equally_high_and_begin_at_plus_y(m: int) -> None:
-    ways, weights = reinhart(m)
-    step = 90.0 / (7 * m + 0.5)
-    heights, begins, counts = np.unique(
-        np.degrees(np.arcsin(ways[:, 2])).round(7), return_index=True, return_counts=True
-    )
-    np.testing.assert_allclose(heights[:-1], step * (np.arange(7 * m) + 0.5), atol=1e-6)
-    assert counts.tolist() == [m * n for n in (30, 30, 24, 24, 18, 12, 6) for _ in range(m)] + [1]
-    assert counts.sum() == 144 * m**2 + 1 and heights[-1] == 90.0
-    assert (ways[begins[:-1], 0] == 0.0).all() and (ways[begins[:-1], 1] > 0.0).all()
-    cap = 2.0 * np.pi * (1.0 - np.cos(np.radians(step / 2.0)))
-    # 1 less a cosine near 1 has lost some digits.
-    assert abs(weights[-1] - cap) < 1e-14
-
-
-def test_tregenza_is_reinharts_first() -> None:
-    for ours, theirs in zip(tregenza(), reinhart(1), strict=True):
-        np.testing.assert_array_equal(ours, theirs)
 
 
 def test_scans_and_faces_have_arrays_of_the_types_and_dimensions_that_are_said() -> None:

@@ -176,6 +176,14 @@ def test_bad_arguments_of_a_sky_are_named(argument, value, said):
         sky_view_factor(given.pop("octree"), given.pop("points"), given.pop("normals"), **given)
 
 
+def test_of_a_sky_within_a_points_horizon_nothing_is_seen():
+    """No patch adds anything there: a share of 0, where it was NaN."""
+    octree = Octree([[0, 0, -9], [1, 0, -9], [0, 1, -9]], [[0, 1, 2]])
+    across = Pattern(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0]]), np.ones(2))
+    for patches in (across, 1):
+        assert sky_view_factor(octree, np.zeros((2, 3)), [[1, 0, 0], [0, 0, 1]], patches=patches).tolist() == [0.0, 1.0]
+
+
 @pytest.mark.parametrize("bad", [[1.0], np.full(3, np.nan), [[1.0, 1.0, 1.0]], [-1, 0, 0]])
 def test_bad_hours_are_named(bad):
     with pytest.raises(ValueError, match=r"^weights: expected "):

@@ -1,0 +1,63 @@
+"""The PLY files that meshes are saved to, read by trimesh and by the bytes alone."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from renderer import Mesh, load_mesh
+from renderer.mesh.load import save_ply
+
+NAMES = {"normals": ("nx", "ny", "nz"), "colors": ("red", "green", "blue"), "texcoords": ("s", "t")}
+TYPES = {"float": "<f4", "double": "<f8"}
+
+
+def mesh_with(attributes: tuple[str, ...], exact: bool) -> Mesh:
+    """Vertices that float32 holds or not, and what they carry; no two columns are alike."""
+    k = np.arange(5.0)
+    vertices = np.stack([k, k * k, 7.0 - k], axis=1) / 4.0 + (0.0 if exact else 1e-9)
+    given: dict[str, Any] = {
+        "normals": np.stack([k / 3.0, -k - 1.0, 0.1 + 0.0 * k], axis=1),
+        "colors": np.stack([k / 7.0, 1.0 - k / 9.0, k % 2], axis=1),
+        "texcoords": np.stack([k / 3.0, -k / 7.0], axis=1),
+    }
+    faces = [[0, 1, 2], [4, 3, 2], [1, 3, 4]]
+    return Mesh(vertices, faces, **{name: given[name] for name in attributes})
+
+
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize("attributes", [(), ("normals",), ("colors",), ("texcoords",), tuple(NAMES)], ids=str)
+def test_a_file_has_what_the_mesh_has_and_nothing_else(
+    tmp_path: Path, attributes: tuple[str, ...], exact: bool
+) -> None:
+    mesh = mesh_with(attributes, exact)
+    save_ply(mesh, tmp_path / "a.ply")
+    read: Any = trimesh.load(tmp_path / "a.ply", process=False)
+    np.testing.assert_array_equal(read.vertices, mesh.vertices)
+    np.testing.assert_array_equal(read.faces, mesh.faces)
+    raw = read.metadata["_ply_raw"]["vertex"]["data"]
+    assert set(raw.dtype.names) == {*"xyz", *(name for each in attributes for name in NAMES[each])}
+    for each in attributes:
+        found = np.stack([raw[name].ravel() for name in NAMES[each]], axis=1)
+        np.testing.assert_array_equal(found, getattr(mesh, each))
+    again = load_mesh(tmp_path / "a.ply")
+    for each in ("vertices", "faces", *NAMES):
+        np.testing.assert_array_equal(getattr(again, each), getattr(mesh, each))
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_its_bytes_are_those_that_its_header_says(tmp_path: Path, exact: bool) -> None:
+    mesh = mesh_with(tuple(NAMES), exact)
+    save_ply(mesh, tmp_path / "a.ply")
+    header, body = (tmp_path / "a.ply").read_bytes().split(b"end_header\n", 1)
+    assert header.startswith(b"ply\nformat binary_little_endian 1.0\n")
+    properties = [line.split()[1:] for line in header.decode().splitlines() if line.startswith("property")]
+    assert properties.pop() == ["list", "uchar", "int", "vertex_indices"]
+    rows = np.dtype([(name, TYPES[kind]) for kind, name in properties])
+    vertices = np.frombuffer(body, rows, 5)
+    np.testing.assert_array_equal(np.stack([vertices[name] for name in "xyz"], axis=1), mesh.vertices)
+    assert rows["x"] == ("<f4" if exact else "<f8") and rows["nx"] == rows["s"] == "<f8" and rows["red"] == "<f4"
+    faces = np.frombuffer(body[5 * rows.itemsize :], [("count", "u1"), ("corners", "<i4", 3)])
+    assert faces["count"].tolist() == [3, 3, 3] and faces["corners"].tolist() == mesh.faces.tolist()
