@@ -129,5 +129,8 @@ def checked_band(band: object) -> int:
 def digest_of_scene(scene: Scene, needs: Needs) -> str:
     """A digest of all that pictures of a scene show, whatever their cameras and settings are."""
     mesh, arrays = pack(scene, needs)
-    # The media are those around the scene's own camera, which is the view's.
-    return digest_of(mesh.vertices, mesh.faces, *(a for name, a in arrays._asdict().items() if name != "media"))
+    # The media are those around the scene's own camera, which is the view's; around any they depend on how the mesh is
+    # divided into bodies.
+    bodies = np.array([len(instance.mesh.faces) for instance in scene.instances], np.int64)
+    shown = (array for name, array in arrays._asdict().items() if name != "media")
+    return digest_of(mesh.vertices, mesh.faces, bodies, *shown)

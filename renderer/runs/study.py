@@ -86,9 +86,11 @@ class Study:
 
 
 def _written(option: Any) -> Any:
-    """An option as a plan has it, in types that JSON has."""
+    """An option as a plan has it, in types that JSON has: an array by its digest, and so the arrays of a list."""
     if isinstance(option, np.ndarray):
         return digest_of(option)
+    if isinstance(option, list | tuple):
+        return [_written(part) for part in option]
     return option.item() if isinstance(option, np.generic) else option
 
 

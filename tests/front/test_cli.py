@@ -62,11 +62,6 @@ def test_accelerator_split_and_threads_change_no_byte(tmp_path: Path) -> None:
     assert pictures[0].startswith(b"\x89PNG") and pictures.count(pictures[0]) == 4
 
 
-def test_quiet_says_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["render", str(STAIRS), "-o", str(tmp_path / "a.png"), "--resolution", "4x4", "--quiet"]) == 0
-    assert capsys.readouterr() == ("", "")
-
-
 def test_compile(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compile"]) == 0
     out, err = capsys.readouterr()

@@ -1,7 +1,8 @@
 """Parts on disk: what is whole is kept, what is not is done again, and another study's folder is refused."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,10 @@ from renderer.runs.parts import Parts, Plan, digest_of
 
 PLAN = Plan(rows=10, size=4, width=0, dtype="<f8", made_of={"kind": "sky", "options": {"patches": 145}})
 ROWS = np.arange(10.0)
+# Another value for each field, and for each of what a plan is made of; of as many bytes where that can be.
+OTHERS: dict[str, Any] = {
+    "rows": 11, "size": 5, "width": 1, "dtype": "<i8", "made_of": PLAN.made_of | {"mesh": "1"},
+}  # fmt: skip
 
 
 def _write(parts: Parts, part: int) -> None:
@@ -46,12 +51,16 @@ def test_a_part_that_a_disk_has_spoilt_is_done_again(tmp_path: Path, spoil: obje
     assert Parts(tmp_path / "parts", PLAN).missing() == [0, 1, 2]
 
 
+def test_every_field_of_a_plan_has_another_value() -> None:
+    assert OTHERS.keys() == {field.name for field in fields(Plan)}
+
+
 @pytest.mark.parametrize(
     "other, said",
-    [(replace(PLAN, rows=11), "rows"), (replace(PLAN, size=5), "size"),
+    [*((replace(PLAN, **{name: OTHERS[name]}), name) for name in OTHERS if name != "made_of"),
      (replace(PLAN, made_of={"kind": "sun", "options": {"patches": 145}}), "kind"),
      (replace(PLAN, made_of={"kind": "sky", "options": {"patches": 577}}), "options"),
-     (replace(PLAN, made_of={"kind": "sky", "options": {"patches": 145}, "mesh": "1"}), "mesh")],
+     (replace(PLAN, made_of=OTHERS["made_of"]), "mesh")],
 )  # fmt: skip
 def test_parts_of_another_study_are_refused_and_kept(tmp_path: Path, other: Plan, said: str) -> None:
     _write(Parts(tmp_path / "parts", PLAN), 0)
@@ -60,14 +69,12 @@ def test_parts_of_another_study_are_refused_and_kept(tmp_path: Path, other: Plan
     assert Parts(tmp_path / "parts", PLAN).missing() == [1, 2]
 
 
-@pytest.mark.parametrize(
-    "other", [PLAN, replace(PLAN, made_of={"kind": "sun"}), replace(PLAN, rows=11), replace(PLAN, dtype="<i8")]
-)
+@pytest.mark.parametrize("other", [PLAN, *(replace(PLAN, **{name: value}) for name, value in OTHERS.items())])
 def test_parts_that_a_removal_cut_short_left_are_those_of_their_run_alone(tmp_path: Path, other: Plan) -> None:
     """Its manifest went first: a run of another plan took its parts for its own, and its result was wrong."""
     _write(Parts(tmp_path / "parts", PLAN), 0)
     (tmp_path / "parts" / "manifest.json").unlink()
-    assert Parts(tmp_path / "parts", other).missing() == ([1, 2] if other is PLAN else [0, 1, 2])
+    assert Parts(tmp_path / "parts", other).missing() == list(range(1 if other is PLAN else 0, other.parts))
 
 
 def test_a_part_is_none_under_another_number(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
 from renderer.process.parallel import available_threads
 from renderer.runs.chosen import on_grid
-from renderer.studies import ambient_occlusion, face_points, sky_view_factor, sun_hours
+from renderer.studies import face_points, sky_view_factor, sun_hours
 from validation.benchmark.measures.meshes import named
 
 SCENE = """
@@ -53,23 +53,6 @@ def on_faces(city: Path, of: Any, *arguments: Any, **options: Any) -> Any:
     found = np.full(len(octree.mesh.faces), np.nan)
     found[faces] = of(octree, points, normals, *arguments, leaving=faces, **options)
     return found
-
-
-@pytest.mark.parametrize(
-    "kind, own, given",
-    [("sky", sky_view_factor, {"patches": 100}), ("sky", sky_view_factor, {"patches": 577}),
-     ("sky", sky_view_factor, {"definition": "geometric"}), ("sky", sky_view_factor, {"distance": 0.05}),
-     ("ao", ambient_occlusion, {"samples": 100}), ("ao", ambient_occlusion, {"distance": 0.05})],
-)  # fmt: skip
-def test_what_a_study_is_told_is_handed_on_and_the_rest_left_to_the_library(
-    city: Path, tmp_path: Path, kind: str, own: Any, given: dict[str, Any]
-) -> None:
-    told = [word for name, value in given.items() for word in (f"--{name}", value)]
-    study(kind, city, "-o", tmp_path / "told.npy", *told, "--quiet")
-    study(kind, city, "--faces", "-o", tmp_path / "default.npy", "--quiet")
-    np.testing.assert_array_equal(np.load(tmp_path / "told.npy"), on_faces(city, own, **given))
-    np.testing.assert_array_equal(np.load(tmp_path / "default.npy"), on_faces(city, own))
-    assert (np.load(tmp_path / "told.npy") != np.load(tmp_path / "default.npy")).any()
 
 
 def test_suns_have_an_hour_each_unless_told_and_the_mesh_hides_as_far_as_told(city: Path, tmp_path: Path) -> None:

@@ -24,9 +24,7 @@ from viewer_client import HEAVY, Client, Got, looking, rendered
 
 import renderer
 from renderer import load_scene, render
-from renderer.inspect.false_color import false_color
 from renderer.picture.image import srgb
-from renderer.scene.camera import OrthographicCamera
 from renderer.viewer import export, passes
 from renderer.viewer.protocol import FILE, Still, parse
 from renderer.viewer.shown import ShownScene, open_file
@@ -121,21 +119,6 @@ def test_a_still_is_the_file_that_the_renderer_saves(
     rendered(client.scene, **settings).save(tmp_path / "expected.png")
     file = received(client, still(settings=settings))
     assert file == (tmp_path / "expected.png").read_bytes()
-
-
-@pytest.mark.parametrize("aov", ["depth", "normal", "face", "cost"])
-def test_a_still_of_other_values_has_their_colours(client: Any, aov: str) -> None:
-    file = received(client, still(settings={"aov": aov}))
-    depth = 0 if aov != "cost" else 6
-    expected = false_color(rendered(client.scene, max_depth=depth, shadows=aov == "cost"), aov)
-    assert np.array_equal(decoded(file), expected)
-
-
-def test_an_orthographic_still_is_the_renderers(client: Any) -> None:
-    seen = camera_of(looking(EYE)["m"], 1.0, height=3.5)
-    assert isinstance(seen, OrthographicCamera)
-    expected = render(client.scene, camera=seen, resolution=(200, 150), max_depth=6).srgb
-    assert np.array_equal(decoded(received(client, still(height=3.5))), expected)
 
 
 def test_a_view_is_answered_while_a_still_is_made(client: Any) -> None:

@@ -131,27 +131,6 @@ def test_a_small_view_of_many_samples_is_first_shown_with_one(client: Client, fo
         assert np.array_equal(got.rgb, srgb(rendered(scene, resolution=(40, 30), samples=samples).radiance))
 
 
-@pytest.mark.parametrize(
-    ("settings", "edit", "options"),
-    [
-        ({"max_depth": 1}, None, {"max_depth": 1}),
-        ({"shadows": False}, None, {"shadows": False}),
-        ({"reflection": False}, ("reflectance = 0.2", ""), {}),
-        ({"refraction": False}, ("transmittance = 0.6", ""), {}),
-        ({"light": [1.0, -1.0, 0.5]}, ("direction = [-0.6, -1.4, -0.8]", "direction = [1.0, -1.0, 0.5]"), {}),
-    ],
-)
-def test_what_a_panel_switches_is_as_if_the_file_said_so(
-    folder: Path, tmp_path: Path, settings: dict[str, Any], edit: tuple[str, str] | None, options: dict[str, Any]
-) -> None:
-    (tmp_path / "edited.toml").write_text(PLAIN.replace(*edit) if edit else PLAIN)
-    scene = load_scene(tmp_path / "edited.toml")
-    with renderer.view(folder / "plain.toml", browser=False) as viewing, Client(viewing.url) as client:
-        plain, got = client.final(), client.final(settings=settings)
-    assert np.array_equal(got.rgb, srgb(rendered(scene, **options).radiance))
-    assert not np.array_equal(got.rgb, plain.rgb)
-
-
 @pytest.mark.parametrize("aov", ["depth", "normal", "face", "cost"])
 def test_an_aov_is_drawn_and_its_scale_told(client: Client, folder: Path, aov: str) -> None:
     client.view(w=100, h=75, settings={"aov": aov})
@@ -564,18 +543,6 @@ def test_a_click_tells_what_the_ray_meets(client: Client, folder: Path, x: int, 
     assert np.allclose(got["point"], end, rtol=0.0, atol=1e-12)
     assert np.allclose(got["normal"], image.normal[y, x], rtol=0.0, atol=1e-6)  # the picture's are float32
     assert got["material"] in shown.scene.materials
-
-
-def test_a_clicked_ray_ends_where_it_weighs_less_than_the_scene_wants(folder: Path) -> None:
-    shown = open_file(folder / "blocks.toml")
-    light = shown.scene.model_copy(update={"render": shown.scene.render.model_copy(update={"min_weight": 0.5})})
-    segments = []
-    for scene in (shown.scene, light):
-        with renderer.view(scene, browser=False) as viewing, Client(viewing.url) as client:
-            view = looking((0.5, 2.6, 5.5))
-            client.send(**{"type": "pick", "seq": 1, "x": 140, "y": 100, **view, **SIZE})
-            segments.append(len(client.told("pick")["path"]))
-    assert segments[1] == rendered(light, min_weight=0.5).rays[100, 140] < segments[0]
 
 
 @pytest.mark.parametrize("walk", [False, True])

@@ -1,0 +1,66 @@
+"""Each key that ``--change`` can set, changed alone, gives the picture of a scene file that has it."""
+
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+import tomlkit
+from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of, write_meshes
+
+from renderer import RenderSettings
+from renderer.cli import main
+from renderer.scene.camera import Camera
+from renderer.scene.change import _Changes
+from renderer.scene.hide import object_names
+from renderer.scene.light import Light
+from renderer.scene.material import Material
+
+CHANGED = [other for other in VARIATIONS if other.keys[0] in _Changes.model_fields]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("changes")
+    write_meshes(folder)
+    return folder
+
+
+def written_by(folder: Path, table: Table, text: str) -> np.ndarray:
+    """What the command writes of the scene with a change."""
+    scene_of(folder, table)
+    words = [str(folder / "scene.toml"), "--change", text, "-o", str(folder / "a.npy"), "--quiet"]
+    assert main(["render", *words]) == 0
+    return np.load(folder / "a.npy")
+
+
+def text_of(other: Variation) -> str:
+    """The change: a camera, a material or the lights whole, or a key of ``render`` alone."""
+    top, name = other.keys[0], other.keys[1]
+    whole = other.varied()[top]
+    return tomlkit.dumps({top: {name: whole[name]} if top in ("materials", "render") else whole})
+
+
+def test_every_table_that_can_be_changed_is_varied_in_each_of_its_types() -> None:
+    assert {other.keys[0] for other in CHANGED} == _Changes.model_fields.keys() - {"hide"}
+    types = {RenderSettings, *get_args(Camera), *get_args(Light), *get_args(Material)}
+    assert {other.record for other in CHANGED} == types
+
+
+@pytest.mark.parametrize("other", CHANGED, ids=str)
+def test_a_change_gives_the_picture_of_a_file_that_has_it(folder: Path, other: Variation) -> None:
+    """All other keys stay as they are: none of the file's has its default."""
+    found = written_by(folder, other.table, text_of(other))
+    assert found.tobytes() == picture(scene_of(folder, other.varied())).radiance.tobytes()
+    assert found.tobytes() != picture(scene_of(folder, other.table)).radiance.tobytes()
+
+
+@pytest.mark.parametrize("name", ["objects.0", "objects.1", "objects.2", "floor"])
+def test_what_is_hidden_gives_the_picture_of_a_file_without_it(folder: Path, name: str) -> None:
+    assert name in object_names(scene_of(folder, BASE))
+    left = {key: value for key, value in BASE.items() if key != name}
+    if name != "floor":
+        left["objects"] = [thing for i, thing in enumerate(BASE["objects"]) if f"objects.{i}" != name]
+    found = written_by(folder, BASE, f'hide = ["{name}"]')
+    assert found.tobytes() == picture(scene_of(folder, left)).radiance.tobytes()
+    assert found.tobytes() != picture(scene_of(folder, BASE)).radiance.tobytes()

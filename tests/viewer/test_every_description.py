@@ -1,0 +1,42 @@
+"""Each field of a scene that a page draws or shows by itself is in what it fetches."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomlkit
+from varied import VARIATIONS, Variation, write_meshes
+
+from renderer.viewer.payload import description, mesh_payload
+from renderer.viewer.shown import open_file
+
+# What the server alone goes by.
+UNTOLD = ("min_weight", "max_rays")
+
+
+def fetched(folder: Path, table: Any) -> tuple[str, bytes]:
+    """What a page knows of the scene of a file, beside its tree and what a picture needs."""
+    (folder / "a.toml").write_text(tomlkit.dumps(table))
+    shown = open_file(folder / "a.toml")
+    told = {key: value for key, value in description(shown).items() if key not in ("id", "octree", "needs")}
+    return json.dumps(told), b"".join(mesh_payload(shown.prepared).pieces)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("described")
+    write_meshes(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def usual(folder: Path) -> dict[str, tuple[str, bytes]]:
+    """By the types of their cameras, the scenes that fields are varied of."""
+    return {v.table["camera"]["type"]: fetched(folder, v.table) for v in (VARIATIONS[0], VARIATIONS[-1])}
+
+
+@pytest.mark.parametrize("other", VARIATIONS, ids=str)
+def test_a_page_is_told_of_another_value(folder: Path, usual: dict[str, tuple[str, bytes]], other: Variation) -> None:
+    told = fetched(folder, other.varied())
+    assert (told == usual[other.table["camera"]["type"]]) == (other.keys[-1] in UNTOLD)

@@ -1,0 +1,213 @@
+"""Each setting of the page and each field of the scene's file, alone, in each way in which the viewer answers."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+import tomlkit
+from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of, write_meshes
+from viewer_ways import (
+    INSIDE,
+    WAYS,
+    WRITTEN,
+    Case,
+    a_still,
+    a_turntable,
+    brute,
+    click,
+    command,
+    octree,
+    page_of,
+    same,
+    save,
+    save_camera,
+)
+
+from renderer import Scene, srgb
+from renderer.inspect.false_color import false_color, shades_of
+from renderer.inspect.ray_cost import camera_steps
+from renderer.picture.pack import media_around
+from renderer.viewer import compare
+from renderer.viewer.compare import compared
+from renderer.viewer.protocol import ViewSettings
+from renderer.viewer.shown import ShownScene, open_file
+
+
+def dark(color: str) -> Callable[[Table], None]:
+    """No material has the colour any more."""
+
+    def change(table: Table) -> None:
+        for material in table["materials"].values():
+            material |= {color: 0.0} if color in material else {}
+
+    return change
+
+
+def into(*keys: Any, value: Any) -> Callable[[Table], None]:
+    """The value stands there."""
+
+    def change(table: Table) -> None:
+        place = table
+        for key in keys[:-1]:
+            place = place[key]
+        place[keys[-1]] = value
+
+    return change
+
+
+GLASS, MIRROR = BASE["materials"]["glass"], BASE["materials"]["steel"]
+SUN, LAMP = BASE["lights"][:2]
+EDITS: Table = {"materials": {"wax": GLASS, "glass": MIRROR}, "lights": [LAMP]}
+TURNED = [0.7, -0.9, -0.2]
+DARK = SUN | {"irradiance": [0.0, 0.0, 0.0]}
+# Settings that differ from those that a page begins with, and how the file has to say so.
+SETTINGS: dict[str, tuple[Table, Callable[[Table], None]]] = {
+    "max_depth": ({"max_depth": 1}, into("render", "max_depth", value=1)),
+    "samples": ({"samples": 9}, into("render", "samples", value=9)),
+    "shadows": ({"shadows": False}, into("render", "shadows", value=False)),
+    "reflection": ({"reflection": False}, dark("reflectance")),
+    "refraction": ({"refraction": False}, dark("transmittance")),
+    "light": ({"light": TURNED}, into("lights", 0, "direction", value=TURNED)),
+    "edits": (
+        {"edits": EDITS},
+        lambda table: table.update(materials=table["materials"] | EDITS["materials"], lights=[LAMP]),
+    ),
+    # The first that shines is turned.
+    "dark": (
+        {"light": TURNED, "edits": {"lights": [LAMP, DARK, SUN, SUN]}},
+        into("lights", value=[LAMP, DARK, SUN | {"direction": TURNED}, SUN]),
+    ),
+}
+# Settings of some ways alone, each with a test of its own below.
+OWN = {"refine", "aov", "pair"}
+# tests/viewer/test_viewer_server.py: a JPEG file looks like the picture.
+ELSEWHERE = {"pixels"}
+# Those that no file of a scene has, nor a command's.
+UNWRITTEN = {"reflection", "refraction"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shown")
+    write_meshes(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shown(folder: Path) -> ShownScene:
+    """The scene, in a file that stays as it is."""
+    (folder / "shown.toml").write_text(tomlkit.dumps(BASE))
+    return open_file(folder / "shown.toml")
+
+
+@cache
+def with_setting(folder: Path, shown: ShownScene, name: str) -> Case:
+    given, change = SETTINGS[name]
+    table = deepcopy(BASE)
+    change(table)
+    return Case(shown, page_of(shown.scene) | given, scene_of(folder, table)).seen()
+
+
+# The ways
+
+
+def shows(way: Any, name: str) -> bool:
+    """Whether the way's answer has the setting: files and commands know no switches, a saved camera no materials."""
+    return not (way in WRITTEN and name in UNWRITTEN) and (way is not save_camera or name != "edits")
+
+
+def test_every_setting_has_a_case() -> None:
+    here = {key for given, _ in SETTINGS.values() for key in given}
+    assert ViewSettings.model_fields.keys() == here | OWN | ELSEWHERE
+
+
+@pytest.mark.parametrize(("name", "way"), [(n, way) for n in SETTINGS for way in (*WAYS, *WRITTEN) if shows(way, n)])
+def test_a_setting_is_as_if_the_file_said_so(folder: Path, shown: ShownScene, name: str, way: Any) -> None:
+    case = with_setting(folder, shown, name)
+    assert same(way(case))
+    assert case.picture().radiance.tobytes() != Case(shown, {}, shown.scene).seen().picture().radiance.tobytes()
+
+
+@pytest.mark.parametrize("way", [octree, brute, a_still, click])
+@pytest.mark.parametrize("name", SETTINGS)
+def test_a_setting_holds_for_an_eye_in_two_bodies(folder: Path, shown: ShownScene, name: str, way: Any) -> None:
+    case = with_setting(folder, shown, name).seen(m=INSIDE)
+    assert len(media_around(shown.scene, case.scene.camera)) == 2
+    assert same(way(case))
+
+
+EDITED = [other for other in VARIATIONS if other.keys[0] in ("materials", "lights")]
+
+
+@pytest.mark.parametrize("other", EDITED, ids=str)
+def test_each_field_that_is_edited_is_shown_and_written(folder: Path, shown: ShownScene, other: Variation) -> None:
+    """A saved camera has the lights too, but no materials."""
+    table, kind, name = other.varied(), other.keys[0], other.keys[1]
+    edits = {"lights": table["lights"]} if kind == "lights" else {"materials": {name: table["materials"][name]}}
+    case = Case(shown, page_of(shown.scene) | {"edits": edits}, scene_of(folder, table)).seen()
+    for way in (octree, command, save, *([save_camera] if kind == "lights" else [])):
+        assert same(way(case)), way
+
+
+@pytest.mark.parametrize("way", [*WAYS, *WRITTEN])
+@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] == "render"], ids=str)
+def test_the_files_settings_hold(folder: Path, other: Variation, way: Any) -> None:
+    assert same(way(of_file(folder, other)))
+
+
+@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] not in ("render", "camera")], ids=str)
+def test_the_picture_is_that_of_the_file(folder: Path, other: Variation) -> None:
+    assert same(octree(of_file(folder, other)))
+
+
+def of_file(folder: Path, other: Variation) -> Case:
+    """The scene of a file with that field, with the settings that a page takes over."""
+    path = folder / "other.toml"
+    path.write_text(tomlkit.dumps(other.varied()))
+    shown = open_file(path)
+    return Case(shown, page_of(shown.scene), shown.scene).seen()
+
+
+@pytest.mark.parametrize("refine", [16, 64])
+def test_a_picture_grows_to_as_many_samples_as_are_asked_for(shown: ShownScene, refine: int) -> None:
+    case = Case(shown, page_of(shown.scene) | {"refine": refine}, shown.scene).seen()
+    assert np.array_equal(case.colors("octree"), srgb(case.picture(samples=refine).radiance))
+
+
+@pytest.mark.parametrize("aov", get_args(ViewSettings.model_fields["aov"].annotation))
+def test_a_value_is_drawn_in_its_colours(shown: ShownScene, aov: Any) -> None:
+    case = Case(shown, page_of(shown.scene) | {"aov": aov}, shown.scene).seen()
+    if aov in ("nodes", "triangles"):
+        counts = getattr(camera_steps(shown.prepared, case.scene.camera, case.size, lambda share: None), aov)
+        expected = shades_of(counts, counts.min(), counts.max())
+    else:
+        plain = {} if aov in ("color", "cost") else {"max_depth": 0, "shadows": False}
+        expected = false_color(case.picture(**plain), aov)
+    for way in (octree, a_still, a_turntable):
+        assert np.array_equal(way(case)[0], expected)
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_another_renderer_is_asked_for_the_picture_with_the_setting(
+    folder: Path, shown: ShownScene, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Bounces and size are told beside the scene; what others cannot switch off is refused."""
+
+    def reference(told: str, scene: Scene, size: Any, max_depth: int, finished: Any) -> Any:
+        assert told == "other"
+        return picture(scene, resolution=size, samples=1, max_depth=max_depth).radiance
+
+    monkeypatch.setattr(compare, "reference_picture", reference)
+    case = with_setting(folder, shown, name)
+    view = replace(case, settings=case.settings | {"pair": "other"}).message("view", seq=1, mode="proof")
+    if name in UNWRITTEN:
+        with pytest.raises(ValueError, match=f"comparison: expected {name} as the materials have it"):
+            compared(shown, view, case.size, lambda share: None)
+        return
+    for found in compared(shown, view, case.size, lambda share: None).pictures:
+        assert found.tobytes() == case.picture(samples=1).radiance.tobytes()
