@@ -20,7 +20,8 @@ from validation.hits.refit import check_refit
 from validation.hits.section import HitEffort, check_leaks, check_mesh
 from validation.hits.walks import check_walks
 from validation.job import Job
-from validation.pictures.section import PictureEffort, check_scene
+from validation.pictures.plan import PictureEffort
+from validation.pictures.section import check_scene
 from validation.pictures.unseen import check_unseen
 from validation.promises import section as promises
 from validation.queries import section

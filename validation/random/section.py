@@ -19,7 +19,8 @@ from validation.gates import Gate
 from validation.hits.check import HitEffort, check_mesh
 from validation.job import Job, Task
 from validation.pictures.check import SHOWN
-from validation.pictures.section import PictureEffort, check_scene
+from validation.pictures.plan import PictureEffort
+from validation.pictures.section import check_scene
 from validation.random.meshes import draw_mesh
 from validation.random.scenes import Drawn, draw_scene
 from validation.random.shrink import shrunk, smaller_meshes, smaller_scenes

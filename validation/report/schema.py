@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-VERSION = 2
+VERSION = 3
 
 _Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
@@ -82,7 +82,7 @@ class ThresholdChanges(_Strict):
 class Metrics(_Strict):
     """The whole file. Sections that did not run are absent; ``left_out`` gives the reasons."""
 
-    version: Literal[2] = Field(alias="schema")
+    version: Literal[3] = Field(alias="schema")
     command: str
     quick: bool
     own: bool

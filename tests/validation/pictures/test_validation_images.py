@@ -19,9 +19,9 @@ from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 from validation.gates import Gate
 from validation.job import Job
-from validation.pictures import ladder, monte_carlo
+from validation.pictures import ladder, monte_carlo, plan, rung
 from validation.pictures import section as images
-from validation.pictures.section import PictureEffort, Reference
+from validation.pictures.plan import WHITTED, PictureEffort, Reference, plan_pictures
 from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba.scene import in_float32
@@ -75,7 +75,7 @@ def check(folder: Path, scene: Scene, effort: PictureEffort = SMALL) -> tuple[di
     said: list[str] = []
     job = Job(True, Thresholds(), folder, said.append)
     result = images.check_scene("small", "a test", scene, effort, job)
-    assert len(said) == images.plan_pictures(scene, effort).steps
+    assert len(said) == plan_pictures(scene, effort).steps
     json.dumps(result[0], allow_nan=False)
     return result
 
@@ -99,7 +99,7 @@ def test_the_whole_ladder_passes_and_leaves_what_the_report_shows(tmp_path: Path
         assert difference.mode == "L"
     assert record["paths"]["paths"] and any("random paths" in gate.subject for gate in gates)
     costs = images.costs_of([record])
-    assert costs[images.WHITTED] > 0.0 and costs[monte_carlo.PATHS] == record["paths"]["seconds"]
+    assert costs[WHITTED] > 0.0 and costs[monte_carlo.PATHS] == record["paths"]["seconds"]
 
 
 def test_a_scene_without_shadows_is_judged_by_who_can(tmp_path: Path) -> None:
@@ -174,10 +174,10 @@ DEFECTS = {
 
 @pytest.mark.parametrize("defect", DEFECTS)
 def test_every_defect_turns_a_gate_red(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, defect: str) -> None:
-    known = Reference("whitted", images.WHITTED, lambda _: None, lambda *_, **__: reference_balls())
-    monkeypatch.setattr(images, "REFERENCES", (known,))
+    known = Reference("whitted", WHITTED, lambda _: None, lambda *_, **__: reference_balls())
+    monkeypatch.setattr(plan, "REFERENCES", (known,))
     wrong, seen_by = DEFECTS[defect]
-    monkeypatch.setattr(images, "render", wrong)
+    monkeypatch.setattr(rung, "render", wrong)
     record, gates = check(tmp_path, balls())
     assert seen_by in {gate.quantity for gate in gates if not gate.passed}
     for comparison in record["rungs"][-1]["comparisons"]:
@@ -198,7 +198,7 @@ def test_srgb_applied_twice_is_seen_in_what_is_saved(tmp_path: Path, monkeypatch
 
 def test_a_rung_that_nobody_judges_is_not_passed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nobody = Reference("path", mitsuba_path.NAME, lambda _: "no reason", whitted)
-    monkeypatch.setattr(images, "REFERENCES", (nobody,))
+    monkeypatch.setattr(plan, "REFERENCES", (nobody,))
     record, gates = check(tmp_path, stairs(), PictureEffort(24, paths=False))
     assert failing(gates) == ["small, everything: references that judge it is 0"]
     assert record["rungs"][0]["left_out"] == {mitsuba_path.NAME: "no reason"}

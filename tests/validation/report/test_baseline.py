@@ -16,7 +16,7 @@ def gate(value: float, threshold: float = 1.0, section: str = "hits", bound: Any
 def metrics(*gates: dict[str, Any], seconds: float = 10.0, **records: Any) -> dict[str, Any]:
     sections = dict.fromkeys(g["section"] for g in gates)
     return {
-        "schema": 2, "command": "python -m validation", "quick": False, "own": True, "left_out": {},
+        "schema": 3, "command": "python -m validation", "quick": False, "own": True, "left_out": {},
         "started": "2026-01-01",
         "verdict": {"passed": all(g["passed"] for g in gates), "failed": sum(not g["passed"] for g in gates)},
         "environment": {"python": "3.11", "threads": 2, "processor": "one", "packages": {"numpy": "2.0"}},

@@ -44,7 +44,7 @@ def metrics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     record = {"seconds": 2.0, "costs": {"Mitsuba <3>": 1.5}, "scenes": [failed]}
     rows = summary.matrix({"images": record}, gates)
     return {
-        "schema": 2, "command": "python -m validation --only images", "quick": False, "own": True,
+        "schema": 3, "command": "python -m validation --only images", "quick": False, "own": True,
         "started": "2026-01-01T10:00:00+00:00", "seconds": 3.0, "verdict": summary.verdict(gates), "matrix": rows,
         "facts": summary.facts(rows, gates, None), "thresholds": {"file": None, "moved": {}}, "gates": gates,
         "left_out": {"hits": "not named by --only"}, "baseline": {"absent": "There is none."}, "images": record,
@@ -126,7 +126,7 @@ def test_metrics_are_read_as_they_were_written(metrics: dict[str, Any], tmp_path
     path = tmp_path / "metrics.json"
     path.write_bytes(schema.text(metrics))
     assert schema.read(path) == metrics
-    path.write_text(path.read_text(encoding="utf-8").replace('"schema": 2', '"schema": 1'))
+    path.write_text(path.read_text(encoding="utf-8").replace('"schema": 3', '"schema": 1'))
     with pytest.raises(ValueError, match=r"metrics\.json: schema: .*got 1"):
         schema.read(path)
     path.write_text("{")
@@ -135,7 +135,7 @@ def test_metrics_are_read_as_they_were_written(metrics: dict[str, Any], tmp_path
 
 
 README = Path(__file__).parents[3] / "reports" / "README.md"
-TYPES: dict[str, Any] = {"2": int, "text": str, "bool": bool, "number": float, "table": dict, "list": list}
+TYPES: dict[str, Any] = {"3": int, "text": str, "bool": bool, "number": float, "table": dict, "list": list}
 
 
 def described() -> dict[str, tuple[str, str]]:

@@ -1,0 +1,134 @@
+"""One rung: our pictures under both rules for offsets, against those of its references, and the reasons of pixels."""
+
+import re
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.picture.image import Image
+from renderer.picture.render import render
+from renderer.scene.scene import UNLIMITED_RAYS, Scene
+from validation.gates import Gate
+from validation.job import Job
+from validation.pictures import check, verdict
+from validation.pictures.check import Pair, Rule
+from validation.pictures.compare import Picture, fragile_pixels
+from validation.pictures.files import write_png
+from validation.pictures.plan import RungTask
+from validation.pictures.shifted_film import shifted
+
+_Offset = Literal["bounded", "mitsuba"] | float
+_RULES: dict[Rule, _Offset] = {"matched": "mitsuba", "own": "bounded"}
+# Colours of the map of pixels: none, then ``verdict.MAPPED`` in order. Only the last two are faults.
+_COLORS = np.array(
+    [
+        (24, 26, 32),
+        (90, 160, 250),
+        (70, 90, 140),
+        (60, 200, 180),
+        (240, 200, 70),
+        (190, 110, 240),
+        (255, 40, 40),
+        (255, 120, 40),
+    ],
+    np.uint8,
+)
+
+
+class Drawn(NamedTuple):
+    """Our pictures of a rung: by rule for offsets, the same under the media of normals, and the fragile pixels."""
+
+    images: dict[Rule, Image]
+    normal: dict[Rule, Picture]
+    fragile: NDArray[np.bool_]
+
+
+def draw(name: str, task: RungTask, job: Job) -> Drawn:
+    """Draw a rung."""
+    scene, size = task.rung.scene, task.resolution
+    job.step(f"pictures: {name}, {task.rung.name}, ours")
+    images = {rule: picture(scene, size, offset) for rule, offset in _RULES.items()}
+    normal = {rule: picture(scene, size, offset, media="normal").radiance for rule, offset in _RULES.items()}
+    # They bound the largest error on the suite's own scenes alone.
+    fragile = np.zeros(size[::-1], np.bool_)
+    if job.own:
+        fragile = fragile_pixels(lambda offset, shift: picture(shifted(scene, shift), size, offset).radiance)
+    return Drawn(images, normal, fragile)
+
+
+def check_rung(
+    name: str,
+    task: RungTask,
+    job: Job,
+    drawn: Drawn,
+    theirs: Mapping[Any, Any],
+    judged: dict[str, Any] | None,
+) -> tuple[dict[str, Any], list[Gate]]:
+    """Compare one rung under both rules with its references' pictures."""
+    subject = f"{name}, {task.rung.name}"
+    reason = "a rung that nobody judges is not passed"
+    found = [Gate("images", subject, "references that judge it", len(task.references), "at least", 1.0, reason)]
+    comparisons = []
+    for reference in task.references:
+        radiance, seconds = theirs[task.rung.name, reference.key]
+        made = {"reference": reference.key, "reference_name": reference.name, "reference_seconds": seconds}
+        for rule, image in drawn.images.items():
+            # The report shows our own rule, which users get, beside the first reference.
+            shown = rule == "own" and reference is task.references[0]
+            against = f"{subject} against {reference.key}, {rule} offset"
+            gates = _path_gates(against, drawn.normal[rule], theirs, task) if reference.key == "path" else []
+            record, passed = check.check(
+                against, Pair(image, rule, radiance, drawn.fragile), job, shown=shown, verdict=gates
+            )
+            comparisons.append(made | {"offset": rule} | record)
+            found += passed
+    record = _rung_record(task, drawn.images["own"], comparisons)
+    if judged is not None:
+        found += verdict.gates(subject, judged)
+        record["verdict"] = _kept(subject, judged, job)
+    return record, found
+
+
+def _path_gates(against: str, ours: Picture, theirs: Mapping[Any, Any], task: RungTask) -> list[Gate]:
+    """The native integrator records no rays: what it draws otherwise than reference B nobody has explained."""
+    path, whitted = (theirs[task.rung.name, key][0] for key in ("path", "whitted"))
+    value = float((verdict.differs(ours, path) & verdict.differs(path, whitted)).sum())
+    reason = "reference B draws the same, and the rays of its pixels were walked"
+    return [Gate("images", against, "pixels that differ without a reason", value, "at most", 0.0, reason)]
+
+
+def _kept(subject: str, judged: dict[str, Any], job: Job) -> dict[str, Any]:
+    """A verdict for the record, with its map as a picture."""
+    name = re.sub(r"\W+", "-", subject) + "-reasons.png"
+    write_png(job.folder / name, _COLORS[judged["map"]])
+    red = any(not gate.passed for gate in verdict.gates(subject, judged))
+    colors = {reason: "#{:02x}{:02x}{:02x}".format(*_COLORS[1 + k]) for k, reason in enumerate(verdict.MAPPED)}
+    kept = {key: value for key, value in judged.items() if key != "map"}
+    return kept | {"file": name, "red": red, "colors": colors}
+
+
+def _rung_record(task: RungTask, own: Image, comparisons: list[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        "name": task.rung.name,
+        "adds": task.rung.adds,
+        "size": list(task.resolution),
+        "rays": int(own.rays.sum()),
+        "ours_seconds": own.render_seconds,
+        "build_seconds": own.build_seconds,
+        "comparisons": comparisons,
+        "left_out": task.left_out,
+    }
+
+
+def picture(
+    scene: Scene,
+    resolution: tuple[int, int],
+    offset: _Offset,
+    media: Literal["stack", "normal"] = "stack",
+    **settings: Any,
+) -> Image:
+    """Our picture with one ray a pixel and no smallest weight."""
+    settings = {"samples": 1, "min_weight": 0.0, "max_rays": UNLIMITED_RAYS} | settings
+    return render(scene, resolution=resolution, offset=offset, media=media, **settings)
