@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.picture.image import Image
+from renderer.picture.image import Image, srgb
 from renderer.picture.render import render
 from renderer.scene.scene import UNLIMITED_RAYS, Scene
 from validation.gates import Gate
@@ -23,18 +23,12 @@ _Offset = Literal["bounded", "mitsuba"] | float
 _RULES: dict[Rule, _Offset] = {"matched": "mitsuba", "own": "bounded"}
 # Colours of the map of pixels: none, then ``verdict.MAPPED`` in order. Only the last two are faults.
 _COLORS = np.array(
-    [
-        (24, 26, 32),
-        (90, 160, 250),
-        (70, 90, 140),
-        (60, 200, 180),
-        (240, 200, 70),
-        (190, 110, 240),
-        (255, 40, 40),
-        (255, 120, 40),
-    ],
+    [(0, 0, 0), (90, 160, 250), (130, 130, 230), (60, 200, 180), (240, 200, 70), (190, 110, 240), (255, 40, 40),
+     (255, 120, 40)],
     np.uint8,
-)
+)  # fmt: skip
+# The brightness of a picture behind its map.
+_DIMMED = 0.3
 
 
 class Drawn(NamedTuple):
@@ -87,7 +81,7 @@ def check_rung(
     record = _rung_record(task, drawn.images["own"], comparisons)
     if judged is not None:
         found += verdict.gates(subject, judged)
-        record["verdict"] = _kept(subject, judged, job)
+        record["verdict"] = _kept(subject, judged, drawn.images["own"], job)
     return record, found
 
 
@@ -99,10 +93,12 @@ def _path_gates(against: str, ours: Picture, theirs: Mapping[Any, Any], task: Ru
     return [Gate("images", against, "pixels that differ without a reason", value, "at most", 0.0, reason)]
 
 
-def _kept(subject: str, judged: dict[str, Any], job: Job) -> dict[str, Any]:
-    """A verdict for the record, with its map as a picture."""
+def _kept(subject: str, judged: dict[str, Any], own: Image, job: Job) -> dict[str, Any]:
+    """A verdict for the record, with its map as a picture: the reasons over our own, dimmed."""
     name = re.sub(r"\W+", "-", subject) + "-reasons.png"
-    write_png(job.folder / name, _COLORS[judged["map"]])
+    grey = (_DIMMED * srgb(own.radiance).mean(axis=2, keepdims=True)).astype(np.uint8)
+    reasons = judged["map"][..., None]
+    write_png(job.folder / name, np.where(reasons == 0, grey, _COLORS[judged["map"]]))
     red = any(not gate.passed for gate in verdict.gates(subject, judged))
     colors = {reason: "#{:02x}{:02x}{:02x}".format(*_COLORS[1 + k]) for k, reason in enumerate(verdict.MAPPED)}
     kept = {key: value for key, value in judged.items() if key != "map"}
