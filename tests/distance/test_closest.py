@@ -249,6 +249,12 @@ def test_coordinates_of_all_sizes_are_told_apart_exactly(vertices, point):
         if found.distance > 0.0:
             less = queries.closest_point(point, max_distance=np.nextafter(found.distance, 0.0))
             assert (less.distance, less.face) == (np.inf, -1) and np.isnan(less.u)
+            # One limit a point, in whatever order and dimensions: each is held to its own.
+            limits = np.array([np.inf, np.nextafter(found.distance, 0.0), found.distance])
+            for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
+                rows = queries.closest_point([[point]] * 3, max_distance=limits[order][:, None])
+                np.testing.assert_array_equal(rows.found, np.not_equal(order, 1)[:, None])
+                np.testing.assert_array_equal(rows.distance[rows.found], found.distance)
 
 
 def test_every_face_of_some_that_float64_can_tell_is_told():

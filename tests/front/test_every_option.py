@@ -165,17 +165,18 @@ def test_what_is_said_of_cut_pixels_names_the_rays_that_held(
 
 
 @pytest.mark.parametrize("where", [[], ["--cluster"]], ids=["here", "cluster"])
+@pytest.mark.parametrize(("png", "npy", "exr"), [("png", "npy", "exr"), ("PNG", "NPY", "EXR")])
 def test_each_format_is_read_by_others_as_the_picture(
-    folder: Path, tmp_path: Path, asked: list[dict[str, Any]], where: list[str]
+    folder: Path, tmp_path: Path, asked: list[dict[str, Any]], where: list[str], png: str, npy: str, exr: str
 ) -> None:
     openexr = pytest.importorskip("OpenEXR")
     expected = picture(load_scene(folder / "scene.toml"))
-    for suffix in ("png", "npy", "exr"):
+    for suffix in (png, npy, exr):
         rendered(folder / "scene.toml", tmp_path / f"a.{suffix}", *where)
-    with Pillow.open(tmp_path / "a.png") as read:
+    with Pillow.open(tmp_path / f"a.{png}") as read:
         assert np.array_equal(np.asarray(read), srgb(expected.radiance))
-    assert np.load(tmp_path / "a.npy").tobytes() == expected.radiance.tobytes()
-    layers = {name: layer.pixels for name, layer in openexr.File(str(tmp_path / "a.exr")).channels().items()}
+    assert np.load(tmp_path / f"a.{npy}").tobytes() == expected.radiance.tobytes()
+    layers = {name: layer.pixels for name, layer in openexr.File(str(tmp_path / f"a.{exr}")).channels().items()}
     assert layers["RGB"].tobytes() == expected.radiance.tobytes()
     assert layers["Z"].tobytes() == expected.depth.astype(np.float32).tobytes()
     assert np.stack([layers[f"normal.{axis}"] for axis in "XYZ"], axis=2).tobytes() == expected.normal.tobytes()

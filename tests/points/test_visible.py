@@ -62,6 +62,23 @@ def test_no_end_hides_itself_however_far_the_other_is(distance, given):
     assert not octree.visible(eye, centres, reaching=faces)[slope < -1e-2].any()
 
 
+@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+def test_an_end_beside_the_face_that_it_names_is_on_it_and_others_are_hidden(accelerator):
+    """Ends 2^-18 to 2^-38 behind a face are on it if they name it, whichever end they are. Nearer than 2^-40 of 3 none
+    is looked at."""
+    queries, heights = accelerator([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), [-(2.0**-k) for k in range(18, 39)]
+    ends = np.column_stack([np.full((len(heights), 2), 0.25), heights])
+    eye = [0.2, 0.2, 3.0]
+    for face in (0, np.zeros(len(ends), int)):
+        assert queries.visible(eye, ends, reaching=face).all() and queries.visible(ends, eye, leaving=face).all()
+    # Each row has the face that it names.
+    named = np.arange(len(ends)) % 2 - 1
+    np.testing.assert_array_equal(queries.visible(eye, ends, reaching=named), named == 0)
+    np.testing.assert_array_equal(queries.visible(ends, eye, leaving=named), named == 0)
+    for other in ({}, {"leaving": -1, "reaching": -1}):
+        assert not queries.visible(eye, ends, **other).any() and not queries.visible(ends, eye, **other).any()
+
+
 def test_a_small_face_at_the_origin_does_not_hide_its_point():
     octree = Octree([[0, 0, 0], [2.0**-10, 0, 0], [0, 2.0**-10, 0]], [[0, 1, 2]])
     target = [2.0**-12, 2.0**-12, 0.0]

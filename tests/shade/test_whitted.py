@@ -17,6 +17,7 @@ from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, Scene, SceneObject
+from renderer.trace.spawn import MITSUBA_EPSILON
 
 # Radiance is stored as float32: half an ulp, and as much again for the float64 sums before it.
 REL = 2.0**-23
@@ -174,12 +175,20 @@ class TestShadows:
     @pytest.mark.parametrize("offset", ["bounded", "mitsuba"])
     def test_shadow_rays_end_at_a_point_light(self, offset: str) -> None:
         light = PointLight(position=(0, 2, 0), intensity=4.0)
-        # Mitsuba's rule stops ten of its epsilons, 9e-4 of the way, short of the light.
-        near = 1e-6 if offset == "bounded" else 4e-3
         for beyond in (1e-12, 1e-6, 0.5, 100.0):
             blocker = quad((0, 2 + beyond, 0), (0, 0, 0.2), (0.2, 0, 0))
             assert self.lit(light, blocker, offset=offset) == pytest.approx(1.0, rel=REL), beyond
-        assert self.lit(light, quad((0, 2 - near, 0), (0, 0, 0.2), (0.2, 0, 0)), offset=offset) == 0.0
+
+    @pytest.mark.parametrize(
+        ("offset", "short"),
+        [("bounded", 2.0**-36), ("mitsuba", 10.0 * MITSUBA_EPSILON), (2.0**-10, 10.0 * 2.0**-10), (0.01, 0.1)],
+    )
+    def test_how_far_before_a_point_light_its_shadow_rays_end(self, offset: Any, short: float) -> None:
+        """A share of the way: by Mitsuba's rule, or by a number's, ten epsilons."""
+        light = PointLight(position=(0, 2, 0), intensity=4.0)
+        for share, expected in ((0.9 * short, 1.0), (1.1 * short, 0.0)):
+            blocker = quad((0, 2.0 * (1.0 - share), 0), (0, 0, 0.2), (0.2, 0, 0))
+            assert self.lit(light, blocker, offset=offset) == pytest.approx(expected, rel=REL)
 
     def test_a_surface_at_the_light_does_not_hide_it(self) -> None:
         """Lamps stand in ceilings: any position, any slope. The docstring of the shadow ray promises it."""

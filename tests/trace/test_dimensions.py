@@ -1,10 +1,12 @@
 """Leading dimensions of rays: kept, broadcast, and not copied where one vector serves all."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
-from renderer import BruteForce, Octree
-from renderer.mesh.shapes import icosphere
+from renderer import BruteForce, Hits, Mesh, Octree
+from renderer.mesh.shapes import box, icosphere
 from renderer.trace.batch import check_rays
 
 BALL = icosphere(2)
@@ -35,6 +37,41 @@ def test_answers_have_the_dimensions_of_the_rays(queries, shape):
     left = queries.closest_hit(hits.points.reshape(-1, 3)[flat.hit], DIRECTIONS[flat.hit], leaving=flat.face[flat.hit])
     again = queries.closest_hit(np.nan_to_num(hits.points), d, leaving=hits.face)
     np.testing.assert_array_equal(again.t[hits.hit], left.t)
+
+
+# A box that stands twice at one place, the second time turned inside out.
+TWICE = Mesh.concatenate([box(), Mesh(box().vertices, box().faces[:, ::-1])])
+
+
+@pytest.mark.parametrize("queries", [Octree.from_mesh(TWICE), BruteForce.from_mesh(TWICE)], ids=["octree", "brute"])
+@pytest.mark.parametrize("shape", [(4, 6), (24, 1), (1, 2, 12)])
+def test_rays_of_any_dimensions_go_on_through_coinciding_faces(queries, shape):
+    """Through two faces at each wall, and out."""
+    directions = np.array([0.5, 0.25, 0.5]) - ORIGINS
+    flat = queries.closest_hit(ORIGINS, directions)
+    hits = queries.closest_hit(ORIGINS.reshape(*shape, 3), directions.reshape(*shape, 3))
+    for _ in range(4):
+        assert flat.hit.any()
+        np.testing.assert_array_equal(hits.face.ravel(), flat.face)
+        np.testing.assert_array_equal(hits.t.ravel(), flat.t)
+        starts, there = np.nan_to_num(flat.points), np.nan_to_num(hits.points)
+        flat = queries.closest_hit(starts, directions, leaving=flat.through())
+        hits = queries.closest_hit(there, directions.reshape(*shape, 3), leaving=hits.through())
+    assert not hits.hit.any() and not flat.hit.any()
+
+
+def test_hits_of_other_dimensions_have_all_that_hits_have():
+    """Each field, its own too, at coinciding faces: there a ray has come upon another face than it hit."""
+    octree, down = Octree.from_mesh(TWICE), [0.0, 0.0, -1.0]
+    first = octree.closest_hit([[0.5, 0.25, 3.0]] * 4, down)
+    hits = octree.closest_hit(first.points, down, leaving=first.through(), t_error=True)
+    for field in fields(Hits):
+        value, moved = getattr(hits, field.name), getattr(hits.shaped((2, 2)), field.name)
+        if field.name == "_mesh":
+            assert moved is value
+        else:
+            np.testing.assert_array_equal(moved, value.reshape(2, 2), strict=True)
+    assert (hits.through().pile != hits.face).all()
 
 
 @pytest.mark.parametrize("queries", QUERIES, ids=["octree", "brute"])
