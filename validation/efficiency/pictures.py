@@ -55,8 +55,8 @@ class PictureTimingEffort:
     runs: int
 
 
-QUICK = PictureTimingEffort(size=32, theirs=(1, 4, 16, 64), truth=256, runs=1)
-FULL = PictureTimingEffort(size=64, theirs=(1, 4, 16, 64, 256), truth=576, runs=3)
+QUICK = PictureTimingEffort(size=32, theirs=(1, 4, 16), truth=144, runs=1)
+FULL = PictureTimingEffort(size=64, theirs=(1, 4, 16, 64), truth=400, runs=3)
 
 
 class Drawn(NamedTuple):
