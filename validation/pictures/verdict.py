@@ -19,7 +19,7 @@ from validation.pictures.check import Rule
 from validation.pictures.compare import VISIBLE, Picture, srgb
 from validation.pictures.explain.media import MediaJudge
 from validation.pictures.explain.partings import way
-from validation.pictures.explain.pixels import RED, Explained, Explainer, Pixel
+from validation.pictures.explain.pixels import RED, SETTLED, Explained, Explainer, Pixel
 
 # Pixels that agree and are walked all the same: a fault of all pixels is seen in each, one of a hundredth of them is
 # missed by 64 with probability 1/2.
@@ -51,10 +51,10 @@ def judge(scene: Scene, pictures: Pictures) -> dict[str, Any]:
     explainer = Explainer(prepared, (width, height))
     reasons = np.zeros((height, width), np.uint8)
     told: list[dict[str, Any]] = []
-    record: dict[str, Any] = {"offsets": {}, "sample": _sampled(explainer, pictures)}
+    record: dict[str, Any] = {"offsets": {}, "left": {}, "sample": _sampled(explainer, pictures)}
     for rule, ours in pictures.ours.items():
         found = explainer.explain(rule, ours, _pixels(differs(ours, pictures.reference)))
-        record["offsets"][rule] = found.counts()
+        record["offsets"][rule], record["left"][rule] = found.counts(), found.left
         told += [_told(rule, pixel, pictures) for pixel in _shown(found)]
         if rule == "own":
             for pixel in found.pixels:
@@ -114,36 +114,42 @@ def _told(rule: Rule, pixel: Pixel, pictures: Pictures) -> dict[str, Any]:
 
 
 def _ruled(prepared: PreparedScene, pictures: Pictures, reasons: NDArray[np.uint8]) -> dict[str, Any]:
-    """The verdict on the pixels that the rule for media decides, which are marked where no other reason is."""
+    """The verdict on the pixels that the rule for media decides, which are marked where no other reason is, and on some
+    that it does not: a stack that is forgotten draws the picture of the normals.
+    """
     decided = differs(pictures.stack, pictures.ours["own"])
-    pixels = _pixels(decided)
-    chosen = [pixels[k] for k in np.linspace(0, len(pixels) - 1, min(_RULED, len(pixels))).astype(int)]
     height, width = decided.shape
-    found = MediaJudge(prepared, (width, height)).judge(chosen) if chosen else []
+    judge = MediaJudge(prepared, (width, height))
+    pixels, alike = _pixels(decided), _pixels(~decided)
+    chosen = [pixels[k] for k in np.linspace(0, len(pixels) - 1, min(_RULED, len(pixels))).astype(int)]
+    sample = [alike[k] for k in np.random.default_rng(_SEED).permutation(len(alike))[:_SAMPLE]]
+    found, others = judge.judge(pictures.stack, chosen), judge.judge(pictures.stack, sample)
     reasons[decided & (reasons == 0)] = 1 + MAPPED.index("media")
     why = [one.why for one in found if one.wrong is None and one.why is not None]
+    wrong = [(one, one.wrong or "nothing lets the rules differ") for one in found if one.wrong or one.why is None]
+    wrong += [(one, one.wrong) for one in others if one.wrong is not None]
     return {
         "share": float(decided.mean()),
-        "judged": len(found),
+        "judged": len(found) + len(others),
         "why": {reason: why.count(reason) for reason in sorted(set(why))},
-        "wrong": [f"row {one.row}, column {one.column}: {one.wrong or 'nothing lets the rules differ'}" for one in found
-                  if one.wrong is not None or one.why is None],
-    }  # fmt: skip
+        "wrong": [f"row {one.row}, column {one.column}: {text}" for one, text in wrong],
+    }
 
 
 def gates(subject: str, record: dict[str, Any]) -> list[Gate]:
     """The gates of a verdict, which all are at most 0."""
     found = []
     for rule, counts in record["offsets"].items():
-        against, total = f"{subject} against whitted, {rule} offset", sum(counts.values())
-        reason = f"of {total:,} that differ visibly; both trees of rays were walked to where they part"
+        against, total, left = f"{subject} against whitted, {rule} offset", sum(counts.values()), record["left"][rule]
+        unseen = f"; {left:,} more were not looked at after {SETTLED} faults" if left else ""
+        reason = f"of {total:,} that differ visibly; both trees of rays were walked to where they part{unseen}"
         found.append(_none(against, "pixels that differ without a reason", counts["unexplained"], reason))
         reason = f"of {total:,} that differ visibly: a hit against exact arithmetic, or a picture against its own rays"
         found.append(_none(against, "pixels in which ours is wrong", counts["ours wrong"], reason))
     sample, media = record["sample"], record["media"]
     reason = f"of {sample['pixels']} that agree: each step of their rays is ours but for float32's rounding"
     found.append(_none(subject, "pixels whose rays take other steps", sample["red"], reason))
-    reason = f"of {media['judged']} that differ between the rules for media: the stack of bodies, written a second time"
+    reason = f"of {media['judged']}: the stack of bodies and the laws of optics, written a second time"
     found.append(_none(subject, "pixels against the rule for media", len(media["wrong"]), reason))
     return found
 

@@ -12,13 +12,16 @@ Kind = Literal["camera", "reflected", "refracted"]
 
 @dataclass
 class Shadow:
-    """A shadow ray in a unit direction, over a length; the radiance that it brings if nothing hides the light."""
+    """A shadow ray in a unit direction, over a length; the radiance that it brings if nothing hides the light; and the
+    face that hides it, where a renderer says so.
+    """
 
     origin: Vector
     direction: Vector
     length: float
     radiance: Vector
     hidden: bool
+    face: int = -1
 
 
 @dataclass

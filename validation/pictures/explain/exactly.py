@@ -9,6 +9,7 @@ from renderer.scene.light import DirectionalLight, Light
 from validation.oracle import exact
 from validation.oracle.rounding import FLOAT64_ROUNDOFF, RayView
 from validation.pictures.explain.partings import Parting
+from validation.pictures.explain.planes import coinciding
 from validation.pictures.explain.rounding import moved_ray
 from validation.references.ray_tree import Node, Shadow
 
@@ -37,16 +38,22 @@ def wrong(rays: Sequence[Parting], points: NDArray[np.float64], faces: NDArray[n
 
 
 def misplaced(node: Node, lights: Sequence[Light]) -> Iterator[str]:
-    """The rays of our own tree that leave a surface from elsewhere, or lead past their light."""
+    """The rays of our own tree that leave a surface from elsewhere, hit the face that they leave, or lead past their
+    light.
+    """
     room = _OFF * (1.0 + float(np.abs(node.point).max(initial=0.0)))
     for kind, child in node.children.items():
         if not float(np.abs(child.origin - node.point).max()) <= room:
             yield f"{kind} ray starts {np.abs(child.origin - node.point).max():.3g} from its surface"
+        if child.face >= 0 and child.face == node.face:
+            yield f"{kind} ray hits face {node.face}, which it leaves, at {child.t!r}"
         yield from misplaced(child, lights)
     for number, shadow in node.shadows.items():
         light = lights[number]
         if not float(np.abs(shadow.origin - node.point).max()) <= room:
             yield f"shadow ray to light {number} starts {np.abs(shadow.origin - node.point).max():.3g} from its surface"
+        if shadow.hidden and shadow.face == node.face:
+            yield f"shadow ray to light {number} is hidden by face {node.face}, which it leaves"
         if not _leads_to(shadow, light, room):
             yield f"shadow ray to light {number} does not end there"
 
@@ -80,7 +87,7 @@ def _near(
 ) -> bool:
     """Whether rounding permits the hit, or a ray from where the start may really be has it."""
     if isinstance(said, Node):
-        if said.face >= 0 and said.t <= _OFF and _has_another(said, points[faces]):
+        if said.face >= 0 and said.t <= _OFF and coinciding(points[faces], said, _START * (1.0 + np.abs(points).max())):
             # By the law of starts a ray stops at once at the next of the faces that coincide where it starts.
             return True
         view = RayView(points, faces, tuple(ray.origin.tolist()), tuple(ray.direction.tolist()), FLOAT64_ROUNDOFF)
@@ -90,17 +97,3 @@ def _near(
     reach = said.t if isinstance(said, Node) and np.isfinite(said.t) else 1.0
     origins, directions = moved_ray(ray.origin, ray.direction, reach, _START, _TRIES)
     return any(_fits(said, hit, length) for hit in exact.closest_hits(points, faces, origins, directions))
-
-
-def _has_another(node: Node, corners: NDArray[np.float64]) -> bool:
-    """Whether another face is in the plane of the one that was hit, and has its point."""
-    room = _OFF * (1.0 + float(np.abs(node.point).max()))
-    boxes = (corners.min(axis=1) <= node.point + room) & (corners.max(axis=1) >= node.point - room)
-    for face in np.flatnonzero(boxes.all(axis=1)).tolist():
-        a, b, c = corners[face]
-        normal = np.cross(b - a, c - a)
-        area = float(np.linalg.norm(normal))
-        level = abs(float(normal @ node.normal)) >= (1.0 - _OFF) * area
-        if face != node.face and level and abs(float(normal @ (node.point - a))) <= room * area:
-            return True
-    return False

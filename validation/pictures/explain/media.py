@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from renderer.inspect.ray_step import steps_of
 from renderer.picture.prepare import PreparedScene
-from renderer.scene.camera import primary_rays
-from renderer.scene.material import Mirror
+from renderer.scene.material import Material, Mirror
 from renderer.scene.scene import Scene
 from validation.oracle.inside import winding_number
+from validation.pictures.explain.optics import wrong_rays
 from validation.pictures.explain.ours import Ours
+from validation.pictures.explain.pixels import STORED
+from validation.pictures.explain.planes import coinciding
 from validation.references.ray_tree import Node
 
 # Faces coincide up to roundings of their corners: some 2^10 float64 roundings of the coordinates.
@@ -54,23 +56,30 @@ class MediaJudge:
     def __init__(self, prepared: PreparedScene, resolution: tuple[int, int]) -> None:
         scene = prepared.scene
         self._scene, self._width = scene, resolution[0]
-        self._rays = primary_rays(scene.camera, *resolution)
-        self._ours = Ours(steps_of(prepared), scene.render.max_depth, shadows=False)
+        self._ours = Ours(steps_of(prepared), scene.render.max_depth, scene.render.shadows)
         triangles = [i.mesh.vertices[i.mesh.faces] for i in scene.instances]
         self._corners = np.concatenate([*triangles, np.zeros((0, 3, 3))])
         self._owner = np.repeat(np.arange(len(triangles)), [len(one) for one in triangles])
-        self._low, self._high = self._corners.min(axis=1), self._corners.max(axis=1)
 
-    def judge(self, pixels: Sequence[tuple[int, int]]) -> list[Ruled]:
-        """The geometry that lets each pixel differ, and where our stack is not that of the rule."""
+    def judge(self, picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]) -> list[Ruled]:
+        """The geometry that lets pixels of our picture by the stack differ from that by the normal, and what is wrong
+        in their rays by the rule for the stack.
+        """
         found = []
+        rows = self._scene.camera.rows(self._width, len(picture))
+        around = self._around(np.asarray(self._scene.camera.eye))
         for row, column in pixels:
-            origin, direction = (rays[row * self._width + column] for rays in self._rays)
-            tree = self._ours.tree(origin, direction)
-            said = list(self._walk(tree, self._around(origin)))
+            x, y = column + 0.5, row + 0.5
+            tree = self._ours.tree(rows[0] + (x * rows[1] + y * rows[2]), rows[3] + (x * rows[4] + y * rows[5]))
+            said = [*self._sum(tree, picture[row, column]), *self._walk(tree, around)]
             wrong = next((text for text in said if text not in WHYS), None)
             found.append(Ruled(row, column, next(iter(said), None) if wrong is None else None, wrong))
         return found
+
+    def _sum(self, tree: Node, color: NDArray[np.floating]) -> Iterator[str]:
+        total = tree.radiance()
+        if not (np.abs(total - color) <= STORED * np.abs(total) + 1e-30).all():
+            yield f"the picture has {color.tolist()}, and the light along its rays is {total.tolist()}"
 
     def _walk(self, node: Node, media: tuple[_Body, ...], turned: bool = False) -> Iterator[str]:
         """What lets the rules differ along a tree, and what is wrong there.
@@ -80,19 +89,26 @@ class MediaJudge:
         after = media
         if node.face >= 0:
             met, sure = self._together(node)
-            glass = [face for face in met if self._scene.materials[self._body(face).material].passes_light]
-            if len(met) > 1 and glass:
+            clear = [self._material(face).passes_light for face in met]
+            if len(met) > 1 and any(clear):
                 yield COINCIDING
-            if node.indices is not None and sure:
+            if not sure and any(clear):
+                # At an edge of a face that coincides: whether the ray is within that one float64 may not know.
+                return
+            if not all(clear) and (node.indices is not None or "refracted" in node.children):
+                yield f"face {node.face}: an opaque face among those that coincide does not stop the ray"
+            elif node.indices is not None:
                 crossed = [(self._body(face), self._enters(node, face)) for face in met]
                 after, indices = _crossed(media, crossed)
                 yield from self._compared(node, media, indices, together=len(met) > 1, turned=turned)
                 turned = turned or self._enters(node, node.face) != (float(node.direction @ node.normal) <= 0.0)
-            elif node.indices is not None:
-                # At an edge of a face that coincides: whether the ray is within that one float64 may not know.
-                return
+            if node.depth < self._ours.max_depth:
+                yield from wrong_rays(node, self._material(node.face))
         for kind, child in node.children.items():
             yield from self._walk(child, after if kind == "refracted" else media, turned)
+
+    def _material(self, face: int) -> Material:
+        return self._scene.materials[self._body(face).material]
 
     def _compared(
         self, node: Node, media: tuple[_Body, ...], indices: tuple[float, float], *, together: bool, turned: bool
@@ -112,14 +128,8 @@ class MediaJudge:
         is within all of them, and not at an edge.
         """
         room = _NEAR * (1.0 + float(np.abs(node.point).max()))
-        boxes = (self._low <= node.point + room) & (self._high >= node.point - room)
-        found, sure = [node.face], True
-        for face in np.flatnonzero(boxes.all(axis=1)).tolist():
-            inside = -np.inf if face == node.face else _depth(self._corners[face], node, room)
-            if inside >= -room:
-                found.append(face)
-                sure = sure and inside > room
-        return sorted(found), sure
+        others = coinciding(self._corners, node, room)
+        return sorted([node.face, *others]), all(depth > room for depth in others.values())
 
     def _enters(self, node: Node, face: int) -> bool:
         if face == node.face:
@@ -165,21 +175,6 @@ def _crossed(
 
 def _index(media: Sequence[_Body]) -> float:
     return media[-1].ior if media else 1.0
-
-
-def _depth(corners: NDArray[np.float64], node: Node, room: float) -> float:
-    """How far the point of a hit is within a face, negative outside, and in another plane too."""
-    a, b, c = corners
-    normal = np.cross(b - a, c - a)
-    area = float(np.linalg.norm(normal))
-    if area == 0.0 or abs(float(normal @ node.normal)) < area * (1.0 - 1e-9):
-        return -np.inf
-    if abs(float(normal @ (node.point - a))) > area * room:
-        return -np.inf
-    sides = ((a, b), (b, c), (c, a))
-    return min(
-        float(normal @ np.cross(q - p, node.point - p)) / (area * float(np.linalg.norm(q - p))) for p, q in sides
-    )
 
 
 def open_glass(scene: Scene) -> dict[str, int]:

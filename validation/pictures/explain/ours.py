@@ -25,7 +25,9 @@ class Ours:
 
     def tree(self, origin: Vector, direction: Vector) -> Node:
         """The tree of a camera ray."""
-        return self._follow(self.steps.camera_ray(_tuple(origin), _tuple(direction)), np.ones(3))
+        ray = self.steps.camera_ray(_tuple(origin), _tuple(direction))
+        # A picture takes the media around its camera's eye, for all points of an orthographic film.
+        return self._follow(ray._replace(media=tuple(self.steps.arrays.media.tolist())), np.ones(3))
 
     def step(self, node: Node) -> Node:
         """What a ray hits, and the rays that leave there: the children have hit nothing, and no shadow is traced.
@@ -57,8 +59,10 @@ class Ours:
         if met is None:
             return node
         for aim in self.steps.aims(ray, met):
-            hides = self.shadows and self.steps.closest(aim.origin, aim.direction, aim.t_max, aim.start).hit[0]
-            node.shadows[aim.light] = _shadow(aim, bool(hides))
+            node.shadows[aim.light] = _shadow(aim, hidden=False)
+            if self.shadows:
+                hits = self.steps.closest(aim.origin, aim.direction, aim.t_max, aim.start)
+                node.shadows[aim.light].hidden, node.shadows[aim.light].face = bool(hits.hit[0]), int(hits.face[0])
         if ray.depth < self.max_depth:
             for child in self._children(ray, met):
                 node.children[child.kind] = self._follow(child._replace(weight=_WHOLE), np.array(child.weight))

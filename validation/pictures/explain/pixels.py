@@ -33,9 +33,11 @@ _WRONG: Reason = "ours wrong"
 RED: tuple[Reason, ...] = (_WRONG, "unexplained")
 
 # A picture holds float32; its pixel's sum is that of the tree in float64: half an ulp, and as much for the sums.
-_STORED = 2.0**-23
+STORED = 2.0**-23
 # After so many red pixels the verdict is settled, and the others are not looked at.
 SETTLED = 20
+# What a hundredth of a step of an 8-bit picture receives is walked: in deep glass most rays are fainter.
+_SEEN = 0.01 / 255.0
 # Pixels that are looked at together.
 _AT_ONCE = 256
 # Less than any radiance that counts.
@@ -61,9 +63,8 @@ class Explained:
     left: int
 
     def counts(self) -> dict[str, int]:
-        """The number of pixels by reason; what was left is unexplained."""
+        """The number of pixels by reason, of those that were looked at."""
         counts = Counter[str](pixel.reason for pixel in self.pixels)
-        counts["unexplained"] += self.left
         return {reason: counts[reason] for reason in REASONS}
 
 
@@ -102,7 +103,7 @@ class Explainer:
         """Whether the first hit of a pixel is as the picture has it, and Mitsuba's but for rounding."""
         hit = self._tree("own", row, column)
         same = hit.face == image.face[row, column] and hit.t == image.depth[row, column]
-        shading = hit.face < 0 or np.abs(hit.shading - image.normal[row, column]).max() <= _STORED
+        shading = hit.face < 0 or np.abs(hit.shading - image.normal[row, column]).max() <= STORED
         return bool(same and shading) and not compare(self._their_tree(row, column), self._ours["matched"]).faults
 
     def _explain(self, rule: Rule, picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]) -> list[Pixel]:
@@ -132,7 +133,7 @@ class Explainer:
     ) -> Iterator[str]:
         """What is wrong with our own tree, whatever Mitsuba's is."""
         total = ours.radiance()
-        if not (np.abs(total - color) <= _STORED * np.abs(total) + _LEAST).all():
+        if not (np.abs(total - color) <= STORED * np.abs(total) + _LEAST).all():
             yield f"the picture has {color.tolist()}, and the light along its rays is {total.tolist()}"
         if rule == "own":
             yield from exactly.misplaced(ours, self._scene.lights)
@@ -154,7 +155,7 @@ class Explainer:
     def _steps(self, theirs: Node) -> tuple[Reason | None, list[str]]:
         """The reason that lies in a step of theirs, None where each is ours but for rounding."""
         coinciding = []
-        for where, node in _nodes(theirs, "camera"):
+        for where, node in _nodes(theirs, "camera", 1.0):
             found, another = compare(node, self._ours["matched"])
             if found:
                 reference = all(self._is_theirs(fault, node) for fault in found)
@@ -179,10 +180,13 @@ def _mesh_of(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return np.concatenate([*points, np.zeros((0, 3))]), np.concatenate([*faces, np.zeros((0, 3), np.int64)])
 
 
-def _nodes(node: Node, where: str) -> Iterator[tuple[str, Node]]:
+def _nodes(node: Node, where: str, weight: float) -> Iterator[tuple[str, Node]]:
+    """The rays of a tree that the pixel receives enough of to be seen."""
     yield where, node
     for kind, child in node.children.items():
-        yield from _nodes(child, f"{where}, {kind}")
+        received = weight * float(child.share.max())
+        if received > _SEEN:
+            yield from _nodes(child, f"{where}, {kind}", received)
 
 
 def _parted(parting: Parting) -> str:

@@ -16,6 +16,8 @@ from validation.references.ray_tree import Node
 
 # Some twenty float32 roundings of 6e-8: a direction goes through a frame, a lobe, and back.
 _FLOOR = 2e-6
+# The cosine at which a light is in the plane of a face but for rounding of its place and of the hit.
+_GRAZING = 8.0 * _FLOOR
 # A shadow ray of a directional light is as long as Mitsuba likes, or endless.
 _FAR = 1e30
 # Of radiance and shares: the same, of the value itself, or of a channel of 1 where it is smaller than that.
@@ -89,10 +91,16 @@ def _differing(theirs: Node, mine: Node, ours: Ours) -> list[Fault]:
 
 def _missing(theirs: Node, mine: Node) -> Iterator[Fault]:
     """Lights that only one of two surfaces faces, and rays that only one of them spawns."""
-    if theirs.shadows.keys() != mine.shadows.keys():
+    if any(_faces(theirs, light, mine) for light in theirs.shadows.keys() ^ mine.shadows.keys()):
         yield Fault("lights that are faced", sorted(mine.shadows), sorted(theirs.shadows), 0.0)
     if theirs.children.keys() != mine.children.keys():
         yield Fault("spawned rays", sorted(mine.children), sorted(theirs.children), 0.0)
+
+
+def _faces(theirs: Node, light: int, mine: Node) -> bool:
+    """Whether a light is before a surface by more than rounding; it may be within a face's plane."""
+    node = theirs if light in theirs.shadows else mine
+    return abs(float(node.shadows[light].direction @ node.shading)) > _GRAZING
 
 
 def _beyond(theirs: Node, mine: Node, near: list[Node]) -> Iterator[Fault]:
