@@ -16,8 +16,9 @@ from validation.references.ray_tree import Node
 
 # Some twenty float32 roundings of 6e-8: a direction goes through a frame, a lobe, and back.
 _FLOOR = 2e-6
-# The cosine at which a light is in the plane of a face but for rounding of its place and of the hit.
-_GRAZING = 8.0 * _FLOOR
+# The cosine at which a light is in the plane of a face but for rounding of its place and of the hit, and for Mitsuba's
+# ray, which starts off the face and ends 9e-4 of its length before the light.
+_GRAZING = 1e-4
 # A shadow ray of a directional light is as long as Mitsuba likes, or endless.
 _FAR = 1e30
 # Of radiance and shares: the same, of the value itself, or of a channel of 1 where it is smaller than that.
@@ -100,7 +101,13 @@ def _missing(theirs: Node, mine: Node) -> Iterator[Fault]:
 def _faces(theirs: Node, light: int, mine: Node) -> bool:
     """Whether a light is before a surface by more than rounding; it may be within a face's plane."""
     node = theirs if light in theirs.shadows else mine
-    return abs(float(node.shadows[light].direction @ node.shading)) > _GRAZING
+    shadow = node.shadows[light]
+    towards = shadow.direction
+    if shadow.length < _FAR:
+        # The ray starts off the surface, perhaps beyond the light.
+        towards = shadow.origin + shadow.length * shadow.direction - node.point
+        towards = towards / np.linalg.norm(towards)
+    return abs(float(towards @ node.shading)) > _GRAZING
 
 
 def _beyond(theirs: Node, mine: Node, near: list[Node]) -> Iterator[Fault]:
