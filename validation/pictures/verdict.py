@@ -53,7 +53,7 @@ def judge(scene: Scene, pictures: Pictures) -> dict[str, Any]:
     told: list[dict[str, Any]] = []
     record: dict[str, Any] = {"offsets": {}, "left": {}, "sample": _sampled(explainer, pictures)}
     for rule, ours in pictures.ours.items():
-        found = explainer.explain(rule, ours, _pixels(differs(ours, pictures.reference)))
+        found = explainer.explain(rule, ours, _pixels(differs(ours, pictures.reference)), pictures.reference)
         record["offsets"][rule], record["left"][rule] = found.counts(), found.left
         told += [_told(rule, pixel, pictures) for pixel in _shown(found)]
         if rule == "own":

@@ -34,6 +34,8 @@ RED: tuple[Reason, ...] = (_WRONG, "unexplained")
 
 # A picture holds float32; its pixel's sum is that of the tree in float64: half an ulp, and as much for the sums.
 STORED = 2.0**-23
+# The reference adds in float32: some hundred roundings of 6e-8.
+_SUMMED = 1e-5
 # After so many red pixels the verdict is settled, and the others are not looked at.
 SETTLED = 20
 # What a hundredth of a step of an 8-bit picture receives is walked: in deep glass most rays are fainter.
@@ -90,11 +92,20 @@ class Explainer:
             for rule, offset in (("own", BOUNDED), ("matched", _MITSUBA))
         }
 
-    def explain(self, rule: Rule, picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]) -> Explained:
-        """The reasons of some pixels, (row, column), of our ``picture`` (h, w, 3) under an offset rule."""
+    def explain(
+        self,
+        rule: Rule,
+        picture: NDArray[np.floating],
+        pixels: Sequence[tuple[int, int]],
+        theirs: NDArray[np.floating] | None = None,
+    ) -> Explained:
+        """The reasons of some pixels, (row, column), of our ``picture`` (h, w, 3) under an offset rule.
+
+        theirs : the reference's picture, whose pixels are compared with the light along its rays.
+        """
         looked: list[Pixel] = []
         for begin in range(0, len(pixels), _AT_ONCE):
-            looked += self._explain(rule, picture, pixels[begin : begin + _AT_ONCE])
+            looked += self._explain(rule, picture, pixels[begin : begin + _AT_ONCE], theirs)
             if sum(pixel.reason in RED for pixel in looked) >= SETTLED:
                 break
         return Explained(looked, len(pixels) - len(looked))
@@ -106,7 +117,10 @@ class Explainer:
         shading = hit.face < 0 or np.abs(hit.shading - image.normal[row, column]).max() <= STORED
         return bool(same and shading) and not compare(self._their_tree(row, column), self._ours["matched"]).faults
 
-    def _explain(self, rule: Rule, picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]) -> list[Pixel]:
+    def _explain(
+        self, rule: Rule, picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]],
+        theirs: NDArray[np.floating] | None,
+    ) -> list[Pixel]:  # fmt: skip
         pairs = [(self._tree(rule, row, column), self._their_tree(row, column)) for row, column in pixels]
         parted = [partings(*pair) for pair in pairs]
         # Exact arithmetic turns the mesh into whole numbers once for all.
@@ -115,7 +129,12 @@ class Explainer:
         for (row, column), pair, places in zip(pixels, pairs, parted, strict=True):
             wrong = [place for place in places if next(judged)]
             faulty = list(self._ours_wrong(rule, pair[0], picture[row, column], wrong))
-            reason, said = self._reason(rule, row, column, pair[1], places) if not faulty else (_WRONG, faulty)
+            if faulty:
+                reason, said = _WRONG, faulty
+            elif theirs is not None and not _is_sum(pair[1], theirs[row, column]):
+                reason, said = "unexplained", ["the reference's picture is not the light along its rays"]
+            else:
+                reason, said = self._reason(rule, row, column, pair[1], places)
             found.append(Pixel(row, column, reason, [*said, *map(_parted, places)], pair))
         return found
 
@@ -169,6 +188,12 @@ class Explainer:
             return False
         (hit,) = exact.closest_hits(*self._mesh, node.origin[None], node.direction[None])
         return fault.ours == -1 if hit is None else fault.ours in hit.faces_at_t
+
+
+def _is_sum(tree: Node, color: NDArray[np.floating]) -> bool:
+    """Whether a pixel of a picture in float32 is the light along its rays."""
+    total = tree.radiance()
+    return bool((np.abs(total - color) <= _SUMMED * (np.abs(total) + 1.0)).all())
 
 
 def _mesh_of(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

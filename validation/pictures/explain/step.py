@@ -16,9 +16,8 @@ from validation.references.ray_tree import Node
 
 # Some twenty float32 roundings of 6e-8: a direction goes through a frame, a lobe, and back.
 _FLOOR = 2e-6
-# The cosine at which a light is in the plane of a face but for rounding of its place and of the hit, and for Mitsuba's
-# ray, which starts off the face and ends 9e-4 of its length before the light.
-_GRAZING = 1e-4
+# The cosine at which a directional light is in the plane of a face but for rounding.
+_GRAZING = 8.0 * _FLOOR
 # A shadow ray of a directional light is as long as Mitsuba likes, or endless.
 _FAR = 1e30
 # Of radiance and shares: the same, of the value itself, or of a channel of 1 where it is smaller than that.
@@ -61,8 +60,12 @@ def at_one_place(one: Node, other: Node) -> bool:
     """Whether two hits are at one place but for rounding."""
     if one.face < 0 or other.face < 0:
         return False
-    size = _FLOOR * (1.0 + float(np.abs(other.point).max()))
-    return float(np.abs(one.point - other.point).max()) <= size
+    return float(np.abs(one.point - other.point).max()) <= _place(other)
+
+
+def _place(node: Node) -> float:
+    """How far rounding moves a point of a surface, as Mitsuba's offset counts coordinates."""
+    return _FLOOR * (1.0 + float(np.abs(node.point).max()))
 
 
 def coincide(one: Node, other: Node) -> bool:
@@ -102,12 +105,11 @@ def _faces(theirs: Node, light: int, mine: Node) -> bool:
     """Whether a light is before a surface by more than rounding; it may be within a face's plane."""
     node = theirs if light in theirs.shadows else mine
     shadow = node.shadows[light]
-    towards = shadow.direction
-    if shadow.length < _FAR:
-        # The ray starts off the surface, perhaps beyond the light.
-        towards = shadow.origin + shadow.length * shadow.direction - node.point
-        towards = towards / np.linalg.norm(towards)
-    return abs(float(towards @ node.shading)) > _GRAZING
+    if shadow.length >= _FAR:
+        return abs(float(shadow.direction @ node.shading)) > _GRAZING
+    # The ray starts off the surface, perhaps beyond the light, and Mitsuba's ends 9e-4 of its length before it.
+    towards = shadow.origin + shadow.length * shadow.direction - node.point
+    return abs(float(towards @ node.shading)) > _place(node)
 
 
 def _beyond(theirs: Node, mine: Node, near: list[Node]) -> Iterator[Fault]:
@@ -129,7 +131,7 @@ def _values(node: Node) -> dict[str, tuple[Any, float]]:
     found: dict[str, tuple[Any, float]] = {"own radiance": (node.own, _color(node.own))}
     if node.face < 0:
         return found
-    place = _FLOOR * (1.0 + float(np.abs(node.point).max()))
+    place = _place(node)
     found |= {"point": (node.point, place), "shading normal": (node.shading, _FLOOR)}
     for light, shadow in node.shadows.items():
         # Mitsuba's rays go to a place, for a directional light to one beyond all faces, from off the surface.

@@ -14,18 +14,20 @@ from validation.references.ray_tree import Kind, Node, Shadow
 
 @dataclass(frozen=True)
 class _Recorded(Recursion):
-    """A recursion that adds a node to ``made`` for each ray; ``under_way`` are those from the camera's on.
+    """A recursion that adds a node to ``made`` for each ray; ``under_way`` are those from the camera's on, and
+    ``lengths`` those of their directions.
 
     first : the number of the first face of each shape.
     """
 
     first: dict[mi.Mesh, int] = field(default_factory=dict)
     under_way: list[Node] = field(default_factory=list)
+    lengths: list[float] = field(default_factory=list)
 
     def leaving(self, si: mi.SurfaceInteraction3f, depth: int) -> mi.Color3f:
         node = self.under_way[-1]
         if si.is_valid():
-            node.face, node.t = self.first[si.shape] + int(si.prim_index), float(si.t)
+            node.face, node.t = self.first[si.shape] + int(si.prim_index), float(si.t) * self.lengths[-1]
             node.point, node.normal, node.shading = _vector(si.p), _vector(si.n), _vector(si.sh_frame.n)
             node.own = _vector(self.surfaces[si.shape].ambient)
         else:
@@ -45,13 +47,18 @@ class _Recorded(Recursion):
 
     def spawn(self, lobe: Lobe, share: mi.Color3f, ray: mi.Ray3f, depth: int) -> mi.Color3f:
         kind: Kind = "refracted" if lobe.context is REFRACTION else "reflected"
-        node = Node(kind, depth, _vector(ray.o), _vector(ray.d), _vector(share))
+        # In deep glass float32's directions are no unit vectors any more, by some roundings.
+        direction = _vector(ray.d)
+        length = float(np.linalg.norm(direction))
+        node = Node(kind, depth, _vector(ray.o), direction / length, _vector(share))
         self.under_way[-1].children[kind] = node
         self.under_way.append(node)
+        self.lengths.append(length)
         try:
             return super().spawn(lobe, share, ray, depth)
         finally:
             self.under_way.pop()
+            self.lengths.pop()
 
 
 class Trees:
@@ -69,7 +76,7 @@ class Trees:
         """The tree of a camera ray, which is rounded to float32."""
         (ray,) = mitsuba_scene.mitsuba_rays((origin[None], direction[None]))
         node = Node("camera", 0, _vector(ray.o), _vector(ray.d), np.ones(3))
-        self._recursion.under_way[:] = [node]
+        self._recursion.under_way[:], self._recursion.lengths[:] = [node], [1.0]
         self._recursion.radiance(ray, 0)
         return node
 
