@@ -121,6 +121,17 @@ def test_an_argument_gives_the_picture_that_render_gives_with_it(
     assert prepared[0][2:] == tuple((usual | given)[key] for key in usual)
 
 
+@pytest.mark.parametrize("name", [*ARGUMENTS, *BITLESS])
+def test_a_worker_gives_other_pictures_of_a_scene_that_it_has(
+    base: Scene, tmp_path: Path, prepared: object, name: str
+) -> None:
+    """Whichever of both it was asked for before."""
+    other = {name: (ARGUMENTS | BITLESS)[name]}
+    for number, given in enumerate((other, {}, other)):
+        found = render_on(None, base, tmp_path / f"parts{number}", **given).image()
+        assert found.radiance.tobytes() == picture(base, **given).radiance.tobytes()
+
+
 @pytest.mark.parametrize("other", [other for other in VARIATIONS if other.keys[0] in ("camera", "render")], ids=str)
 def test_a_prepared_scene_takes_the_picture_of_another_camera_or_setting(
     bases: dict[str, Scene], folder: Path, other: Variation

@@ -57,11 +57,14 @@ def vertices(draw: Any) -> tuple[list[Column], dict[str, NDArray[np.float64]]]:
         ]
     if draw(st.booleans()):
         steps = (np.stack([k % 5, k % 3, k % 2], axis=1) * 51.0 % 256.0).astype(int)
-        type_ = draw(st.sampled_from([*UNSIGNED, *FLOATS]))
-        full = 1 if type_ in FLOATS else most(type_)
-        stored = steps % 2 / 2.0 if type_ in FLOATS else steps * (full // 255)
-        attributes["colors"] = stored / full
-        columns += [(f"{type_} {name}", stored[:, i].tolist()) for i, name in enumerate(("red", "green", "blue"))]
+        channels = []
+        for i, name in enumerate(("red", "green", "blue")):
+            type_ = draw(st.sampled_from([*UNSIGNED, *FLOATS]))
+            full = 1 if type_ in FLOATS else most(type_)
+            stored = steps[:, i] % 2 / 2.0 if type_ in FLOATS else steps[:, i] * (full // 255)
+            channels.append(stored / full)
+            columns.append((f"{type_} {name}", stored.tolist()))
+        attributes["colors"] = np.stack(channels, axis=1)
     if draw(st.booleans()):
         names = draw(st.sampled_from([("s", "t"), ("u", "v"), ("texture_u", "texture_v")]))
         attributes["texcoords"] = np.stack([k / 8.0, 1.0 - k / 4.0], axis=1)

@@ -15,15 +15,15 @@ STEPS = st.sampled_from([0.25, 1.0, 3.0])
 @given(
     st.integers(0, 2**20), st.integers(2, 5), st.integers(2, 5), st.sampled_from([0.0, 0.2, 0.6, 1.0]),
     st.one_of(STEPS, st.tuples(STEPS, STEPS), st.none()), st.sampled_from([None, (100.0, -50.0, 7.0)]),
-    st.sampled_from(sorted(FORMS)),
+    st.sampled_from(sorted(FORMS)), st.sampled_from([0.0, 1000.0, -1000.0]),
 )  # fmt: skip
 @settings(max_examples=60)
 def test_a_height_field_has_two_faces_for_each_cell_whose_corners_are_known(
-    seed: int, rows: int, columns: int, unknown: float, spacing: Any, origin: Any, form: str
+    seed: int, rows: int, columns: int, unknown: float, spacing: Any, origin: Any, form: str, level: float
 ) -> None:
     """A face stays where its own corners are known; vertices that are not known lie within the bounds."""
     rng = np.random.default_rng(seed)
-    heights = rng.integers(-9, 9, (rows, columns)) / 4.0
+    heights = rng.integers(-9, 9, (rows, columns)) / 4.0 + level
     heights[rng.random((rows, columns)) < unknown] = np.nan
     options = {} if spacing is None else {"spacing": spacing}
     options |= {} if origin is None else {"origin": origin}

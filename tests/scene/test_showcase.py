@@ -41,11 +41,16 @@ def test_the_whole_mesh_is_seen_and_lit_and_large_enough(tmp_path: Path, shape: 
     assert (image.face[rows[-1] + 2] >= len(mesh.faces)).any()
 
 
-def test_the_written_scene_is_the_one_that_is_rendered(tmp_path: Path) -> None:
-    (tmp_path / "models").mkdir()
-    (tmp_path / "scenes").mkdir()
+@pytest.mark.parametrize("leads_to", [None, ".", "far/away", "models"])
+def test_the_written_scene_is_the_one_that_is_rendered(tmp_path: Path, leads_to: str | None) -> None:
+    """Also where the scene is written through a link, into whichever folder it leads."""
+    for name in ("models", "scenes", "far/away"):
+        (tmp_path / name).mkdir(parents=True)
     path, written = file_of(tmp_path / "models", icosphere(2), name='a "b".ply'), tmp_path / "scenes" / "it.toml"
+    if leads_to is not None:
+        written.symlink_to(tmp_path / leads_to / "other.toml")
     write_scene(path, written)
+    assert written.is_symlink() == (leads_to is not None)
     found, expected = (render(load_scene(p), resolution=(30, 20)) for p in (written, path))
     assert found.radiance.tobytes() == expected.radiance.tobytes()
 

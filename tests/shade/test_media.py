@@ -44,6 +44,29 @@ def test_glass_without_a_back_wall() -> None:
     np.testing.assert_allclose(normal, passed(0.0, 1.0, 1.5) * passed(0.0, 1.0, 1.33, 1.0), rtol=STORED)
 
 
+def _open_at_the_top(low: float, high: float) -> Mesh:
+    mesh = slab(low, high)
+    return Mesh(mesh.vertices, mesh.faces[~_upper(mesh)])
+
+
+@pytest.mark.parametrize(
+    ("others", "below"),
+    [
+        ([], []),
+        ([(_open_at_the_top, 1.0, 3.0, GLASS)], []),
+        ([(slab, 0.0, 1.0, WATER)], [1.33]),
+        ([(_open_at_the_top, 1.0, 3.0, GLASS), (slab, 0.0, 1.0, WATER)], [1.33]),
+        ([(slab, 0.0, 12.0, WATER), (_open_at_the_top, 1.0, 3.0, GLASS)], [1.33]),
+    ],
+)
+def test_a_body_that_was_never_entered_is_left_from_its_own_medium(others: Any, below: list[float]) -> None:
+    """Glass without a top, whose bottom is met alone or with faces of other bodies in the same place."""
+    parts = [(_open_at_the_top(1.0, 2.0), GLASS), *((shape(*ends), material) for shape, *ends, material in others)]
+    for some in (parts, parts[::-1]):
+        found = render(straight_down(*some), resolution=(3, 3), max_depth=6).radiance
+        np.testing.assert_allclose(found, passed(0.0, 1.5, *below, 1.0), rtol=STORED)
+
+
 def _upper(mesh: Mesh) -> Any:
     """The faces of a box at its highest coordinate."""
     heights = mesh.vertices[mesh.faces][:, :, 1]

@@ -8,6 +8,7 @@ import pytest
 import tomlkit
 from varied import VARIATIONS, Variation, write_meshes
 
+from renderer import load_mesh
 from renderer.viewer.payload import description, mesh_payload
 from renderer.viewer.shown import open_file
 
@@ -40,3 +41,16 @@ def usual(folder: Path) -> dict[str, tuple[str, bytes]]:
 def test_a_page_is_told_of_another_value(folder: Path, usual: dict[str, tuple[str, bytes]], other: Variation) -> None:
     told = fetched(folder, other.varied())
     assert (told == usual[other.table["camera"]["type"]]) == (other.keys[-1] in UNTOLD)
+
+
+@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] in ("objects", "floor")], ids=str)
+def test_each_object_has_the_faces_of_its_mesh_and_the_floor_two_for_each_square(
+    folder: Path, other: Variation
+) -> None:
+    table = other.varied()
+    (folder / "b.toml").write_text(tomlkit.dumps(table))
+    shown = open_file(folder / "b.toml")
+    across, along = table["floor"]["squares"]
+    expected = [len(load_mesh(folder / entry["mesh"]).faces) for entry in table["objects"]] + [2 * across * along]
+    assert [told["faces"] for told in description(shown)["objects"]] == expected
+    assert sum(expected) == len(shown.prepared.mesh.faces)

@@ -32,8 +32,10 @@ from renderer import Scene, srgb
 from renderer.inspect.false_color import false_color, shades_of
 from renderer.inspect.ray_cost import camera_steps
 from renderer.picture.pack import media_around
-from renderer.viewer import compare
+from renderer.viewer import compare, passes
+from renderer.viewer import shown as shown_module
 from renderer.viewer.compare import compared
+from renderer.viewer.passes import passes_of
 from renderer.viewer.protocol import ViewSettings
 from renderer.viewer.shown import ShownScene, open_file
 
@@ -163,6 +165,23 @@ def test_the_files_settings_hold(folder: Path, other: Variation, way: Any) -> No
 @pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] not in ("render", "camera")], ids=str)
 def test_the_picture_is_that_of_the_file(folder: Path, other: Variation) -> None:
     assert same(octree(of_file(folder, other)))
+
+
+@pytest.mark.parametrize("mode", ["octree", "brute"])
+@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] == "render"], ids=str)
+def test_the_files_settings_hold_in_every_band(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, other: Variation, mode: str
+) -> None:
+    """Where pictures before the last have fewer rays than the file allows."""
+    monkeypatch.setattr(passes, "BAND_PIXELS", 1)
+    monkeypatch.setattr(shown_module, "SOON", 2)
+    case = of_file(folder, other).seen(h=70)
+    bands = [p for p in passes_of(case.message("view", seq=1, mode=mode)) if p.band is not None]
+    assert len(bands) == 3
+    payload = b"".join(case.answer(mode, number) for number in range(-3, 0))
+    found = np.frombuffer(payload, np.uint8).reshape(*case.size[::-1], 4)[..., :3]
+    samples = {} if mode == "octree" else {"samples": 1}
+    assert np.array_equal(found, srgb(case.picture(**samples).radiance))
 
 
 def of_file(folder: Path, other: Variation) -> Case:
