@@ -22,7 +22,13 @@ from renderer.picture.render import View
 BEHIND = PerspectiveCamera(eye=(-2.0, 2.5, 3.0), target=(0.0, 0.5, 0.0))
 # Another value for each argument of ``render`` that a cluster takes: those that change bits, and those that do not.
 SETTINGS = OTHERS[RenderSettings]
-ARGUMENTS: dict[str, Any] = {"camera": BEHIND, "offset": 0.01, "planes": ("depth", "rays"), **SETTINGS}
+ARGUMENTS: dict[str, Any] = {
+    "camera": BEHIND,
+    "offset": 0.01,
+    "media": "normal",
+    "planes": ("depth", "rays"),
+    **SETTINGS,
+}
 BITLESS = {"accelerator": "brute", "split": "sah", "progress": True}
 
 
@@ -96,7 +102,7 @@ def test_no_two_pictures_have_a_plan_in_common(bases: dict[str, Scene], base: Sc
     scenes = [bases[kind] for kind in bases]
     scenes += [scene_of(folder, other.varied()) for other in VARIATIONS if other.keys != ("camera", "type")]
     plans = [plan_of(scene) for scene in scenes]
-    plans += [plan_of(base, **{name: ARGUMENTS[name]}) for name in ("camera", "offset")]
+    plans += [plan_of(base, **{name: ARGUMENTS[name]}) for name in ("camera", "offset", "media")]
     # Some planes have rows of as many bytes as others.
     plans += [plan_of(base, planes=some) for number in range(4) for some in combinations(PLANES[1:], number)]
     assert len(set(plans)) == len(plans)
@@ -105,7 +111,7 @@ def test_no_two_pictures_have_a_plan_in_common(bases: dict[str, Scene], base: Sc
 def test_every_argument_of_a_picture_is_varied() -> None:
     own = signature(render).parameters.keys() - {"scene", "settings", "needs", "threads"}
     assert ARGUMENTS.keys() | BITLESS.keys() == own | RenderSettings.model_fields.keys()
-    assert set(View._fields) == {"camera", "chosen", "offset", "planes"}
+    assert set(View._fields) == {"camera", "chosen", "offset", "media", "planes"}
 
 
 @pytest.mark.parametrize("name", [*ARGUMENTS, *BITLESS])
