@@ -122,7 +122,9 @@ def _ruled(prepared: PreparedScene, pictures: Pictures, reasons: NDArray[np.uint
     judge = MediaJudge(prepared, (width, height))
     pixels, alike = _pixels(decided), _pixels(~decided)
     chosen = [pixels[k] for k in np.linspace(0, len(pixels) - 1, min(_RULED, len(pixels))).astype(int)]
-    sample = [alike[k] for k in np.random.default_rng(_SEED).permutation(len(alike))[:_SAMPLE]]
+    # Without glass there are no media.
+    count = _SAMPLE if prepared.needs.refraction else 0
+    sample = [alike[k] for k in np.random.default_rng(_SEED).permutation(len(alike))[:count]]
     found, others = judge.judge(pictures.stack, chosen), judge.judge(pictures.stack, sample)
     reasons[decided & (reasons == 0)] = 1 + MAPPED.index("media")
     why = [one.why for one in found if one.wrong is None and one.why is not None]

@@ -9,7 +9,7 @@ from renderer.scene.light import DirectionalLight, Light
 from validation.oracle import exact
 from validation.oracle.rounding import FLOAT64_ROUNDOFF, RayView
 from validation.pictures.explain.partings import Parting
-from validation.pictures.explain.planes import coinciding
+from validation.pictures.explain.planes import Planes
 from validation.pictures.explain.rounding import moved_ray
 from validation.references.ray_tree import Node, Shadow
 
@@ -87,7 +87,8 @@ def _near(
 ) -> bool:
     """Whether rounding permits the hit, or a ray from where the start may really be has it."""
     if isinstance(said, Node):
-        if said.face >= 0 and said.t <= _OFF and coinciding(points[faces], said, _START * (1.0 + np.abs(points).max())):
+        room = _START * (1.0 + float(np.abs(points).max()))
+        if said.face >= 0 and said.t <= _OFF and Planes(points[faces]).coinciding(said, room):
             # By the law of starts a ray stops at once at the next of the faces that coincide where it starts.
             return True
         view = RayView(points, faces, tuple(ray.origin.tolist()), tuple(ray.direction.tolist()), FLOAT64_ROUNDOFF)

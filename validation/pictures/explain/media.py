@@ -21,7 +21,7 @@ from validation.oracle.inside import winding_number
 from validation.pictures.explain.optics import wrong_rays
 from validation.pictures.explain.ours import Ours
 from validation.pictures.explain.pixels import STORED
-from validation.pictures.explain.planes import coinciding
+from validation.pictures.explain.planes import Planes
 from validation.references.ray_tree import Node
 
 # Faces coincide up to roundings of their corners: some 2^10 float64 roundings of the coordinates.
@@ -59,6 +59,7 @@ class MediaJudge:
         self._ours = Ours(steps_of(prepared), scene.render.max_depth, scene.render.shadows)
         triangles = [i.mesh.vertices[i.mesh.faces] for i in scene.instances]
         self._corners = np.concatenate([*triangles, np.zeros((0, 3, 3))])
+        self._planes = Planes(self._corners)
         self._owner = np.repeat(np.arange(len(triangles)), [len(one) for one in triangles])
 
     def judge(self, picture: NDArray[np.floating], pixels: Sequence[tuple[int, int]]) -> list[Ruled]:
@@ -128,7 +129,7 @@ class MediaJudge:
         is within all of them, and not at an edge.
         """
         room = _NEAR * (1.0 + float(np.abs(node.point).max()))
-        others = coinciding(self._corners, node, room)
+        others = self._planes.coinciding(node, room)
         return sorted([node.face, *others]), all(depth > room for depth in others.values())
 
     def _enters(self, node: Node, face: int) -> bool:

@@ -6,16 +6,21 @@ from numpy.typing import NDArray
 from validation.references.ray_tree import Node
 
 
-def coinciding(corners: NDArray[np.float64], node: Node, room: float) -> dict[int, float]:
-    """The other faces in the plane of the face that was hit which have the point, but for ``room``, by number: how far
-    the point is within each.
+class Planes:
+    """The faces of a mesh, corners (F, 3, 3), to be searched for those in one plane."""
 
-    corners : (F, 3, 3) of all faces.
-    """
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    boxes = ((low <= node.point + room) & (high >= node.point - room)).all(axis=1)
-    found = {face: _within(corners[face], node, room) for face in np.flatnonzero(boxes).tolist() if face != node.face}
-    return {face: depth for face, depth in found.items() if depth >= -room}
+    def __init__(self, corners: NDArray[np.float64]) -> None:
+        self.corners = corners
+        self._low, self._high = corners.min(axis=1), corners.max(axis=1)
+
+    def coinciding(self, node: Node, room: float) -> dict[int, float]:
+        """The other faces in the plane of the face that was hit which have the point, but for ``room``, by number: how
+        far the point is within each.
+        """
+        boxes = ((self._low <= node.point + room) & (self._high >= node.point - room)).all(axis=1)
+        faces = [face for face in np.flatnonzero(boxes).tolist() if face != node.face]
+        found = {face: _within(self.corners[face], node, room) for face in faces}
+        return {face: depth for face, depth in found.items() if depth >= -room}
 
 
 def _within(corners: NDArray[np.float64], node: Node, room: float) -> float:
