@@ -17,6 +17,7 @@ from validation.gates import Gate
 from validation.job import Job
 from validation.pictures import compare
 from validation.pictures.compare import ImageComparison, Picture
+from validation.pictures.explain.pixels import Rule
 from validation.pictures.files import write_failed, write_shown
 from validation.thresholds import REASONS
 
@@ -25,8 +26,6 @@ _STEPS = 0.5 + 1e-9
 # The quantity of the gate on pictures of nothing.
 SHOWN = "pixels with a surface"
 _MAPS = ("difference", "flip_map")
-
-Rule = Literal["matched", "own"]
 
 
 class Pair(NamedTuple):

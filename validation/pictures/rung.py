@@ -13,8 +13,9 @@ from renderer.scene.scene import UNLIMITED_RAYS, Scene
 from validation.gates import Gate
 from validation.job import Job
 from validation.pictures import check, verdict
-from validation.pictures.check import Pair, Rule
+from validation.pictures.check import Pair
 from validation.pictures.compare import Picture, fragile_pixels
+from validation.pictures.explain.pixels import Rule
 from validation.pictures.files import write_png
 from validation.pictures.plan import RungTask
 from validation.pictures.shifted_film import shifted

@@ -15,11 +15,10 @@ from renderer.picture.prepare import PreparedScene
 from renderer.picture.render import prepare
 from renderer.scene.scene import Scene
 from validation.gates import Gate
-from validation.pictures.check import Rule
 from validation.pictures.compare import VISIBLE, Picture, srgb
 from validation.pictures.explain.media import MediaJudge
 from validation.pictures.explain.partings import way
-from validation.pictures.explain.pixels import RED, SETTLED, Explained, Explainer, Pixel
+from validation.pictures.explain.pixels import RED, SETTLED, Explained, Explainer, Pixel, Rule
 
 # Pixels that agree and are walked all the same: a fault of all pixels is seen in each, one of a hundredth of them is
 # missed by 64 with probability 1/2.

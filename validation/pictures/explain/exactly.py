@@ -30,10 +30,10 @@ def wrong(rays: Sequence[Parting], points: NDArray[np.float64], faces: NDArray[n
     some = [one for one in judged if one is not None]
     origins, directions = np.array([ray.origin for ray, _ in some]), np.array([ray.direction for ray, _ in some])
     exactly = exact.closest_hits(points, faces, origins, directions)
-    result = [False] * len(rays)
+    planes, result = Planes(points[faces]), [False] * len(rays)
     for row, (ray, length), hit in zip(rows, some, exactly, strict=True):
         said = rays[row].ours if length is None else rays[row].ours.shadows[rays[row].light]
-        result[row] = not (_fits(said, hit, length) or _near(said, ray, length, points, faces))
+        result[row] = not (_fits(said, hit, length) or _near(said, ray, length, planes, points, faces))
     return result
 
 
@@ -83,12 +83,17 @@ def _fits(said: Node | Shadow, hit: exact.ExactHit | None, length: float | None)
 
 
 def _near(
-    said: Node | Shadow, ray: Node | Shadow, length: float | None, points: NDArray[np.float64], faces: NDArray[np.int64]
+    said: Node | Shadow,
+    ray: Node | Shadow,
+    length: float | None,
+    planes: Planes,
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
 ) -> bool:
     """Whether rounding permits the hit, or a ray from where the start may really be has it."""
     if isinstance(said, Node):
         room = _START * (1.0 + float(np.abs(points).max()))
-        if said.face >= 0 and said.t <= _OFF and Planes(points[faces]).coinciding(said, room):
+        if said.face >= 0 and said.t <= _OFF and planes.coinciding(said, room):
             # By the law of starts a ray stops at once at the next of the faces that coincide where it starts.
             return True
         view = RayView(points, faces, tuple(ray.origin.tolist()), tuple(ray.direction.tolist()), FLOAT64_ROUNDOFF)

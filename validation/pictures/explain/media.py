@@ -20,7 +20,7 @@ from renderer.scene.scene import Scene
 from validation.oracle.inside import winding_number
 from validation.pictures.explain.optics import wrong_rays
 from validation.pictures.explain.ours import Ours
-from validation.pictures.explain.pixels import STORED
+from validation.pictures.explain.pixels import wrong_sum
 from validation.pictures.explain.planes import Planes
 from validation.references.ray_tree import Node
 
@@ -70,17 +70,11 @@ class MediaJudge:
         rows = self._scene.camera.rows(self._width, len(picture))
         around = self._around(np.asarray(self._scene.camera.eye))
         for row, column in pixels:
-            x, y = column + 0.5, row + 0.5
-            tree = self._ours.tree(rows[0] + (x * rows[1] + y * rows[2]), rows[3] + (x * rows[4] + y * rows[5]))
-            said = [*self._sum(tree, picture[row, column]), *self._walk(tree, around)]
+            tree = self._ours.pixel(rows, row, column)
+            said = [*wrong_sum(tree, picture[row, column]), *self._walk(tree, around)]
             wrong = next((text for text in said if text not in WHYS), None)
             found.append(Ruled(row, column, next(iter(said), None) if wrong is None else None, wrong))
         return found
-
-    def _sum(self, tree: Node, color: NDArray[np.floating]) -> Iterator[str]:
-        total = tree.radiance()
-        if not (np.abs(total - color) <= STORED * np.abs(total) + 1e-30).all():
-            yield f"the picture has {color.tolist()}, and the light along its rays is {total.tolist()}"
 
     def _walk(self, node: Node, media: tuple[_Body, ...], turned: bool = False) -> Iterator[str]:
         """What lets the rules differ along a tree, and what is wrong there.

@@ -29,6 +29,11 @@ class Ours:
         # A picture takes the media around its camera's eye, for all points of an orthographic film.
         return self._follow(ray._replace(media=tuple(self.steps.arrays.media.tolist())), np.ones(3))
 
+    def pixel(self, rows: NDArray[np.float64], row: int, column: int) -> Node:
+        """The tree of the ray through a pixel's centre, to the bit as the kernel has it of the camera's ``rows``."""
+        x, y = column + 0.5, row + 0.5
+        return self.tree(rows[0] + (x * rows[1] + y * rows[2]), rows[3] + (x * rows[4] + y * rows[5]))
+
     def step(self, node: Node) -> Node:
         """What a ray hits, and the rays that leave there: the children have hit nothing, and no shadow is traced.
 

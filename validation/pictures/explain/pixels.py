@@ -139,9 +139,7 @@ class Explainer:
         return found
 
     def _tree(self, rule: Rule, row: int, column: int) -> Node:
-        # To the bit as the kernel has them.
-        rows, x, y = self._rows, column + 0.5, row + 0.5
-        return self._ours[rule].tree(rows[0] + (x * rows[1] + y * rows[2]), rows[3] + (x * rows[4] + y * rows[5]))
+        return self._ours[rule].pixel(self._rows, row, column)
 
     def _their_tree(self, row: int, column: int) -> Node:
         at = row * self._width + column
@@ -151,9 +149,7 @@ class Explainer:
         self, rule: str, ours: Node, color: NDArray[np.floating], wrong: Sequence[Parting]
     ) -> Iterator[str]:
         """What is wrong with our own tree, whatever Mitsuba's is."""
-        total = ours.radiance()
-        if not (np.abs(total - color) <= STORED * np.abs(total) + _LEAST).all():
-            yield f"the picture has {color.tolist()}, and the light along its rays is {total.tolist()}"
+        yield from wrong_sum(ours, color)
         if rule == "own":
             yield from exactly.misplaced(ours, self._scene.lights)
         for place in wrong:
@@ -188,6 +184,13 @@ class Explainer:
             return False
         (hit,) = exact.closest_hits(*self._mesh, node.origin[None], node.direction[None])
         return fault.ours == -1 if hit is None else fault.ours in hit.faces_at_t
+
+
+def wrong_sum(tree: Node, color: NDArray[np.floating]) -> Iterator[str]:
+    """Says where a pixel of our picture is not the light along its rays."""
+    total = tree.radiance()
+    if not (np.abs(total - color) <= STORED * np.abs(total) + _LEAST).all():
+        yield f"the picture has {color.tolist()}, and the light along its rays is {total.tolist()}"
 
 
 def _is_sum(tree: Node, color: NDArray[np.floating]) -> bool:

@@ -9,6 +9,7 @@ from renderer import Dielectric, PerspectiveCamera, Phong, Scene, SceneObject, p
 from renderer.inspect.ray_step import Steps
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
+from validation.pictures.explain import media
 from validation.pictures.explain.media import COINCIDING, OPEN, OVERLAPPING, MediaJudge, open_glass
 from validation.pictures.verdict import differs
 
@@ -68,7 +69,7 @@ def test_a_stack_that_forgets_is_seen(monkeypatch: pytest.MonkeyPatch, why: str)
 
     monkeypatch.setattr(Steps, "bounce", forgetful)
     # The picture is sound, and is not compared here.
-    monkeypatch.setattr(MediaJudge, "_sum", lambda *_: [])
+    monkeypatch.setattr(media, "wrong_sum", lambda *_: [])
     assert any("by the rule the indices are" in (one.wrong or "") for one in judged(SCENES[why]))
 
 
