@@ -11,19 +11,21 @@ follows both branches: these have a reason or are red (``explain``).
 import math
 import time
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.picture.render import prepare, render
+from renderer.picture.prepare import MediaRule
+from renderer.picture.render import prepare
 from renderer.scene.camera import primary_rays
 from renderer.scene.material import Dielectric, Phong
-from renderer.scene.scene import UNLIMITED_RAYS, Scene
+from renderer.scene.scene import Scene
 from validation.error_curves import slope
 from validation.gates import Gate
 from validation.pictures.compare import VISIBLE, fragile_pixels, srgb
 from validation.pictures.explain.pixels import RED, Explainer
+from validation.pictures.one_ray import Offset, picture
 from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import path as mitsuba_path
 from validation.references.mitsuba import whitted as mitsuba_whitted
@@ -203,14 +205,9 @@ def _explained(
     return sum(found.counts()[reason] for reason in RED), ~np.isin(rows, list(reasoned))
 
 
-def _picture(
-    scene: Scene, size: int, offset: Any = "mitsuba", media: Literal["stack", "normal"] = "stack"
-) -> NDArray[np.float64]:
-    """Our picture through the pixels' centres, (size, size, 3), without a smallest weight, as in the random paths."""
-    image = render(
-        scene, resolution=(size, size), samples=1, min_weight=0.0, max_rays=UNLIMITED_RAYS, offset=offset, media=media
-    )
-    return image.radiance.astype(np.float64)
+def _picture(scene: Scene, size: int, offset: Offset = "mitsuba", media: MediaRule = "stack") -> NDArray[np.float64]:
+    """Our picture through the pixels' centres, (size, size, 3)."""
+    return picture(scene, (size, size), offset, media).radiance.astype(np.float64)
 
 
 def _gates(name: str, scatter: Scatter, fragile: float, unexplained: int, own: bool) -> list[Gate]:

@@ -2,14 +2,12 @@
 
 import re
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.picture.image import Image, srgb
-from renderer.picture.render import render
-from renderer.scene.scene import UNLIMITED_RAYS, Scene
 from validation.gates import Gate
 from validation.job import Job
 from validation.pictures import check, verdict
@@ -17,11 +15,11 @@ from validation.pictures.check import Pair
 from validation.pictures.compare import Picture, fragile_pixels
 from validation.pictures.explain.pixels import Rule
 from validation.pictures.files import write_png
+from validation.pictures.one_ray import Offset, picture
 from validation.pictures.plan import RungTask
 from validation.pictures.shifted_film import shifted
 
-_Offset = Literal["bounded", "mitsuba"] | float
-_RULES: dict[Rule, _Offset] = {"matched": "mitsuba", "own": "bounded"}
+_RULES: dict[Rule, Offset] = {"matched": "mitsuba", "own": "bounded"}
 # Colours of the map of pixels: none, then ``verdict.MAPPED`` in order. Only the last two are faults.
 _COLORS = np.array(
     [(0, 0, 0), (90, 160, 250), (130, 130, 230), (60, 200, 180), (240, 200, 70), (190, 110, 240), (255, 40, 40),
@@ -117,15 +115,3 @@ def _rung_record(task: RungTask, own: Image, comparisons: list[dict[str, Any]]) 
         "comparisons": comparisons,
         "left_out": task.left_out,
     }
-
-
-def picture(
-    scene: Scene,
-    resolution: tuple[int, int],
-    offset: _Offset,
-    media: Literal["stack", "normal"] = "stack",
-    **settings: Any,
-) -> Image:
-    """Our picture with one ray a pixel and no smallest weight."""
-    settings = {"samples": 1, "min_weight": 0.0, "max_rays": UNLIMITED_RAYS} | settings
-    return render(scene, resolution=resolution, offset=offset, media=media, **settings)

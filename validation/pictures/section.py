@@ -20,8 +20,9 @@ from validation.job import Job, Task
 from validation.pictures import aovs, monte_carlo, placement, unseen, verdict
 from validation.pictures.explain.media import open_glass
 from validation.pictures.files import write_png
+from validation.pictures.one_ray import picture
 from validation.pictures.plan import PictureEffort, Plan, plan_pictures
-from validation.pictures.rung import Drawn, check_rung, draw, picture
+from validation.pictures.rung import Drawn, check_rung, draw
 from validation.references.mitsuba import camera as mitsuba_camera
 from validation.references.mitsuba import whitted as mitsuba_whitted
 from validation.references.mitsuba.scene import in_float32

@@ -19,7 +19,7 @@ from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 from validation.gates import Gate
 from validation.job import Job
-from validation.pictures import ladder, monte_carlo, plan, rung
+from validation.pictures import ladder, monte_carlo, one_ray, plan
 from validation.pictures import section as images
 from validation.pictures.plan import WHITTED, PictureEffort, Reference, plan_pictures
 from validation.pictures.shifted_film import shifted
@@ -177,7 +177,7 @@ def test_every_defect_turns_a_gate_red(tmp_path: Path, monkeypatch: pytest.Monke
     known = Reference("whitted", WHITTED, lambda _: None, lambda *_, **__: reference_balls())
     monkeypatch.setattr(plan, "REFERENCES", (known,))
     wrong, seen_by = DEFECTS[defect]
-    monkeypatch.setattr(rung, "render", wrong)
+    monkeypatch.setattr(one_ray, "render", wrong)
     record, gates = check(tmp_path, balls())
     assert seen_by in {gate.quantity for gate in gates if not gate.passed}
     for comparison in record["rungs"][-1]["comparisons"]:
