@@ -7,8 +7,8 @@ rounding; where rounding misses that point they are wider, and still bounds.
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import least, magnitude, movemask, select, smaller, splat4, square_root
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import least, magnitude, movemask, select, smaller, splat4, square_root
 from renderer.trace.intersect import load_corners
 
 # Corners less the point, u, v and the nearest point err by 2^-53 each, of a corner's reach; together by 20 such errors

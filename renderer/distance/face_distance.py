@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.expansions import OUT_OF_RANGE, PARTS, expand_area, expand_volume, pair_of
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import (
     cross_pairs,
     dot_pairs,
     length_pair,
@@ -19,8 +18,9 @@ from renderer.kernels.pairs import (
     quotient,
     scaled_difference,
 )
-from renderer.kernels.signs import UNDECIDED, lies_within, volume_sign
-from renderer.kernels.simd import larger, put
+from renderer.numerics.expansions import OUT_OF_RANGE, PARTS, expand_area, expand_volume, pair_of
+from renderer.numerics.predicates import UNDECIDED, lies_within, volume_sign
+from renderer.numerics.simd import larger, put
 
 # Shares of the terms of a sum of products of pairs, which errs by 2^-98 of them. Below CANCELLED it loses so many
 # digits that it is computed as an expansion. Below LOST its sign is in doubt: a point so near an edge, as seen along

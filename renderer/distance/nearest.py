@@ -10,8 +10,8 @@ import numpy as np
 
 from renderer.distance.block_distance import bound_distances
 from renderer.distance.face_distance import UNTOLD, distance_to_face
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     at,
     extract,
     get,
@@ -26,12 +26,12 @@ from renderer.kernels.simd import (
     splat4,
     store,
 )
-from renderer.kernels.vec3 import three
-from renderer.points.point import Point
+from renderer.numerics.vec3 import three
+from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
+from renderer.trace.point import Point
 from renderer.trace.rays import hit_pointers
-from renderer.trace.sides import corner
 
 # In place of a face: float64 cannot tell.
 UNTOLD_FACE = -2

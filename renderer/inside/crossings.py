@@ -9,10 +9,10 @@ of their rounding errors or by expansions, so the counts are those of real arith
 
 from typing import Any, NamedTuple
 
-from renderer.kernels.expansions import PARTS
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.signs import UNDECIDED, area_sign, differ, lies_within, volume_sign
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.expansions import PARTS
+from renderer.numerics.predicates import UNDECIDED, area_sign, differ, lies_within, volume_sign
+from renderer.numerics.simd import (
     at,
     count_bits,
     get,
@@ -26,10 +26,10 @@ from renderer.kernels.simd import (
     splat4,
     splat8,
 )
+from renderer.trace.edge_signs import coordinate
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
-from renderer.trace.sides import coordinate
 
 # In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot tell.
 ON_FACE, UNTOLD = -(2**31), -(2**31) + 1

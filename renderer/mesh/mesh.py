@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import plain_array, real_array
+from renderer.arguments.arrays import plain_array, real_array
 from renderer.errors import MeshError
 from renderer.lazy import lazy
 from renderer.mesh.edges import open_edges

@@ -10,10 +10,10 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_argument
+from renderer.arguments.arrays import real_argument
 from renderer.errors import expect
 from renderer.picture.exr import check_exr, exr_bytes
-from renderer.process.files import as_path, check_writable, write_atomically
+from renderer.system.files import as_path, check_writable, write_atomically
 
 # The arrays of an ``Image``; radiance is always there.
 PLANES = ("radiance", "depth", "normal", "face", "rays")

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, field_validator, model_validator
 
+from renderer.arguments.limits import FARTHEST
 from renderer.errors import expect
-from renderer.limits import FARTHEST
 from renderer.scene.fields import Fields, FiniteVector
 
 

@@ -18,12 +18,12 @@ from renderer.errors import MeshError, SceneError, expect
 from renderer.lazy import lazy
 from renderer.mesh.load import MESH_SUFFIXES, load_mesh
 from renderer.mesh.mesh import Mesh
-from renderer.process.files import as_path, read_whole, write_atomically
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.showcase import showcase_text
+from renderer.system.files import as_path, read_whole, write_atomically
 
 
 def _typed(default: str) -> BeforeValidator:

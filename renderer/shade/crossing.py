@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get, pointer, put, smaller
-from renderer.kernels.vec3 import dot
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import get, pointer, put, smaller
+from renderer.numerics.vec3 import dot
 from renderer.shade.records import IOR
 from renderer.shade.surface import Look, left_from, lets_through, look_at, scene_pointers
 from renderer.trace.leaf import tree_pointers

@@ -5,9 +5,9 @@ k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import add, row3, three, times
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, put
+from renderer.numerics.vec3 import add, row3, three, times
 from renderer.shade.bundle import SIZE
 from renderer.shade.lights import aim, see_light
 from renderer.shade.records import DIELECTRIC, KIND, MIRROR, UNLIT

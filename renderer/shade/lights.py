@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get
-from renderer.kernels.vec3 import dot, normalized, scale, sub, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import get
+from renderer.numerics.vec3 import dot, normalized, scale, sub, three
 from renderer.shade.records import DIRECTIONAL, LIGHT_COLUMNS
 from renderer.shade.surface import scene_pointers
 from renderer.trace.spawn import spawn_origin

@@ -5,8 +5,8 @@ Vectors are tuples of float64. ``n`` is the unit normal on the side of the incom
 
 import math
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.vec3 import add, dot, scale, sub
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.vec3 import add, dot, scale, sub
 
 
 @inlined

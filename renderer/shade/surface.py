@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get, pointer
-from renderer.kernels.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import get, pointer
+from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
 from renderer.trace.spawn import Facet, facet_of, offset_distance

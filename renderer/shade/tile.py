@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, pointer, put, smaller
-from renderer.kernels.vec3 import add, normalized, row3, scale, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, pointer, put, smaller
+from renderer.numerics.vec3 import add, normalized, row3, scale, three
 from renderer.shade.bundle import SIDE, SIZE, append, clear, count_of
 from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
 from renderer.shade.surface import scene_pointers

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, put
+from renderer.numerics.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
 from renderer.shade.bundle import (
     BUNDLE_DOUBLES,
     BUNDLE_INTEGERS,

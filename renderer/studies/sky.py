@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect, is_count
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.studies.directions import MOST, Pattern, fibonacci_hemisphere, reinhart, tregenza, turned
 from renderer.studies.share import (
     answer,

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, pointer, put, smaller
-from renderer.kernels.vec3 import add, cross, dot, largest_component, normalized, row3, scale, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, pointer, put, smaller
+from renderer.numerics.vec3 import add, cross, dot, largest_component, normalized, row3, scale, three
 from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     double_of,
     extract,
     float32_pointer,
@@ -20,7 +20,6 @@ from renderer.kernels.simd import (
     smaller,
     splat8,
 )
-from renderer.trace.doubt import settled
 from renderer.trace.intersect import hit_triangles, make_shear, room_of, round_both
 from renderer.trace.layout import (
     BLOCK_COUNT,
@@ -37,6 +36,7 @@ from renderer.trace.layout import (
     SCALE,
     WIDE,
 )
+from renderer.trace.resolve import settled
 
 
 class TreePointers(NamedTuple):

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     bits_float,
     count_bits,
     extract,

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     address,
     alike,
     at,
@@ -51,7 +51,7 @@ from renderer.trace.ray_lanes import (
     shear_of,
 )
 from renderer.trace.rays import ray_at, starts8
-from renderer.trace.singly import search_carefully, stack_size
+from renderer.trace.single import search_carefully, stack_size
 from renderer.trace.starts.record import EDGE
 from renderer.trace.starts.record import FACE as START_FACE
 from renderer.trace.starts.record import SLACK as START_SLACK

@@ -4,8 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     address,
     at,
     bool_pointer,
@@ -22,7 +23,6 @@ from renderer.kernels.simd import (
     select,
     smaller,
 )
-from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.trace.intersect import Ray
 from renderer.trace.leaf import NO_FACE
 from renderer.trace.starts.record import FACE, SLACK, StartPointers, start_pointers

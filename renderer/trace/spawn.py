@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, larger, pointer, put, smaller
-from renderer.kernels.vec3 import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, larger, pointer, put, smaller
+from renderer.numerics.vec3 import (
     add,
     barycentric,
     cross,
@@ -24,8 +24,8 @@ from renderer.kernels.vec3 import (
     three,
     unit_and_length,
 )
-from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import CORNER, DOUBT, SLANT
+from renderer.trace.resolve import LINE, ROUNDING
 from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
     ABOVE,

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import (
     at,
     bits_float,
     count_bits,

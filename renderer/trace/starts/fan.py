@@ -6,10 +6,10 @@ products; where rounding may have made one of them, ``region`` decides.
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import heads
-from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import cross, dot, largest_component, normalized, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import heads
+from renderer.numerics.simd import at, get, put
+from renderer.numerics.vec3 import cross, dot, largest_component, normalized, three
 from renderer.trace.starts.cone import (
     FIRST_NODE,
     FREE_PATH,

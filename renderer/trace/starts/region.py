@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs, dot_pairs, heads
-from renderer.kernels.vec3 import dot, normalized
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import as_pairs, dot_pairs, heads
+from renderer.numerics.vec3 import dot, normalized
 from renderer.trace.starts.cone import (
     FIRST_NODE,
     FREE,

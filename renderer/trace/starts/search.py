@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.kernels.simd import extract, get, larger, local_doubles, lowest_bit, pointer, put, smaller, splat8
-from renderer.kernels.vec3 import add, largest_component, sub
-from renderer.trace.doubt import settled
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
+from renderer.numerics.simd import extract, get, larger, local_doubles, lowest_bit, pointer, put, smaller, splat8
+from renderer.numerics.vec3 import add, largest_component, sub
+from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import (
     CORNER,
     Ray,
@@ -29,7 +29,7 @@ from renderer.trace.intersect import (
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, is_better, octants_around, push_children, tree_pointers
-from renderer.trace.sides import corner
+from renderer.trace.resolve import settled
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
