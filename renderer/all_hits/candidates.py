@@ -67,6 +67,7 @@ def find_blocks(tree, rays, begin, end, scratch, found):
         entered, leaves = leaves, 0
         for k in range(entered):
             r = get(lanes.at_leaf, k)
+            # rule: seen-blocks
             if get(lanes.bits, k) != 0:
                 block = ~get(prepared.integers, CHILD + r) >> LEAF_BITS
                 _list_block(found, get(prepared.integers, NUMBER + r) - begin, block)

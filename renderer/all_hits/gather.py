@@ -87,6 +87,7 @@ def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, memory)
             if kept + count > found.capacity or hits > _WORK:
                 return i, -1
             hits += count
+            # rule: max-hits
             counts[i] = smaller(_ordered(tree, found, count, merge, keep), most)
             if keep:
                 _keep(found, kept, counts[i], tree.scale, make_shear(ray_at(source, i)[0]).direction_z)
@@ -264,6 +265,7 @@ def _merge(tree, found, count, order):
     _sort(tree, found, order, on_edges, True)
     for k in range(1, on_edges):
         # Those of one place follow each other. The first one's place stands for all, merged or not.
+        # rule: merge-at-edge
         if _compare_places(tree, found, get(order, k - 1), get(order, k)) == 0:
             put(found.integers, _row(found, _FACE, get(order, k)), np.int64(_MERGED))
 
@@ -307,6 +309,7 @@ def _precedes(tree, found, i, j, by_place):
     if place < 0 or other < 0:
         return place < other
     face, other = get(found.integers, _row(found, _FACE, i)), get(found.integers, _row(found, _FACE, j))
+    # rule: order-at-t
     return ti < tj or (ti == tj and face < other)
 
 
@@ -324,6 +327,7 @@ def _ends(tree, found, i):
     """The places in its block of the ends of a hit's edge, the lower first; of a corner, that twice."""
     place = get(found.integers, _row(found, _AT, i))
     edges = get(found.integers, _row(found, _EDGES, i))
+    # rule: corner-of-edges
     if edges & (edges - 1) != 0:
         # Two edges meet in the corner that is opposite to the third.
         corner = place + 12 * lowest_bit(~edges & 7)

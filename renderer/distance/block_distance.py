@@ -43,6 +43,7 @@ def bound_distances(tree, base, point, limit):
     low, high = select(distance <= zero, zero, along / distance - error), distance * splat4(_MORE) + error
     # Of an unused place all is NaN, which is not within any limit.
     within = low <= splat4(limit)
+    # rule: bound-of-block
     limit = smaller(limit, least(select(within, high, splat4(np.inf))))
     return movemask(within & (low <= splat4(limit))), low, limit
 

@@ -59,6 +59,7 @@ def distance_to_face(a, b, c, p, parts):
     wc = dot_pairs(seen.pa, cross_pairs(seen.ab, normal))[0]
     limit = _LOST * _largest(normal)
     on_a, on_b, on_c = limit * _largest(seen.bc), limit * _largest(seen.ca), limit * _largest(seen.ab)
+    # rule: over-face
     if wa > on_a and wb > on_b and wc > on_c:
         height, total = _height(seen, normal, a, b, c, p, parts), wa + wb + wc
         distance = _rounded(quotient(height, length_pair(normal)))
@@ -146,6 +147,7 @@ def _expanded(a, b, p, first, second, otherwise, parts):
 def _height(seen, normal, a, b, c, p, parts):
     """The distance of the point from the face's plane times the length of the normal."""
     height = dot_pairs(seen.pa, normal)
+    # rule: cancelled-height
     if abs(height[0]) < _CANCELLED * _largest(normal):
         count = expand_volume(a, b, c, p, parts)
         if count == OUT_OF_RANGE:
@@ -169,11 +171,13 @@ def _distance_to_edge(a, b, p, seen, edge, parts):
 def _distance_to_ordered(a, b, p, seen, edge, parts):
     pa, pb, ab = edge
     behind, ahead = -dot_pairs(pa, ab)[0], dot_pairs(pb, ab)[0]
+    # rule: nearest-corner
     if behind <= 0.0:
         return _rounded(length_pair(pa)), 0.0
     if ahead <= 0.0:
         return _rounded(length_pair(pb)), 1.0
     area = cross_pairs(pa, ab)
+    # rule: cancelled-area
     if _largest(area) < _CANCELLED * _largest(pa):
         area = _expanded(a, b, p, seen.to_reach, seen.to_side, area, parts)
     return _rounded(quotient(length_pair(area), length_pair(ab))), behind / (behind + ahead)

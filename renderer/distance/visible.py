@@ -80,6 +80,7 @@ def _picked(end: _Ends, rows: NDArray[np.int64]) -> _Ends:
 
 def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> RayBatch:
     """Rays from the one end to the other, both left out."""
+    # rule: room-at-ends
     room = _BESIDE * np.maximum(np.abs(start.points), np.abs(stop.points)).max(axis=1, initial=0.0)
     directions, reach = _way(start.points, stop.points)
     room = np.maximum(room / np.abs(directions).max(axis=1, initial=0.0), _LEAST)

@@ -196,8 +196,10 @@ def _cross_exactly(tree, place, column, parts):
     if side == 0 and (s0 != 0 or s1 != 0 or s2 != 0):
         return 0, 1
     if side == 0:
+        # rule: on-upright-face
         return 0, lies_within(a, b, c, p, parts)
     # The point moves by (e, e^2), so an edge that it lies on passes it on one side.
+    # rule: move-off-edge
     s0 = s0 if s0 != 0 else _moved_sign(b, c)
     s1 = s1 if s1 != 0 else _moved_sign(c, a)
     s2 = s2 if s2 != 0 else _moved_sign(a, b)

@@ -269,6 +269,7 @@ class Mesh:
         for corner in range(3):
             angle = _angle(edges[corner], edges[corner - 1])
             for axis in range(3):
+                # rule: weight-by-angle
                 weighted[axis, :, corner] = normals[axis] * angle
         flat, count = self.faces.ravel(), len(self.vertices)
         sums = [np.bincount(flat, along.ravel(), minlength=count).astype(np.float64) for along in weighted]

@@ -42,6 +42,7 @@ def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
 def _encoded(linear: ArrayLike) -> NDArray[np.uint8]:
     x = np.clip(np.asarray(linear, np.float64), 0.0, 1.0)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)
+    # rule: rounded-encoding
     return (encoded * 255.0 + 0.5).astype(np.uint8)
 
 

@@ -194,6 +194,7 @@ def arrays_for(prepared: PreparedScene, camera: Camera, offset: OffsetRule, medi
     together where the rules cross each face by itself.
     """
     arrays = prepared.arrays
+    # rule: media-at-eye
     if prepared.needs.refraction and camera is not prepared.scene.camera:
         arrays = arrays._replace(media=media_around(prepared.scene, camera))
     if media == "normal":

@@ -49,6 +49,7 @@ class _Camera(Fields):
     @field_validator("eye")
     @classmethod
     def _is_near_enough(cls, eye: tuple[float, float, float]) -> tuple[float, float, float]:
+        # rule: eye-within-limit
         if max(map(abs, eye)) > FARTHEST:
             raise ValueError(f"expected coordinates within {FARTHEST:.3g}, as far as rays are traced")
         return eye

@@ -366,6 +366,7 @@ def _floor_meshes(floor: Floor) -> list[tuple[Mesh, str]]:
     a = row * (nx + 1) + column
     b, c, d = a + nx + 1, a + nx + 2, a + 1
     faces = np.stack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)], 1)
+    # rule: floor-colour
     color = (row + column) % len(floor.materials)
     meshes = []
     for index, name in enumerate(floor.materials):

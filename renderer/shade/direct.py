@@ -148,6 +148,7 @@ def light_surfaces(tree, scene, bundle, surfaces, lit, settings, work):
             _trace_shadows(tree, scene, bundle, lit, aimed, work)
         for k in range(aimed):
             i = get(lit, SIZE + k)
+            # rule: shadows
             if not (settings.shadows and get(work.found.hit, k)):
                 towards, arriving = three(shadows, _TOWARDS + 3 * k), three(shadows, _ARRIVING + 3 * k)
                 _add_light(scene, bundle, at(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)

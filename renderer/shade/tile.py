@@ -76,6 +76,7 @@ def _shoot(camera, scene, bundle, place, block):
         i, j = _place(k)
         x, y = x0 + i, y0 + j
         if x < x1 and y < y1:
+            # rule: place-in-pixel
             px, py = x + place[0], y + place[1]
             rows = camera.rows
             o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))

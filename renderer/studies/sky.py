@@ -74,6 +74,7 @@ def sky_view_factor(
     asked = check_asked(octree, points, pole if normals is None else normals, leaving, threads, progress)
     pattern = _patches(patches)
     ways = turned(pattern.directions, pole)
+    # rule: cosine-of-patches
     cosine = definition == "cosine"
     values = pattern.weights / lengths_of(ways) if cosine else pattern.weights
     sky = Sky(ways, values, limits_of(distance, ways), False, cosine)

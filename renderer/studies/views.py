@@ -96,6 +96,7 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
             left = begin + np.flatnonzero(face_normals(corners).any(axis=1) & ~are_edge_on(corners, place))
             for u, v in _centroids(int(cuts)):
                 points = points_on(mesh, left, np.full(len(left), u), np.full(len(left), v))
+                # rule: faces-in-view
                 reached = octree.visible(points, place, leaving=left)
                 seen[left[reached]] = True
                 left = left[~reached]
@@ -194,6 +195,7 @@ def _first_hits(octree: Queries, place: Floats, ways: Floats, reach: Floats, nor
     rays, _ = check_rays(place, ways, 0.0, reach)
     face, code, anchor = (part[0] for part in on_surface(tree, mesh, place[None], np.full(1, -1), octree.threads))
     if face >= 0:
+        # rule: outer-side-of-scanner
         outer = face_normals(mesh.vertices[mesh.faces[face : face + 1]])[0] if normal is None else normal
         row = _row_on_side(octree, face, code, anchor, outer)
         count, (face, code) = len(ways), row[[FACE, CODE]].astype(np.int64)

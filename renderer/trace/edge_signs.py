@@ -72,6 +72,7 @@ def products_sign(a, b, c, d):
     ratio = 2.0 if exponent > 0 else (0.5 if exponent < 0 else 1.0)
     one, other = exact_product(a * ratio, b), exact_product(c, d)
     heads = one[0] - other[0]
+    # rule: product-tails
     return left * _sign(heads if heads != 0.0 else one[1] - other[1])
 
 

@@ -125,6 +125,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
             bits &= bits - 1
             ti = extract(t4, i)
             fi = get(tree.faces, block * BLOCK_FACES + i)
+            # rule: tie-in-blocks
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
                 t, face, u, v, w = ti, fi, extract(u4, i), extract(v4, i), extract(w4, i)
     return t, face, u, v, w, doubtful

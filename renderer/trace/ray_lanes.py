@@ -152,6 +152,7 @@ def nearest_in_leaf(tree, rays, r, leaf):
         shear_of(rays, r),
         best_of(rays, r),
     )
+    # rule: weights-of-hit
     put_best(rays, r, (t, face, u, v, w))
     put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
     return face != NO_FACE, doubts

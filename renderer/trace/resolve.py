@@ -82,6 +82,7 @@ def settled(tree, at, ray, shear, hit, blurred):
     t0, t1 = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
     first, last = np.float64(t0) * _BEFORE, np.float32(t1 * FAR_PADDING)
     t, u, v, w = hit
+    # rule: uncertain-determinant
     if blurred:
         t, u, v, w = _meet_face(tree, at, ray, first / largest, np.float64(last) / largest)
         w = -1.0 if _slope(tree, at, ray) * shear.direction_z > 0.0 else 1.0
@@ -95,6 +96,7 @@ def settled(tree, at, ray, shear, hit, blurred):
     if round_down(t * largest) > last:
         t = np.float64(last) / largest
     if t0 > box_limit(t, largest):
+        # rule: t-within-box
         t = first / largest
     return t, u, v, w
 
@@ -323,6 +325,7 @@ def _meet_line(face, low, high):
     second = _second(face, t)
     if not length(sub(_place(face, t), scale(d, t))) <= ROUNDING:
         return np.nan, 0.0, 0.0
+    # rule: t-on-line
     return t, second, 0.0
 
 

@@ -31,6 +31,7 @@ def search_singly(tree, ray, t_max, stack):
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
     lower = splat8(round_down(ray.t_min * largest))
+    # rule: first-limit
     best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
     if not tree.has_nodes:
         return nearest_carefully(tree, 0, tree.count, ray, shear, best), tree.count
@@ -41,6 +42,7 @@ def search_singly(tree, ray, t_max, stack):
         child = get(stack, top)
         if child < 0:
             first, count = blocks_of(child)
+            # rule: blocks-of-leaf
             best = nearest_carefully(tree, first, count, ray, shear, best)
             steps += count
             continue

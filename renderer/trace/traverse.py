@@ -132,6 +132,7 @@ def _finish(tree, rays, found, scratch, r, any_hit):
     """
     best, (_, doubles, integers), steps = best_of(scratch.prepared, r), scratch.prepared, np.int64(0)
     i, slack = get(integers, NUMBER + r), get(doubles, SLACK + r)
+    # rule: resolve-uncertain
     if get(integers, DOUBTFUL + r) != 0 or slack == EDGE:
         best, steps = search_carefully(
             tree, rays, i, at(scratch.lanes.stacks, stack_of(scratch.lanes, r)), scratch.holders, any_hit

@@ -55,6 +55,7 @@ def arcs_of(tree, anchor, holders, count):
 @kernel
 def _cut(tree, anchor, holders, count):
     """List the arcs behind the cones; returns their number, 0 where none is cut or there is no room for all."""
+    # rule: foot-of-wall
     if not _are_cut(tree, anchor, holders, count):
         return 0
     end = count

@@ -76,6 +76,7 @@ def write_fan(tree, anchor, holders, count, nodes, k, side, table, room):
     for attempt in range(ATTEMPTS):
         sound = path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH)
         if sound and _write_rows(tree, anchor, holders, count, heads(hub_of(attempt)), table):
+            # rule: closed-fan
             put(table, _CLOSED, np.float64(_are_closed(holders, count, nodes)))
             put(table, _COUNT, np.float64(count))
             return

@@ -219,6 +219,7 @@ def _height(face, anchor):
         return 0
     if shared == 2:
         third = _third(a, b) if c == NONE else (_third(b, c) if a == NONE else _third(a, c))
+        # rule: start-on-edge
         if (anchor.zeros >> third) & 1 != 0:
             return 0
         p0, p1, p2 = face.corners
