@@ -22,7 +22,6 @@ HEAVY = {
     "numpy",
     "pydantic",
     "trimesh",
-    "plyfile",
     "PIL",
     "tqdm",
     "scipy.linalg",
