@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.counts import count_argument
 from renderer.checkpoints.parts import Parts, Plan, digest_of
-from renderer.errors import expect
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import pack
 from renderer.picture.prepare import PreparedScene
@@ -121,9 +120,7 @@ def band_of(view: View) -> int:
 
 def checked_band(band: object) -> int:
     """``band``, a number of rows. Raises ``ValueError`` for what is none."""
-    good = isinstance(band, Integral) and not isinstance(band, bool) and int(band) >= 1
-    expect(good, "band", "an integer >= 1 or None", repr(band))
-    return int(band)  # type: ignore[call-overload]
+    return count_argument("band", band, 1, alternative=" or None")
 
 
 def digest_of_scene(scene: Scene, needs: Needs) -> str:

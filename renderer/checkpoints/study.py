@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.checkpoints.parts import Parts, Plan, digest_of
+from renderer.checkpoints.parts import Computed, Parts, Plan, digest_of
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
@@ -20,7 +20,6 @@ from renderer.studies.ambient import ambient_occlusion
 from renderer.studies.share import check_asked
 from renderer.studies.sky import sky_view_factor, sun_hours
 from renderer.system.files import check_writable
-from renderer.system.terminal import progress_bar
 
 Floats = NDArray[np.float64]
 # Points of a part: with 145 directions some seconds of work on one thread, which is what a kill loses at most.
@@ -124,13 +123,10 @@ def run(octree: Octree, study: Study, points: Points, folder: Path, *, progress:
     """
     check_writable(folder.with_name(f"{folder.name}.try"))
     parts = parts_of(octree, study, points, folder)
-    missing = parts.missing()
-    with progress_bar(len(points), "point", progress) as update:
-        if update is not None:
-            update(len(points) - sum(end - begin for begin, end in map(parts.plan.span, missing)))
+
+    def compute(missing: list[int]) -> Computed:
         for part in missing:
-            some = points.part(parts.rows(part))
-            parts.write(part, study.answer(octree, some))
-            if update is not None:
-                update(len(some))
+            yield part, study.answer(octree, points.part(parts.rows(part)))
+
+    parts.complete(compute, "point", progress)
     return parts

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import count_argument
 from renderer.jit.decorators import kernel
 from renderer.numerics.simd import splat8, store
 from renderer.octree import BruteForce, Octree
@@ -41,7 +41,7 @@ def boxes_at(octree: Octree | BruteForce, level: int) -> Boxes:
 
     Raises ``ValueError`` for a negative level.
     """
-    expect(is_count(level), "level", "an integer >= 0", repr(level))
+    count_argument("level", level)
     tree, scale = octree.tree, octree.tree.scale
     boxes = _root_box(tree)
     children = np.zeros(len(boxes), np.int64)

@@ -10,7 +10,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import count_argument
+from renderer.errors import expect
 from renderer.scene.material import Phong
 from renderer.scene.scene import Instance, Scene
 
@@ -98,7 +99,8 @@ def needs_of(scene: Scene, max_depth: int | None = None) -> Needs:
     False
     """
     expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
-    expect(max_depth is None or is_count(max_depth), "max_depth", "an integer >= 0 or None", repr(max_depth))
+    if max_depth is not None:
+        count_argument("max_depth", max_depth, alternative=" or None")
     return Needs(**{f.feature: f.value for f in examine(scene, max_depth)})  # type: ignore[arg-type]
 
 
@@ -110,9 +112,7 @@ def checked_needs(needs: Needs | None, scene: Scene, max_depth: int) -> Needs:
     expect(isinstance(needs, Needs), "needs", "a Needs or None", type(needs).__name__)
     for finding, (name, given) in zip(findings, asdict(needs).items(), strict=True):
         if name == "lights":
-            least, most = finding.value, len(scene.lights)
-            good = isinstance(given, int) and not isinstance(given, bool) and least <= given <= most
-            expect(good, "needs.lights", f"an integer from {least} to {most}", repr(given))
+            count_argument("needs.lights", given, int(finding.value), len(scene.lights))
         else:
             expect(isinstance(given, bool), f"needs.{name}", "True or False", repr(given))
             expect(given or not finding.value, f"needs.{name}", f"True ({finding.reason})", "False")

@@ -9,10 +9,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import thread as pools
 from functools import cache
-from numbers import Integral
 from threading import Lock, current_thread
 
-from renderer.errors import expect
+from renderer.arguments.counts import count_argument
 
 # The pool's threads: at least so many, and so many per processor. More would not change results.
 _LEAST_POOL, _PER_PROCESSOR = 16, 4
@@ -29,11 +28,7 @@ def available_threads() -> int:
 
 def checked_threads(threads: int | None) -> int:
     """``threads``, or all available processors for None."""
-    if threads is None:
-        return available_threads()
-    good = isinstance(threads, Integral) and not isinstance(threads, bool) and threads >= 1
-    expect(good, "threads", "an integer >= 1 or None", repr(threads))
-    return int(threads)
+    return available_threads() if threads is None else count_argument("threads", threads, 1, alternative=" or None")
 
 
 @cache
