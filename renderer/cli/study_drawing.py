@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from renderer.diagnostics.false_color import shades_of
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.ply import by_name, format_columns
+from renderer.picture.encoding import write_pixels
 from renderer.picture.image import Image, write_array
 from renderer.system.files import write_atomically
 
@@ -97,9 +97,4 @@ def write_npy(path: Path, values: Floats) -> None:
 
 def write_png(path: Path, picture: Bytes) -> None:
     """Write (h, w, 3) sRGB."""
-    from PIL import Image as Pillow
-
-    def write(file: BinaryIO) -> None:
-        Pillow.fromarray(picture).save(file, "png")
-
-    write_atomically(path, write)
+    write_atomically(path, lambda file: write_pixels(file, picture))
