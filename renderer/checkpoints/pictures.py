@@ -16,7 +16,7 @@ from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import pack
 from renderer.picture.prepare import PreparedScene
 from renderer.picture.render import View
-from renderer.scene.needs import Needs
+from renderer.scene.needs import Features
 from renderer.scene.scene import Scene
 from renderer.system.files import check_writable
 
@@ -123,7 +123,7 @@ def checked_band(band: object) -> int:
     return count_argument("band", band, 1, alternative=" or None")
 
 
-def digest_of_scene(scene: Scene, needs: Needs) -> str:
+def digest_of_scene(scene: Scene, needs: Features) -> str:
     """A digest of all that pictures of a scene show, whatever their cameras and settings are."""
     mesh, arrays = pack(scene, needs)
     # The media are those around the scene's own camera, which is the view's; around any they depend on how the mesh is

@@ -301,7 +301,7 @@ def _view(options: argparse.Namespace) -> None:
 def _info(options: argparse.Namespace) -> None:
     from renderer.octree import Octree
     from renderer.picture.pack import pack
-    from renderer.scene.needs import examine, needs_of
+    from renderer.scene.needs import examine, features_of
     from renderer.scene.scene import load_scene
 
     scene = load_scene(options.scene)
@@ -314,14 +314,15 @@ def _info(options: argparse.Namespace) -> None:
             f"  {instance.mesh.name or 'mesh':<20} {len(instance.mesh.faces):>9} faces  {normals:<7} "
             f"{instance.material} ({material.type})"
         )
-    if needs_of(scene).octree:
+    findings = examine(scene)
+    if features_of(findings).octree:
         stats = Octree.from_mesh(pack(scene)[0], split=options.split).stats
         say(
             f"octree ({options.split}): {stats.nodes} nodes, {stats.leaves} leaves, depth {stats.depth}, "
             f"{stats.references} references in {stats.blocks} blocks ({stats.fill:.0%} full), "
             f"{stats.bytes / 1e6:.1f} MB"
         )
-    for feature, value, reason in examine(scene):
+    for feature, value, reason in findings:
         say(f"  {feature.replace('_', ' '):<16} {'needed' if value else 'left out'}: {reason}")
 
 

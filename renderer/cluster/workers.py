@@ -13,7 +13,7 @@ from renderer.checkpoints.pictures import Picture
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.picture.prepare import PreparedScene, prepare_scene
-from renderer.scene.needs import Needs
+from renderer.scene.needs import Features
 from renderer.scene.scene import Scene
 
 # The trees of a worker, by the digests of what they are over; the latest ones, because a worker serves many runs.
@@ -53,7 +53,7 @@ class SentScene(NamedTuple):
 
     digest: str
     scene: Scene
-    needs: Needs
+    needs: Features
     accelerator: str
     split: Literal["midpoint", "sah"]
 
