@@ -15,8 +15,8 @@ from renderer.checkpoints.parts import Computed, Parts, Plan, digest_of
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.ordering.morton import order_along_curve
 from renderer.studies.ambient import ambient_occlusion
+from renderer.studies.points import Points
 from renderer.studies.share import check_asked
 from renderer.studies.sky import sky_view_factor, sun_hours
 from renderer.system.files import check_writable
@@ -24,33 +24,6 @@ from renderer.system.files import check_writable
 Floats = NDArray[np.float64]
 # Points of a part: with 145 directions some seconds of work on one thread, which is what a kill loses at most.
 PART = 1 << 15
-# Points that are put in order together: 32 bytes each while it is done, and a second of sorting.
-_TOGETHER = 1 << 22
-
-
-@dataclass(frozen=True, eq=False)
-class Points:
-    """The points of a study: ``points`` and ``normals`` (n, 3) float64, and ``leaving`` (n,) int64, -1 for a face that
-    is not known.
-    """
-
-    points: Floats
-    normals: Floats
-    leaving: NDArray[np.int64]
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-    def part(self, rows: slice | NDArray[np.int64]) -> Points:
-        """Those of some rows."""
-        return Points(self.points[rows], self.normals[rows], self.leaving[rows])
-
-    def order(self) -> NDArray[np.int64]:
-        """The rows (n,) in which those that follow each other lie together, along a curve that fills space."""
-        rows = np.empty(len(self), np.int64)
-        for first in range(0, len(self), _TOGETHER):
-            rows[first : first + _TOGETHER] = first + order_along_curve(self.points[first : first + _TOGETHER])[0]
-        return rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,7 +121,7 @@ def _check_output(options: argparse.Namespace) -> None:
 
 def _check_options(options: argparse.Namespace) -> None:
     """What can be told of the other options before any work."""
-    from renderer.cli.study_drawing import FINER
+    from renderer.diagnostics.mesh_values import FINER
     from renderer.scene.scene import MOST_PIXELS
 
     for kind, names in _OWN.items():
@@ -136,7 +136,7 @@ def _check_options(options: argparse.Namespace) -> None:
 
 def _options_of(options: argparse.Namespace) -> dict[str, Any]:
     """The keyword arguments of the study."""
-    from renderer.checkpoints.study_points import suns_of
+    from renderer.studies.points import suns_of
 
     of: dict[str, Any] = {"distance": options.distance}
     if options.kind == "sun":
@@ -151,7 +151,7 @@ def _camera(options: argparse.Namespace) -> Any:
 
 
 def _chosen(octree: Any, options: argparse.Namespace) -> Any:
-    from renderer.checkpoints import study_points as chosen
+    from renderer.studies import points as chosen
 
     if options.points is not None:
         return chosen.of_file(octree, options.points)
@@ -162,7 +162,7 @@ def _chosen(octree: Any, options: argparse.Namespace) -> Any:
 
 def _write(output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, camera: Any) -> None:
     """Write a result that is more than the answers of the points."""
-    from renderer.cli import study_drawing as drawing
+    from renderer.diagnostics import mesh_values as drawing
 
     suffix = output.suffix.lower()
     if chosen.of_faces is None and chosen.of_vertices is None:
@@ -182,10 +182,10 @@ def _write(output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, an
 
 def _picture(mesh: Any, camera: Any, options: argparse.Namespace) -> Any:
     """The faces and normals that a camera sees; without one, from the south-west and above."""
-    from renderer.cli.study_drawing import FINER
-    from renderer.cli.study_view import from_above
+    from renderer.diagnostics.mesh_values import FINER
     from renderer.picture.render import render
     from renderer.scene.material import Phong
+    from renderer.scene.overview import from_above
     from renderer.scene.scene import Scene, SceneObject
 
     thing = SceneObject(mesh=mesh, material="grey", normals="flat")

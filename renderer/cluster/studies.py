@@ -7,12 +7,13 @@ from typing import Any, Literal
 
 from renderer.arguments.counts import count_argument
 from renderer.checkpoints.parts import Parts, digest_of
-from renderer.checkpoints.study import PART, Points, Study, parts_of
+from renderer.checkpoints.study import PART, Study, parts_of
 from renderer.cluster.tasks import Results, Task, results
 from renderer.cluster.workers import SentMesh, answer_part
 from renderer.errors import expect
 from renderer.octree import Octree
 from renderer.picture.render import check_tree
+from renderer.studies.points import Points
 from renderer.system.files import as_path
 
 
@@ -29,7 +30,7 @@ def run_on(
 ) -> Parts:
     """``renderer.checkpoints.study.run`` on the workers of ``client``, a ``distributed.Client``.
 
-    points  where, as ``renderer.checkpoints.study_points`` makes them
+    points  where, as ``renderer.studies.points`` makes them
     folder  for the parts, a new one or that of a run that was killed; the caller removes it
     size    points of a part at least. It changes no bit
     split   the tree that workers build, as ``Octree.from_mesh`` takes it. It changes no bit
@@ -45,7 +46,7 @@ def run_on(
     >>> from tempfile import TemporaryDirectory
     >>> from renderer import Octree
     >>> from renderer.cluster import connected, run_on
-    >>> from renderer.checkpoints.study_points import on_faces
+    >>> from renderer.studies.points import on_faces
     >>> from renderer.checkpoints.study import Study
     >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> with connected(workers=1) as client, TemporaryDirectory() as folder:

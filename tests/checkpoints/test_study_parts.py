@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from renderer import Octree
-from renderer.checkpoints.study import Points, Study, parts_of, run
-from renderer.checkpoints.study_points import on_faces
+from renderer.checkpoints.study import Study, parts_of, run
+from renderer.studies.points import Points, on_faces
 from validation.benchmark.measures.meshes import named
 
 STUDY = Study("sky", {})

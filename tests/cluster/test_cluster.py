@@ -17,8 +17,8 @@ from watched import Watched
 
 from renderer import Mesh, Octree, cluster
 from renderer.checkpoints.study import Study, run
-from renderer.checkpoints.study_points import on_faces
 from renderer.cluster import any_hit, closest_hit, connected, run_on
+from renderer.studies.points import on_faces
 from renderer.system.threads import checked_threads
 from validation.benchmark.measures.meshes import named
 

@@ -18,10 +18,10 @@ from watched import Watched
 
 from renderer import Octree, Scene, load_scene, render
 from renderer.checkpoints.study import Study
-from renderer.checkpoints.study_points import on_faces
 from renderer.cli.main import main
 from renderer.cluster import connected, render_on, run_on
 from renderer.mesh.load import save_ply
+from renderer.studies.points import on_faces
 from validation.benchmark.measures.meshes import named
 
 GLASS: dict[str, Any] = {"resolution": (80, 60), "samples": 16}

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.checkpoints.study import Study
-from renderer.checkpoints.study_points import of_file, on_grid
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.octree import Octree
@@ -27,6 +26,7 @@ from renderer.studies import (
     tregenza,
     visible_faces,
 )
+from renderer.studies.points import of_file, on_grid
 from validation.oracle.exact import closest_hits
 from validation.oracle.starts import Surface
 from validation.studies.bodies import FAR, bodies, street, terrain, touching, town
