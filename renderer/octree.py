@@ -11,7 +11,7 @@ from renderer.arguments.arrays import flag_argument
 from renderer.arguments.counts import count_argument
 from renderer.errors import MeshError, expect
 from renderer.mesh.mesh import Mesh, Repairs
-from renderer.queryable import Queries
+from renderer.queryable import Built, Queries
 from renderer.system.threads import checked_threads
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 from renderer.tree.build import SPLITS, build_blocks, build_tree
@@ -93,7 +93,7 @@ class _Accelerator(Queries):
         scaled, scale = _scaled(moved)
         refitted = refit_tree(tree, scaled, moved.faces, scale, self.threads)
         _check_sides(moved, scaled, refitted)
-        self._built = (moved, refitted)
+        self._built = Built(moved, refitted)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} over {len(self.mesh.faces):,} faces, depth {self.tree.depth}>"

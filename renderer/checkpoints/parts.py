@@ -36,7 +36,7 @@ _MOST_BYTES = 1 << 26
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run computes, in parts.
+    """The result of a run, in parts, and all that it depends on.
 
     rows       of the result, one a point of a study, or a row of pixels
     size       rows of a part; the last may have fewer

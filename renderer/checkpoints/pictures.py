@@ -30,7 +30,7 @@ _CUT = "cut"
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What is rendered: a view of a scene, which is named by its digest, see ``digest_of_scene``."""
+    """The view of a scene that is rendered; the scene is named by its digest, see ``digest_of_scene``."""
 
     view: View
     scene: str

@@ -1,4 +1,4 @@
-"""A study as a record that can be stored, sent and repeated: what is asked, of which points, part by part."""
+"""A study as a record that can be stored, sent and repeated, and its run, part by part."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PART = 1 << 15
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What is asked of each point.
+    """A question to each of many points.
 
     kind        "sky": sky view factor; "sun": hours of sun; "ao": ambient occlusion
     options     the keyword arguments of the kind's function, other than points, threads and progress
@@ -40,8 +40,8 @@ class Study:
     def __post_init__(self) -> None:
         expect(self.kind in KINDS, "kind", f"one of {list(KINDS)}", repr(self.kind))
 
-    def answer(self, octree: Octree, points: Points, threads: int | None = None) -> Floats:
-        """The answers (n,) for points; each is the same whatever other points are asked with it."""
+    def evaluate(self, octree: Octree, points: Points, threads: int | None = None) -> Floats:
+        """The answers (n,) for points; each is the same whatever other points are evaluated with it."""
         return KINDS[self.kind](
             octree, points.points, points.normals, leaving=points.leaving, threads=threads, **self.options
         )
@@ -70,7 +70,7 @@ KINDS: dict[str, Callable[..., Floats]] = {"sky": sky_view_factor, "sun": sun_ho
 
 
 def folder_of(output: Path) -> Path:
-    """Where the parts of a result are while it is under way."""
+    """The folder of the parts of a result that is under way."""
     return output.with_name(f"{output.name}.parts")
 
 
@@ -83,7 +83,7 @@ def parts_of(octree: Octree, study: Study, points: Points, folder: Path, size: i
     # Here, as an error of a part would name its own row.
     check_asked(octree, points.points, points.normals, points.leaving, None, False)
     # Of no point, so that options that the kind refuses leave no folder, which would stand in the way of right ones.
-    study.answer(octree, points.part(slice(0)))
+    study.evaluate(octree, points.part(slice(0)))
     order = points.order()
     plan = study.plan(octree.mesh, points, order, *(() if size is None else (size,)))
     return Parts(folder, plan, order)
@@ -99,7 +99,7 @@ def run(octree: Octree, study: Study, points: Points, folder: Path, *, progress:
 
     def compute(missing: list[int]) -> Computed:
         for part in missing:
-            yield part, study.answer(octree, points.part(parts.rows(part)))
+            yield part, study.evaluate(octree, points.part(parts.rows(part)))
 
     parts.complete(compute, "point", progress)
     return parts

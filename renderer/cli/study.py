@@ -80,7 +80,7 @@ def _study(options: argparse.Namespace) -> None:
 
 
 def _said(options: argparse.Namespace, parts: Any, seconds: float) -> str:
-    """What was made, and the number of points that see nothing, so that this is not silent."""
+    """The line about the result, with the number of points that see nothing, so that this is not silent."""
     outputs = ", ".join(map(str, options.output))
     blind = 0 if options.kind == "sun" else parts.count(0.0)
     told = f"; {blind:,} see nothing: they face down, are hidden all around or lie inside a body" if blind else ""
@@ -101,7 +101,7 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
 
 
 def _check_output(options: argparse.Namespace) -> None:
-    """What can be told of the outputs before any work."""
+    """Refuse outputs that cannot be written, before any work."""
     from renderer.system.files import are_apart, check_writable
 
     on_mesh = options.grid is None and options.points is None
@@ -120,7 +120,7 @@ def _check_output(options: argparse.Namespace) -> None:
 
 
 def _check_options(options: argparse.Namespace) -> None:
-    """What can be told of the other options before any work."""
+    """Refuse other options that do not fit together, before any work."""
     from renderer.diagnostics.mesh_values import FINER
     from renderer.scene.scene import MOST_PIXELS
 

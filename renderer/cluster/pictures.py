@@ -116,7 +116,7 @@ def frames_on(
 
 
 class _Sender:
-    """What workers are to be sent for pictures with the same options."""
+    """The scenes as workers are sent them, for pictures with the same options."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         settings = dict(options)

@@ -9,7 +9,7 @@ from renderer.arguments.counts import count_argument
 from renderer.checkpoints.parts import Parts, digest_of
 from renderer.checkpoints.study import PART, Study, parts_of
 from renderer.cluster.tasks import Results, Task, results
-from renderer.cluster.workers import SentMesh, answer_part
+from renderer.cluster.workers import SentMesh, evaluate_part
 from renderer.errors import expect
 from renderer.octree import Octree
 from renderer.picture.render import check_tree
@@ -60,7 +60,7 @@ def run_on(
 
     def compute(missing: list[int]) -> Results:
         tasks = (Task(part, sent, (study, points.part(parts.rows(part)))) for part in missing)
-        return results(client, answer_part, tasks)
+        return results(client, evaluate_part, tasks)
 
     parts.complete(compute, "point", progress)
     return parts

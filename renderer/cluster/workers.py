@@ -1,4 +1,4 @@
-"""What a worker keeps: the meshes and scenes that it was sent, with their trees, which it builds once each."""
+"""The meshes and scenes that a worker was sent and keeps, with their trees, which it builds once each."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ def _kept(key: str, make: Callable[[], Any]) -> Any:
         return _TREES[key]
 
 
-def answer_part(mesh: SentMesh, study: Any, points: Any) -> NDArray[np.float64]:
+def evaluate_part(mesh: SentMesh, study: Any, points: Any) -> NDArray[np.float64]:
     """The answers to a study's part; a task."""
-    answers: NDArray[np.float64] = study.answer(mesh.octree(), points, threads=1)
+    answers: NDArray[np.float64] = study.evaluate(mesh.octree(), points, threads=1)
     return answers
 
 

@@ -17,7 +17,7 @@ def write_pixels(file: BinaryIO, pixels: NDArray[np.uint8], format: Format = "pn
 
 
 def encoded(pixels: NDArray[np.uint8], format: Format = "png", **options: Any) -> bytes:
-    """What ``write_pixels`` writes."""
+    """The bytes that ``write_pixels`` writes."""
     buffer = io.BytesIO()
     write_pixels(buffer, pixels, format, **options)
     return buffer.getvalue()

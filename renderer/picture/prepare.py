@@ -103,7 +103,7 @@ class PreparedScene:
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
         settings = kernel_settings_of(self.needs, chosen, offset, media)
         arrays = arrays_for(self, camera, offset, media)
-        across, cut = -(-width // TILE), np.zeros(tiles((width, end_row - first_row)), np.int64)
+        across, cut = -(-width // TILE), np.zeros(tiles(width, end_row - first_row), np.int64)
 
         def render_in(film: Film, first: int) -> Iterator[None]:
             x, y = first % across * TILE, first_row + first // across * TILE
@@ -150,9 +150,8 @@ def _restored(scene: Scene, octree: Octree | BruteForce, needs: Features, build_
     return PreparedScene(scene, octree.mesh, octree, needs, arrays, tree, build_seconds)
 
 
-def tiles(resolution: tuple[int, int]) -> int:
-    """The number of tiles of a picture of (width, height)."""
-    width, height = resolution
+def tiles(width: int, height: int) -> int:
+    """The number of tiles of a picture."""
     return -(-width // TILE) * -(-height // TILE)
 
 

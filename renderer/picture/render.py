@@ -71,7 +71,7 @@ def render(
         prepared = scene
     else:
         prepared = _prepared(scene, view.chosen.max_depth, accelerator, split, needs, threads)
-    with progress_bar(tiles(view.chosen.resolution), "tile", progress) as update:
+    with progress_bar(tiles(*view.chosen.resolution), "tile", progress) as update:
         image = prepared.picture(view.camera, view.chosen, view.offset, threads, update, view.planes, media=view.media)
     if image.cut:
         warnings.warn(image.cut_message(view.chosen.max_rays), CutWarning, stacklevel=2)
@@ -106,8 +106,8 @@ def prepare(
 
 
 class View(NamedTuple):
-    """What a picture shows of its scene: a camera, settings, the rules of offsets and media, and the planes that are
-    kept, all checked.
+    """The view that a picture shows of its scene: a camera, settings, the rules of offsets and media, and the planes
+    that are kept, all checked.
     """
 
     camera: Camera

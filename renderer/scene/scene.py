@@ -284,7 +284,7 @@ def _scene_path(path: object) -> Path:
 
 
 def _table(path: Path) -> dict[str, Any]:
-    """What a scene file holds."""
+    """The content of a scene file."""
     try:
         return tomllib.loads(read_whole(path).decode("utf-8-sig"))
     except OSError as error:

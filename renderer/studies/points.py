@@ -1,4 +1,4 @@
-"""The points of a study that a command line names: a file's, a grid's, those of faces or of vertices."""
+"""The points of a study: of faces, of vertices, of a grid or of a file; and directions to the sun of a file."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """Points, and what their answers become.
+    """Points, and functions that spread their answers over the mesh.
 
     of_faces : from the answers (n,) to one a face (F,), NaN where a face has none; None where points are on no faces.
     of_vertices : to one a vertex (V,), NaN where it has none; None likewise.

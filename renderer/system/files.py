@@ -141,7 +141,7 @@ def _remove_unlocked(path: Path) -> None:
 
 
 def _beginning(target: Path) -> str:
-    """How the names of temporary files of ``target`` begin: a name has at most 255 bytes, a character up to four."""
+    """The beginning of temporary files' names: a name has at most 255 bytes, a character up to four."""
     return f".{target.name[:60]}."
 
 

@@ -218,14 +218,14 @@ _PAYLOADS: dict[Mode, Callable[[ShownScene, CameraMessage, Pass, Callable[[float
 
 
 def _legend(aov: str, limits: Limits) -> dict[str, Any]:
-    """What is told of a scale of colours: its ends, and the colours at even steps between them."""
+    """The legend of a scale of colours: its ends, and the colours at even steps between them."""
     return {"type": "legend", "aov": aov, "low": limits[0], "high": limits[1], "colors": scale_colors(aov).tolist()}
 
 
 def _steps(
     shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]
 ) -> tuple[NDArray[np.uint8], Limits, float]:
-    """What the camera rays test, as colours, the ends of their scale, and rays per second."""
+    """The steps of the camera rays as colours, the ends of their scale, and rays per second."""
     began = time.perf_counter()
     prepared = shown.brute if view.mode == "brute" else shown.prepared
     camera = camera_of(view.m, view.fovy, height=view.height)
@@ -244,7 +244,7 @@ def picture(
     camera = camera_of(view.m, view.fovy, height=view.height)
     planes = ("rays", *_PLANES[view.settings.aov])
     first, end = wanted.band or (0, wanted.size[1])
-    number = tiles((wanted.size[0], end - first))
+    number = tiles(wanted.size[0], end - first)
     return prepared.picture(
         camera, settings, BOUNDED, shown.threads, lambda done: finished(done / number), planes, wanted.band
     )

@@ -28,7 +28,7 @@ _CAMERA_BYTES = 16384
 
 
 class _Mark(NamedTuple):
-    """What tells a file from one that was edited since: nanoseconds of its last change, bytes, and its number."""
+    """The mark by which a file that was edited since is told: nanoseconds of its last change, bytes, and its number."""
 
     changed: int
     size: int

@@ -235,7 +235,7 @@ def places_of_a_grid() -> Asked:
             path = Path(folder) / "points.npy"
             np.save(path, np.concatenate([grid_points.points, grid_points.normals], axis=1))
             read = of_file(octree, path).points
-        found.append(study.answer(octree, read) == study.answer(octree, grid_points))
+        found.append(study.evaluate(octree, read) == study.evaluate(octree, grid_points))
     return _count(np.concatenate(found))
 
 

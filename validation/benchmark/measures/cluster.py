@@ -124,7 +124,7 @@ class Measured:
         driver, after = time.process_time() - began, client.run(time.process_time)
         began, order = time.process_time(), points.order()
         for first in range(0, len(order), size):
-            _LEAST.answer(self.trees[1], points.part(order[first : first + size]))
+            _LEAST.evaluate(self.trees[1], points.part(order[first : first + size]))
         alone = time.process_time() - began
         return {"driver": driver, "workers": sum(after[w] - before[w] for w in after), "alone": alone}
 
