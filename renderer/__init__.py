@@ -6,8 +6,7 @@ and kept on disk; ``octree-render compile`` compiles them ahead. The line comes 
 ``logging.getLogger("renderer").setLevel("ERROR")`` or OCTREE_RENDERER_QUIET=1 in the environment turns it off.
 """
 
-import lazy_loader
-
 from renderer.jit import loaded as _loaded  # noqa: F401  # before all others, to note the time
+from renderer.lazy_names import attach_stub as _attach_stub
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = _attach_stub(__name__)

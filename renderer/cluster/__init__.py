@@ -4,6 +4,6 @@
 when they are first used.
 """
 
-import lazy_loader
+from renderer.lazy_names import attach_stub as _attach_stub
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = _attach_stub(__name__)

@@ -3,6 +3,6 @@
 The functions are those of ``__init__.pyi``, imported when they are first used. They take an ``Octree`` first.
 """
 
-import lazy_loader
+from renderer.lazy_names import attach_stub as _attach_stub
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = _attach_stub(__name__)

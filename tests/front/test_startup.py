@@ -106,7 +106,7 @@ print(callable(render), *[f"{name}:{found.__module__}" for name, found in public
 
 def test_the_public_names_are_listed_and_others_are_errors():
     assert dir(renderer) == sorted(renderer.__all__)
-    with pytest.raises(AttributeError, match="No renderer attribute Octre"):
+    with pytest.raises(AttributeError, match="module 'renderer' has no attribute 'Octre'"):
         _ = renderer.Octre
     with pytest.raises(ImportError, match="Octre"):
         from renderer import Octre  # noqa: F401
