@@ -94,38 +94,44 @@ def _one_primitive_a_node(content: bytes, document: Any) -> bytes:
 
 def _refuse_unread(document: Any) -> None:
     """Raise ``MeshError`` for contents that trimesh drops or reads wrongly in silence. It refuses malformed entries."""
-
-    def dicts(owner: Any, key: str) -> list[dict[str, Any]]:
-        entries = owner.get(key) if isinstance(owner, dict) else None
-        return [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
-
     required = document.get("extensionsRequired") if isinstance(document, dict) else None
     for extension in required if isinstance(required, list) else []:
         if not str(extension).startswith(_HARMLESS):
             raise MeshError(f"GLB: expected plain buffers, got the extension {extension}: save it without compression")
-    accessors = dicts(document, "accessors")
-    for number, mesh in enumerate(dicts(document, "meshes")):
-        weights = mesh.get("weights")
-        if isinstance(weights, list) and any(weights):
-            raise MeshError(f"GLB: expected a mesh that stands still, got morph weights in mesh {number}: apply them")
-        for primitive in dicts(mesh, "primitives"):
-            _refuse_integers(primitive, accessors, number)
-            if primitive.get("mode", _TRIANGLES) == _TRIANGLE_FAN:
-                raise MeshError(f"GLB: expected triangles or strips, got a TRIANGLE_FAN in mesh {number}")
+    accessors = _dicts(document, "accessors")
+    for number, mesh in enumerate(_dicts(document, "meshes")):
+        _refuse_mesh(mesh, accessors, number)
     for number, accessor in enumerate(accessors):
         if "sparse" in accessor:
             raise MeshError(f"GLB: expected plain accessors, got a sparse one, accessor {number}")
         if "bufferView" not in accessor:  # all zeros, as many as it says
             raise MeshError(f"GLB: expected accessors with data, got none in accessor {number}")
-    for number, buffer in enumerate(dicts(document, "buffers")):
+    for number, buffer in enumerate(_dicts(document, "buffers")):
         if not str(buffer.get("uri", "data:")).startswith("data:"):
             raise MeshError(f"GLB: expected its own bytes, got another file for buffer {number}: put it in")
-    nodes = dicts(document, "nodes")
+    nodes = _dicts(document, "nodes")
     for number, node in enumerate(nodes):
         for key in ("skin", "weights"):  # they move the vertices of the node's mesh
             if "mesh" in node and node.get(key) not in (None, []):
                 raise MeshError(f"GLB: expected a mesh that stands still, got {key} in node {number}: apply them")
     _refuse_deep(nodes)
+
+
+def _dicts(owner: Any, key: str) -> list[dict[str, Any]]:
+    """The entries of a list in ``owner`` that are objects; none where there is no such list."""
+    entries = owner.get(key) if isinstance(owner, dict) else None
+    return [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
+
+
+def _refuse_mesh(mesh: dict[str, Any], accessors: list[dict[str, Any]], number: int) -> None:
+    """Raise ``MeshError`` for a mesh that moves, has fans, or has vertices that are no float32."""
+    weights = mesh.get("weights")
+    if isinstance(weights, list) and any(weights):
+        raise MeshError(f"GLB: expected a mesh that stands still, got morph weights in mesh {number}: apply them")
+    for primitive in _dicts(mesh, "primitives"):
+        _refuse_integers(primitive, accessors, number)
+        if primitive.get("mode", _TRIANGLES) == _TRIANGLE_FAN:
+            raise MeshError(f"GLB: expected triangles or strips, got a TRIANGLE_FAN in mesh {number}")
 
 
 def _refuse_integers(primitive: dict[str, Any], accessors: list[dict[str, Any]], mesh: int) -> None:
