@@ -1,11 +1,11 @@
 """``octree-render study``: arguments in, a study's result as an array, a coloured mesh, or a picture."""
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
 from renderer.cli.cluster import add_cluster, on_cluster
+from renderer.cli.render import resolution
 from renderer.errors import expect
 from renderer.system.terminal import say
 
@@ -19,8 +19,8 @@ _POINTS = ".npy, (n, 3), or (n, 6) with normals; on the surface or not"
 _GRID = "points as seen from above (z up), so far apart, on what they see first"
 
 
-def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> None:
-    """Add the command to a parser's ``commands``; ``resolution`` reads WxH."""
+def add_study(commands: Any) -> None:
+    """Add the command to a parser's ``commands``."""
     study = commands.add_parser(
         "study",
         help="what points of a mesh see: the sky, the sun, their surroundings",

@@ -229,7 +229,7 @@ def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatc
     log = logging.getLogger("renderer.jit")
     monkeypatch.setattr(log, "level", logging.CRITICAL)
     before = logging.CRITICAL, list(log.handlers)
-    monkeypatch.setattr("renderer.cli.main._render", lambda _options: log.warning("renderer: compiling %s", "it"))
+    monkeypatch.setattr("renderer.cli.render._render", lambda _options: log.warning("renderer: compiling %s", "it"))
     assert main(["render", "any.toml", *(["--quiet"] if quiet else [])]) == 0
     assert capsys.readouterr() == ("", "" if quiet else "octree-render: compiling it\n")
     assert (log.level, log.handlers) == before
@@ -258,12 +258,12 @@ def test_kernels_for_a_level_have_the_bits_of_native_ones_and_leave_nothing_to_c
     program = """
 import sys
 from renderer.cli import main as cli
-choose = cli._choose_processor
+choose = cli.choose_processor
 def choose_and_ask_less(*options):
     choose(*options)  # before Numba is imported
     from renderer.precompile import PARTS
     PARTS["queries"] = [p for p in PARTS["queries"] if p.name in ("build", "refit", "a few rays", "many rays")]
-cli._choose_processor = choose_and_ask_less
+cli.choose_processor = choose_and_ask_less
 sys.exit(cli.main(sys.argv[1:]))
 """
     command = [sys.executable, "-P", "-c", program, "compile", "--queries", "--level", level, "-o", str(folder)]
