@@ -43,7 +43,7 @@ from renderer.cluster.workers import SentMesh
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.studies.points import on_faces
+from renderer.studies.points import Points, on_faces
 from renderer.system.files import write_atomically
 from renderer.system.threads import available_threads
 from validation import environment
@@ -82,7 +82,7 @@ class Measured:
 
     def call(self, threads: int) -> float:
         """All points in one call."""
-        return timed(self.study.answer, self.trees[threads], self.points)()
+        return timed(self.study.evaluate, self.trees[threads], self.points)()
 
     def tree(self, threads: int) -> float:
         """The tree from the mesh."""
@@ -92,7 +92,7 @@ class Measured:
         """The points in parts on disk, in one process."""
         return self._seconds(lambda folder: runs.run(self.trees[threads], self.study, self.points, folder))
 
-    def workers(self, client: Any, study: runs.Study, points: runs.Points, size: int = runs.PART) -> float:
+    def workers(self, client: Any, study: runs.Study, points: Points, size: int = runs.PART) -> float:
         """A study on a cluster; the first of a round builds the tree there."""
         return self._seconds(lambda folder: run_on(client, self.sent, study, points, folder, size=size, split=SPLIT))
 
@@ -105,7 +105,7 @@ class Measured:
         """Seconds of each part on one thread of one process."""
         order = self.points.order()
         pieces = [self.points.part(order[first : first + size]) for first in range(0, len(order), size)]
-        return [timed(self.study.answer, self.trees[1], piece)() for piece in pieces]
+        return [timed(self.study.evaluate, self.trees[1], piece)() for piece in pieces]
 
     def ends(self) -> tuple[float, float]:
         """Seconds of what comes before the parts and behind them."""
@@ -117,7 +117,7 @@ class Measured:
                 parts.write(part, np.zeros(len(range(*parts.plan.span(part)))))
             return planned, timed(parts.joined)()
 
-    def costs(self, client: Any, points: runs.Points, size: int) -> dict[str, float]:
+    def costs(self, client: Any, points: Points, size: int) -> dict[str, float]:
         """CPU seconds of a study with next to nothing to compute."""
         before, began = client.run(time.process_time), time.process_time()
         self.workers(client, _LEAST, points, size)
