@@ -115,6 +115,7 @@ def _list_all(tree, rays, i, candidates, k, found, scratch):
 
 @inlined
 def _enter(tree, query, node, count):
+    """Go on where the ray of a ``_Query`` or a ``_QueryFrom`` goes."""
     return count, enter_node(tree, node, query.single, query.t_max)[1]
 
 
@@ -164,7 +165,7 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
         pile = pile if is_negative(stopped[0]) else np.int64(stopped[1])
         stopped = stopped_again(tree, departure, np.int64(stopped[1]), pile, scratch.holders)
     query = _QueryFrom(departure, prepare_single(ray), t_max, found, rays.starts, i)
-    return walk(tree, stack, query, count, _enter_from, _list_hits_from)
+    return walk(tree, stack, query, count, _enter, _list_hits_from)
 
 
 class _QueryFrom(NamedTuple):
@@ -176,11 +177,6 @@ class _QueryFrom(NamedTuple):
     found: Found
     starts: StartPointers
     row: int
-
-
-@inlined
-def _enter_from(tree, query, node, count):
-    return count, enter_node(tree, node, query.single, query.t_max)[1]
 
 
 @kernel
