@@ -69,7 +69,6 @@ IN_SHORT: dict[str, tuple[dict[str, str], str]] = {
         "--rays 100",
     ),
     "python -m validation.benchmark.measures.studies": ({}, "--mesh city --faces 1000 --points 100"),
-    "python -m validation.benchmark.limits.counts": ({"city_1m": "city_2000"}, "--rays 2000"),
     "python tests/fuzz --inputs 100000": ({"100000": "20"}, ""),
     "python scenes/make_quarter.py": ({}, "--buildings 40"),
 }
