@@ -85,9 +85,9 @@ def measure(
         meshes,
         processes,
         studies,
+        tree_options,
     )
     from validation.benchmark.page import record, targets
-    from validation.benchmark.parameters import study
     from validation.benchmark.peers.systems import available
 
     began, date, load = time.perf_counter(), datetime.now(UTC), record.load()
@@ -112,7 +112,7 @@ def measure(
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
         "first_answers": first_answers.measure(step),
-        "knobs": study.run(quick, step),
+        "trees": tree_options.run(quick, step),
     }  # fmt: skip
     return found | {"targets": targets.judged(found), "seconds": time.perf_counter() - began}
 

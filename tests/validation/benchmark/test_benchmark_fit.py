@@ -8,32 +8,9 @@ import pytest
 
 from validation import timing
 from validation.benchmark.measures import frames, processes
-from validation.benchmark.measures.fit import log_fit
 from validation.benchmark.page.targets import Target, judged
 from validation.benchmark.peers import libllvm
 from validation.timing import interleaved, ratio
-
-
-def test_a_fit_finds_the_law_that_made_the_costs() -> None:
-    sizes = [1_000, 10_000, 98_304, 1_000_000]
-    fit = log_fit(sizes, [17.5 * math.log2(n) - 40.25 for n in sizes])
-    assert fit is not None
-    # Least squares of four points in float64.
-    assert fit.a == pytest.approx(17.5, rel=1e-12) and fit.b == pytest.approx(-40.25, rel=1e-11)
-    assert fit.residual < 1e-10
-    assert fit.at(4096) == pytest.approx(17.5 * 12 - 40.25, rel=1e-12)
-
-
-def test_the_residual_is_the_root_mean_square() -> None:
-    # +1, -2, +1 about a line has no part along it: mean 0, slope 0.
-    fit = log_fit([2, 4, 8], [11.0, 18.0, 31.0])
-    assert fit is not None
-    assert (fit.a, fit.b) == (pytest.approx(10.0), pytest.approx(0.0, abs=1e-12))
-    assert fit.residual == pytest.approx(math.sqrt(6 / 3))
-
-
-def test_two_sizes_fit_nothing() -> None:
-    assert log_fit([1000, 2000, 2000], [1.0, 2.0, 3.0]) is None
 
 
 def test_contenders_take_turns_after_a_rest_and_the_first_round_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,6 +44,26 @@ def build_figures(record: Record) -> list[dict[str, str]]:
     return found
 
 
+def tree_figures(record: Record) -> list[dict[str, str]]:
+    """For each family of rays: time and bytes of trees with other options, against the time to build them."""
+    of = record["trees"]
+    points = {p["name"]: p for p in of["points"]}
+    rows = {sweep: [points[name] for name in names] for sweep, names in of["sweeps"].items()}
+    seconds = {sweep: [p["build_seconds"] for p in row] for sweep, row in rows.items()}
+    found = []
+    for family, names in of["fronts"].items():
+        panels = [
+            Panel(
+                [Series(k, seconds[k], [p["ns_per_ray"][family] for p in row]) for k, row in rows.items()], "ns a ray"
+            ),
+            Panel([Series(k, seconds[k], [p["bytes"] for p in row]) for k, row in rows.items()], "bytes"),
+        ]
+        name = f"Options of the tree, {family} rays"
+        title = f"{name}: nanoseconds a ray and bytes against seconds to build. On the front: {'; '.join(names)}."
+        found.append({"title": title, "svg": draw(panels, x_label="build, seconds", title=name)})
+    return found
+
+
 def _curves(record: Record, rows: Sequence[Record], key: str, value: Callable[[Record, int], float]) -> list[Series]:
     """One curve for each contender under ``key`` of the rows: ``value`` of its entry and the number of faces."""
     curves = []

@@ -7,7 +7,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from validation.benchmark.measures.kinds import DIGITS, FIRST, KINDS
-from validation.benchmark.page import figures, heat, pareto
+from validation.benchmark.page import figures, heat
 from validation.benchmark.peers.ours import OURS, OURS_ONE
 from validation.report.page import number
 
@@ -22,7 +22,7 @@ def html(record: Mapping[str, Any]) -> str:
     plots = {
         "query_figures": figures.query_figures(record),
         "build_figures": figures.build_figures(record),
-        "parameter_figures": pareto.figures(record["knobs"]) if record["knobs"] else [],
+        "tree_figures": figures.tree_figures(record),
     }
     shown: dict[str, Any] = dict(zip(("rays", "others"), _tables(record), strict=True))
     shown |= {"heat": {"shades": heat.SHADES, "legend": heat.legend(), "least": heat.MEAN_FACES,

@@ -36,7 +36,9 @@ frames            scene, size, max_depth, faces, labels, contenders, ratios, ray
                   mean_error, pixel_share against ours
 processes         by name: command, seconds, median
 first_answers     level, for which kernels were compiled ahead; rows by name: unit, values, median; null where not run
-knobs             see ``study.run``; null where not run
+trees             faces, rays (one thread); differing_rays: with other bits than the default tree's, of all trees
+  points[]        name, build_seconds, bytes, ns_per_ray (by family), differing_rays
+  sweeps, fronts  names of points: by option, in its order; by family, those that none beats in build and rays
 targets[]         see ``targets.Target``; met and aimed are null where nothing was measured
 heat map          is none of the keys: ``heat`` takes it from queries, builds, memory and calls
 """
@@ -57,7 +59,7 @@ SCHEMA = 8
 KEYS = (
     "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series",
     "kinds", "open_edges", "queries", "drop_in", "calls", "studies", "builds", "memory", "frames", "processes",
-    "first_answers", "knobs", "targets",
+    "first_answers", "trees", "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 
