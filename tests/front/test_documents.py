@@ -95,7 +95,7 @@ RUN_ELSEWHERE = {
         r"cluster\.main\(\[.*\]\) == 0",
     ),
     "python -m validation.benchmark.measures.versions": (
-        "tests/validation/benchmark/test_benchmark_versions.py",
+        "tests/validation/benchmark/test_versions.py",
         r"versions\.main\(\[.*\]\) == 0",
     ),
 }
