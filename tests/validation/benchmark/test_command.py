@@ -19,7 +19,7 @@ from validation.benchmark.measures import (
     studies,
     tree_options,
 )
-from validation.benchmark.page import page, record
+from validation.benchmark.page import figures, page, record
 from validation.benchmark.peers import systems
 from validation.benchmark.peers.ours import OURS
 
@@ -38,10 +38,11 @@ def test_a_short_run_measures_all_and_its_page_is_drawn_again(tmp_path: Path, mo
     for module, name, value in (
         (systems, "_PEERS", {name: systems._PEERS[name] for name in ("embree", "libigl")} | {"nobody": ("no", "find")}),
         (meshes, "QUICK", (100, 400)), (meshes, "QUICK_FORMS", (("scan", 300),)), (calls, "_CALLS", 2),
-        (command, "QUICK_RAYS", 300), (drop_in, "QUICK_RAYS", (1,)), (studies, "QUICK_SIZE", 200),
-        (tree_options, "QUICK_LEVEL", 1), (tree_options, "QUICK_RAYS", 50),
+        (command, "QUICK_RAYS", 300), (drop_in, "QUICK_RAYS", (1,)), (drop_in, "_LEAST", 1),
+        (studies, "QUICK_SIZE", 200), (tree_options, "QUICK_LEVEL", 1), (tree_options, "QUICK_RAYS", 50),
         (studies, "memory", lambda *_: 10), (frames, "measure", lambda *_: _FRAMES),
         (processes, "measure", lambda *_: _PROCESSES), (first_answers, "measure", lambda *_: None),
+        (figures, "draw", lambda *_, title, **more: f"<svg>{title}</svg>"),
         (memory, "measure", lambda mesh, *_: _MEMORY | {"mesh": mesh.name, "faces": len(mesh.faces)}),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
@@ -53,7 +54,10 @@ def test_a_short_run_measures_all_and_its_page_is_drawn_again(tmp_path: Path, mo
     # Nothing is inside of a city, which is open.
     asked = {row["query"] for row in found["queries"] if row["mesh"] == "own"}
     assert {"closest", "nearest"} <= asked and not asked & {"contains", "signed"} and found["open_edges"]["own"] > 0
-    assert "<svg" in (tmp_path / "benchmark.html").read_text(encoding="utf-8")
+    # A curve for each family and query, of builds, and of the tree by two families of rays.
+    series = {(row["family"], row["query"]) for row in found["queries"] if row["mesh"] in found["series"]}
+    drawn = (tmp_path / "benchmark.html").read_text(encoding="utf-8")
+    assert drawn.count("<svg>") == len(series) + 1 + 2
     # The page alone is drawn from what is stored.
     monkeypatch.setattr(command, "measure", lambda *_: pytest.fail("measured"))
     monkeypatch.setattr(page, "html", lambda record: f"drawn from {record['date']}")
