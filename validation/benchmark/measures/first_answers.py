@@ -81,7 +81,7 @@ def _one_round(cache: Path, ahead: Path) -> dict[str, float]:
 
 def _spend(command: list[str], **more: str) -> Spent:
     """Run a process as our child, so that the system counts it and its children."""
-    import resource  # only where ``supported``
+    import resource  # POSIX only, as ``measure`` asks
 
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     environment = child.environment(OCTREE_RENDERER_QUIET="1", **more)
