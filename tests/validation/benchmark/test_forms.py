@@ -97,11 +97,11 @@ def test_a_run_has_its_series_every_form_twice_and_files(tmp_path: Path, monkeyp
     assert full == {(form, faces) for form in FORMS for faces in (100_000, 1_000_000)} and len(meshes.FULL_FORMS) == 10
     assert len(meshes.QUICK_FORMS) <= 2 and all(faces <= 10_000 for _, faces in meshes.QUICK_FORMS)
     monkeypatch.setattr(meshes, "FULL", (300, 1_000))
-    monkeypatch.setattr(meshes, "FULL_FORMS", (("soup", 100), ("terrain", 1_000_000)))
+    monkeypatch.setattr(meshes, "FULL_FORMS", (("soup", 100), ("terrain", 10_000)))
     found = list(meshes.chosen(False, False, (tmp_path / "own.ply",)))
     assert [(c.mesh.name, c.kind, c.brief) for c in found] == [
         ("spheres_300", "spheres", False), ("spheres_1k", "spheres", False), ("soup_100", "soup", True),
-        ("terrain_1m", "terrain", True), ("own", "file", False)]  # fmt: skip
+        ("terrain_10k", "terrain", True), ("own", "file", False)]  # fmt: skip
     assert found[-1].mesh.is_float32
 
 

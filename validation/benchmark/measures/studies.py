@@ -72,7 +72,7 @@ class Views(NamedTuple):
         up: NDArray[np.bool_] = self.normals[rows] @ self.directions.T > 0.0
         return up
 
-    def hidden(self, octree: Octree, threads: int) -> NDArray[np.uint8]:
+    def hidden(self, octree: Octree, threads: int) -> NDArray[Any]:
         """Ours: the bits of what is hidden from each point."""
         return occlusion(octree, self.points, self.normals, self.directions, leaving=self.faces, packed=True,
                          threads=threads)  # fmt: skip
