@@ -17,7 +17,7 @@ from twins import CUBES, MESH, Flags, Floats, Integers, dot, holding, meetings, 
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box
-from renderer.queries import Queries
+from renderer.queryable import Queries
 
 # The cubes of the other twins, and one that is turned inside out.
 TURNED = box((12.0, 0.0, 0.0), (14.0, 2.0, 2.0))

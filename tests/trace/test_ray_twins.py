@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from twins import CORNERS, FACES, MESH, NORMALS, Floats, Integers, dot, holding, meetings
 
 from renderer import BruteForce, Mesh, Octree
-from renderer.queries import Queries
+from renderer.queryable import Queries
 
 TARGETS = {
     "octree": Octree.from_mesh(MESH, threads=1),

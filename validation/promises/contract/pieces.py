@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 import renderer
-from renderer import cli, cluster, studies
+from renderer import cluster, studies
+from renderer.cli import main as cli
 from validation.promises.contract.fields import described
 
 # A line that begins the definition of a name: "t_max   the last ..." or "faces : (F, 3) ...".
