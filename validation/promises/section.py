@@ -12,7 +12,6 @@ from validation.promises.contract import table
 from validation.promises.hits.alone import check_alone
 from validation.promises.hits.batches import check_batches, check_refits
 from validation.promises.hits.bounds import check_bounds
-from validation.promises.hits.builds import check_builds
 from validation.promises.hits.counts import check_counts
 from validation.promises.hits.errors import check_errors
 from validation.promises.hits.files import check_files
@@ -71,7 +70,6 @@ HITS: dict[str, Callable[[], Rows]] = {
     "rays alone": lambda: check_alone(_random()),
     "refits": check_refits,
     "trees": lambda: check_trees(_random()),
-    "builds": lambda: check_builds(_random()),
     "counts": lambda: check_counts(_random()),
     "files": check_files,
     "formats": lambda: check_formats(_random()),
