@@ -22,6 +22,9 @@ from renderer.runs.chosen import on_faces
 from renderer.runs.study import Study, run
 from validation.benchmark.measures.meshes import named
 
+pytestmark = pytest.mark.judges("cluster.any_hit", "cluster.closest_hit", "cluster.connected", "cluster.run_on")
+
+
 SIZE = 64
 
 
