@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from renderer.errors import extra_hint
-from renderer.process.interrupt import interruptible
-from renderer.process.terminal import one_line
+from renderer.system.interrupt import interruptible
+from renderer.system.terminal import one_line
 from validation.output import add_output, check_output
 from validation.sections import NAMES, choose
 

@@ -12,9 +12,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from renderer.mesh.load import load_mesh
-from renderer.process.files import write_atomically
-from renderer.process.parallel import available_threads
 from renderer.scene.scene import load_scene
+from renderer.system.files import write_atomically
+from renderer.system.threads import available_threads
 from validation import environment
 from validation.gates import Gate
 from validation.job import Job

@@ -139,7 +139,7 @@ def test_frames_go_on_where_the_parts_of_one_that_is_done_were_left(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr("renderer.runs.pictures.PictureRun.remove", stop)
+        patched.setattr("renderer.checkpoints.pictures.PictureRun.remove", stop)
         frames_on(client, scenes, outputs, folder, **OPTIONS)
     (done,) = (path for path in outputs if path.exists())
     before = done.stat().st_mtime_ns

@@ -17,7 +17,7 @@ from twins import CUBES, MESH, Flags, Floats, Integers, dot, holding, meetings, 
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box
-from renderer.queries import Queries
+from renderer.queryable import Queries
 
 pytestmark = pytest.mark.judges(
     "BruteForce.closest_point", "BruteForce.contains", "BruteForce.signed_distance", "BruteForce.visible",

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import renderer
-from renderer.cli import _choose_processor, main
+from renderer.cli.main import _choose_processor, main
 from renderer.picture.render import render
 from renderer.precompile import compile_ahead
 from renderer.scene.scene import load_scene
@@ -40,7 +40,7 @@ def _compiled() -> None:
 
 
 def run(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "renderer.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "renderer.cli.main", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=120, check=False, **options)
 
 
@@ -226,7 +226,7 @@ def test_a_disk_that_fills_up_is_one_line(
 # computed from then on: the clock's would depend on what else the machine does.
 INTERRUPTS_ITSELF = """
 import os, signal, sys, time
-from renderer import cli
+from renderer.cli import main as cli
 from renderer.picture import prepare
 traced, pressed = prepare.for_chunks, []
 
@@ -290,10 +290,10 @@ def test_compile_fails_where_nothing_can_be_kept(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     nowhere = str(tmp_path / "file" / "cache")
     script = (
-        "import sys, renderer.kernels.store as store, renderer.precompile as ahead\n"
+        "import sys, renderer.jit.cache as store, renderer.precompile as ahead\n"
         "store._folders = lambda sources: store.Folders(None, ())\n"
         "ahead.PARTS['queries'] = ahead.PARTS['queries'][-1:]\n"
-        "from renderer.cli import main; sys.exit(main(['compile', '--queries', '--quiet']))"
+        "from renderer.cli.main import main; sys.exit(main(['compile', '--queries', '--quiet']))"
     )
     done = subprocess.run(
         [sys.executable, "-P", "-c", script], capture_output=True, text=True, timeout=120, check=False,

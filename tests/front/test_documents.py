@@ -21,7 +21,7 @@ import pytest
 import yaml
 
 from renderer import Octree, load_scene
-from renderer.cli import main, make_parser
+from renderer.cli.main import main, make_parser
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
 from validation.__main__ import make_parser as validation_parser
@@ -517,7 +517,7 @@ def test_what_a_page_names_is_there(page):
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("`renderer/trace/query.py::closest_hits`", ("renderer/trace/query.py", "closest_hits")),
+        ("`renderer/trace/closest.py::closest_hits`", ("renderer/trace/closest.py", "closest_hits")),
         ("see renderer/octree.py, and", ("renderer/octree.py", "")),
         ("in `scenes/`.", ("scenes/", "")),
         ("(tests/trace/test_order.py).", ("tests/trace/test_order.py", "")),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from renderer import cli
+from renderer.cli import main as cli
 
 SCENES = Path(__file__).parents[2] / "scenes"
 MATERIAL = re.compile(r"^material = (.*)$", re.MULTILINE)

@@ -43,11 +43,11 @@ from renderer import (
     prepare,
     render,
 )
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.shapes import grid, icosphere
 from renderer.picture import prepare as preparing
-from renderer.process.parallel import available_threads
 from renderer.shade import records
+from renderer.system.threads import available_threads
 
 SCENES = Path(__file__).parents[2] / "scenes"
 GLASS, STAIRS, BLOCK = SCENES / "glass.toml", SCENES / "stairs.toml", SCENES / "models" / "block.ply"
@@ -693,7 +693,8 @@ def test_compile_compiles_what_it_is_told_and_all_by_default(what: str | None, m
 
 @pytest.mark.judges("octree-render compile --quiet")
 def test_compile_is_quiet_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
-    from renderer import cli, precompile
+    from renderer import precompile
+    from renderer.cli import main as cli
 
     monkeypatch.setattr(precompile, "compile_ahead", lambda what, began: [began(str(part)) for part in "ab"])
     monkeypatch.setattr(cli, "on_terminal", lambda: True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from renderer import DirectionalLight, Mirror, OrthographicCamera, Scene
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.shapes import box, icosphere
 from renderer.picture.image import srgb
 from renderer.scene.change import changed

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from renderer import Image, Mesh, Needs, Scene, load_scene, needs_of, render
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.pack import pack
 from renderer.picture.prepare import build_octree, kernel_settings_of, tree_for

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from renderer import Mesh, SceneError, load_scene, render
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.scene.scene import write_scene

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.inspect.ray_path import MAX_RAYS, ray_path
+from renderer.diagnostics.ray_path import MAX_RAYS, ray_path
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.image import Image

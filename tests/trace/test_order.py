@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from meshes import assert_same_hits, make_mesh, options, rays_at, separate
 from numpy.random import Generator
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import extract
+from renderer.jit.decorators import kernel
+from renderer.numerics.simd import extract
 from renderer.octree import BruteForce, Octree
-from renderer.trace.doubt import _meet_slab, settled
 from renderer.trace.hits import Hits
 from renderer.trace.intersect import FAR_PADDING, Ray, box_limit, hit_triangles, largest_of, make_shear, round_down
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import tree_pointers
+from renderer.trace.resolve import _meet_slab, settled
 from validation.oracle import exact
 
 SIDE = 100

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from twins import CORNERS, FACES, MESH, NORMALS, Floats, Integers, dot, holding, meetings
 
 from renderer import BruteForce, Mesh, Octree
-from renderer.queries import Queries
+from renderer.queryable import Queries
 
 pytestmark = pytest.mark.judges(
     "BruteForce.all_hits", "BruteForce.any_hit", "BruteForce.closest_hit", "BruteForce.count_hits",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from renderer import BruteForce, MeshError, Octree
-from renderer.limits import SHORTEST
+from renderer.arguments.limits import SHORTEST
 from renderer.mesh.shapes import box, icosphere
 from renderer.octree import _LEAST_SIDE, _ROWS
 from validation.oracle import exact

@@ -18,7 +18,7 @@ from viewer_client import SIZE, Client, looking
 
 import renderer
 from renderer import load_scene
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.viewer.commands import command_of
 from renderer.viewer.protocol import AskCommand
 from renderer.viewer.shown import open_file

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from renderer.errors import extra_hint
-from renderer.process.interrupt import interruptible
-from renderer.process.terminal import one_line
+from renderer.system.interrupt import interruptible
+from renderer.system.terminal import one_line
 from validation.output import add_output, check_output
 
 # Rays or points of a family, in full and in quick runs.
@@ -49,7 +49,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here, so that --help does not wait for it.
-    from renderer.process.files import check_writable, write_atomically
+    from renderer.system.files import check_writable, write_atomically
     from validation.benchmark.page import history, page, record
     from validation.progress import steps
 

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.checkpoints.study import Study
+from renderer.checkpoints.study_points import of_file, on_grid
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.octree import Octree
-from renderer.runs.chosen import of_file, on_grid
-from renderer.runs.study import Study
 from renderer.scene.camera import OrthographicCamera
 from renderer.studies import (
     ambient_occlusion,

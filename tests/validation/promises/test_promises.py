@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from renderer import octree
-from renderer.inspect import tree_boxes
+from renderer.diagnostics import tree_boxes
 from renderer.mesh import ears, obj, polygons
 from renderer.octree import Octree
 from renderer.picture import image, pack, prepare
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.scene import scene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits

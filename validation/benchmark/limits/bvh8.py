@@ -8,7 +8,7 @@ nodes and blocks, not its code.
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
+from renderer.jit.decorators import kernel
 
 Floats = NDArray[np.float64]
 _CHILDREN, _BLOCK = 8, 4

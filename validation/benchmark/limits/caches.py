@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
+from renderer.jit.decorators import kernel
 from validation.benchmark.limits.trees import NODE_BYTES, PlainTree
 
 LINE = 64

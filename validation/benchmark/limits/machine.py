@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import kernel
+from renderer.numerics.simd import (
     at,
     count_bits,
     farthest_first,
@@ -20,7 +20,7 @@ from renderer.kernels.simd import (
     store,
 )
 from renderer.octree import Octree
-from renderer.process.parallel import for_chunks
+from renderer.system.threads import for_chunks
 from renderer.trace.batch import RayBatch
 from renderer.trace.intersect import largest_of, make_shear, make_slabs, meet_boxes, meet_planes, see_triangles
 from renderer.trace.layout import BLOCK_WORDS, CHILDREN, NODE_WORDS

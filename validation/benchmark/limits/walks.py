@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
+from renderer.jit.decorators import kernel
 from renderer.trace.batch import RayBatch
 from renderer.trace.packet import BUDGET
 from renderer.trace.ray_lanes import WIDTH

@@ -12,12 +12,12 @@ from renderer import Image, Needs, Scene, load_scene, needs_of, render
 from renderer.mesh.shapes import box, icosphere
 from renderer.picture.pack import pack
 from renderer.picture.prepare import build_octree, kernel_settings_of, tree_for
-from renderer.process.parallel import available_threads
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight
 from renderer.scene.material import Mirror, Phong
 from renderer.scene.scene import Floor, SceneObject
 from renderer.shade.tile import tile_memory
+from renderer.system.threads import available_threads
 from renderer.trace.spawn import BOUNDED
 
 SCENES = Path(__file__).parents[3] / "scenes"

@@ -35,17 +35,17 @@ from typing import Any
 
 import numpy as np
 
+from renderer.checkpoints import study as runs
+from renderer.checkpoints.parts import Parts, digest_of
+from renderer.checkpoints.study_points import on_faces
+from renderer.cli.study import SPLIT
 from renderer.cluster import connected, run_on
 from renderer.cluster.workers import SentMesh
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.process.files import write_atomically
-from renderer.process.parallel import available_threads
-from renderer.runs import study as runs
-from renderer.runs.chosen import on_faces
-from renderer.runs.parts import Parts, digest_of
-from renderer.study_command import SPLIT
+from renderer.system.files import write_atomically
+from renderer.system.threads import available_threads
 from validation import environment
 from validation.benchmark.measures.meshes import named
 from validation.timing import timed

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from renderer.kernels.levels import AHEAD_VARIABLE
-from renderer.process import child
+from renderer.jit.levels import AHEAD_VARIABLE
+from renderer.system import child
 from validation.scenes import SCENES
 
 _RUNS = 3
@@ -93,7 +93,7 @@ def _spend(command: list[str], **more: str) -> Spent:
 
 def _kernels_ahead(folder: Path) -> tuple[str, Path]:
     """The level for which kernels are compiled ahead, and a folder of all kernels for it."""
-    from renderer.kernels.store import runnable_levels
+    from renderer.jit.cache import runnable_levels
 
     levels = runnable_levels()
     # Most machines of today have x86-64-v3; without it, the best level that this machine runs.

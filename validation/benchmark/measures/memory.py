@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from renderer.mesh.mesh import Mesh
-from renderer.process import child
+from renderer.system import child
 from validation.benchmark.measures.meshes import displaced_spheres
 from validation.benchmark.peers import ours
 from validation.benchmark.peers.contender import System

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.cli.study import SPLIT
 from renderer.octree import Octree
-from renderer.points.curve import order_along_curve
-from renderer.process import child
-from renderer.process.parallel import available_threads
+from renderer.ordering.morton import order_along_curve
 from renderer.studies import occlusion, tregenza
 from renderer.studies.directions import turned
-from renderer.study_command import SPLIT
+from renderer.system import child
+from renderer.system.threads import available_threads
 from validation.benchmark.measures.families import families
 from validation.benchmark.measures.forms import FORMS
 from validation.benchmark.measures.memory import most_resident, resident

@@ -53,7 +53,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from renderer.process.files import write_atomically
+from renderer.system.files import write_atomically
 from validation import environment
 from validation.benchmark.peers.contender import System
 

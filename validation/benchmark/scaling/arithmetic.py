@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from renderer.runs.study import PART
+from renderer.checkpoints.study import PART
 from validation.benchmark.scaling.figures import Figures, hops
 
 

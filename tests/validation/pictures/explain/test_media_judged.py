@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from renderer import Dielectric, PerspectiveCamera, Phong, Scene, SceneObject, prepare, render
-from renderer.inspect.ray_step import Steps
+from renderer.diagnostics.ray_step import Steps
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from validation.pictures.explain import media
