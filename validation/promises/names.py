@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 import renderer
 from renderer import cluster, studies, trimesh_ray
-from renderer.cli import make_parser
+from renderer.cli.main import make_parser
 from renderer.scene.scene import Scene
 
 # Each package, and what its names begin with.
