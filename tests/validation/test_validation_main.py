@@ -24,6 +24,14 @@ from validation.report import schema
 from validation.sections import NAMES, SECTIONS
 from validation.stability import section as stability
 
+pytestmark = pytest.mark.judges(
+    "octree-validate --defects", "octree-validate --gate", "octree-validate --mesh", "octree-validate --mutants",
+    "octree-validate --of", "octree-validate --only", "octree-validate --output", "octree-validate --quick",
+    "octree-validate --random", "octree-validate --scene", "octree-validate --seed",
+    "octree-validate --write-baseline",
+)  # fmt: skip
+
+
 SCENE = Path(__file__).parents[2] / "scenes" / "stairs.toml"
 MESH = SCENE.parent / "models" / "stairs.ply"
 

@@ -11,8 +11,9 @@ from pydantic import BaseModel
 
 import renderer
 from renderer import cluster, studies, trimesh_ray
-from renderer.cli.main import make_parser
+from renderer.cli.main import make_parser as render_parser
 from renderer.scene.scene import Scene
+from validation.options import make_parser as validate_parser
 
 # Each package, and what its names begin with.
 _PACKAGES = ((renderer, ""), (studies, "studies."), (cluster, "cluster."), (trimesh_ray, "trimesh_ray."))
@@ -21,8 +22,8 @@ _PACKAGES = ((renderer, ""), (studies, "studies."), (cluster, "cluster."), (trim
 def public_names() -> list[str]:
     """Every public name once, such as ``Octree.closest_hit``, ``scene.floor.min`` or ``octree-render view --port``."""
     exported = [name for package, prefix in _PACKAGES for name in _exported(package, prefix)]
-    parser = make_parser()
-    return list(dict.fromkeys([*exported, *_keys(Scene, "scene"), *_options(parser, parser.prog)]))
+    options = [*_options(render_parser(), "octree-render"), *_options(validate_parser(), "octree-validate")]
+    return list(dict.fromkeys([*exported, *_keys(Scene, "scene"), *options]))
 
 
 def _exported(package: ModuleType, prefix: str) -> Iterator[str]:
