@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from pydantic import BaseModel
 
 from validation.gates import Gate
 from validation.promises import judges, names, section
 from validation.promises.judges import check_names, marked
+from validation.report import page
 from validation.studies import holds
 
 GATE = Gate("hits", "a sphere", "leaks", 0.0, "at most", 0.0, "it is closed")
@@ -53,6 +55,22 @@ def test_a_judge_of_an_unknown_name_turns_a_gate_red(checkout: Path) -> None:
     assert red(found) == ["judged, and not public"] and found[0]["unknown"] == ["saev"]
     (checkout / "tests" / "test_more.py").write_text('@pytest.mark.judges("laod")\ndef test(): ...\n')
     assert check_names([], (), checkout)[0]["unknown"] == ["laod"]
+
+
+def shown(found: dict[str, Any]) -> str:
+    """The section of the report, without promises."""
+    environment = Environment(loader=FileSystemLoader(page._TEMPLATES), undefined=StrictUndefined)
+    environment.filters["number"] = page.number
+    environment.globals["titles"] = {"hits": "Hits", "queries": "Queries"}
+    return environment.get_template("promises.html").render(m={"promises": {"rows": [], "names": found}})
+
+
+def test_the_report_shows_who_judges_each_name_and_is_red_where_nobody_does(checkout: Path) -> None:
+    html = shown(check_names([replace(GATE, judged=("saev",))], (), checkout)[0])
+    assert '<td class="name bad">save</td><td class="wrap bad">no judge</td>' in html
+    assert "test_files.py::test_load" in html and '<p class="bad">Judged, and not public: saev</p>' in html
+    assert "Hits 1" in shown(check_names([replace(GATE, judged=("save",))], (), checkout)[0])
+    assert "the run left out images" in shown(check_names([], ["images"], checkout)[0])
 
 
 def test_where_tests_or_sections_are_missing_the_reason_is_said_and_nothing_is_judged(checkout: Path) -> None:
