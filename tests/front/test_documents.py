@@ -139,6 +139,7 @@ def commands(*starts):
     return list(dict.fromkeys(pairs))
 
 
+@pytest.mark.judges("Hits.hit")
 @pytest.mark.parametrize(("page", "block"), snippets(), ids=shown)
 def test_python_in_a_page_runs_as_it_stands(page, block, tmp_path, monkeypatch):
     """In a checkout, of which nothing is changed: pictures go elsewhere."""
