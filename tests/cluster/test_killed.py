@@ -24,6 +24,12 @@ from renderer.mesh.load import save_ply
 from renderer.studies.points import on_faces
 from validation.benchmark.measures.meshes import named
 
+pytestmark = pytest.mark.judges(
+    "cluster.connected", "cluster.render_on", "cluster.run_on", "octree-render render --cluster",
+    "octree-render study --cluster",
+)  # fmt: skip
+
+
 GLASS: dict[str, Any] = {"resolution": (80, 60), "samples": 16}
 # Longer than any wait here; it ends a test that would hang.
 PATIENCE = 60.0
