@@ -50,16 +50,15 @@ def careful_angle(a, b, c, p, parts):
     if rest > PLAIN:
         return math.atan2(dot(x, cross(y, z)), rest)
     if yz >= xy and yz >= zx:
-        return _angle_at((a, b, c, p), x, y, z, parts)
+        return _angle_at(a, b, c, p, x, y, z, parts)
     if zx >= xy:
-        return _angle_at((b, c, a, p), y, z, x, parts)
-    return _angle_at((c, a, b, p), z, x, y, parts)
+        return _angle_at(b, c, a, p, y, z, x, parts)
+    return _angle_at(c, a, b, p, z, x, y, parts)
 
 
 @kernel
-def _angle_at(corners, x, y, z, parts):
+def _angle_at(a, b, c, p, x, y, z, parts):
     """The angle by its corner between the two sides that are longest from the point; x, y, z: directions to corners."""
-    a, b, c, p = corners
     m, n = _normal(a, b, p, parts), _normal(a, c, p, parts)
     across = cross(m, n)
     sine, side = length(across), 1 if dot(across, x) > 0.0 else -1

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.arguments.arrays import flag_argument
 from renderer.arguments.points import check_points
 from renderer.errors import expect
-from renderer.inside.crossings import ON_FACE, UNTOLD, count_crossings
+from renderer.inside.crossings import ON_FACE, UNDECIDED_COUNT, count_crossings
 from renderer.inside.rational import crossings_of
 from renderer.inside.winding import exceeds_half
 from renderer.mesh.mesh import Mesh
@@ -71,9 +71,9 @@ def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) 
             yield
 
     ask_in_order(count, points, mesh, axis, _LEAST, threads)
-    untold = np.flatnonzero(counted == UNTOLD)
-    triangles = mesh.triangles if len(untold) else np.empty((0, 3, 3))
-    for row in untold:
+    undecided = np.flatnonzero(counted == UNDECIDED_COUNT)
+    triangles = mesh.triangles if len(undecided) else np.empty((0, 3, 3))
+    for row in undecided:
         winding, on = crossings_of(points[row], triangles, axis)
         counted[row] = ON_FACE if on else winding
     return counted

@@ -58,7 +58,7 @@ def add_blocks(tree, first, count, point, total, parts):
     A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products that tell a face
     leave float64's range, for which it takes coordinates as unlike as 1 and 2^-300.
     """
-    real, imaginary, turns, apart = total
+    apart = total.apart
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
         rest, volume, sure = _see_block(tree, base, point)
@@ -68,9 +68,8 @@ def add_blocks(tree, first, count, point, total, parts):
             bits &= bits - 1
             if get(tree.faces, block * BLOCK_FACES + i) >= 0:
                 apart += _careful_angle(tree, base + i, point, parts)
-        rest, volume = select(sure, rest, splat4(1.0)), select(sure, volume, splat4(0.0))
-        real, imaginary, turns = _times(real, imaginary, turns, rest, volume)
-    return Turned(real, imaginary, turns, apart)
+        total = _times(total, select(sure, rest, splat4(1.0)), select(sure, volume, splat4(0.0)))
+    return Turned(total.real, total.imaginary, total.turns, apart)
 
 
 @kernel
@@ -109,16 +108,16 @@ def _direction(x, y, z):
 
 
 @inlined
-def _times(real, imaginary, turns, a, b):
-    """The product of numbers and a + b i, made of size one, and its turns; no a + b i lies on the negative axis."""
+def _times(total, a, b):
+    """``total`` times a + b i, its product made of size one; no a + b i lies on the negative axis."""
     zero, one = splat4(0.0), splat4(1.0)
-    x, y = real * a - imaginary * b, real * b + imaginary * a
+    x, y = total.real * a - total.imaginary * b, total.real * b + total.imaginary * a
     # Angles go from -pi, without it, to pi. Two of one sign pass pi where the sign of their sum is the other.
-    over = (imaginary >= zero) & (b >= zero) & (y < zero)
-    under = (imaginary < zero) & (b < zero) & (y >= zero)
-    turns = turns + select(over, one, zero) - select(under, one, zero)
+    over = (total.imaginary >= zero) & (b >= zero) & (y < zero)
+    under = (total.imaginary < zero) & (b < zero) & (y >= zero)
+    turns = total.turns + select(over, one, zero) - select(under, one, zero)
     share = one / (magnitude(x) + magnitude(y))
-    return x * share, y * share, turns
+    return Turned(x * share, y * share, turns, total.apart)
 
 
 @kernel

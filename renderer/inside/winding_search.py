@@ -13,6 +13,8 @@ from renderer.trace.point import Point
 # The nodes and blocks that a call sums, beside those of one point: some milliseconds, so that Ctrl-C need not wait for
 # long.
 _WORK = 1 << 16
+# In place of a tolerance: only on which side of 1/2 the number lies.
+SIDE_OF_HALF = -1.0
 # The share with which a search for a tolerance begins: the bounds add up to about the tolerance around a closed mesh.
 _FIRST = 2.0
 # The next share aims at so much of the tolerance, and is at most half of the last.
@@ -22,56 +24,39 @@ _FIRST_SIDE, _NEXT_SIDE = 1.0, 2.0**-4
 
 
 @kernel
-def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
-    """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``.
+def find_windings(words, rows, points, tolerance, out, stack, begin, end):
+    """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``;
+    for SIDE_OF_HALF numbers that are above 1/2 where they are, and else not.
 
-    They are NaN where float64's range does not hold what tells them, see ``add_blocks``. ``rows`` is what
+    They are NaN where float64's range does not hold what decides them, see ``add_blocks``. ``rows`` is what
     ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns the row before which it
     ended: early after _WORK.
     """
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
-    work = np.int64(0)
+    work, first_share = np.int64(0), _FIRST_SIDE if tolerance < 0.0 else _FIRST * tolerance
     for i in range(begin, end):
         row = at(pointer(points), 3 * i)
         point = _point_at(tree, row)
-        number, bound, share = 0.0, np.inf, _FIRST * tolerance
+        number, bound, share = 0.5, np.inf, first_share
         if not _is_held(tree, row, point):
             number, bound = np.nan, 0.0
-        while bound > tolerance and share > ROUNDING and tree.has_nodes:
+        while _is_open(number, bound, tolerance) and share > ROUNDING and tree.has_nodes:
             number, bound, steps = _search(tree, rows, point, share, stack, parts)
             work += steps
-            share *= smaller(_LESS, _AIM * tolerance / bound)
-        out[i] = number
-        if bound > tolerance:
-            out[i] = _all_faces(tree, point, parts)
+            share *= _NEXT_SIDE if tolerance < 0.0 else smaller(_LESS, _AIM * tolerance / bound)
+        if _is_open(number, bound, tolerance):
+            number = _all_faces(tree, point, parts)
             work += tree.count
+        out[i] = number
         if work > _WORK:
             return i + 1
     return end
 
 
-@kernel
-def exceed_half(words, rows, points, out, stack, begin, end):
-    """Write numbers above 1/2 where winding numbers are, and else others, to ``out`` (n,); all else as above."""
-    tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
-    work = np.int64(0)
-    for i in range(begin, end):
-        row = at(pointer(points), 3 * i)
-        point = _point_at(tree, row)
-        number, bound, share = 0.5, 0.0, _FIRST_SIDE
-        if not _is_held(tree, row, point):
-            number = np.nan
-        while abs(number - 0.5) <= bound and share > ROUNDING and tree.has_nodes:
-            number, bound, steps = _search(tree, rows, point, share, stack, parts)
-            work += steps
-            share *= _NEXT_SIDE
-        out[i] = number
-        if abs(number - 0.5) <= bound:
-            out[i] = _all_faces(tree, point, parts)
-            work += tree.count
-        if work > _WORK:
-            return i + 1
-    return end
+@inlined
+def _is_open(number, bound, tolerance):
+    """Whether a number with a bound of its error leaves open what is asked."""
+    return abs(number - 0.5) <= bound if tolerance < 0.0 else bound > tolerance
 
 
 @inlined

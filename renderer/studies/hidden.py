@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.arguments.arrays import flag_argument
 from renderer.errors import expect
 from renderer.queryable import Queries
-from renderer.studies.share import answer, answer_bits, check_asked, check_directions, check_weights, limits_of
+from renderer.studies.share import check_directions, check_request, check_weights, evaluate, evaluate_bits, limits_of
 from renderer.studies.sweep import Sky
 
 
@@ -62,12 +62,12 @@ def occlusion(
     >>> np.unpackbits(bits, axis=-1, count=4)
     array([[1, 1, 1, 0]], dtype=uint8)
     """
-    asked = check_asked(octree, points, normals, leaving, threads, progress)
-    ways = check_directions("directions", directions)
-    limits = limits_of(distance, ways)
+    request = check_request(octree, points, normals, leaving, threads, progress)
+    directions = check_directions("directions", directions)
+    limits = limits_of(distance, directions)
     if flag_argument("packed", packed):
         expect(weights is None, "weights", "None, as bits have none", "an array")
-        return answer_bits(octree, asked, Sky(ways, np.ones(len(ways)), limits, False, False))
-    values = check_weights("weights", weights, len(ways))
+        return evaluate_bits(octree, request, Sky(directions, np.ones(len(directions)), limits, False, False))
+    values = check_weights("weights", weights, len(directions))
     expect(bool(values.any()), "weights", "one that is not 0", "all 0")
-    return answer(octree, asked, Sky(ways, values, limits, False, False), hidden=True, share=True)
+    return evaluate(octree, request, Sky(directions, values, limits, False, False), hidden=True, share=True)

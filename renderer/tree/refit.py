@@ -33,17 +33,15 @@ def _fit_leaves(vertices, faces, block_faces, nodes, links, begin, end):
             if code >= 0 and nodes[at] <= nodes[at + 8]:
                 first = (code >> LEAF_BITS) * BLOCK_FACES
                 last = first + ((code & (MAX_LEAF_BLOCKS - 1)) + 1) * BLOCK_FACES
-                _fit_leaf(vertices, faces, block_faces, (first, last), nodes, at)
+                _fit_leaf(vertices, faces, block_faces, first, last, nodes, at)
 
 
 @kernel
-def _fit_leaf(vertices, faces, block_faces, leaf, nodes, at):
-    """Set the box whose words are ``at``, ``at + 8``, ... to the union of those of the faces in the places ``leaf`` =
-    (first, last).
-    """
+def _fit_leaf(vertices, faces, block_faces, first, last, nodes, at):
+    """Set the box whose words are ``at``, ``at + 8``, ... to the union of those of the faces in ``first:last``."""
     for axis in range(3):
         low, high = np.float32(np.inf), np.float32(-np.inf)
-        for i in range(leaf[0], leaf[1]):
+        for i in range(first, last):
             face = block_faces[i]
             if face >= 0:
                 a, b, c = faces[face]

@@ -16,7 +16,7 @@ from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight
 from renderer.scene.material import Mirror, Phong
 from renderer.scene.scene import Floor, SceneObject
-from renderer.shade.tile import tile_memory
+from renderer.shade.tile import tile_scratch
 from renderer.system.threads import available_threads
 from renderer.trace.spawn import BOUNDED
 
@@ -108,9 +108,9 @@ def memory(scene: Scene, needs: Needs) -> int:
     """Bytes of the arrays that a picture reads: the scene's, the tree's and the scratch of every thread."""
     mesh, world = pack(scene, needs)
     tree = tree_for(build_octree(mesh, "auto", "midpoint", needs), needs)
-    memory = tile_memory(tree.depth, kernel_settings_of(needs, scene.render, BOUNDED))
-    rays = memory.trace
-    parts = (rays.floats, rays.doubles, rays.integers, memory.doubles, memory.integers, memory.hits, memory.total)
-    scratch = sum(array.nbytes for array in parts)
+    scratch = tile_scratch(tree.depth, kernel_settings_of(needs, scene.render, BOUNDED))
+    rays = scratch.trace
+    parts = (rays.floats, rays.doubles, rays.integers, scratch.doubles, scratch.integers, scratch.hits, scratch.total)
+    a_thread = sum(array.nbytes for array in parts)
     arrays = [*world, tree.nodes, tree.blocks, tree.faces]
-    return sum(array.nbytes for array in arrays) + available_threads() * scratch
+    return sum(array.nbytes for array in arrays) + available_threads() * a_thread
