@@ -17,6 +17,11 @@ from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
+pytestmark = pytest.mark.judges(
+    "BruteForce.contains", "BruteForce.tree", "Mesh.odd_edges", "Mesh.open_edges", "Octree.contains"
+)
+
+
 MESHES = closed_solids()
 
 

@@ -21,6 +21,9 @@ from renderer.trace.single import stack_size
 from validation.references.igl import Igl
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
+pytestmark = pytest.mark.judges("BruteForce.winding_number", "Octree.contains", "Octree.winding_number")
+
+
 SOLIDS = closed_solids()
 TOLERANCES = (0.3, 1e-2, 1e-3, 1e-6, 1e-10, 0.0)
 # What a face that counts alone errs by.

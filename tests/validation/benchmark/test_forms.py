@@ -45,14 +45,6 @@ def test_scan_and_tube_are_closed_and_face_outward(name: str) -> None:
         assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0.0
 
 
-def test_a_scan_has_faces_and_details_of_many_sizes(forms: dict[str, Mesh]) -> None:
-    size = areas(forms["scan"])
-    assert np.quantile(size, 0.95) > 10 * np.quantile(size, 0.05)
-    # Around the middle the height over a ring differs from its neighbours' mean as it would not on an ellipsoid.
-    radius = np.linalg.norm(forms["scan"].vertices, axis=1)
-    assert np.std(radius) / radius.mean() > 0.05
-
-
 def test_a_tube_is_forty_times_as_long_as_wide_lies_obliquely_and_is_missed(forms: dict[str, Mesh]) -> None:
     mesh = forms["thin"]
     along = np.linalg.svd(mesh.vertices - mesh.vertices.mean(axis=0), full_matrices=False)[2]
@@ -91,20 +83,6 @@ def test_a_city_has_blocks_of_twelve_faces_with_streets_between_and_a_ground(for
     assert areas(mesh)[-2:].tolist() == [2.0, 2.0] and (mesh.face_normals()[-2:, 1] > 0.99).all()
 
 
-def test_a_soup_is_of_single_faces_of_many_sizes_and_rays_pass_part_of_it(forms: dict[str, Mesh]) -> None:
-    mesh = forms["soup"]
-    assert len(mesh.vertices) == 3 * len(mesh.faces) == len(mesh.open_edges)
-    size = areas(mesh) ** 0.5
-    assert np.quantile(size, 0.99) > 10 * np.quantile(size, 0.01)
-    crossed = []
-    for same in (mesh, FORMS["soup"](40_000)):
-        octree = Octree.from_mesh(same)
-        random = next(family for family in families(octree, 2_000) if family.name == "random")
-        crossed.append(octree.count_hits(random.origins, random.directions).mean())
-    # As many faces lie on a ray through many small ones as through few large ones.
-    assert 0.5 < crossed[0] < 4.0 and crossed[1] == pytest.approx(crossed[0], rel=0.25)
-
-
 @pytest.mark.parametrize("name", FORMS)
 def test_every_family_asks_something_of_every_form(name: str, forms: dict[str, Mesh]) -> None:
     octree = Octree.from_mesh(forms[name])
@@ -119,11 +97,11 @@ def test_a_run_has_its_series_every_form_twice_and_files(tmp_path: Path, monkeyp
     assert full == {(form, faces) for form in FORMS for faces in (100_000, 1_000_000)} and len(meshes.FULL_FORMS) == 10
     assert len(meshes.QUICK_FORMS) <= 2 and all(faces <= 10_000 for _, faces in meshes.QUICK_FORMS)
     monkeypatch.setattr(meshes, "FULL", (300, 1_000))
-    monkeypatch.setattr(meshes, "FULL_FORMS", (("soup", 100), ("terrain", 1_000_000)))
+    monkeypatch.setattr(meshes, "FULL_FORMS", (("soup", 100), ("terrain", 10_000)))
     found = list(meshes.chosen(False, False, (tmp_path / "own.ply",)))
     assert [(c.mesh.name, c.kind, c.brief) for c in found] == [
         ("spheres_300", "spheres", False), ("spheres_1k", "spheres", False), ("soup_100", "soup", True),
-        ("terrain_1m", "terrain", True), ("own", "file", False)]  # fmt: skip
+        ("terrain_10k", "terrain", True), ("own", "file", False)]  # fmt: skip
     assert found[-1].mesh.is_float32
 
 

@@ -1,63 +1,11 @@
-"""The benchmark's arithmetic: fits, rounds and ratios, targets, and what a libLLVM's name says."""
+"""Targets: the worst of the rows that count, the mean that is aimed at, and whether a bound is reached."""
 
-import math
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from validation import timing
 from validation.benchmark.measures import frames, processes
-from validation.benchmark.measures.fit import log_fit
 from validation.benchmark.page.targets import Target, judged
-from validation.benchmark.peers import libllvm
-from validation.timing import interleaved, ratio
-
-
-def test_a_fit_finds_the_law_that_made_the_costs() -> None:
-    sizes = [1_000, 10_000, 98_304, 1_000_000]
-    fit = log_fit(sizes, [17.5 * math.log2(n) - 40.25 for n in sizes])
-    assert fit is not None
-    # Least squares of four points in float64.
-    assert fit.a == pytest.approx(17.5, rel=1e-12) and fit.b == pytest.approx(-40.25, rel=1e-11)
-    assert fit.residual < 1e-10
-    assert fit.at(4096) == pytest.approx(17.5 * 12 - 40.25, rel=1e-12)
-
-
-def test_the_residual_is_the_root_mean_square() -> None:
-    # +1, -2, +1 about a line has no part along it: mean 0, slope 0.
-    fit = log_fit([2, 4, 8], [11.0, 18.0, 31.0])
-    assert fit is not None
-    assert (fit.a, fit.b) == (pytest.approx(10.0), pytest.approx(0.0, abs=1e-12))
-    assert fit.residual == pytest.approx(math.sqrt(6 / 3))
-
-
-def test_two_sizes_fit_nothing() -> None:
-    assert log_fit([1000, 2000, 2000], [1.0, 2.0, 3.0]) is None
-
-
-def test_contenders_take_turns_after_a_rest_and_the_first_round_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    order: list[str] = []
-    rests: list[tuple[float, int]] = []
-    monkeypatch.setattr(timing, "REST", 0.25)
-    monkeypatch.setattr(timing.time, "sleep", lambda seconds: rests.append((seconds, len(order))))
-
-    def call(name: str) -> Callable[[], float]:
-        def seconds() -> float:
-            order.append(name)
-            return float(len(order))
-
-        return seconds
-
-    seconds = interleaved({name: call(name) for name in "abc"}, runs=2)
-    assert "".join(order) == "abcabcabc" and rests == [(0.25, i) for i in range(9)]
-    assert seconds == {"a": [4.0, 7.0], "b": [5.0, 8.0], "c": [6.0, 9.0]}
-
-
-def test_the_ratio_is_the_median_of_the_rounds() -> None:
-    # The ratio of the medians would be 4 / 2.
-    assert ratio([3.0, 4.0, 9.0], [3.0, 2.0, 1.0]) == 2.0
-    assert ratio([2.0, 4.0, 30.0], [2.0, 1.0, 10.0]) == 3.0
 
 
 @pytest.mark.parametrize(
@@ -184,30 +132,3 @@ def test_single_things_are_judged_by_themselves(targets: dict[str, dict[str, Any
     assert (frame["at_least"], frame["aim"], frame["met"], frame["aimed"]) == (1.5, 2.5, True, False)
     assert targets["import renderer"]["met"] is False and targets["render warm"]["met"] is False
     assert targets["first hit"]["met"] is False and targets["first picture"]["met"] is None
-
-
-@pytest.mark.parametrize(
-    ("path", "major"),
-    [
-        ("/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1", 19),
-        ("/usr/lib/x86_64-linux-gnu/libLLVM-15.so.1", 15),
-        ("/nowhere/llvm-20/lib/libLLVM.so", 20),
-        ("/opt/nowhere/libLLVM.so", 0),
-    ],
-)
-def test_the_version_of_a_libllvm_is_read_from_its_path(path: str, major: int) -> None:
-    assert libllvm.version(path) == major
-
-
-def test_a_libllvm_that_the_user_names_is_the_only_candidate(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(libllvm.VARIABLE, "/nowhere/libLLVM.so")
-    assert list(libllvm.candidates()) == ["/nowhere/libLLVM.so"]
-    # Dr.Jit cannot load it, in its own process: here an answer comes back.
-    assert libllvm.usable() is None
-
-
-def test_too_old_a_libllvm_is_no_candidate(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(libllvm.VARIABLE, raising=False)
-    monkeypatch.setattr(libllvm, "_PLACES", ("x",))
-    monkeypatch.setattr(libllvm, "glob", lambda _: ["/a/libLLVM-15.so", "/a/libLLVM.so.19.1", "/a/libLLVM.so.20.1"])
-    assert list(libllvm.candidates()) == ["/a/libLLVM.so.20.1", "/a/libLLVM.so.19.1"]
