@@ -28,11 +28,11 @@ from renderer.numerics.simd import (
 )
 from renderer.numerics.vec3 import three
 from renderer.trace.edge_signs import corner
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import NO_FACE, tree_pointers
 from renderer.trace.point import Point
 from renderer.trace.rays import hit_pointers
-from renderer.trace.walk import blocks_of
+from renderer.trace.walk import child_in, walk_nearest_first
 
 # In place of a face: float64 cannot decide.
 UNDECIDED_FACE = -2
@@ -74,6 +74,21 @@ class Scratch(NamedTuple):
     squares: Any
     work: Any
     parts: Any
+
+
+class _Query(NamedTuple):
+    """A point, and the scratch of its search."""
+
+    point: Point
+    scratch: Scratch
+
+
+class _Found(NamedTuple):
+    """The nearest face so far, the number of faces that are listed, and a bound of the distance."""
+
+    best: Nearest
+    listed: int
+    limit: float
 
 
 @kernel
@@ -136,26 +151,25 @@ def _is_scaled(point, p, scale):
 @kernel
 def _search(tree, point, limit, scratch):
     """The ``Nearest`` face within ``limit``."""
-    best, listed = Nearest(np.inf, np.int32(NO_FACE), 0.0, 0.0), np.int64(0)
-    if not tree.has_nodes:
-        best, listed, limit = _search_blocks(tree, 0, tree.count, point, scratch, best, listed, limit)
-        return _settle(tree, point, scratch, best, listed, limit)
-    top = 1
-    put(scratch.children, 0, 0)
+    query, none = _Query(point, scratch), Nearest(np.inf, np.int32(NO_FACE), 0.0, 0.0)
     put(scratch.near, 0, 0.0)
-    while top > 0:
-        top -= 1
-        if get(scratch.near, top) > _squared(limit):
-            continue
-        child = get(scratch.children, top)
-        if child < 0:
-            first, count = blocks_of(child)
-            best, listed, limit = _search_blocks(tree, first, count, point, scratch, best, listed, limit)
-            continue
-        base = child * NODE_WORDS
-        bits = _bound_boxes(tree.nodes, base, point, splat4(_squared(limit)), scratch.squares)
-        top = _push_nearest_last(tree.links, base + CHILDREN, bits, scratch, top)
-    return _settle(tree, point, scratch, best, listed, limit)
+    found = walk_nearest_first(
+        tree, scratch.children, query, _Found(none, np.int64(0), limit), _reaches, _enter, _list_faces
+    )
+    return _settle(tree, query, found)
+
+
+@inlined
+def _reaches(query, k, found):
+    return get(query.scratch.near, k) <= _squared(found.limit)
+
+
+@inlined
+def _enter(tree, query, node, found, top):
+    bits = _bound_boxes(
+        tree.nodes, node * NODE_WORDS, query.point, splat4(_squared(found.limit)), query.scratch.squares
+    )  # fmt: skip
+    return found, _push_nearest_last(tree, node, bits, query.scratch, top)
 
 
 @inlined
@@ -165,8 +179,8 @@ def _squared(limit):
 
 
 @inlined
-def _push_nearest_last(links, base, bits, scratch, top):
-    """Let the octants ``bits`` wait, the nearest on top; ``base`` is where the node's links begin.
+def _push_nearest_last(tree, node, bits, scratch, top):
+    """Let the octants ``bits`` of a node wait, the nearest on top.
 
     The others are in no order: most are out of reach once the nearest is searched, and sorting takes longer.
     """
@@ -178,7 +192,7 @@ def _push_nearest_last(links, base, bits, scratch, top):
         bits &= bits - 1
         square = get(scratch.squares, i)
         put(scratch.near, top, square)
-        put(scratch.children, top, np.int64(get(links, base + i)))
+        put(scratch.children, top, child_in(tree, node, i))
         nearest, least = (top, square) if square < least else (nearest, least)
         top += 1
     last = top - 1
@@ -214,11 +228,14 @@ def _gap(nodes, row, x):
 
 
 @kernel
-def _search_blocks(tree, first, count, point, scratch, best, listed, limit):
-    """List the faces of some blocks that may be within ``limit``, and lower that to what they bound."""
+def _list_faces(tree, query, first, count, found):
+    """List the faces of some blocks that may be within the limit, and lower that to what they bound; the search goes
+    on.
+    """
+    scratch, best, listed, limit = query.scratch, found.best, found.listed, found.limit
     put(scratch.work, 0, get(scratch.work, 0) + count)
     for block in range(first, first + count):
-        bits, low, limit = bound_distances(tree, block * BLOCK_WORDS, point, limit)
+        bits, low, limit = bound_distances(tree, block * BLOCK_WORDS, query.point, limit)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
@@ -226,17 +243,19 @@ def _search_blocks(tree, first, count, point, scratch, best, listed, limit):
             put(scratch.least, listed, extract(low, i))
             listed += 1
             if listed == LISTED:
-                best = _settle(tree, point, scratch, best, listed, limit)
+                best = _settle(tree, query, _Found(best, listed, limit))
                 limit, listed = smaller(limit, best.distance * _MORE), np.int64(0)
-    return best, listed, limit
+    return _Found(best, listed, limit), False
 
 
 @kernel
-def _settle(tree, point, scratch, best, listed, limit):
-    """The better of ``best`` and the listed faces that are still within the limit: least distance, then lowest face."""
-    p = point.x, point.y, point.z
-    for k in range(listed):
-        if get(scratch.least, k) > limit:
+def _settle(tree, query, found):
+    """The better of the best face and the listed ones that are still within the limit: least distance, then lowest
+    face.
+    """
+    best, scratch, p = found.best, query.scratch, (query.point.x, query.point.y, query.point.z)
+    for k in range(found.listed):
+        if get(scratch.least, k) > found.limit:
             continue
         place = get(scratch.places, k)
         put(scratch.work, 0, get(scratch.work, 0) + _MEASURE)

@@ -32,7 +32,7 @@ from renderer.trace.edge_signs import coordinate
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.walk import blocks_of, push_children
+from renderer.trace.walk import walk
 
 # In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot tell.
 ON_FACE, UNDECIDED_COUNT = -(2**31), -(2**31) + 1
@@ -64,6 +64,22 @@ class AxisRay(NamedTuple):
     up: bool
 
 
+class _Query(NamedTuple):
+    """A ray, and memory for an expansion, behind which the blocks tested are counted."""
+
+    ray: AxisRay
+    parts: Any
+
+
+class _Crossings(NamedTuple):
+    """What a ray has crossed: the winding number so far; and 1 where its point lies on a face, UNDECIDED or more where
+    float64 cannot decide.
+    """
+
+    winding: int
+    on: int
+
+
 @kernel
 def count_crossings(words, points, axis, middle, rows, out, stack, begin):
     """Winding numbers (or ON_FACE, or UNDECIDED_COUNT) for ``points`` (n, 3), from row ``begin`` on, to
@@ -85,10 +101,8 @@ def count_crossings(words, points, axis, middle, rows, out, stack, begin):
         if x / scale != get(row, axis_x) or y / scale != get(row, axis_y) or z / scale != get(row, axis):
             # The tree's units cannot hold it exactly.
             winding, on = np.int64(0), np.int64(UNDECIDED)
-        elif tree.has_nodes:
-            winding, on = _search_nodes(tree, ray, pointer(stack), parts)
         else:
-            winding, on = _cross_blocks(tree, 0, tree.count, ray, parts, np.int64(0), np.int64(0))
+            winding, on = _search(tree, _Query(ray, parts), pointer(stack))
         out[rows[i]] = UNDECIDED_COUNT if on >= UNDECIDED else (ON_FACE if on else winding)
         if get(work, 0) > WORK:
             return i + 1
@@ -96,19 +110,14 @@ def count_crossings(words, points, axis, middle, rows, out, stack, begin):
 
 
 @kernel
-def _search_nodes(tree, ray, stack, parts):
-    """The winding number by a ray, and whether its point is on a face, through the nodes whose boxes it meets."""
-    winding, on, top = np.int64(0), np.int64(0), 1
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, count = blocks_of(child)
-            winding, on = _cross_blocks(tree, first, count, ray, parts, winding, on)
-            continue
-        top = push_children(tree, child, _meet_boxes(tree.nodes, child * NODE_WORDS, ray), stack, top)
-    return winding, on
+def _search(tree, query, stack):
+    """The ``_Crossings`` of a ray with all faces."""
+    return walk(tree, stack, query, _Crossings(np.int64(0), np.int64(0)), _enter, _cross_blocks)
+
+
+@inlined
+def _enter(tree, query, node, found):
+    return found, _meet_boxes(tree.nodes, node * NODE_WORDS, query.ray)
 
 
 @inlined
@@ -125,8 +134,9 @@ def _meet_boxes(nodes, base, ray):
 
 
 @kernel
-def _cross_blocks(tree, first, count, ray, parts, winding, on):
-    """Add the crossings with the faces of some blocks to ``winding``, and mark in ``on`` what the point lies on."""
+def _cross_blocks(tree, query, first, count, found):
+    """Add the crossings with the faces of some blocks to ``found``; the search goes on."""
+    ray, parts, winding, on = query.ray, query.parts, found.winding, found.on
     put(parts, PARTS, get(parts, PARTS) + count)
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
@@ -139,7 +149,7 @@ def _cross_blocks(tree, first, count, ray, parts, winding, on):
                 put(parts, PARTS, get(parts, PARTS) + _EXACTLY)
                 step, touches = _cross_exactly(tree, base + i, ray, parts)
                 winding, on = winding + step, on | touches
-    return winding, on
+    return _Crossings(winding, on), False
 
 
 @inlined
