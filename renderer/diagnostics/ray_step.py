@@ -190,9 +190,10 @@ class Steps:
         self, kind: Kind, ray: Ray, surface: Surface, place: Place, direction: Vector, weight: Vector,
         media: tuple[int, ...],
     ) -> Ray:  # fmt: skip
-        w, (p, error, n_g, *_) = normalized(direction), surface
-        start = self._start(place, n_g, w, ray.direction)
-        return Ray(kind, ray.depth + 1, spawn_origin(p, error, n_g, w, self.offset), w, weight, media, start)
+        w = normalized(direction)
+        start = self._start(place, surface.n_g, w, ray.direction)
+        origin = spawn_origin(surface.p, surface.error, surface.n_g, w, self.offset)
+        return Ray(kind, ray.depth + 1, origin, w, weight, media, start)
 
 
 def steps_of(prepared: PreparedScene, offset: OffsetRule = BOUNDED, media: MediaRule = "stack") -> Steps:

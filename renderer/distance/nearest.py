@@ -1,7 +1,7 @@
 """The face that is nearest to a point: a search through the tree, the nearest boxes first.
 
 The search keeps a bound of the distance and lists the faces that may be within it. ``distance_to_face`` measures only
-those. So the answer is the least of those distances over all faces, whatever the tree and the order.
+those. So the result is the least of those distances over all faces, whatever the tree and the order.
 """
 
 from typing import Any, NamedTuple

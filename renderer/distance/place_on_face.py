@@ -21,7 +21,8 @@ from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
 
 # 32 roundings of float64, and 8 of float32.
 DOUBLE, SINGLE = 2.0**-48, 2.0**-21
-# A point is exactly on an edge where the product of the ways along it and to the point is less, of ways of about 1.
+# A point is exactly on an edge where the product of the vectors along it and to the point is less, of vectors of size
+# about 1.
 _EXACT = 2.0**-80
 
 

@@ -1,4 +1,4 @@
-"""Crossings of a ray from a point along an axis, counted exactly: the answer to what lies inside.
+"""Crossings of a ray from a point along an axis, counted exactly: they decide what lies inside.
 
 Each crossing counts 1 or -1, so their sum, the winding number, is odd where their number is.
 
@@ -34,7 +34,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.walk import walk
 
-# In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot tell.
+# In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot decide.
 ON_FACE, UNDECIDED_COUNT = -(2**31), -(2**31) + 1
 _ROUNDOFF = 2.0**-53
 # The blocks that a call tests, some milliseconds, and how many of them one exact test costs.
@@ -154,12 +154,12 @@ def _cross_blocks(tree, query, first, count, found):
 
 @inlined
 def _cross_block(tree, base, ray):
-    """Bits of four faces: those surely crossed, those that float64 cannot tell, and where the winding rises by one."""
+    """Bits of four faces: the surely crossed, those that float64 cannot decide, and where the winding rises by one."""
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, ray)
     x, y, z = splat4(ray.x), splat4(ray.y), splat4(ray.z)
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = x0 - x, x1 - x, x2 - x, y0 - y, y1 - y, y2 - y, z0 - z, z1 - z, z2 - z
 
-    # On which side of each edge the ray passes, as far as rounding tells.
+    # On which side of each edge the ray passes, as far as rounding decides.
     a, b, c, d, e, f = x1 * y2, y1 * x2, x2 * y0, y2 * x0, x0 * y1, y0 * x1
     e0, e1, e2 = a - b, c - d, e - f
     m0, m1, m2 = magnitude(a) + magnitude(b), magnitude(c) + magnitude(d), magnitude(e) + magnitude(f)

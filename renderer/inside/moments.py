@@ -29,7 +29,7 @@ from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree, cache_aligned
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.walk import blocks_of, stack_size
+from renderer.trace.walk import blocks_of, child_in, stack_size
 
 # Nodes per chunk: some milliseconds, but for the first chunk, whose nodes hold all faces.
 _NODES = 256
@@ -106,7 +106,7 @@ def _measure_octants(words, rows, scratch, begin, end):
     tree, rows = tree_pointers(words), pointer(rows)
     for node in range(begin, end):
         for place in range(8):
-            base, link = node * MOMENT_WORDS + place, np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + place))
+            base, link = node * MOMENT_WORDS + place, child_in(tree, node, place)
             scratch.total[:] = 0.0
             if not _is_used(tree, node, place):
                 put(rows, base + 8 * X, _FAR)
@@ -144,7 +144,7 @@ def _list_leaves(tree, link, scratch):
             continue
         for place in range(8):
             if _is_used(tree, child, place):
-                scratch.stack[top] = get(tree.links, child * NODE_WORDS + CHILDREN + place)
+                scratch.stack[top] = child_in(tree, child, place)
                 top += 1
     return count
 
@@ -279,7 +279,7 @@ def _join_octants(words, rows, scratch, begin, end):
     tree, rows = tree_pointers(words), pointer(rows)
     for node in range(end - 1, begin - 1, -1):
         for place in range(8):
-            child = np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + place))
+            child = child_in(tree, node, place)
             if child < 0:
                 continue
             base = node * MOMENT_WORDS + place

@@ -25,7 +25,7 @@ ORDER = 6
 X, Y, Z, RADIUS, SIZE, SPREAD, COEFFICIENTS = range(7)
 ROWS = COEFFICIENTS + ORDER * (ORDER + 2)
 MOMENT_WORDS = 8 * ROWS
-# Above this q no series is asked: 1 - q keeps its digits.
+# Above this q no series is evaluated: 1 - q keeps its digits.
 _NEAREST = 0.75
 # Rounding errors of a series as a share of size / R^2. A face's own numbers err by some 2^-48 of its size, and joining
 # them in up to 256 levels by as much a level.

@@ -29,7 +29,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 # each, then six products of three. Its angle errs by the share of that in its size: by 2^-44 of a turn at most where
 # the square of its size is at least LEAST_SQUARE. Nearer than 2^-5 of its length to an edge it may be less.
 _LEAST_SQUARE = 2.0**-10
-# A volume above it has its true sign, which tells both sides of the face apart.
+# A volume above it has its true sign, which says on which side of the face the point is.
 _LEAST_VOLUME = 2.0**-46
 # The sum of three inverse distances, of corners from the point, below which no square has lost digits to underflow.
 _NEAREST = 2.0**450
@@ -55,7 +55,7 @@ def no_turn():
 def add_blocks(tree, first, count, point, total, parts):
     """``total`` and the angles of the faces of some blocks, seen from ``point``; ``parts`` is memory for an expansion.
 
-    A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products that tell a face
+    A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products that measure a face
     leave float64's range, for which it takes coordinates as unlike as 1 and 2^-300.
     """
     apart = total.apart

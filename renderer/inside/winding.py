@@ -12,7 +12,7 @@ from renderer.inside.moments import moments_of
 from renderer.inside.rational import winding_of
 from renderer.inside.winding_search import SIDE_OF_HALF, find_windings
 from renderer.mesh.mesh import Mesh
-from renderer.ordering.cells import ask_in_order
+from renderer.ordering.cells import search_in_order
 from renderer.trace.closest import rays_against_blocks
 from renderer.trace.layout import Tree
 from renderer.trace.walk import stack_size
@@ -49,7 +49,7 @@ def _numbers(tree: Tree, mesh: Mesh, points: Floats, tolerance: float, threads: 
             yield
         numbers[rows] = found
 
-    ask_in_order(find, points, mesh, None, least, threads)
+    search_in_order(find, points, mesh, None, least, threads)
     undecided = np.flatnonzero(np.isnan(numbers))
     triangles = mesh.triangles if len(undecided) else np.empty((0, 3, 3))
     for row in undecided:

@@ -58,7 +58,7 @@ def find_windings(words, rows, points, tolerance, out, stack, begin, end):
 
 @inlined
 def _is_open(number, bound, tolerance):
-    """Whether a number with a bound of its error leaves open what is asked."""
+    """Whether a number with a bound of its error leaves the question open."""
     return abs(number - 0.5) <= bound if tolerance < 0.0 else bound > tolerance
 
 

@@ -27,8 +27,8 @@ def occlusion(
 ) -> NDArray[np.float64] | NDArray[np.uint8]:
     """The share of directions that is HIDDEN from each point, (...) float64 from 0 to 1; or one bit for each of them.
 
-    A direction d is hidden from a point where d . n <= 0, as float64 computes it of its unit normal n: it is at the
-    point's horizon or below. Else it is hidden where a ray this way hits anything, as ``octree.any_hit`` tells.
+    A direction d is hidden if it is at the point's horizon or below, d . n <= 0 as float64 computes it of the unit
+    normal n, or if a ray in direction d hits the mesh, see ``octree.any_hit``.
 
     points      (..., 3), finite
     normals     (..., 3) as points, or one (3,) for all; not zero, of any length; None: no point has a horizon
@@ -37,9 +37,9 @@ def occlusion(
     leaving     the face that each point lies on, (...) or one for all, -1 where that is not known; None: -1 for all. A
                 point is then on the surface where it is as near as 32 roundings of float64 of its largest coordinate;
                 or, if all its coordinates are numbers of float32, where each is as near as 8 of its own roundings to
-                float32. Rays start at the point of the face that is nearest: no epsilon
-                is needed. The normal says on which side of the faces there the point is: directions that lead through
-                them to another side are hidden. Without a normal the faces that hold the point hide nothing
+                float32. Rays start at the point of the face that is nearest: no epsilon is needed. The normal says on
+                which side of the faces there the point is: directions that lead through them to another side are
+                hidden. Without a normal the faces that hold the point hide nothing
     packed      True: (..., ceil(k / 8)) uint8 with a set bit for each hidden direction, in the order of
                 ``numpy.unpackbits(..., axis=-1, count=k)``. There are no weights then
     distance    how far the mesh hides, in scene units

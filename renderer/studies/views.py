@@ -76,7 +76,7 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
     the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
     only what looks to the eye. An eye on the surface is not hidden by the faces that hold it; see ``octree.visible``,
     which this calls. A face without area is not seen, and neither is one whose plane the eye lies in,
-    which no rounding tells. Raises ``ValueError`` naming the argument.
+    exactly. Raises ``ValueError`` naming the argument.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
