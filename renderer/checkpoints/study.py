@@ -17,7 +17,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.studies.ambient import ambient_occlusion
 from renderer.studies.points import Points
-from renderer.studies.share import check_asked
+from renderer.studies.share import check_request
 from renderer.studies.sky import sky_view_factor, sun_hours
 from renderer.system.files import check_writable
 
@@ -81,7 +81,7 @@ def parts_of(octree: Octree, study: Study, points: Points, folder: Path, size: i
     its kind refuses, and for the folder of another study.
     """
     # Here, as an error of a part would name its own row.
-    check_asked(octree, points.points, points.normals, points.leaving, None, False)
+    check_request(octree, points.points, points.normals, points.leaving, None, False)
     # Of no point, so that options that the kind refuses leave no folder, which would stand in the way of right ones.
     study.evaluate(octree, points.part(slice(0)))
     order = points.order()

@@ -79,18 +79,18 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
     octree.any_hit(rays.origins, rays.directions)  # raises for rays out of bounds
     tree, scale = octree.tree, octree.tree.scale
     (ox, oy, oz), (dx, dy, dz) = (scale * rays.origins[0]).tolist(), rays.directions[0].tolist()
-    ray, best = Ray(ox, oy, oz, dx, dy, dz, 0.0), (scale * float(rays.t_max[0]), NO_FACE)
+    ray, t, face = Ray(ox, oy, oz, dx, dy, dz, 0.0), scale * float(rays.t_max[0]), NO_FACE
     opened: list[Visit] = []
-    waiting = [o for box in _root_box(tree) for o in _met_octants(_above(tree, box), 0, -1, ray, best[0])]
+    waiting = [o for box in _root_box(tree) for o in _met_octants(_above(tree, box), 0, -1, ray, t)]
     while waiting:
         distance, child, level, box = waiting.pop()
-        if distance > _limit(ray, best[0]):
+        if distance > _limit(ray, t):
             continue
         opened.append(Visit(level, box[:3] / scale, box[3:] / scale, child < 0))
         if child < 0:
-            best = _best_in_leaf(tree.words, child, ray, best)
+            t, face = _best_in_leaf(tree.words, child, ray, t, face)
         else:
-            waiting += _met_octants(tree, child, level, ray, best[0])
+            waiting += _met_octants(tree, child, level, ray, t)
     return opened
 
 
@@ -143,9 +143,9 @@ def _limit(ray: Ray, t: float) -> float:
 
 
 @kernel
-def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, best: tuple[float, int]) -> tuple[float, np.int64]:
-    """The better of ``best`` = (t, face) and the hits in a leaf."""
-    seen, (first, count) = tree_pointers(words), blocks_of(leaf)
-    start = (best[0], np.int32(best[1]), 0.0, 0.0, 1.0)
-    t, face, _, _, _ = nearest_carefully(seen, first, count, ray, make_shear(ray), start)
-    return t, np.int64(face)
+def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, t: float, face: int) -> tuple[float, int]:
+    """t and face of the best hit so far and those in a leaf."""
+    tree, (first, count) = tree_pointers(words), blocks_of(leaf)
+    best = (t, np.int32(face), 0.0, 0.0, 1.0)
+    t, face, _, _, _ = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
+    return t, int(face)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.inside.rational import crossings_of, winding_of
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera
 from renderer.scene.needs import Features, lit_materials, needs_of
@@ -79,9 +80,9 @@ def _material_rows(scene: Scene) -> dict[str, int]:
 
 def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
     """Materials of the closed, light-passing meshes around the camera's eye, outermost (by volume) first."""
-    rows, around = _material_rows(scene), []
+    rows, around = _material_rows(scene), list[tuple[float, int]]()
     for instance in scene.instances:
-        if scene.materials[instance.material].passes_light and _winding(instance.mesh, camera.eye) > 0.5:
+        if scene.materials[instance.material].passes_light and _is_inside(instance.mesh, np.array(camera.eye)):
             p0, p1, p2 = instance.mesh.triangles.transpose(1, 0, 2)
             volume = abs(np.einsum("nk,nk->", p0, np.cross(p1, p2)))
             around.append((volume, rows[instance.material]))
@@ -89,24 +90,16 @@ def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
     return np.array([row for _, row in sorted(around, reverse=True)][:MAX_MEDIA], np.int64)
 
 
-def _winding(mesh: Mesh, point: tuple[float, float, float]) -> float:
-    """The winding number of ``mesh`` around ``point``: the solid angle of its faces over 4 pi, 1 inside a closed mesh.
+def _is_inside(mesh: Mesh, point: NDArray[np.float64]) -> bool:
+    """Whether the winding number of ``mesh`` around ``point`` is above 1/2.
 
-    van Oosterom and Strackee, The Solid Angle of a Plane Triangle, IEEE Trans. Biomed. Eng. 30:2, 1983.
+    A point on the surface is outside: rays from there into the mesh enter it, and others leave what they were never in.
     """
     lower, upper = mesh.bounds
     if (np.less(point, lower) | np.greater(point, upper)).any():
-        return 0.0
-    with np.errstate(over="ignore", invalid="ignore"):  # meshes of such sizes are refused when the tree is built
-        a, b, c = (mesh.triangles - np.asarray(point)).transpose(1, 0, 2)
-        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-        dots = [np.einsum("nk,nk->n", v, w) for v, w in ((a, b), (b, c), (c, a))]
-        denominator = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
-        volume = np.einsum("nk,nk->n", a, np.cross(b, c))
-        if ((volume == 0.0) & (denominator <= 0.0)).any():
-            # On the surface: rays from there into the mesh enter it, and others leave what they were never in.
-            return 0.0
-        return float(2.0 * np.arctan2(volume, denominator).sum() / (4.0 * np.pi))
+        return False
+    _, on = crossings_of(point, mesh.triangles, 0)
+    return not on and winding_of(point, mesh.triangles) > 0.5
 
 
 def _normals(scene: Scene, count: int) -> NDArray[np.float64]:

@@ -20,7 +20,7 @@ from renderer.scene.needs import Features
 from renderer.scene.scene import RenderSettings, Scene
 from renderer.shade.bundle import SIZE
 from renderer.shade.surface import MAX_MEDIA, SceneArrays
-from renderer.shade.tile import CUT, Film, render_tile, tile_memory
+from renderer.shade.tile import CUT, Film, Rectangle, render_tile, tile_scratch
 from renderer.shade.whitted import Settings
 from renderer.system.threads import available_threads, checked_threads, for_chunks
 from renderer.trace.closest import rays_against_blocks
@@ -108,11 +108,11 @@ class PreparedScene:
         def render_in(film: Film, first: int) -> Iterator[None]:
             x, y = first % across * TILE, first_row + first // across * TILE
             tall, wide = film.radiance.shape[:2]
-            tile = (x, y, min(x + TILE, wide), min(y + TILE, tall))
-            memory = tile_memory(self.tree.depth, settings, _bundles_in_a_row(self.tree))
-            while not render_tile(self.tree.words, arrays, settings, rows, samples, film, tile, memory):
+            tile = Rectangle(x, y, min(x + TILE, wide), min(y + TILE, tall))
+            scratch = tile_scratch(self.tree.depth, settings, _bundles_in_a_row(self.tree))
+            while not render_tile(self.tree.words, arrays, settings, rows, samples, film, tile, scratch):
                 yield
-            cut[first] = memory.state[CUT]
+            cut[first] = scratch.state[CUT]
 
         # The kernel is loaded before the picture takes its memory: without any left, LLVM ends the process.
         for _ in render_in(_film(1, 0, planes), 0):

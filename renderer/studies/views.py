@@ -77,7 +77,7 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
     the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
     only what looks to the eye. An eye on the surface is not hidden by the faces that hold it; see ``octree.visible``,
     which this calls. A face without area is not seen, and neither is one whose plane the eye lies in,
-    which no rounding tells. Raises ``ValueError`` naming the argument.
+    exactly. Raises ``ValueError`` naming the argument.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
@@ -172,13 +172,13 @@ def scan(
     """
     _expect_octree(octree)
     place = _one_place("origin", origin, octree)
-    ways = _ways(pattern)
-    reach = limits_of(distance, ways)
+    directions = _directions(pattern)
+    reach = limits_of(distance, directions)
     towards = None if normal is None else _one_direction("normal", normal)
     parts: list[Scan] = []
-    with progress_bar(len(ways), "ray", flag_argument("progress", progress)) as update:
-        for begin in range(0, len(ways), _ROWS):
-            some = ways[begin : begin + _ROWS]
+    with progress_bar(len(directions), "ray", flag_argument("progress", progress)) as update:
+        for begin in range(0, len(directions), _ROWS):
+            some = directions[begin : begin + _ROWS]
             hits = _first_hits(octree, place, some, reach[begin : begin + _ROWS], towards)
             rays = np.flatnonzero(hits.hit)
             away = hits.t[rays] * lengths_of(some[rays])
@@ -188,16 +188,16 @@ def scan(
     return Scan(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _first_hits(octree: Queries, place: Floats, ways: Floats, reach: Floats, normal: Floats | None) -> Hits:
+def _first_hits(octree: Queries, place: Floats, directions: Floats, reach: Floats, normal: Floats | None) -> Hits:
     """The first hits of rays from one place, which may lie on the surface."""
     mesh, tree = octree._built
-    rays, _ = check_rays(place, ways, 0.0, reach)
+    rays, _ = check_rays(place, directions, 0.0, reach)
     face, code, anchor = (part[0] for part in on_surface(tree, mesh, place[None], np.full(1, -1), octree.threads))
     if face >= 0:
         # rule: outer-side-of-scanner
         outer = face_normals(mesh.vertices[mesh.faces[face : face + 1]])[0] if normal is None else normal
         row = _row_on_side(octree, face, code, anchor, outer)
-        count, (face, code) = len(ways), row[[FACE, CODE]].astype(np.int64)
+        count, (face, code) = len(directions), row[[FACE, CODE]].astype(np.int64)
         leaving = Leaving(np.full(count, face), np.full(1, code), np.tile(row[ANCHOR : ANCHOR + 3], (count, 1)))
         rays = moved_off(rays, leaving, mesh, tree.scale, octree.threads)
         rays.starts[HEAD:].view(np.float64).reshape(count, ROW)[:, WAY:] = outer
@@ -246,7 +246,7 @@ def _rows_of(camera: Camera, width: int, height: int) -> Floats:
     return rows.astype(np.float64)
 
 
-def _ways(pattern: Pattern | ArrayLike | int) -> Floats:
+def _directions(pattern: Pattern | ArrayLike | int) -> Floats:
     if isinstance(pattern, Pattern):
         return check_directions("pattern", pattern.directions)
     if isinstance(pattern, Integral):  # of NumPy, too
