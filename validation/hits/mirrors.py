@@ -65,7 +65,7 @@ def check_mirrors(job: Job, rays: int | None = None, make: Callable[..., Any] = 
 
 
 def reflected(tracer: Any, origins: Floats, directions: Floats) -> tuple[int, int]:
-    """How many rays are lost within ``BOUNCES`` reflections, and how many of the others stay at a place."""
+    """The number of rays that are lost within ``BOUNCES`` reflections, and of others that stay at a place."""
     lost, began = 0, len(origins)
     while len(origins):
         kept, stays = _reflected_once(tracer, origins, directions)

@@ -282,7 +282,7 @@ def _is_beside_another(surface: Surface, start: Start) -> bool:
 
 
 def _from_edges(triangles: Floats, place: Floats) -> Floats:
-    """How far a place is from the edges of triangles (n, 3, 3), (n, 3)."""
+    """Distances (n, 3) of a place from the edges of triangles (n, 3, 3)."""
     along, way = np.roll(triangles, -1, axis=1) - triangles, place - triangles
     share = np.einsum("nex,nex->ne", along, way) / np.maximum(np.einsum("nex,nex->ne", along, along), 2.0**-1000)
     distances: Floats = np.linalg.norm(way - np.clip(share, 0.0, 1.0)[..., None] * along, axis=2)
@@ -357,7 +357,7 @@ def _is_closer(surface: Surface, face: int, start: Start, direction: Floats, nea
 
 
 def _reach(surface: Surface, first: First, direction: Floats, face: int) -> float:
-    """How far t may be from the exact one, by the slope of a face."""
+    """The largest error of t that is right, by the slope of a face."""
     normal = np.array([float(x) for x in surface.normal(face)])
     along = abs(float(normal @ direction)) / float(np.abs(normal).max())
     return _RELATIVE * float(first.t or 0) + (_ABSOLUTE * surface.largest / along if along else np.inf)

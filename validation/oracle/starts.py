@@ -38,7 +38,7 @@ _RAYS_AT_ONCE = 1024
 
 
 class Start(NamedTuple):
-    """Where a ray starts, and the face that it leaves; -1 where none is named.
+    """The start of a ray, and the face that it leaves; -1 where none is named.
 
     ``pile`` is the face at which it came upon those that coincide with ``face``: None where that is ``face``.
     """

@@ -80,7 +80,7 @@ def _gate(row: Row) -> Gate:
 
 
 def unseen(scene: Scene, size: int, **options: Any) -> tuple[int, int]:
-    """How many pixels of a picture see a surface, and how many of these see light, of which there is none."""
+    """The number of pixels of a picture that see a surface, and of these that see light, of which there is none."""
     image = render(scene, resolution=(size, size), samples=1, max_rays=UNLIMITED_RAYS, min_weight=0.0, **options)
     met = image.face >= 0
     return int(met.sum()), int((met & ~(image.radiance == 0.0).all(axis=-1)).sum())
@@ -268,7 +268,7 @@ def _worst(subject: str, asked: Sequence[tuple[Sequence[Part], float, float]], s
 
 
 def through(parts: Sequence[Part], angle: float, size: int) -> Floats:
-    """What parallel rays at an angle from above see of a sky of 1."""
+    """The radiance along parallel rays at an angle from above, under a sky of 1."""
     t = math.radians(angle)
     target = np.array([0.3, 0.0, 0.2])
     eye = target + 20.0 * np.array([math.sin(t), math.cos(t), 0.0])

@@ -125,7 +125,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def _others(mesh: Mesh, points: Floats, squares: list[tuple[Any, int]]) -> dict[str, int]:
-    """How many distances of other libraries are off by more than some ulp."""
+    """The number of distances of other libraries that are off by more than some ulp."""
     wrong = {}
     for name, peer in peers().items():
         found, most = (

@@ -1,4 +1,4 @@
-"""What holds of studies exactly: each check counts the answers that are not as they must be."""
+"""Exact laws of studies: each check counts the answers that break one."""
 
 from collections.abc import Callable
 from pathlib import Path

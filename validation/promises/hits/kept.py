@@ -1,4 +1,4 @@
-"""What copies of meshes and trees keep: every array when a mesh is moved, copied, pickled, or a tree is stored."""
+"""Copies of meshes and trees keep every array: when a mesh is moved, copied, pickled, or a tree is stored."""
 
 import copy
 import pickle

@@ -1,4 +1,4 @@
-"""What a hit tells besides its face: t, u, v, the point and the normal, by whole numbers."""
+"""Numbers of a hit besides its face: t, u, v, the point and the normal, by whole numbers."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""What the checks of pictures share: surfaces that glow and need no light, and how such pictures compare."""
+"""Scenes of surfaces that glow and need no light, and the comparison of their pictures with colours by hand."""
 
 from typing import Any
 

@@ -73,14 +73,14 @@ _DARK: Color = (0.0, 0.25, 0.5)
 
 
 def _film_x() -> Floats:
-    """Where rays in a straight line would meet the floor."""
+    """The x at which rays in a straight line would meet the floor."""
     width = _SIZE[0]
     across: Floats = (np.arange(width) + 0.5 - width / 2) / width * np.hypot(1.0, _SLANT)
     return across
 
 
 def _shift(slabs: list[tuple[str, float, float]], height: float) -> float:
-    """How much further along x a ray of the slant meets the floor than it would in a straight line."""
+    """The way along x from where a straight ray of the slant would meet the floor to where this one does."""
     borders = sorted([(top, name, True) for name, top, _ in slabs] + [(low, name, False) for name, _, low in slabs])[
         ::-1
     ]

@@ -92,7 +92,7 @@ def _visits(root: _Octant, origin: Floats, direction: Floats, t_max: float) -> t
 
 
 def _entry(octant: _Octant, origin: Floats, direction: Floats) -> float:
-    """Where a ray enters a box, from 0 on; infinite where it does not."""
+    """The t at which a ray enters a box, from 0 on; infinite where it does not."""
     ways = (octant.box - origin) / direction
     first, last = max(ways.min(axis=0).max(), 0.0), ways.max(axis=0).min()
     return float(first if first <= last else np.inf)

@@ -68,7 +68,7 @@ def _grid_box(count: int) -> Mesh:
 
 
 def _told(faces: list[Face]) -> tuple[int, bool]:
-    """How often tetrahedra wind around the origin, and whether it lies on a face of one."""
+    """The winding number of tetrahedra around the origin, and whether it lies on a face of one."""
     winding, on = 0, False
     for k in range(0, len(faces), 4):
         volumes = [volume(face) for face in faces[k : k + 4]]

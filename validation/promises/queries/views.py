@@ -1,4 +1,4 @@
-"""What points see of each other around a ball: everything from its centre, nothing through it."""
+"""Visibility around a ball: everything from its centre, nothing through it."""
 
 from typing import Any
 
