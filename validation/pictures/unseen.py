@@ -20,6 +20,7 @@ from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import UNLIMITED_RAYS, Floor, Scene, SceneObject
 from validation.gates import Gate
 from validation.job import Job
+from validation.meshes import mirror_bodies
 
 Floats = NDArray[np.float64]
 Part = tuple[Mesh, Material]
@@ -38,7 +39,6 @@ _EYES = ((2.3, 3.0, 4.1), (-1.7, 5.0, 0.4), (0.0, 4.0, 4.0))
 _FLOOR = Floor(min=(-99.0, -99.0), max=(99.0, 99.0), materials=("dark",), squares=(3, 3))
 # Heights of the ground: a third has no float64, so that the same plane has many roundings.
 _HEIGHTS = (0.0, 1e3 / 3.0)
-_TURN = np.linalg.qr(np.array([[2.0, 3.0, 1.0], [-1.0, 2.0, 5.0], [4.0, -1.0, 1.0]]))[0]
 
 
 class Row(NamedTuple):
@@ -95,20 +95,6 @@ def scene_of(parts: Sequence[Part], camera: Any, **more: Any) -> Scene:
 
 
 # ------------------------------------------------------------------------------------------------- closed mirrors
-
-
-def mirror_bodies() -> dict[str, Mesh]:
-    """Convex bodies, to be seen from their middle."""
-    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], np.float64)
-    tetrahedron = Mesh(corners, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
-    rim = [[0.0, 0.0], [1.0, 0.0], [math.cos(math.pi / 3.0), math.sin(math.pi / 3.0)]]
-    prism = Mesh(
-        [[x, y, z] for z in (0.0, 1.0) for x, y in rim],
-        [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]],
-    )
-    cuboid = box((0.0, 0.0, 0.0), (1.0, 1.5, 0.75))
-    turned = Mesh(cuboid.vertices @ _TURN.T, cuboid.faces)
-    return {"tetrahedron": tetrahedron, "prism of 60 degrees": prism, "cube": box(), "turned box": turned}
 
 
 def _mirrors(name: str, mesh: Mesh, size: int) -> Row:

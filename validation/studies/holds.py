@@ -27,6 +27,7 @@ from renderer.studies import (
     tregenza,
     visible_faces,
 )
+from validation.meshes import tetrahedron
 from validation.oracle.exact import closest_hits
 from validation.oracle.starts import Surface
 from validation.studies.bodies import FAR, bodies, street, terrain, touching, town
@@ -242,9 +243,9 @@ def places_of_a_grid() -> Asked:
 def edges_from_both_sides() -> Asked:
     """Points of a tetrahedron's edges see its middle, each other, and what is before one of their two faces."""
     rng = np.random.default_rng(_SEED)
-    corners = np.array([[0.1, 0.2, 0.3], [1.3, 0.1, 0.2], [0.4, 1.7, 0.1], [0.3, 0.4, 1.1]])
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    octree, middle = Octree(corners, faces), corners.mean(axis=0)
+    mesh = tetrahedron()
+    corners, faces = mesh.vertices, mesh.faces
+    octree, middle = Octree.from_mesh(mesh), corners.mean(axis=0)
     normals = octree.mesh.face_normals()
     right = []
     for i, j in np.argwhere(np.triu(np.ones((4, 4)), 1)):

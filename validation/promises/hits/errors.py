@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.meshes import squares
 from validation.oracle.distance import way_from
 from validation.promises.row import row
-from validation.promises.squares import squares
 
 # Powers of two, of sizes and of t: usual, and denormal.
 _SIZES = (0, 100, -330)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from validation.meshes import loose
 from validation.promises.row import row
 
 _JUDGE = "meshes by hand"
@@ -137,7 +138,7 @@ def _digits() -> NDArray[np.bool_]:
     for k in range(len(vertices)):
         moved = vertices.copy()
         moved[k, 2] = 1.0 / 3.0
-        octree = Octree.from_mesh(Mesh(moved, np.arange(len(moved), dtype=np.int32).reshape(-1, 3)))
+        octree = Octree.from_mesh(loose(moved))
         hits = octree.closest_hit(moved[k] + [0.0, 0.0, 2.0], [0.0, 0.0, -1.0])
         kept.append(hits.face == k // 3 and abs(hits.t - 2.0) <= 2.0**-51)
     return np.array([*kept, *_last_digit()])
@@ -148,6 +149,6 @@ def _last_digit() -> list[bool]:
     x = np.repeat(np.arange(_MANY, dtype=np.float64), 3)
     vertices = np.stack([x, np.tile([0.0, 1.0, 0.0], _MANY), np.tile([0.0, 0.0, 1.0], _MANY)], 1)
     vertices[-3:, 0] += 1.0 / 3.0
-    octree = Octree(vertices, np.arange(3 * _MANY).reshape(-1, 3))
+    octree = Octree.from_mesh(loose(vertices))
     hits = octree.closest_hit([_MANY + 1.0, 0.25, 0.25], [-1.0, 0.0, 0.0])
     return [bool(hits.t == _MANY + 1.0 - vertices[-1, 0]), bool(hits.face == _MANY - 1)]

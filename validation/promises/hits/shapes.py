@@ -7,6 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.octree import BruteForce, Octree
+from validation.meshes import loose
 from validation.promises.refused import refuses
 from validation.promises.row import row
 
@@ -23,10 +24,9 @@ _ROWS, _COLUMNS = 5, 7
 
 def check_shapes(rng: Generator) -> list[dict[str, Any]]:
     """Rays in rows and columns, with bounds and faces of their own, beside the same rays one after another."""
-    corners = (rng.normal(size=(_FACES, 1, 3)) + rng.normal(size=(_FACES, 3, 3))).reshape(-1, 3)
-    faces = np.arange(3 * _FACES).reshape(-1, 3)
+    mesh = loose(rng.normal(size=(_FACES, 1, 3)) + rng.normal(size=(_FACES, 3, 3)))
     rays, near, refused = [], [], []
-    for tracer in (Octree(corners, faces), BruteForce(corners, faces)):
+    for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
         for of_origins, of_directions in _SHAPES:
             for order in _ORDERS:
                 origins = np.asarray(rng.normal(size=(*of_origins, 3)), order=order)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.trace.layout import Tree
+from validation.meshes import loose
 from validation.promises import levels
 from validation.promises.row import row
 
@@ -41,9 +42,8 @@ def _octrees(rng: Generator) -> Iterator[Octree]:
         # A part of few faces, which is a leaf beside subtrees of thousands.
         corners[1:4] += 100.0 * (count > 8192)
         single = corners.astype(np.float32).astype(np.float64)
-        faces = np.arange(3 * count).reshape(-1, 3)
         split: Literal["midpoint", "sah"] = "midpoint" if leaf_size == 8 else "sah"
-        octree = Octree(single.reshape(-1, 3), faces, split=split, leaf_size=leaf_size)
+        octree = Octree.from_mesh(loose(single), split=split, leaf_size=leaf_size)
         yield octree
         octree.refit((3.0 * rng.permutation(corners) + 1.0).reshape(-1, 3))
         yield octree

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from renderer.inspect.tree_boxes import Visit, boxes_at, visited
 from renderer.inspect.tree_boxes import levels as count_levels
 from renderer.octree import Octree
+from validation.meshes import loose
 from validation.promises import levels
 from validation.promises.row import row
 
@@ -36,7 +37,7 @@ def check_openings(rng: Generator, count: int) -> list[dict[str, Any]]:
     for unit in (1.0, _TINY):
         corners = rng.normal(size=(_FACES, 1, 3)) + 0.2 * rng.normal(size=(_FACES, 3, 3))
         corners[::2, :, 0] += 12.0
-        octree = Octree(unit * corners.reshape(-1, 3), np.arange(3 * _FACES).reshape(-1, 3))
+        octree = Octree.from_mesh(loose(unit * corners))
         root = _root(octree, corners, unit)
         shown += _shown(octree, root, unit)
         for origin, direction in _rays(rng, count):

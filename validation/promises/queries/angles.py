@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from validation.meshes import loose
 from validation.oracle.distance import dot
 from validation.promises.queries.whole import Face, heaps, relative, volume
 from validation.promises.row import row
@@ -30,9 +31,8 @@ def check_angles(rng: Generator) -> list[dict[str, Any]]:
     for faces, points in heaps(rng):
         # Three of four faces: open.
         some = faces[np.arange(len(faces)) % 4 != 0]
-        mesh = Mesh(some.reshape(-1, 3), np.arange(3 * len(some), dtype=np.int32).reshape(-1, 3))
         exact = np.array([turns(point, some) for point in points])
-        octree = Octree.from_mesh(mesh)
+        octree = Octree.from_mesh(loose(some))
         for tolerance in (0.0, 1e-9):
             off = np.abs(octree.winding_number(points, tolerance) - exact)
             kept.append(off <= tolerance + _OF_A_FACE * len(some))
@@ -115,4 +115,4 @@ def _lidless(axis: int, cuts: int = 3) -> Mesh:
         a, b, c = np.moveaxis(faces, 1, 0)
         ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
         faces = np.concatenate([np.stack(three, 1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
-    return Mesh(faces.reshape(-1, 3), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3))
+    return loose(faces)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.meshes import integer_box, loose
 from validation.oracle.distance import cross, dot
 from validation.promises.queries.whole import Corner, Face, heaps, relative, volume
 from validation.promises.row import row
-from validation.promises.squares import squares
 
 Floats = NDArray[np.float64]
 # Squares along each side of a box, and points beside its sides.
@@ -23,7 +23,7 @@ def check_inside(rng: Generator) -> list[dict[str, Any]]:
     """Tetrahedra that overlap, turned either way, some of them flat, by both rules, with and without surface."""
     found = []
     for faces, points in heaps(rng):
-        mesh = Mesh(faces.reshape(-1, 3), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3))
+        mesh = loose(faces)
         told = [_told(relative(point, faces)[0]) for point in points]
         winding, on = (np.array(one) for one in zip(*told, strict=True))
         for asked in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
@@ -43,7 +43,7 @@ def _slabs(rng: Generator) -> NDArray[np.bool_]:
     """Boxes of which each side is a grid, so that nodes of the tree are flat, and points beside their sides."""
     kept = []
     for axis, turn in product(range(3), (1.0, -1.0)):
-        mesh = _grid_box(_SQUARES)
+        mesh = integer_box(_SQUARES)
         size = np.roll([8.25, _SQUARES, _SQUARES], axis) / _SQUARES
         start = np.roll([1.75, 0.0, 0.0], axis)
         vertices = turn * (mesh.vertices * size + start)
@@ -54,17 +54,6 @@ def _slabs(rng: Generator) -> NDArray[np.bool_]:
         points[:, axis] = np.where(end, 10.0, 1.75) + off
         kept.append(octree.contains(turn * points) == (off > 0.0) ^ (end == 1))
     return np.concatenate(kept)
-
-
-def _grid_box(count: int) -> Mesh:
-    """The box [0, count]^3 of unit squares."""
-    row, column = np.divmod(np.arange(count**2), count)
-    u, v = row + np.array([[0], [1], [1], [0]]), column + np.array([[0], [0], [1], [1]])
-    sides = []
-    for axis, end in product(range(3), (0, 1)):
-        corners = np.roll(np.stack([np.full(u.shape, count * end), u, v], axis=-1), axis, axis=-1)
-        sides.append(np.moveaxis(corners, 0, 1)[:, :: 1 if end else -1])
-    return squares(np.concatenate(sides).astype(np.float64))
 
 
 def _told(faces: list[Face]) -> tuple[int, bool]:

@@ -17,6 +17,7 @@ from renderer.kernels.simd import pointer
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.points.point import Point
+from validation.meshes import loose
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -56,8 +57,8 @@ def check_series(rng: Generator) -> list[dict[str, Any]]:
 def _series_kept(rng: Generator, count: int, unlike: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Of eight groups of one kind: points around each in random directions, and the octants that they are."""
     body = _body(rng, count, unlike)
-    reach, mesh = np.linalg.norm(body, axis=2), _mesh(body[None] + _places()[:, None, None])
-    octree = Octree.from_mesh(mesh, leaf_size=32)
+    reach, mesh = np.linalg.norm(body, axis=2), loose(body[None] + _places()[:, None, None])
+    octree = Octree.fromloose(mesh, leaf_size=32)
     ways = rng.normal(size=(8, len(_RADII), 3, 3))
     ways /= np.linalg.norm(ways, axis=3, keepdims=True)
     away = np.array(_RADII)[:, None] * reach.max()
@@ -98,7 +99,7 @@ def _bounds(rng: Generator) -> list[dict[str, Any]]:
 def _bounds_kept(rng: Generator, copies: int, leaf_size: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Of such groups of one kind which bounds are right, and which series are asked as they should."""
     mesh, points, away = _in_line(rng, copies)
-    octree = Octree.from_mesh(mesh, leaf_size=leaf_size)
+    octree = Octree.fromloose(mesh, leaf_size=leaf_size)
     moments, scale, found = moments_of(octree.tree, 1), octree.tree.scale, np.zeros((len(points), 3))
     _see_root(moments, scale * points, np.full(len(points), 1e9), found)
     error = np.abs(winding(points, mesh.triangles) - found[:, 0])
@@ -128,7 +129,7 @@ def _in_line(rng: Generator, copies: int) -> tuple[Mesh, Floats, Floats]:
     faces += _places()[:, None, None]
     away = np.broadcast_to(1.0 / _NEARNESS, (8, len(_NEARNESS)))
     points = _places()[:, None] + away[..., None] * axis[:, None]
-    return _mesh(faces), points.reshape(-1, 3), away.ravel()
+    return loose(faces), points.reshape(-1, 3), away.ravel()
 
 
 @kernel
@@ -178,8 +179,3 @@ def _body(rng: Generator, count: int, unlike: float) -> Floats:
 def _places() -> Floats:
     """The centres of eight groups, (8, 3)."""
     return _APART * np.array(list(np.ndindex(2, 2, 2)), np.float64)
-
-
-def _mesh(faces: Floats) -> Mesh:
-    corners = faces.reshape(-1, 3)
-    return Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Mesh, Octree
-from renderer.mesh.shapes import box, grid, icosphere, lattice_faces
+from renderer.mesh.shapes import box, grid, icosphere
 from validation.hits.rays import RayFamily, float32_exact, leak_rays
+from validation.meshes import integer_box
 from validation.oracle.exact import FLOAT64_ROUNDOFF
 from validation.oracle.rounding import RayView
 from validation.stability.cases.case import ExtremeCase, Outcome
@@ -75,9 +76,9 @@ def _integer_box(quick: bool) -> Outcome:
     def say(t: Floats, face: Ints) -> str:
         return f"t == 1 on {(t == 1).sum():,}, |t - 1| <= {np.abs(t - 1).max():.0e}"
 
-    holds, equal, largest, texts = True, 0, 0.0, []
+    whole, holds, equal, largest, texts = integer_box(), True, 0, 0.0, []
     for shift in (0.0, 2.0**20):
-        mesh, rays = _unit_quad_box(8, shift), ray_batch(origins + shift, directions)
+        mesh, rays = Mesh(whole.vertices + shift, whole.faces), ray_batch(origins + shift, directions)
         hits = closest(Octree.from_mesh(mesh), rays)
         errors = against_exact(mesh, rays, hits)
         holds &= as_exact(errors) and errors.hits == count and bool((hits.t[unrounded] == 1).all())
@@ -85,20 +86,6 @@ def _integer_box(quick: bool) -> Outcome:
         texts.append(embree_says(mesh, rays, say))
     ours = f"t == 1 on {equal:,} of {2 * count:,}, all {2 * unrounded.sum():,} unrounded; |t - 1| <= {largest:.1e}"
     return Outcome(ours, holds, *(f"{a}; shifted {b}" for a, b in zip(*texts, strict=True)))
-
-
-def _unit_quad_box(side: int, shift: float) -> Mesh:
-    """The surface of [0, side]^3 + shift in unit quads of two faces with shared vertices."""
-    i, j = np.divmod(np.arange((side + 1) ** 2), side + 1)
-    points: list[Floats] = []
-    faces = []
-    for axis in range(3):
-        for level in (0, side):
-            faces.append(lattice_faces(side + 1, side + 1) + len(points) * len(i))
-            points.append(np.roll(np.stack([np.full(len(i), level), i, j], axis=1), axis, axis=1))
-    vertices, place = np.unique(np.concatenate(points), axis=0, return_inverse=True)
-    corners = place.reshape(-1)[np.concatenate(faces)].astype(np.int32)
-    return Mesh(vertices + shift, corners)
 
 
 def _grid_vertices(quick: bool) -> Outcome:

@@ -10,7 +10,7 @@ import numpy as np
 from renderer import Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
 from validation.stability.cases.case import ExtremeCase, Outcome
-from validation.stability.cases.judgement import SEED, both
+from validation.stability.cases.judgement import SEED
 from validation.stability.cases.queries.contacts import rays_of, wrong_rays
 from validation.stability.cases.queries.inside import points_at, wrong_answers
 from validation.stability.cases.queries.nearest import fan
@@ -66,7 +66,7 @@ def hard_solids() -> dict[str, Mesh]:
     return {
         "far away": Mesh(corners + 1e9, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
         "lines and points": Mesh(cube.vertices, np.concatenate([cube.faces, [[0, 0, 1], [2, 2, 2], [5, 0, 5]]])),
-        "three times": both(cube, both(cube, cube)),
+        "three times": Mesh.concatenate([cube, cube, cube]),
         "slivers": Mesh(ball.vertices * [1, 1e-4, 1e-8], ball.faces),
     }
 

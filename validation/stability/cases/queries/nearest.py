@@ -6,7 +6,7 @@ from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
 from validation.oracle.distance import nearest, rational, ulps_from_root
 from validation.stability.cases.case import ExtremeCase, Outcome
-from validation.stability.cases.judgement import SEED, Floats, both
+from validation.stability.cases.judgement import SEED, Floats
 
 # The exact distance, rounded: half an ulp, and as little more as twice the digits leave.
 _ULPS = 0.51
@@ -19,8 +19,8 @@ def hard_meshes() -> dict[str, Mesh]:
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     return {
         "lines and points": lines,
-        "twice": both(cube, cube),
-        "touching": both(cube, box((1, -1, -1), (3, 1, 1))),
+        "twice": Mesh.concatenate([cube, cube]),
+        "touching": Mesh.concatenate([cube, box((1, -1, -1), (3, 1, 1))]),
         "slivers": Mesh(ball.vertices * [1, 1e-4, 1e-8], ball.faces),
         "far away": Mesh(corners + 1e9, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
     }
