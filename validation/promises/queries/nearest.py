@@ -48,16 +48,16 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
     """Distances, faces and nearest points."""
     heap, shell = [], []
     for faces, points in heaps(rng):
-        for asked in (Octree.fromloose(loose(faces)), BruteForce.fromloose(loose(faces))):
+        for asked in (Octree.from_mesh(loose(faces)), BruteForce.from_mesh(loose(faces))):
             heap.append(_kept(asked, faces, points[::4]))
     # So near a corner of a face so large that the way vanishes in units of the face.
     heap.append(
-        _kept(Octree.fromloose(loose(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
+        _kept(Octree.from_mesh(loose(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
     )
-    heap.append(_kept(Octree.fromloose(loose(_LEANING)), _LEANING, _BEFORE + np.spacing(_BEFORE) * _steps(rng)))
+    heap.append(_kept(Octree.from_mesh(loose(_LEANING)), _LEANING, _BEFORE + np.spacing(_BEFORE) * _steps(rng)))
     for _ in range(_SHELLS):
         faces = _shell(rng)
-        shell.append(_kept(Octree.fromloose(loose(faces)), faces, np.zeros((1, 3))))
+        shell.append(_kept(Octree.from_mesh(loose(faces)), faces, np.zeros((1, 3))))
     return [
         row("the nearest face and its distance, whatever the sizes of coordinates", _JUDGE, np.concatenate(heap)),
         row("the nearest of faces that are as near but for some ulp", _JUDGE, np.concatenate(shell)),
@@ -70,7 +70,7 @@ def _beyond(rng: Generator) -> NDArray[np.bool_]:
     """Points above a face, another is far away, with limits near their heights: one a point, and one for all."""
     heights = rng.uniform(1.0, 2.0, _PLACES)
     points = np.stack([np.full(_PLACES, 0.25), np.full(_PLACES, 0.25), heights], 1)
-    octree, kept = Octree.fromloose(loose(np.stack([_CORNER, _CORNER + 1e3]))), []
+    octree, kept = Octree.from_mesh(loose(np.stack([_CORNER, _CORNER + 1e3]))), []
     for limit in (heights * rng.choice([0.5, 0.999, 1.001], _PLACES), *rng.uniform(1.0, 2.0, 3)):
         found = octree.closest_point(points, limit)
         told = [~np.isnan(found.u), ~np.isnan(found.v), ~np.isnan(found.points).any(axis=1), found.face == 0]
@@ -131,7 +131,7 @@ def _edges_kept(rng: Generator) -> NDArray[np.bool_]:
     away = 2.0 ** rng.uniform(*_AWAY, (_WEDGES, _PLACES, 1)) * long[:, None]
     points = a[:, None] + share * (b - a)[:, None] + away * out[:, None]
     # No other wedge comes so near.
-    found = Octree.fromloose(loose(faces)).closest_point(points)
+    found = Octree.from_mesh(loose(faces)).closest_point(points)
     kept: NDArray[np.bool_] = (found.face == 2 * np.arange(_WEDGES)[:, None]).ravel()
     return kept
 

@@ -58,7 +58,7 @@ def _series_kept(rng: Generator, count: int, unlike: float) -> tuple[NDArray[np.
     """Of eight groups of one kind: points around each in random directions, and the octants that they are."""
     body = _body(rng, count, unlike)
     reach, mesh = np.linalg.norm(body, axis=2), loose(body[None] + _places()[:, None, None])
-    octree = Octree.fromloose(mesh, leaf_size=32)
+    octree = Octree.from_mesh(mesh, leaf_size=32)
     ways = rng.normal(size=(8, len(_RADII), 3, 3))
     ways /= np.linalg.norm(ways, axis=3, keepdims=True)
     away = np.array(_RADII)[:, None] * reach.max()
@@ -99,7 +99,7 @@ def _bounds(rng: Generator) -> list[dict[str, Any]]:
 def _bounds_kept(rng: Generator, copies: int, leaf_size: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Of such groups of one kind which bounds are right, and which series are asked as they should."""
     mesh, points, away = _in_line(rng, copies)
-    octree = Octree.fromloose(mesh, leaf_size=leaf_size)
+    octree = Octree.from_mesh(mesh, leaf_size=leaf_size)
     moments, scale, found = moments_of(octree.tree, 1), octree.tree.scale, np.zeros((len(points), 3))
     _see_root(moments, scale * points, np.full(len(points), 1e9), found)
     error = np.abs(winding(points, mesh.triangles) - found[:, 0])
