@@ -19,8 +19,8 @@ from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits.bodies import Body, bodies
 from validation.job import Job
-from validation.oracle.distance import cross, difference, dot, rational
 from validation.oracle.starts import First, Start, Surface, stopped
+from validation.oracle.vectors import cross, difference, dot, rational, whole_vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -241,7 +241,7 @@ def judged_at_once(surface: Surface, batch: Batch) -> tuple[Bools, Bools]:
         keys = np.concatenate([signs, batch.sides[rows, None]], axis=1)
         _, one, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         for k, row in enumerate(rows[one]):
-            some, way = group.ravel() == k, _whole(batch.directions[row])
+            some, way = group.ravel() == k, whole_vector(batch.directions[row])
             stops = _stops(surface, regions, start, (way, int(batch.sides[row]), batch.through))
             t, face, here = batch.t[rows[some]], batch.face[rows[some]], at[some]
             stopped_right = (t == 0.0) & np.isin(face, [stop for stop in stops if stop is not None])
@@ -304,16 +304,9 @@ def exact_signs(normals: Sequence[tuple[int, int, int]], directions: Floats) -> 
     sizes = np.abs(directions) @ np.abs(rounded).T
     signs = np.sign(products).astype(np.int8)
     for ray, k in zip(*np.nonzero(~(np.abs(products) > _SIGN_ROUNDINGS * sizes + 2.0**-1000)), strict=True):
-        value = dot(normals[k], _whole(directions[ray]))
+        value = dot(normals[k], whole_vector(directions[ray]))
         signs[ray, k] = (value > 0) - (value < 0)
     return signs
-
-
-def _whole(direction: Floats) -> tuple[int, int, int]:
-    ratios = [x.as_integer_ratio() for x in direction.tolist()]
-    unit = max(bottom for _, bottom in ratios)
-    x, y, z = (top * (unit // bottom) for top, bottom in ratios)
-    return x, y, z
 
 
 def is_right(

@@ -11,7 +11,8 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from validation.job import Job
-from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.oracle.distance import nearest, ulps_from_root
+from validation.oracle.vectors import rational
 from validation.queries.peers import OPEN3D, peers
 from validation.queries.solids import solids
 

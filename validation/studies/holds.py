@@ -245,7 +245,7 @@ def edges_from_both_sides() -> Asked:
     rng = np.random.default_rng(_SEED)
     mesh = tetrahedron()
     corners, faces = mesh.vertices, mesh.faces
-    octree, middle = Octree.from_mesh(mesh), corners.mean(axis=0)
+    octree, middle = Octree(corners, faces), corners.mean(axis=0)
     normals = octree.mesh.face_normals()
     right = []
     for i, j in np.argwhere(np.triu(np.ones((4, 4)), 1)):

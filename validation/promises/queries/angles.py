@@ -1,6 +1,7 @@
 """Winding numbers of open meshes, near their faces too: by solid angles in whole numbers, and on which side of 1/2."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.meshes import loose
-from validation.oracle.distance import dot
-from validation.promises.queries.whole import Face, heaps, relative, volume
+from validation.oracle.vectors import dot, relative, volume
+from validation.promises.queries.heaps import heaps
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -57,10 +58,10 @@ def _beside(rng: Generator) -> NDArray[np.bool_]:
 
 def turns(point: Floats, triangles: Floats) -> float:
     """The winding number of triangles (F, 3, 3) around a point: by van Oosterom and Strackee, rounded at the end."""
-    return math.fsum(_angle(face) for face in relative(point, triangles)[0]) / (2.0 * math.pi)
+    return math.fsum(_angle(face) for face in relative(point.tolist(), triangles.tolist())[0]) / (2.0 * math.pi)
 
 
-def _angle(face: Face) -> float:
+def _angle(face: Sequence[Sequence[int]]) -> float:
     """Half the solid angle of a face from the origin; 0 in its plane."""
     over = volume(face)
     if over == 0:

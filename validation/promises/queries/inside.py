@@ -1,5 +1,6 @@
 """Points in, on and beside closed solids whose coordinates are of all sizes: each solid alone, in whole numbers."""
 
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -10,8 +11,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
 from validation.meshes import integer_box, loose
-from validation.oracle.distance import cross, dot
-from validation.promises.queries.whole import Corner, Face, heaps, relative, volume
+from validation.oracle.vectors import cross, dot, relative, volume
+from validation.promises.queries.heaps import heaps
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -24,7 +25,7 @@ def check_inside(rng: Generator) -> list[dict[str, Any]]:
     found = []
     for faces, points in heaps(rng):
         mesh = loose(faces)
-        told = [_told(relative(point, faces)[0]) for point in points]
+        told = [_told(relative(point, faces.tolist())[0]) for point in points.tolist()]
         winding, on = (np.array(one) for one in zip(*told, strict=True))
         for asked in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
             found += [
@@ -56,7 +57,7 @@ def _slabs(rng: Generator) -> NDArray[np.bool_]:
     return np.concatenate(kept)
 
 
-def _told(faces: list[Face]) -> tuple[int, bool]:
+def _told(faces: list[list[list[int]]]) -> tuple[int, bool]:
     """The winding number of tetrahedra around the origin, and whether it lies on a face of one."""
     winding, on = 0, False
     for k in range(0, len(faces), 4):
@@ -67,13 +68,13 @@ def _told(faces: list[Face]) -> tuple[int, bool]:
     return winding, on
 
 
-def lies_on(face: Face) -> bool:
+def lies_on(face: Sequence[Sequence[int]]) -> bool:
     """Whether the origin, in a face's plane, lies on the face, which may be a line or a point.
 
     Within, it is to the left of all sides or to the right of all. On the line of such a face, coordinates tell.
     """
     a, b, c = face
-    sides: list[Corner] = [cross(a, b), cross(b, c), cross(c, a)]
+    sides = [cross(a, b), cross(b, c), cross(c, a)]
     if any(any(side) for side in sides):
         return all(dot(sides[i], sides[i - 1]) >= 0 for i in range(3))
     return all(min(x) <= 0 <= max(x) for x in zip(a, b, c, strict=True))

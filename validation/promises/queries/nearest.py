@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from renderer.octree import BruteForce, Octree
 from validation.meshes import loose
-from validation.oracle.distance import ulps_from_root
-from validation.promises.queries.whole import heaps, relative, squared_distance
+from validation.oracle.distance import squared_distance, ulps_from_root
+from validation.oracle.vectors import relative
+from validation.promises.queries.heaps import heaps
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,7 @@ _AWAY = -41.5, -39.0
 _SHELLS, _FACES = 20, 48
 _CORNER = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 _ABOVE = np.array([0.0, 0.0, 1.0])
+_ORIGIN = (0, 0, 0)
 _LARGE, _LEAST = 2.0**59 * np.stack([_CORNER, _CORNER + _ABOVE]), 2.0**-1074
 
 # A large face and a small one nearly in its plane, and a point before both: their distances differ by an ulp, and the
@@ -105,8 +107,8 @@ def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[
 
 def _nearest(point: Floats, faces: Floats) -> tuple[Fraction, int]:
     """The least squared distance, and the lowest face that has it."""
-    whole, unit = relative(point, faces)
-    squares = [squared_distance(face) for face in whole]
+    whole, unit = relative(point.tolist(), faces.tolist())
+    squares = [squared_distance(_ORIGIN, face) for face in whole]
     least = min(squares)
     return least / unit**2, squares.index(least)
 
@@ -139,6 +141,6 @@ def _edges_kept(rng: Generator) -> NDArray[np.bool_]:
 def _shell(rng: Generator) -> Floats:
     """Faces that are all at a distance of 1 from the origin, but for rounding: at corners, at edges and within."""
     faces = rng.normal(size=(_FACES, 3, 3)) + 2.0 * rng.normal(size=(_FACES, 1, 3))
-    whole, unit = relative(np.zeros(3), faces)
-    distance: Floats = np.sqrt([float(squared_distance(face) / unit**2) for face in whole])
+    whole, unit = relative(_ORIGIN, faces.tolist())
+    distance: Floats = np.sqrt([float(squared_distance(_ORIGIN, face) / unit**2) for face in whole])
     return faces / distance[:, None, None]

@@ -6,8 +6,8 @@ from numpy.random import Generator
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
 from validation.meshes import loose
-from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
+from validation.oracle.vectors import rational
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import SEED, Floats
 

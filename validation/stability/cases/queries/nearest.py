@@ -4,7 +4,8 @@ import numpy as np
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
-from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.oracle.distance import nearest, ulps_from_root
+from validation.oracle.vectors import rational
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import SEED, Floats
 
