@@ -21,6 +21,7 @@ from renderer.scene.scene import UNLIMITED_RAYS, Floor, Scene, SceneObject
 from validation.gates import Gate
 from validation.job import Job
 from validation.meshes import mirror_bodies
+from validation.pictures.explain.optics import fresnel
 
 Floats = NDArray[np.float64]
 Part = tuple[Mesh, Material]
@@ -202,8 +203,7 @@ def passed(angle: float, *indices: float) -> float:
     share, sine = 1.0, math.sin(math.radians(angle)) * indices[0]
     for n1, n2 in pairwise(indices):
         c1, c2 = math.sqrt(1.0 - (sine / n1) ** 2), math.sqrt(1.0 - (sine / n2) ** 2)
-        s, p = (n1 * c1 - n2 * c2) / (n1 * c1 + n2 * c2), (n1 * c2 - n2 * c1) / (n1 * c2 + n2 * c1)
-        share *= 1.0 - (s * s + p * p) / 2.0
+        share *= 1.0 - fresnel(c1, c2, n1, n2)
     return share
 
 

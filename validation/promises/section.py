@@ -16,10 +16,8 @@ from validation.promises.hits.builds import check_builds
 from validation.promises.hits.counts import check_counts
 from validation.promises.hits.errors import check_errors
 from validation.promises.hits.files import check_files
-from validation.promises.hits.formats import check_formats
 from validation.promises.hits.kept import check_kept
 from validation.promises.hits.limits import check_limits
-from validation.promises.hits.meshes import check_meshes
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
 from validation.promises.hits.planes import check_planes
@@ -73,9 +71,7 @@ HITS: dict[str, Callable[[], Rows]] = {
     "trees": lambda: check_trees(_random()),
     "builds": lambda: check_builds(_random()),
     "counts": lambda: check_counts(_random()),
-    "files": check_files,
-    "formats": lambda: check_formats(_random()),
-    "changed meshes": check_meshes,
+    "mesh files": lambda: check_files(_random()),
     "kept arrays": lambda: check_kept(_random()),
     "shapes of rays": lambda: check_shapes(_random()),
     "refusals": lambda: check_refusals(_random()),

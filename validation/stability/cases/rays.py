@@ -12,6 +12,7 @@ from validation.hits.rays import RayFamily, float32_exact, leak_rays
 from validation.meshes import integer_box
 from validation.oracle.exact import FLOAT64_ROUNDOFF
 from validation.oracle.rounding import RayView
+from validation.promises.refused import refused
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import (
     FIRST_FACE,
@@ -175,11 +176,8 @@ def _bad_rays(quick: bool) -> Outcome:
         else:
             arrays[argument][row, 1] = value
         for query in (octree.closest_hit, octree.any_hit):
-            try:
-                query(arrays["origins"], arrays["directions"])
-                caught.append(False)
-            except ValueError as error:
-                caught.append(str(error).startswith(f"{argument}: ") and str(error).endswith(f"in row {row}"))
+            said = refused(query, arrays["origins"], arrays["directions"]) or ""
+            caught.append(said.startswith(f"{argument}: ") and said.endswith(f"in row {row}"))
     return Outcome(of(caught, "rejected by argument and row"), all(caught))
 
 
