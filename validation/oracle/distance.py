@@ -3,8 +3,11 @@
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import TypeVar
 
-from validation.oracle.vectors import Number, cross, difference, dot
+from validation.oracle.vectors import cross, difference, dot
+
+Number = TypeVar("Number", int, Fraction)
 
 
 def way_to(point: Sequence[Number], triangle: Sequence[Sequence[Number]]) -> list[Fraction]:

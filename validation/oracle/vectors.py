@@ -1,12 +1,13 @@
-"""Vectors of whole or rational numbers: products, differences, signs, and floats as the exact numbers that they are."""
+"""Vectors of whole, rational or decimal numbers: products, differences, signs, and floats as exact numbers."""
 
 from collections.abc import Iterable, Sequence
+from decimal import Decimal
 from fractions import Fraction
 from math import gcd
 from typing import TypeVar
 
 Whole = tuple[int, int, int]
-Number = TypeVar("Number", int, Fraction)
+Number = TypeVar("Number", int, Fraction, Decimal)
 
 
 def rational(rows: Sequence[Sequence[float]]) -> list[list[Fraction]]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from renderer import Mesh, Octree
 from renderer.mesh.shapes import box, grid, icosphere
 from validation.hits.rays import RayFamily, float32_exact, leak_rays
+from validation.hits.watertight import leaks
 from validation.meshes import integer_box
 from validation.oracle.exact import FLOAT64_ROUNDOFF
 from validation.oracle.rounding import RayView
@@ -46,12 +47,12 @@ def _leaks(kind: int) -> Callable[[bool], Outcome]:
         mesh = float32_mesh(icosphere(5))
         rays = leak_rays(mesh.vertices, mesh.faces, 100_000 if quick else 1_000_000, SEED)[kind]
         octree = Octree.from_mesh(mesh)
-        leaks = ~closest(octree, rays).hit | ~octree.any_hit(rays.origins, rays.directions)
+        lost = leaks(octree, rays)
 
         def say(t: Floats, face: Ints) -> str:
             return of(face < 0, "leak")
 
-        return Outcome(f"{leaks.sum():,} leaks of {len(rays):,}", not leaks.any(), *embree_says(mesh, rays, say))
+        return Outcome(f"{lost:,} leaks of {len(rays):,}", lost == 0, *embree_says(mesh, rays, say))
 
     return run
 
