@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from renderer import SceneError
-from renderer.cli import make_parser
+from renderer.cli.main import make_parser
 from renderer.mesh.shapes import box
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight

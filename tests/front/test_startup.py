@@ -14,7 +14,14 @@ import pytest
 from signatures import SIGNATURES
 
 import renderer
-from renderer.cli import main
+from renderer.cli.main import main
+
+pytestmark = pytest.mark.judges(
+    "octree-render compile", "octree-render compile --all", "octree-render compile --level",
+    "octree-render compile --output", "octree-render compile --pictures", "octree-render compile --queries",
+    "octree-render render --quiet",
+)  # fmt: skip
+
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {
@@ -51,8 +58,8 @@ def heavy_after(script: str) -> set[str]:
     ("script", "needs"),
     [
         ("import renderer", set()),
-        ("from renderer.cli import main", set()),
-        ("from renderer.cli import main\ntry: main(['render', '--help'])\nexcept SystemExit: pass", set()),
+        ("from renderer.cli.main import main", set()),
+        ("from renderer.cli.main import main\ntry: main(['render', '--help'])\nexcept SystemExit: pass", set()),
         ("from renderer import load_mesh, Mesh", {"numpy"}),
         ("from renderer import Octree", {"numpy", "numba"}),
         ("import renderer.studies", set()),
@@ -69,7 +76,7 @@ def test_a_render_of_the_command_line_loads_no_scipy_and_leaves_it_importable(tm
     """Where memory is scarce its OpenBLAS would wait for memory without end."""
     script = f"""
 import sys
-from renderer.cli import main
+from renderer.cli.main import main
 sys.argv = ["octree-render", "render", "scenes/stairs.toml", "-o", {str(tmp_path / "a.png")!r}, "--resolution", "8x8"]
 assert main() == 0
 assert not any(name.startswith("scipy") for name in sys.modules) and "numba" in sys.modules
@@ -120,10 +127,10 @@ from renderer.precompile import compile_ahead
 compile_ahead()
 before = signatures()
 from renderer import BruteForce, Octree, load_scene, needs_of, render
-from renderer.inspect.face_phong import face_colors
-from renderer.inspect.ray_path import ray_path
+from renderer.diagnostics.face_phong import face_colors
+from renderer.diagnostics.ray_path import ray_path
 from renderer.picture.prepare import prepare_scene
-from renderer.inspect.tree_boxes import visited
+from renderer.diagnostics.tree_boxes import visited
 from renderer.mesh.shapes import box
 for name in ("three_models", "stairs", "glass"):
     for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
@@ -163,7 +170,7 @@ compile_ahead("queries")
 before = signatures()
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.studies import ambient_occlusion, occlusion, scan, sky_view_factor, visible_faces
 ball, rng = icosphere(3), np.random.default_rng(1)
 # In float64 and in float32, of which the kernels of trees have two kinds.
@@ -210,7 +217,7 @@ print(len(before), *sorted(signatures() - before))
 @pytest.mark.parametrize("seconds", [0.0, 0.5, 1.3])
 def test_control_c_while_compiling_ends_with_130_and_no_traceback(tmp_path, seconds):
     picture = tmp_path / "a.png"
-    command = [sys.executable, "-m", "renderer.cli", "render", "scenes/three_models.toml", "-o", str(picture)]
+    command = [sys.executable, "-m", "renderer.cli.main", "render", "scenes/three_models.toml", "-o", str(picture)]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     running = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
     try:
@@ -229,7 +236,7 @@ def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatc
     log = logging.getLogger("renderer.jit")
     monkeypatch.setattr(log, "level", logging.CRITICAL)
     before = logging.CRITICAL, list(log.handlers)
-    monkeypatch.setattr("renderer.cli._render", lambda _options: log.warning("renderer: compiling %s", "it"))
+    monkeypatch.setattr("renderer.cli.main._render", lambda _options: log.warning("renderer: compiling %s", "it"))
     assert main(["render", "any.toml", *(["--quiet"] if quiet else [])]) == 0
     assert capsys.readouterr() == ("", "" if quiet else "octree-render: compiling it\n")
     assert (log.level, log.handlers) == before
@@ -239,7 +246,7 @@ def test_a_notice_stands_on_a_line_of_its_own_beside_a_progress_bar():
     script = """
 import io, logging, sys
 from tqdm import tqdm
-from renderer.cli import compile_notices
+from renderer.cli.main import compile_notices
 sys.stderr = io.StringIO()
 with compile_notices(silent=False), tqdm(total=3, file=sys.stderr, ncols=40):
     logging.getLogger("renderer.jit").warning("renderer: compiling it")
@@ -251,13 +258,13 @@ print(repr(sys.stderr.getvalue()))
 
 def test_kernels_for_a_level_have_the_bits_of_native_ones_and_leave_nothing_to_compile(tmp_path):
     """Compiled in one process for any machine of the level, found by another one that may not write anywhere near."""
-    from renderer.kernels.store import runnable_levels
+    from renderer.jit.cache import runnable_levels
 
     folder, level = tmp_path / "kernels", runnable_levels()[-1]
     # Of all queries, which take half a minute, only those that are asked below.
     program = """
 import sys
-from renderer import cli
+from renderer.cli import main as cli
 choose = cli._choose_processor
 def choose_and_ask_less(*options):
     choose(*options)  # before Numba is imported
@@ -273,7 +280,7 @@ sys.exit(cli.main(sys.argv[1:]))
 import hashlib
 import numpy as np
 from renderer import Octree
-from renderer.kernels.notice import compile_seconds
+from renderer.jit.notice import compile_seconds
 from renderer.mesh.shapes import icosphere
 octree, rng = Octree.from_mesh(icosphere(5)), np.random.default_rng(1)
 origins, digest = 3.0 * rng.normal(size=(5000, 3)), hashlib.sha256()
@@ -315,7 +322,7 @@ def test_compile_shows_on_a_terminal_how_far_it_is():
 import io, sys
 class Terminal(io.StringIO):
     def isatty(self): return True
-from renderer.cli import main
+from renderer.cli.main import main
 sys.stderr = Terminal()
 assert main(["compile", "--queries"]) == 0
 shown = sys.stderr.getvalue()

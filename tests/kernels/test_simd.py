@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from renderer.kernels.simd import (
+from renderer.numerics.simd import (
     alike,
     bits_float,
     double_of,

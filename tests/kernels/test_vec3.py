@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from renderer.kernels.vec3 import length, normalized
+from renderer.numerics.vec3 import length, normalized
 
 
 @pytest.mark.parametrize("size", [5e-324, 1e-310, 1e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300])
