@@ -12,7 +12,7 @@ from renderer.inside.crossings import count_crossings
 from renderer.inside.rational import _on_upright
 from renderer.mesh.shapes import box, torus
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
-from renderer.trace.single import stack_size
+from renderer.trace.walk import stack_size
 from validation.oracle.inside import winding_number
 from validation.oracle.vectors import rational
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers

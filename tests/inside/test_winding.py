@@ -17,7 +17,7 @@ from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
 from renderer.numerics.simd import at, local_doubles, pointer
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.single import stack_size
+from renderer.trace.walk import stack_size
 from validation.references.igl import Igl
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
