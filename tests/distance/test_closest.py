@@ -13,7 +13,8 @@ from renderer.distance.nearest import LISTED, measure_faces
 from renderer.distance.rational import nearest_exactly
 from renderer.inside import contains as inside
 from renderer.mesh.shapes import box, icosphere, torus
-from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.oracle.distance import nearest, ulps_from_root
+from validation.oracle.vectors import rational
 from validation.queries.distances import points_about
 from validation.stability.cases.queries.inside import closed_solids
 

@@ -13,8 +13,8 @@ from renderer.inside.rational import _on_upright
 from renderer.mesh.shapes import box, torus
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
 from renderer.trace.walk import stack_size
-from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
+from validation.oracle.vectors import rational
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
 pytestmark = pytest.mark.judges(

@@ -10,8 +10,8 @@ from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.trace import error as bounding
 from validation.oracle import exact
-from validation.oracle.distance import cross, difference, dot
 from validation.oracle.starts import start_near
+from validation.oracle.vectors import cross, difference, dot
 
 pytestmark = pytest.mark.judges("AllHits", "Hits", "Octree.closest_hit")
 

@@ -8,7 +8,7 @@ import pytest
 from renderer import BruteForce, Octree
 from renderer.mesh.shapes import box
 from renderer.studies import fibonacci_sphere, occlusion, scan, sky_view_factor, sun_hours
-from validation.oracle.distance import cross, difference, dot
+from validation.oracle.vectors import cross, difference, dot
 
 BOTH = pytest.mark.parametrize("accelerator", [Octree, BruteForce])
 GROUND = np.array([[-10, -10, 0], [30, -10, 0], [-10, 30, 0]], float), np.array([[0, 1, 2]])

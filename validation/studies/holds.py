@@ -1,4 +1,4 @@
-"""What holds of studies exactly: each check counts the answers that are not as they must be."""
+"""Exact laws of studies: each check counts the answers that break one."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,6 +27,7 @@ from renderer.studies import (
     visible_faces,
 )
 from renderer.studies.points import of_file, on_grid
+from validation.meshes import tetrahedron
 from validation.oracle.exact import closest_hits
 from validation.oracle.starts import Surface
 from validation.studies.bodies import FAR, bodies, street, terrain, touching, town
@@ -242,8 +243,8 @@ def places_of_a_grid() -> Asked:
 def edges_from_both_sides() -> Asked:
     """Points of a tetrahedron's edges see its middle, each other, and what is before one of their two faces."""
     rng = np.random.default_rng(_SEED)
-    corners = np.array([[0.1, 0.2, 0.3], [1.3, 0.1, 0.2], [0.4, 1.7, 0.1], [0.3, 0.4, 1.1]])
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    mesh = tetrahedron()
+    corners, faces = mesh.vertices, mesh.faces
     octree, middle = Octree(corners, faces), corners.mean(axis=0)
     normals = octree.mesh.face_normals()
     right = []

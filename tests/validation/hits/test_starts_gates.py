@@ -8,6 +8,7 @@ from lawful import Lawful
 
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box
+from validation import meshes
 from validation.hits import bodies, mirrors, starts, walks
 from validation.hits.bodies import Body
 from validation.job import Job
@@ -25,17 +26,17 @@ def checked(body, make=Lawful, effort=EFFORT):
 
 
 SAMPLES = {
-    "tetrahedron": Body("", bodies.tetrahedron(), True),
-    "turned box": Body("", bodies.turned(box()), True),
-    "notched": Body("", bodies.notched(), True),
-    "reflex prism": Body("", bodies.prism(300.0), True),
-    "flat prism": Body("", bodies.turned(bodies.prism(0.1)), True),
+    "tetrahedron": Body("", meshes.tetrahedron(), True),
+    "turned box": Body("", meshes.turned(box()), True),
+    "notched": Body("", meshes.hilly(1), True),
+    "reflex prism": Body("", meshes.prism(300.0), True),
+    "flat prism": Body("", meshes.turned(meshes.prism(0.1)), True),
     "raster": Body("", bodies.raster(5), False),
-    "soup": Body("", bodies.soup(bodies.prism(60.0)), True),
+    "soup": Body("", meshes.loose(meshes.prism(60.0).triangles), True),
     "needle": Body("", bodies.needle(2.0**-40), True),
     "stack": Body("", bodies.stack(), False),
     "boxes": Body("", bodies.boxes_side_by_side(), False),
-    "far away": Body("", Mesh(bodies.tetrahedron().vertices * 1e3 + 1e9, bodies.tetrahedron().faces), True),
+    "far away": Body("", Mesh(meshes.tetrahedron().vertices * 1e3 + 1e9, meshes.tetrahedron().faces), True),
 }
 
 
@@ -154,7 +155,7 @@ def test_mirrors_reflect_for_ever(monkeypatch):
 
 def test_a_ray_that_is_lost_or_stays_is_counted(monkeypatch):
     monkeypatch.setattr(mirrors, "BOUNCES", 20)
-    mesh, rng = bodies.tetrahedron(), np.random.default_rng(3)
+    mesh, rng = meshes.tetrahedron(), np.random.default_rng(3)
     rays = mirrors.aimed("vertex", mesh.vertices, mesh.faces, np.tile(mesh.vertices.mean(axis=0), (8, 1)), rng)
 
     class Stuck(Lawful):

@@ -5,7 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from validation.oracle.distance import rational, squared_distance, way_from
+from validation.oracle.distance import squared_distance, way_from
+from validation.oracle.vectors import rational
 
 TRIANGLE = rational([[0, 0, 0], [4, 0, 0], [0, 3, 0]])
 

@@ -9,9 +9,10 @@ import pytest
 
 from validation.oracle import exact
 from validation.oracle.cones import Regions, cone_at
-from validation.oracle.distance import dot, rational, squared_distance
+from validation.oracle.distance import squared_distance
 from validation.oracle.fans import Fan
 from validation.oracle.starts import First, Start, Surface, first_hit, start_near, start_on, stopped
+from validation.oracle.vectors import dot, rational
 
 ZERO = Fraction(0)
 WAYS = [way for way in product((-2, -1, 0, 1, 3), repeat=3) if any(way)]

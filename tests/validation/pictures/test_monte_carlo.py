@@ -15,7 +15,7 @@ from validation.pictures import monte_carlo
 from validation.pictures.monte_carlo import scatter_of
 from validation.references.mitsuba import path as mitsuba_path
 from validation.report import page
-from validation.report.monte_carlo_figure import figure
+from validation.report.figures import monte_carlo_figure
 from validation.report.page import number
 from validation.scenes import SCENES
 
@@ -122,7 +122,7 @@ def test_a_sound_picture_passes_and_its_record_is_drawn() -> None:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters["number"] = number
-    environment.globals["monte_carlo_figure"] = figure
+    environment.globals["monte_carlo_figure"] = monte_carlo_figure
     page = environment.get_template("monte_carlo.html").render(r=record)
     assert "1 / sqrt(N)" in page and "after" in page.lower() and "Left out" not in page
 

@@ -11,8 +11,8 @@ from renderer import Octree
 from renderer.trimesh_ray import RayMeshIntersector
 from validation.job import Job
 from validation.oracle.contacts import contacts
-from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
+from validation.oracle.vectors import rational
 from validation.queries import section
 from validation.queries.contacts import check_contacts
 from validation.queries.distances import check_distances, meshes, points_about

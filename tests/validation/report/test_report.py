@@ -78,7 +78,7 @@ def test_an_extreme_case_is_found_by_its_number(
     metrics: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The site links to it, see docs/case_links.py."""
-    monkeypatch.setitem(report.FIGURES, "figures", lambda record: [])
+    monkeypatch.setitem(report.FIGURES, "stability_figures", lambda record: [])
     said = dict.fromkeys(
         ("construct", "expected", "ours", "embree_default", "embree_robust", "mitsuba", "tolerance"), "x"
     )

@@ -9,7 +9,7 @@ import pytest
 from renderer import Octree
 from renderer.studies.points import Chosen, Points
 from validation.job import Job
-from validation.report import page, studies_figures
+from validation.report import figures, page
 from validation.studies import bits, bodies, corners, forms, holds, section
 from validation.thresholds import Thresholds
 
@@ -33,7 +33,7 @@ def test_all_gates_pass_and_the_record_draws_a_figure(run):
     assert all(gate.passed for gate in gates)
     assert all(row["asked"] > 0 for row in (*record["bits"], *record["corners"], *record["holds"]))
     assert (folder / section.PICTURE).stat().st_size > 10_000
-    (figure,) = studies_figures.figures(record)
+    (figure,) = figures.studies_figures(record)
     assert "N^-0.7" in figure["svg"] and "as by chance" in figure["svg"]
     assert page.PARTIALS["studies"] == ("Studies", "studies.html")
 

@@ -1,4 +1,4 @@
-"""What points see of each other around a ball: everything from its centre, nothing through it."""
+"""Visibility around a ball: everything from its centre, nothing through it."""
 
 from typing import Any
 
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from renderer.octree import BruteForce, Octree
+from validation.meshes import loose, squares
 from validation.promises.row import row
-from validation.promises.squares import squares
 
 _COUNT = 2000
 # Sizes of the ball and how far away it lies: rounding has moved points off their faces.
@@ -61,7 +61,7 @@ def _closed() -> NDArray[np.bool_]:
     """A box of corners of its own for each face, with both zeros."""
     corners = box((0.0, -1.0, -1.0), (1.0, 1.0, 1.0)).triangles.reshape(-1, 3)
     corners[::2][corners[::2] == 0.0] = -0.0
-    mesh = Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+    mesh = loose(corners)
     return np.array([len(mesh.open_edges) == 0, len(mesh.odd_edges) == 0])
 
 
@@ -72,7 +72,7 @@ def _covered() -> NDArray[np.bool_]:
     for height in 2.0 ** -np.arange(2.0, 43.0):
         corners = np.concatenate([below, (below + above)[::-1], below + height * above])
         for tracer in (Octree, BruteForce):
-            built = tracer(corners, np.arange(9).reshape(-1, 3))
+            built = tracer.from_mesh(loose(corners))
             kept += [not built.visible(np.zeros(3), above, leaving=0, reaching=1)]
             kept += [bool(built.visible(height * above, above, leaving=2, reaching=1))]
     return np.array(kept)

@@ -1,53 +1,12 @@
-"""Points and triangles in whole numbers, and meshes whose corners and points meet in lines and planes exactly."""
+"""Meshes whose corners and points meet in lines and planes exactly, with coordinates of all sizes."""
 
-from collections.abc import Iterator, Sequence
-from fractions import Fraction
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from validation.oracle.distance import cross, difference, dot
-
 Floats = NDArray[np.float64]
-Corner = Sequence[int]
-Face = tuple[Corner, Corner, Corner]
-
-
-def relative(point: Floats, triangles: Floats) -> tuple[list[Face], int]:
-    """The corners of triangles (F, 3, 3) less a point (3,), times the power of two that makes them whole; and that."""
-    ratios = [x.as_integer_ratio() for x in (*point.tolist(), *triangles.ravel().tolist())]
-    unit = max(bottom for _, bottom in ratios)
-    x, y, z, *rest = (top * (unit // bottom) for top, bottom in ratios)
-    corners = [(a - x, b - y, c - z) for a, b, c in zip(rest[::3], rest[1::3], rest[2::3], strict=True)]
-    return list(zip(corners[::3], corners[1::3], corners[2::3], strict=True)), unit
-
-
-def volume(face: Face) -> int:
-    """The determinant of a face's corners: 0 where the origin lies in its plane."""
-    a, b, c = face
-    return dot(a, cross(b, c))
-
-
-def squared_distance(face: Face) -> Fraction:
-    """The squared distance of a face from the origin."""
-    a, b, c = face
-    normal, sides = cross(difference(b, a), difference(c, a)), ((a, b), (b, c), (c, a))
-    if any(normal) and all(dot(cross(difference(q, p), normal), p) >= 0 for p, q in sides):
-        return Fraction(volume(face) ** 2, dot(normal, normal))
-    return min(_from_side(p, difference(q, p)) for p, q in sides)
-
-
-def _from_side(start: Corner, side: Corner) -> Fraction:
-    """The squared distance of a side, which may be a point, from the origin."""
-    along, square = -dot(start, side), dot(side, side)
-    if 0 < along < square:
-        across = cross(start, side)
-        return Fraction(dot(across, across), square)
-    corner = start if along <= 0 else difference(side, difference((0, 0, 0), start))
-    return Fraction(dot(corner, corner))
-
-
 # Powers of two of the numbers that coordinates of a mesh are drawn from: alike, unlike, and as unlike as can be.
 _POWERS = ((0, 0, 0, 0), (0, -3, -30, -55), (0, -52, -120, -400), (0, -10, -600, -1000))
 _FACES = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
