@@ -186,18 +186,19 @@ def _make_folder(output: Path) -> None:
 def run_defects(request: Request) -> list[Gate]:
     """Inject the seeded defects, store the results as ``defects.json`` and return the gates.
 
-    A report in the same folder is drawn again with these results.
+    A run that was interrupted goes on where it was. A report in the same folder is drawn again with these results.
     """
     from validation.defects import run as defects
-    from validation.defects.list import DEFECTS
+    from validation.defects.answers import Known
 
     began, started = time.perf_counter(), datetime.now(UTC)
     sources = environment.sources_sha256()
-    chosen = [d for d in DEFECTS if not (request.quick and d.kernel)]
     _check_folder(request.output)
     _make_folder(request.output)
+    known = Known(request.output / "defects-so-far.json", sources)
+    chosen = defects.chosen(request.quick)
     with steps(len(chosen) + 1) as step:
-        record, gates = defects.run(request.quick, step)
+        record, gates = defects.run(chosen, step, known=known)
     record |= {
         "sources": sources,
         "quick": request.quick,
@@ -207,6 +208,7 @@ def run_defects(request: Request) -> list[Gate]:
     }
     text = json.dumps(record, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     _write(request.output / "defects.json", text.encode())
+    known.forget()
     _draw_again(request.output)
     return gates
 

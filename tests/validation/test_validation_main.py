@@ -13,7 +13,9 @@ import pytest
 from validation import __main__ as command
 from validation import suite
 from validation.defects import run as defects
+from validation.defects.answers import Answer
 from validation.defects.list import DEFECTS
+from validation.defects.record import gates, record
 from validation.gates import Gate
 from validation.job import Job
 from validation.mutants import run as mutants
@@ -231,25 +233,24 @@ def test_the_baseline_is_written_read_and_named_in_the_summary(
 
 class TestDefects:
     @pytest.fixture
-    def answers(self, monkeypatch: pytest.MonkeyPatch) -> list[defects.Answer]:
+    def answers(self, monkeypatch: pytest.MonkeyPatch) -> list[Answer]:
         """What each process would have said; the first is the control."""
-        answers: list[defects.Answer] = []
+        answers: list[Answer] = []
 
-        def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, Any], list[Gate]]:
-            chosen = list(DEFECTS[:1])
-            return defects.record(chosen, answers[0], answers[1:]), defects.gates(chosen, answers[0], answers[1:])
+        def run(*_: object, known: object) -> tuple[dict[str, Any], list[Gate]]:
+            return record(DEFECTS[:1], answers[0], answers[1:]), gates(DEFECTS[:1], answers[0], answers[1:])
 
         monkeypatch.setattr(defects, "run", run)
         return answers
 
     def test_the_record_is_stored_and_every_report_shows_it(
-        self, tmp_path: Path, sections: dict[str, Fake], answers: list[defects.Answer], monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path, sections: dict[str, Fake], answers: list[Answer], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         output = ["--output", str(tmp_path)]
         assert command.main(["--only", "hits", *output]) == 0
         assert "No run is stored" in (tmp_path / "index.html").read_text(encoding="utf-8")
-        gates = ("hits: a: b",)
-        answers += [defects.Answer(gates, red, None, 1.0) for red in ((), gates)]
+        names = ("hits: a: b",)
+        answers += [Answer(names, red, None, 1.0) for red in ((), names)]
         assert command.main(["--defects", *output]) == 0
         assert "The sources are the same now" in (tmp_path / "index.html").read_text(encoding="utf-8")
         assert metrics(tmp_path)["facts"][0]["value"] == 1
@@ -258,9 +259,9 @@ class TestDefects:
         assert "The sources have changed since" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
     def test_one_that_is_let_through_is_exit_code_1(
-        self, tmp_path: Path, answers: list[defects.Answer], capsys: pytest.CaptureFixture[str]
+        self, tmp_path: Path, answers: list[Answer], capsys: pytest.CaptureFixture[str]
     ) -> None:
-        answers += [defects.Answer(("hits: a: b",), (), None, 1.0)] * 2
+        answers += [Answer(("hits: a: b",), (), None, 1.0)] * 2
         assert command.main(["--defects", "--output", str(tmp_path)]) == 1
         assert "gates turned red is 0, expected at least 1" in capsys.readouterr().out
         assert json.loads((tmp_path / "defects.json").read_text(encoding="utf-8"))["caught"] == 0
