@@ -60,7 +60,7 @@ def run(request: Request) -> dict[str, Any]:
 
     _make_folder(request.output)
     # Read once more for the report: they may grow meanwhile.
-    stored_defects(request.output), stored_mutants(request.output)
+    stored_defects(request.output)
 
     # Run the sections, with pictures in a temporary folder.
     with TemporaryDirectory(dir=request.output, prefix=".run-") as folder, Workers(_processes()) as workers:
@@ -127,13 +127,12 @@ def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, 
 
 
 def _outcome(records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], output: Path) -> dict[str, Any]:
-    """What follows from records and gates, and what earlier runs stored about defects and mutants."""
-    defects, mutants = stored_defects(output), stored_mutants(output)
+    """What follows from records and gates, and what an earlier run stored about defects."""
+    defects = stored_defects(output)
     rows = summary.matrix(records, gates)
     found = {"gates": gates, "verdict": summary.verdict(gates), "matrix": rows}
     found["facts"] = summary.facts(rows, gates, defects)
-    found |= {} if defects is None else {"defects": defects}
-    return found | ({"mutants": mutants} if mutants else {})
+    return found | ({} if defects is None else {"defects": defects})
 
 
 def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
@@ -213,21 +212,6 @@ def run_defects(request: Request) -> list[Gate]:
     return gates
 
 
-def run_mutants(request: Request, target: str, count: int, seed: int) -> dict[str, Any]:
-    """Judge mutants of a target, go on from the stored record, and return the counts, see ``record.summary``.
-
-    A report in the same folder is drawn again with these results.
-    """
-    from validation.mutants import run as mutants
-
-    _check_folder(request.output)
-    _make_folder(request.output)
-    with steps() as step:
-        found = mutants.run(target, count, seed, request.output, step)
-    _draw_again(request.output)
-    return found
-
-
 def _draw_again(output: Path) -> None:
     """Draw the report in ``output`` again with the stored defects, if there is one of this schema."""
     try:
@@ -236,16 +220,6 @@ def _draw_again(output: Path) -> None:
         return
     records = {row["section"]: metrics[row["section"]] for row in metrics["matrix"]}
     write(metrics | _outcome(records, metrics["gates"], output), output, output / "pictures")
-
-
-def stored_mutants(output: Path) -> dict[str, Any]:
-    """What the last runs of mutants found, by target; a target that was never broken is missing."""
-    from validation.mutants.record import summary as mutants_of
-    from validation.mutants.targets import TARGETS, record_of
-
-    root = Path(__file__).resolve().parents[1]
-    found = {target: mutants_of(record_of(target, output), root) for target in TARGETS}
-    return {target: one for target, one in found.items() if one is not None}
 
 
 def stored_defects(output: Path) -> dict[str, Any] | None:

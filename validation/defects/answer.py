@@ -4,10 +4,14 @@ It must not import the renderer before the injection.
 """
 
 import json
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from validation.defects.inject import inject
+
+if sys.platform != "win32":
+    import resource
 
 if TYPE_CHECKING:
     from validation.gates import Gate
@@ -19,9 +23,12 @@ MARK = "gates: "
 def answer(task: str) -> None:
     """Counterpart of ``run.run_checks`` in the child process: inject, check, print the gates as a line of JSON.
 
-    The task names a defect, or None, the modules that have ``DEFECTS`` and ``run(group)``, and the group.
+    The task has a defect's name, or None; the modules that have ``DEFECTS`` and ``run(group)``; the group; and the
+    seconds of computing after which the system ends this process.
     """
-    name, defects, checks, group = json.loads(task)
+    name, defects, checks, group, patience = json.loads(task)
+    if sys.platform != "win32":
+        resource.setrlimit(resource.RLIMIT_CPU, (patience, patience + 10))
     if name is not None:
         inject(next(defect.change for defect in import_module(defects).DEFECTS if defect.name == name))
     # Imported only now, because it loads the renderer.

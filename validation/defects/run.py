@@ -7,6 +7,7 @@ separate folder, so this checkout's kernels stay unchanged.
 import json
 import os
 import shutil
+import signal
 import subprocess
 import time
 from collections.abc import Callable, Sequence
@@ -23,8 +24,12 @@ from validation.defects.record import gates, idle, record
 from validation.defects.seeded.defect import Defect
 from validation.gates import Gate
 
-# Ten times the time of the slowest defect on two busy cores: beyond it a kernel does not terminate.
-_PATIENCE = 600.0
+# Seconds of computing, ten times those of the slowest defect: beyond them a kernel does not terminate.
+_PATIENCE = 600
+# Seconds by the clock, on a machine on which ten others compute too.
+_LONGEST = 10.0 * _PATIENCE
+# The signal that ends a process whose seconds of computing are spent: SIGXCPU, or where there is none SIGKILL.
+_OUT_OF_TIME = getattr(signal, "SIGXCPU", 9)
 # Each process compiles on one core.
 _AT_ONCE = 2
 
@@ -83,14 +88,17 @@ def run_checks(name: str | None, group: str, cache: Path, modules: Modules = OUR
     """Run the checks of ``group`` in a new process with one defect, or none; its kernels go to ``cache``."""
     began = time.perf_counter()
     cache.mkdir(parents=True, exist_ok=True)
-    command = child.command("validation.defects.answer:answer", json.dumps([name, *modules, group]))
+    command = child.command("validation.defects.answer:answer", json.dumps([name, *modules, group, _PATIENCE]))
     environment = child.environment(NUMBA_CACHE_DIR=str(cache))
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_LONGEST, check=False)
+        hangs = done.returncode == -_OUT_OF_TIME
     except subprocess.TimeoutExpired:
-        # A kernel that runs for ever is noticed by whoever waits for the report.
-        return Answer((), (HANGS,), None, time.perf_counter() - began)
+        hangs = True
     seconds = time.perf_counter() - began
+    if hangs:
+        # A kernel that runs for ever is noticed by whoever waits for the report.
+        return Answer((), (HANGS,), None, seconds)
     said = [line for line in done.stdout.splitlines() if line.startswith(MARK)]
     if done.returncode or not said:
         last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
