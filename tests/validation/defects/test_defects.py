@@ -167,7 +167,7 @@ def test_an_error_is_no_verdict(tmp_path: Path, tiny: defects.Modules) -> None:
 
 def test_a_defect_that_never_ends_is_caught(tmp_path: Path, tiny: defects.Modules, monkeypatch: Any) -> None:
     """It was counted as an error, and the suite said that nothing had noticed it."""
-    monkeypatch.setattr(defects, "_PATIENCE", 6)
+    monkeypatch.setattr(defects, "_PATIENCE", 3)
     answer = defects.run_checks("endless", "pictures", tmp_path, tiny)
     assert answer.red == (HANGS,) and answer.error is None
     defect = Defect("pictures", "endless", Rule("rounded-encoding", value("0")))
