@@ -10,24 +10,18 @@ import numpy as np
 
 from renderer.all_hits.candidates import LISTED, TOGETHER, find_blocks, make_candidates
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, extract, get, is_negative, lowest_bit, pointer, put, smaller, splat8
+from renderer.numerics.simd import at, extract, get, is_negative, lowest_bit, pointer, put, smaller
 from renderer.trace.edge_signs import coordinate, exact_sides
-from renderer.trace.intersect import (
-    box_limit,
-    enter_boxes,
-    hit_triangles,
-    largest_of,
-    make_shear,
-    make_slabs,
-    round_down,
-)
+from renderer.trace.intersect import hit_triangles, make_shear
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import NO_FACE, blocks_of, push_children, tree_pointers
+from renderer.trace.leaf import NO_FACE, tree_pointers
 from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.resolve import settled
-from renderer.trace.starts.record import PILE
-from renderer.trace.starts.search import counted_from_start, depart, meet_near, near_bits, stopped_again
+from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
+from renderer.trace.starts.record import PILE, StartPointers
+from renderer.trace.starts.search import Departure, counted_from_start, depart, meet_near, near_bits, stopped_again
 from renderer.trace.traverse import make_scratch
+from renderer.trace.walk import walk
 
 # Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
 # place of the face in its block, the edges passed as bits, and the order as int64. Of the hits of the rays before it:
@@ -96,46 +90,40 @@ def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, memory)
     return begin, -1
 
 
+class _Query(NamedTuple):
+    """A ray, its t_max, and where its hits are listed."""
+
+    single: SingleRay
+    t_max: float
+    found: Found
+
+
 @kernel
 def _list_all(tree, rays, i, candidates, k, found, scratch):
     """List all hits of ray ``i``, the k-th candidate; returns their number, of which the capacity is listed."""
     ray, t_max = ray_at(rays, i)
     if ray.leaving >= 0.0:
         return _list_from(tree, rays, i, ray, t_max, found, scratch)
-    shear, count = make_shear(ray), np.int64(0)
-    if not tree.has_nodes:
-        return _list_hits(tree, (0, tree.count), ray, shear, t_max, found, count)
-    listed = get(candidates.counts, k)
-    if listed > LISTED:
-        return _search(tree, ray, shear, t_max, found, scratch.packet_stack)
+    query, listed = _Query(prepare_single(ray), t_max, found), get(candidates.counts, k)
+    if not tree.has_nodes or listed > LISTED:
+        return walk(tree, scratch.packet_stack, query, np.int64(0), _enter, _list_hits)
+    count = np.int64(0)
     for place in range(k * LISTED, k * LISTED + listed):
-        count = _list_hits(tree, (get(candidates.blocks, place), 1), ray, shear, t_max, found, count)
+        count, _ = _list_hits(tree, query, get(candidates.blocks, place), 1, count)
     return count
 
 
-@kernel
-def _search(tree, ray, shear, t_max, found, stack):
-    """``_list_all`` by a search for the ray alone."""
-    largest = largest_of(ray)
-    slabs = make_slabs(ray, largest)
-    lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
-    count, top = np.int64(0), 1
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            count = _list_hits(tree, blocks_of(child), ray, shear, t_max, found, count)
-            continue
-        _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
-        top = push_children(tree, child, bits, stack, top)
-    return count
+@inlined
+def _enter(tree, query, node, count):
+    """Go on where the ray of a ``_Query`` or a ``_QueryFrom`` goes."""
+    return count, enter_node(tree, node, query.single, query.t_max)[1]
 
 
 @kernel
-def _list_hits(tree, blocks, ray, shear, t_max, found, count):
-    """Add the hits in some blocks (first, number) to the list."""
-    for block in range(blocks[0], blocks[0] + blocks[1]):
+def _list_hits(tree, query, first, blocks, count):
+    """Add the hits in some blocks to the list."""
+    ray, shear, t_max = query.single.ray, query.single.shear, query.t_max
+    for block in range(first, first + blocks):
         base = block * BLOCK_WORDS
         bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, t_max)
         while bits != 0:
@@ -146,8 +134,8 @@ def _list_hits(tree, blocks, ray, shear, t_max, found, count):
                 edges = _edges_passed(exact_sides(tree, base + i, shear))
             if (doubts >> i) & 1 != 0:
                 hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-            count = _add_hit(tree, found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
-    return count
+            count = _add_hit(tree, query.found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
+    return count, False
 
 
 @inlined
@@ -176,29 +164,26 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
         # The sign of 0 tells the next face of the pile from one that begins another.
         pile = pile if is_negative(stopped[0]) else np.int64(stopped[1])
         stopped = stopped_again(tree, departure, np.int64(stopped[1]), pile, scratch.holders)
-    shear, largest = make_shear(ray), largest_of(ray)
-    if not tree.has_nodes:
-        return _list_hits_from(tree, rays.starts, i, (0, tree.count), departure, shear, t_max, found, count)
-    slabs, top = make_slabs(ray, largest), 1
-    lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            count = _list_hits_from(tree, rays.starts, i, blocks_of(child), departure, shear, t_max, found, count)
-            continue
-        _, bits = enter_boxes(tree.nodes, child, slabs, lower, upper)
-        top = push_children(tree, child, bits, stack, top)
-    return count
+    query = _QueryFrom(departure, prepare_single(ray), t_max, found, rays.starts, i)
+    return walk(tree, stack, query, count, _enter, _list_hits_from)
+
+
+class _QueryFrom(NamedTuple):
+    """``_Query`` of a ray that leaves the surface, and which of the rays with such starts it is."""
+
+    departure: Departure
+    single: SingleRay
+    t_max: float
+    found: Found
+    starts: StartPointers
+    row: int
 
 
 @kernel
-def _list_hits_from(tree, starts, row, blocks, departure, shear, t_max, found, count):
-    """``_list_hits`` for ray ``row``, which leaves the surface."""
-    ray = departure.ray
-    largest = largest_of(ray)
-    for block in range(blocks[0], blocks[0] + blocks[1]):
+def _list_hits_from(tree, query, first, blocks, count):
+    """``_list_hits`` for a ray that leaves the surface."""
+    departure, ray, shear, t_max = query.departure, query.single.ray, query.single.shear, query.t_max
+    for block in range(first, first + blocks):
         base = block * BLOCK_WORDS
         bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, t_max)
         near = near_bits(tree, block, departure, shear, bits)
@@ -218,9 +203,9 @@ def _list_hits_from(tree, starts, row, blocks, departure, shear, t_max, found, c
                     hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
                 if ray.t_min <= hit[0] <= t_max:
                     face = np.int64(get(tree.faces, block * BLOCK_FACES + i))
-                    hit = counted_from_start(tree, starts, row, ray, largest, hit, face)
-            count = _add_hit(tree, found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
-    return count
+                    hit = counted_from_start(tree, query.starts, query.row, ray, query.single.largest, hit, face)
+            count = _add_hit(tree, query.found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
+    return count, False
 
 
 @inlined

@@ -21,11 +21,11 @@ from renderer.shade.whitted import passes_light_of, refract_from
 from renderer.trace.batch import check_rays, make_starts
 from renderer.trace.closest import closest_hits
 from renderer.trace.hits import Hits
-from renderer.trace.single import stack_size
 from renderer.trace.spawn import BOUNDED, OffsetRule, Place, spawn_origin, start_row
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.level import Spot
 from renderer.trace.starts.record import HEAD, ROW
+from renderer.trace.walk import stack_size
 
 Vector = tuple[float, float, float]
 Floats = NDArray[np.float64]

@@ -17,7 +17,8 @@ from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import check_rays
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
-from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, tree_pointers
+from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.trace.walk import blocks_of
 
 Boxes = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from renderer.trace.closest import rays_against_blocks
 from renderer.trace.hits import points_on
 from renderer.trace.layout import Tree
 from renderer.trace.rays import HIT_ROWS
-from renderer.trace.single import stack_size
+from renderer.trace.walk import stack_size
 
 # The fewest points of a chunk: some milliseconds of search.
 _LEAST = 1024

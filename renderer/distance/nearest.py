@@ -29,9 +29,10 @@ from renderer.numerics.simd import (
 from renderer.numerics.vec3 import three
 from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
+from renderer.trace.leaf import NO_FACE, tree_pointers
 from renderer.trace.point import Point
 from renderer.trace.rays import hit_pointers
+from renderer.trace.walk import blocks_of
 
 # In place of a face: float64 cannot tell.
 UNTOLD_FACE = -2
@@ -71,7 +72,7 @@ def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
     """Write distance, u, v and face (or UNTOLD_FACE) of ``points``, from row ``begin`` on, to ``out[:, rows]``, (4, m).
 
     limits     (m,) or (1,), the largest distance that counts
-    integers   memory for ``singly.stack_size`` and LISTED int64; ``doubles``, for as many float64 and nine more
+    integers   memory for ``walk.stack_size`` and LISTED int64; ``doubles``, for as many float64 and nine more
 
     Returns the row before which it ended: early after WORK, so that Ctrl-C need not wait for long.
     """

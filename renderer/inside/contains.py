@@ -16,7 +16,7 @@ from renderer.inside.winding import exceeds_half
 from renderer.mesh.mesh import Mesh
 from renderer.ordering.cells import ask_in_order
 from renderer.trace.layout import Tree
-from renderer.trace.single import stack_size
+from renderer.trace.walk import stack_size
 
 # The fewest points of a chunk: a millisecond of work.
 _LEAST = 4096

@@ -29,7 +29,8 @@ from renderer.numerics.simd import (
 from renderer.trace.edge_signs import coordinate
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+from renderer.trace.leaf import tree_pointers
+from renderer.trace.walk import blocks_of, push_children
 
 # In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot tell.
 ON_FACE, UNTOLD = -(2**31), -(2**31) + 1
@@ -66,7 +67,7 @@ def count_crossings(words, points, axis, middle, rows, out, stack, begin):
     """Winding numbers (or ON_FACE, or UNTOLD) for ``points`` (n, 3), from row ``begin`` on, to ``out[rows[i]]``, int32.
 
     The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
-    ``stack`` is memory for ``singly.stack_size`` int64. Returns the row before which it ended: early after WORK, so
+    ``stack`` is memory for ``walk.stack_size`` int64. Returns the row before which it ended: early after WORK, so
     that Ctrl-C need not wait for long.
     """
     tree, parts = tree_pointers(words), local_doubles()

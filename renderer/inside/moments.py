@@ -28,8 +28,8 @@ from renderer.system.threads import for_chunks
 from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree, cache_aligned
-from renderer.trace.leaf import blocks_of, tree_pointers
-from renderer.trace.single import stack_size
+from renderer.trace.leaf import tree_pointers
+from renderer.trace.walk import blocks_of, stack_size
 
 # Nodes per chunk: some milliseconds, but for the first chunk, whose nodes hold all faces.
 _NODES = 256

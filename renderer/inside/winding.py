@@ -15,7 +15,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.ordering.cells import ask_in_order
 from renderer.trace.closest import rays_against_blocks
 from renderer.trace.layout import Tree
-from renderer.trace.single import stack_size
+from renderer.trace.walk import stack_size
 
 Floats = NDArray[np.float64]
 # The fewest points of a chunk: some milliseconds of search.

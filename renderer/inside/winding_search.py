@@ -7,8 +7,9 @@ from renderer.inside.multipoles import MOMENT_WORDS, ROUNDING, see_octants, sum_
 from renderer.inside.solid_angle import add_blocks, no_turn, turns_of
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import at, get, larger, local_doubles, pointer, put, smaller, splat4
-from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+from renderer.trace.leaf import tree_pointers
 from renderer.trace.point import Point
+from renderer.trace.walk import blocks_of, push_children
 
 # The nodes and blocks that a call sums, beside those of one point: some milliseconds, so that Ctrl-C need not wait for
 # long.
@@ -26,7 +27,7 @@ def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
     """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``.
 
     They are NaN where float64's range does not hold what tells them, see ``add_blocks``. ``rows`` is what
-    ``moments_of`` has for the tree, ``stack`` memory for ``singly.stack_size`` int64. Returns the row before which it
+    ``moments_of`` has for the tree, ``stack`` memory for ``walk.stack_size`` int64. Returns the row before which it
     ended: early after _WORK.
     """
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()

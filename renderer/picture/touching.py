@@ -8,7 +8,7 @@ from renderer.shade.surface import SceneArrays
 from renderer.shade.touching import mark_touching
 from renderer.system.threads import for_chunks
 from renderer.trace.layout import Tree
-from renderer.trace.single import stack_size
+from renderer.trace.walk import stack_size
 
 _CHUNK = 4096
 

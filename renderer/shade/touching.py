@@ -24,8 +24,9 @@ from renderer.numerics.vec3 import largest_of_three, length, sub
 from renderer.shade.surface import lets_through, scene_pointers
 from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import blocks_of, octants_around, push_children, tree_pointers
+from renderer.trace.leaf import octants_around, tree_pointers
 from renderer.trace.starts.level import CORNER_ERROR, plane_of
+from renderer.trace.walk import blocks_of, push_children
 
 # The share of a face's coordinates by which its box grows.
 _ROOM = 2.0**-45

@@ -22,10 +22,10 @@ from renderer.system.terminal import progress_bar
 from renderer.trace.batch import Leaving, check_rays, moved_off
 from renderer.trace.closest import closest_hits
 from renderer.trace.hits import Hits, points_on
-from renderer.trace.single import stack_size
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import ANCHOR, CODE, FACE, HEAD, ROW, WAY
 from renderer.trace.starts.search import side_taken
+from renderer.trace.walk import stack_size
 
 Floats = NDArray[np.float64]
 

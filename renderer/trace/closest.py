@@ -13,8 +13,9 @@ from renderer.trace.hits import Hits
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HIT_ROWS
-from renderer.trace.single import FEW_DEPTH, stack_size, trace_few
+from renderer.trace.single import FEW_DEPTH, trace_few
 from renderer.trace.traverse import Memory, make_memory, search_chunk, trace_chunk
+from renderer.trace.walk import stack_size
 
 # Few rays go in smaller chunks, sixteen per thread, so that no thread has much more to do than another.
 _LEAST_CHUNK = 1024

@@ -16,7 +16,6 @@ from renderer.numerics.simd import (
     lowest_bit,
     movemask,
     pointer,
-    put,
     smaller,
     splat8,
 )
@@ -26,11 +25,8 @@ from renderer.trace.layout import (
     BLOCK_FACES,
     BLOCK_WORDS,
     BLOCKS,
-    CHILDREN,
     DEPTH,
     FACES,
-    LEAF_BITS,
-    MAX_LEAF_BLOCKS,
     NODE_WORDS,
     NODES,
     SCALE,
@@ -72,22 +68,6 @@ def tree_pointers(words):
         get(at, DEPTH) > 0,
         double_of(get(at, SCALE)),
     )
-
-
-@inlined
-def blocks_of(leaf):
-    """The first block of a leaf, and how many it has."""
-    return ~leaf >> LEAF_BITS, (~leaf & (MAX_LEAF_BLOCKS - 1)) + 1
-
-
-@inlined
-def push_children(tree, node, bits, stack, top):
-    """Let the children in the octants ``bits`` of a node wait on a stack, the last on top; returns the new top."""
-    while bits != 0:
-        put(stack, top, np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + lowest_bit(bits))))
-        bits &= bits - 1
-        top += 1
-    return top
 
 
 @inlined

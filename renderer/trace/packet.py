@@ -240,7 +240,7 @@ def trace_packet(tree, rays, stack, any_hit):
     """Search for hits of sixteen prepared rays with one dominant axis and sign; the results stay in ``rays``.
 
     With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns the number of octants left on the
-    stack, 0 unless the packet gave up, and the bits of the rays in doubt. ``stack`` is scratch of ``singly.stack_size``
+    stack, 0 unless the packet gave up, and the bits of the rays in doubt. ``stack`` is scratch of ``walk.stack_size``
     entries.
     """
     beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes

@@ -30,7 +30,7 @@ from renderer.numerics.simd import (
 )
 from renderer.trace.intersect import Shear, box_limit, largest_of, room_of, round_both
 from renderer.trace.layout import CACHE_LINE, CHILDREN, NODE_WORDS, UNUSED, cache_aligned
-from renderer.trace.leaf import NO_FACE, blocks_of, nearest_in_blocks
+from renderer.trace.leaf import NO_FACE, nearest_in_blocks
 from renderer.trace.packet import Beam, enter_beam, highest_origin, lowest_origin, make_beam, meet_box
 from renderer.trace.ray_lanes import (
     BLOCK_ROW,
@@ -51,10 +51,11 @@ from renderer.trace.ray_lanes import (
     shear_of,
 )
 from renderer.trace.rays import ray_at, starts8
-from renderer.trace.single import search_carefully, stack_size
+from renderer.trace.single import search_carefully
 from renderer.trace.starts.record import EDGE
 from renderer.trace.starts.record import FACE as START_FACE
 from renderer.trace.starts.record import SLACK as START_SLACK
+from renderer.trace.walk import blocks_of, stack_size
 
 # The leaves of a list: 128 kB with the rays. Half as many take as long, twice as many 5 % longer.
 LISTED = 256

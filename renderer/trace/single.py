@@ -3,18 +3,14 @@
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import LOCAL_WORDS, at, get, is_negative, local_words, pointer, put, splat8
-from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, push_children, tree_pointers
+from renderer.numerics.simd import LOCAL_WORDS, at, get, is_negative, local_words, pointer, put
+from renderer.trace.intersect import largest_of, make_shear
+from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
+from renderer.trace.single_ray import Found, enter_node, prepare_single
 from renderer.trace.starts.record import EDGE, PILE
 from renderer.trace.starts.search import NEAR_HIT, search_from, t_from
-
-
-def stack_size(depth: int) -> int:
-    """Entries of one stack: each level leaves at most seven octants waiting, and some are written beyond the top."""
-    return 7 * depth + 24
-
+from renderer.trace.walk import stack_size, walk
 
 # The levels of the deepest tree whose stack fits into a kernel's own frame.
 FEW_DEPTH = (LOCAL_WORDS - stack_size(0)) // 7
@@ -28,28 +24,22 @@ def search_singly(tree, ray, t_max, stack):
     The octants of a node are visited from the last to the first, not by their distance. That suits few rays and
     compiles in a fraction of the time that packets and streams take.
     """
-    largest = largest_of(ray)
-    slabs, shear = make_slabs(ray, largest), make_shear(ray)
-    lower = splat8(round_down(ray.t_min * largest))
     # rule: first-limit
     best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
-    if not tree.has_nodes:
-        return nearest_carefully(tree, 0, tree.count, ray, shear, best), tree.count
-    top, steps = 1, np.int64(0)
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, count = blocks_of(child)
-            # rule: blocks-of-leaf
-            best = nearest_carefully(tree, first, count, ray, shear, best)
-            steps += count
-            continue
-        _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
-        top = push_children(tree, child, bits, stack, top)
-        steps += 1
-    return best, steps
+    return walk(tree, stack, prepare_single(ray), Found(best, np.int64(0)), _enter, _visit)
+
+
+@inlined
+def _enter(tree, single, node, found):
+    _, bits = enter_node(tree, node, single, found.best[0])
+    return Found(found.best, found.steps + 1), bits
+
+
+@inlined
+def _visit(tree, single, first, count, found):
+    # rule: blocks-of-leaf
+    best = nearest_carefully(tree, first, count, single.ray, single.shear, found.best)
+    return Found(best, found.steps + count), False
 
 
 @kernel

@@ -2,19 +2,21 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, lowest_bit, pointer, put, splat8, store
+from renderer.numerics.simd import at, get, lowest_bit, pointer, put, store
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
-from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.layout import BLOCK_FACES, CHILDREN, NODE_WORDS, Tree
-from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, tree_pointers
+from renderer.trace.intersect import box_limit
+from renderer.trace.layout import BLOCK_FACES, Tree
+from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
 from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
-from renderer.trace.single import stack_size
+from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
+from renderer.trace.walk import child_in, stack_size, walk_nearest_first
 
 _WORD = 0xFFFFFFFF
 # The nodes and triangles that a call tests, beside those of one ray: some milliseconds, so that Ctrl-C need not wait
@@ -48,7 +50,7 @@ def count_steps(tree: Tree, rays: RayBatch, shape: tuple[int, ...], threads: int
         size = stack_size(tree.depth)
         stack, near = np.empty(size, np.int64), np.empty(size + 8, np.float32)
         while begin < end:
-            begin, row = _count_chunk(tree.words, rays, counts, stack, near, (begin, end))
+            begin, row = _count_chunk(tree.words, rays, counts, stack, near, begin, end)
             if row >= 0:
                 bad.append(row)
                 return
@@ -63,53 +65,78 @@ def count_steps(tree: Tree, rays: RayBatch, shape: tuple[int, ...], threads: int
 
 
 @kernel
-def _count_chunk(words, rays, counts, stack, near, bounds):
-    """Write nodes and triangles of the rays from bounds[0] to bounds[1] to ``counts`` (2, n).
+def _count_chunk(words, rays, counts, stack, near, begin, end):
+    """Write nodes and triangles of the rays begin:end to ``counts`` (2, n).
 
-    stack  memory for ``singly.stack_size`` int64
+    stack  memory for ``walk.stack_size`` int64
     near   for as many float32 and eight more
 
     Returns the ray before which it ended, early after _WORK; and the row of a ray out of range, or -1.
     """
     tree, source = tree_pointers(words), ray_pointers(rays, tree_pointers(words).scale)
-    bad, work = first_bad_ray(source, bounds[0], bounds[1]), np.int64(0)
+    bad, work = first_bad_ray(source, begin, end), np.int64(0)
     if bad < 0 and tree.has_nodes:
-        for i in range(bounds[0], bounds[1]):
+        waiting = _Waiting(pointer(stack), pointer(near), at(pointer(near), len(stack)))
+        for i in range(begin, end):
             ray, t_max = ray_at(source, i)
-            distances = at(pointer(near), len(stack))
-            counts[0, i], counts[1, i] = _count(tree, ray, t_max, pointer(stack), pointer(near), distances)
+            counts[0, i], counts[1, i] = _count(tree, ray, t_max, waiting)
             work += counts[0, i] + counts[1, i]
             if work > _WORK:
                 return i + 1, bad
-    return bounds[1], bad
+    return end, bad
+
+
+class _Waiting(NamedTuple):
+    """Pointers to the children that wait, to the distances of their boxes, and to those of eight octants."""
+
+    stack: Any
+    near: Any
+    distances: Any
+
+
+class _Query(NamedTuple):
+    """A ray, and what waits for it."""
+
+    single: SingleRay
+    waiting: _Waiting
+
+
+class _Counted(NamedTuple):
+    """The best hit so far, and the nodes and triangles that it took."""
+
+    best: Any
+    nodes: int
+    triangles: int
 
 
 @kernel
-def _count(tree, ray, t_max, stack, near, distances):
-    """Nodes and triangles of one ray; ``near`` has the distances of the boxes that wait on the stack."""
-    largest = largest_of(ray)
-    slabs, shear = make_slabs(ray, largest), make_shear(ray)
-    lower = splat8(round_down(ray.t_min * largest))
-    best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
-    nodes, triangles, top = np.int64(0), np.int64(0), 1
-    put(stack, 0, 0)
-    put(near, 0, np.float32(0.0))
-    while top > 0:
-        top -= 1
-        limit = box_limit(best[0], largest)
-        if get(near, top) > limit:
-            continue
-        child = get(stack, top)
-        if child < 0:
-            first, count = blocks_of(child)
-            best = nearest_carefully(tree, first, count, ray, shear, best)
-            triangles += _faces_in(tree, first, count)
-            continue
-        nodes += 1
-        t0, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(limit))
-        store(distances, 0, t0)
-        top = _push_sorted(tree.links, child * NODE_WORDS + CHILDREN, bits, stack, near, distances, top)
-    return nodes, triangles
+def _count(tree, ray, t_max, waiting):
+    """Nodes and triangles of one ray."""
+    put(waiting.near, 0, np.float32(0.0))
+    nothing = _Counted((t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(0), np.int64(0))
+    query = _Query(prepare_single(ray), waiting)
+    found = walk_nearest_first(tree, waiting.stack, query, nothing, _reaches, _enter, _visit)
+    return found.nodes, found.triangles
+
+
+@inlined
+def _reaches(query, k, found):
+    # Nothing is beyond a limit of NaN.
+    return not get(query.waiting.near, k) > box_limit(found.best[0], query.single.largest)
+
+
+@inlined
+def _enter(tree, query, node, found, top):
+    t0, bits = enter_node(tree, node, query.single, found.best[0])
+    store(query.waiting.distances, 0, t0)
+    top = _push_sorted(tree, node, bits, query.waiting, top)
+    return _Counted(found.best, found.nodes + 1, found.triangles), top
+
+
+@inlined
+def _visit(tree, query, first, count, found):
+    best = nearest_carefully(tree, first, count, query.single.ray, query.single.shear, found.best)
+    return _Counted(best, found.nodes, found.triangles + _faces_in(tree, first, count)), False
 
 
 @kernel
@@ -121,16 +148,13 @@ def _faces_in(tree, first, count):
 
 
 @inlined
-def _push_sorted(links, base, bits, stack, near, distances, top):
-    """``push_children`` with the nearest on top, as in streams; ``base`` is where a node's links begin.
-
-    ``near`` has the distances of what waits, ``distances`` those of the octants.
-    """
-    first = top
+def _push_sorted(tree, node, bits, waiting, top):
+    """``push_children`` with the nearest on top, as in streams."""
+    stack, near, first = waiting.stack, waiting.near, top
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        distance, child, k = get(distances, i), np.int64(get(links, base + i)), top
+        distance, child, k = get(waiting.distances, i), child_in(tree, node, i), top
         while k > first and _precedes(get(near, k - 1), get(stack, k - 1), distance, child):
             put(near, k, get(near, k - 1))
             put(stack, k, get(stack, k - 1))

@@ -24,7 +24,7 @@ from renderer.trace.ray_lanes import (
     prepare_eight,
 )
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers
-from renderer.trace.single import search_carefully, stack_size, write_best
+from renderer.trace.single import search_carefully, write_best
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import EDGE
 from renderer.trace.stream import (
@@ -48,6 +48,7 @@ from renderer.trace.stream import (
     take_hits,
     wait_octant,
 )
+from renderer.trace.walk import stack_size
 
 # Sixteen rays are no packet when a slope against their dominant axis differs by more than this from the first ray's.
 # The bound only spares scattered rays the attempt; a packet whose rays part later ends by its BUDGET.

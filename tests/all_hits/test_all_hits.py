@@ -16,6 +16,12 @@ from renderer.octree import BruteForce, Octree
 from validation.oracle.contacts import contacts, hits
 from validation.stability.cases.judgement import both, soup_of
 
+pytestmark = pytest.mark.judges(
+    "AllHits", "AllHits.counts", "AllHits.normals", "AllHits.ray", "BruteForce.all_hits", "BruteForce.count_hits",
+    "Octree.all_hits", "Octree.count_hits",
+)  # fmt: skip
+
+
 SEEDS = st.integers(0, 2**20)
 BOTH = pytest.mark.parametrize("accelerator", [Octree, BruteForce])
 

@@ -125,6 +125,11 @@ def test_every_option_has_a_case() -> None:
     assert {max(action.option_strings, key=len, default=action.dest) for action in actions} == known
 
 
+@pytest.mark.judges(
+    "octree-render study", "octree-render study --definition", "octree-render study --distance",
+    "octree-render study --faces", "octree-render study --patches", "octree-render study --samples",
+    "octree-render study kind",
+)  # fmt: skip
 @pytest.mark.parametrize("where", [[], ["--cluster"]], ids=["here", "cluster"])
 @pytest.mark.parametrize("name", [*FUNCTIONS, *KINDS])
 def test_the_answers_are_those_of_the_function_with_the_options_argument(

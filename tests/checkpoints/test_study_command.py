@@ -20,6 +20,14 @@ from renderer.mesh.shapes import box
 from renderer.studies import face_points, sky_view_factor, sun_hours
 from validation.benchmark.measures.meshes import named
 
+pytestmark = pytest.mark.judges(
+    "octree-render study", "octree-render study --camera", "octree-render study --cluster",
+    "octree-render study --definition", "octree-render study --distance", "octree-render study --faces",
+    "octree-render study --grid", "octree-render study --output", "octree-render study --patches",
+    "octree-render study --points", "octree-render study --resolution", "octree-render study --samples",
+    "octree-render study --suns", "octree-render study kind", "octree-render study mesh",
+)  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def city(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -21,6 +21,16 @@ from renderer.studies import face_points, sky_view_factor, sun_hours
 from renderer.system.threads import available_threads
 from validation.benchmark.measures.meshes import named
 
+pytestmark = pytest.mark.judges(
+    "octree-render study --camera", "octree-render study --cluster", "octree-render study --definition",
+    "octree-render study --distance", "octree-render study --faces", "octree-render study --grid",
+    "octree-render study --output", "octree-render study --patches", "octree-render study --points",
+    "octree-render study --quiet", "octree-render study --resolution", "octree-render study --samples",
+    "octree-render study --suns", "octree-render study --threads", "octree-render study --vertices",
+    "octree-render study kind", "octree-render study mesh",
+)  # fmt: skip
+
+
 SCENE = """
 ambient = 1.0
 [camera]

@@ -22,6 +22,9 @@ from renderer.cluster import any_hit, closest_hit, connected, run_on
 from renderer.system.threads import checked_threads
 from validation.benchmark.measures.meshes import named
 
+pytestmark = pytest.mark.judges("cluster.any_hit", "cluster.closest_hit", "cluster.connected", "cluster.run_on")
+
+
 SIZE = 64
 
 

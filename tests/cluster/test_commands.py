@@ -12,6 +12,9 @@ from renderer.cli.main import main
 from renderer.mesh.load import save_ply
 from validation.benchmark.measures.meshes import named
 
+pytestmark = pytest.mark.judges("cluster.connected", "cluster.render_on", "octree-render render --cluster")
+
+
 PICTURE = ["render", "scenes/glass.toml", "--resolution", "48x40", "--samples", "4"]
 
 

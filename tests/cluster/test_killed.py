@@ -24,6 +24,12 @@ from renderer.cluster import connected, render_on, run_on
 from renderer.mesh.load import save_ply
 from validation.benchmark.measures.meshes import named
 
+pytestmark = pytest.mark.judges(
+    "cluster.connected", "cluster.render_on", "cluster.run_on", "octree-render render --cluster",
+    "octree-render study --cluster",
+)  # fmt: skip
+
+
 GLASS: dict[str, Any] = {"resolution": (80, 60), "samples": 16}
 # Longer than any wait here; it ends a test that would hang.
 PATIENCE = 60.0

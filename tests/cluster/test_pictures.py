@@ -14,6 +14,9 @@ from renderer.cluster import frames_on, render_on
 from renderer.picture.image import PLANES
 from renderer.scene.camera import Camera
 
+pytestmark = pytest.mark.judges("cluster.frames_on", "cluster.render_on")
+
+
 OPTIONS: dict[str, Any] = {"resolution": (60, 44), "samples": 4, "max_depth": 4}
 
 

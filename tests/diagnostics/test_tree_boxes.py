@@ -136,6 +136,7 @@ def check_visits(octree: Octree, origin: Any, direction: Any, t_max: float) -> N
     assert told <= known
 
 
+@pytest.mark.judges("Octree.count_steps")
 @pytest.mark.parametrize("octree", octrees())
 def test_what_the_ray_enters_before_its_hit_is_visited(octree: Octree) -> None:
     origins, directions = rays_at(octree.mesh.vertices, octree.mesh.faces, 5, count=4)
@@ -156,6 +157,7 @@ def test_visits_of_any_mesh(kind: str, seed: int) -> None:
         check_visits(octree, origin, direction, np.inf)
 
 
+@pytest.mark.judges("Octree.count_steps", "Steps")
 def test_octants_are_opened_nearest_first_and_not_behind_the_hit() -> None:
     """Along x through an icosphere: what lies in front is opened by its entry, and the far half is left alone."""
     octree = Octree.from_mesh(icosphere(4), leaf_size=4)

@@ -17,6 +17,18 @@ from renderer.picture.render import render
 from renderer.precompile import compile_ahead
 from renderer.scene.scene import load_scene
 
+pytestmark = pytest.mark.judges(
+    "__version__", "octree-render --version", "octree-render compile", "octree-render compile --all",
+    "octree-render compile --level", "octree-render info", "octree-render info --split",
+    "octree-render info scene", "octree-render render",
+    "octree-render render --accelerator", "octree-render render --max-depth", "octree-render render --max-rays",
+    "octree-render render --min-weight", "octree-render render --output", "octree-render render --resolution",
+    "octree-render render --samples", "octree-render render --split", "octree-render render --threads",
+    "octree-render render --write-scene", "octree-render render scene", "octree-render view --port",
+    "octree-render view scene", "render",
+)  # fmt: skip
+
+
 ROOT = Path(__file__).parents[2]
 STAIRS = ROOT / "scenes" / "stairs.toml"
 

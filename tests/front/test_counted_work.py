@@ -17,6 +17,12 @@ from renderer.numerics.simd import splat8
 from renderer.trace.intersect import Ray, enter_boxes, largest_of, make_slabs
 from renderer.trace.spawn import BOUNDED
 
+pytestmark = pytest.mark.judges(
+    "Octree", "Octree.all_hits", "Octree.closest_point", "Octree.load", "Octree.refit", "Octree.winding_number",
+    "PreparedScene.picture", "Steps",
+)  # fmt: skip
+
+
 DOWN = [0.0, 0.0, -1.0]
 
 

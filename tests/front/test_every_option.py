@@ -138,6 +138,7 @@ def test_a_picture_is_that_of_render_with_the_options_argument(
     assert (found.tobytes() != picture(scene).radiance.tobytes()) == (name not in BITLESS)
 
 
+@pytest.mark.judges("octree-render render --quiet")
 @pytest.mark.parametrize("where", [[], ["--cluster"]], ids=["here", "cluster"])
 @pytest.mark.parametrize("quiet", [True, False])
 def test_a_bar_is_shown_unless_quiet(

@@ -16,6 +16,13 @@ from signatures import SIGNATURES
 import renderer
 from renderer.cli.main import main
 
+pytestmark = pytest.mark.judges(
+    "octree-render compile", "octree-render compile --all", "octree-render compile --level",
+    "octree-render compile --output", "octree-render compile --pictures", "octree-render compile --queries",
+    "octree-render render --quiet",
+)  # fmt: skip
+
+
 ROOT = Path(__file__).parents[2]
 HEAVY = {
     "numba",

@@ -17,9 +17,12 @@ from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
 from renderer.numerics.simd import at, local_doubles, pointer
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.single import stack_size
+from renderer.trace.walk import stack_size
 from validation.references.igl import Igl
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
+
+pytestmark = pytest.mark.judges("BruteForce.winding_number", "Octree.contains", "Octree.winding_number")
+
 
 SOLIDS = closed_solids()
 TOLERANCES = (0.3, 1e-2, 1e-3, 1e-6, 1e-10, 0.0)

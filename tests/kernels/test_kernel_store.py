@@ -282,6 +282,7 @@ class TestAhead:
         folder.rename(package / "compiled")
         assert run(package) == LOADED
 
+    @pytest.mark.judges("octree-render compile")
     def test_they_are_not_used_for_other_sources(self, package, folder):
         before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.iterdir()}
         bottom_of(package).write_text("STEP = 20\n")

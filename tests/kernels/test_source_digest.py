@@ -40,16 +40,16 @@ def whole(tmp_path):
 
 def test_an_edit_of_the_layout_changes_the_kernels_over_it_alone(whole):
     changed = changed_by(whole, "trace/layout.py")
-    kernels = {"trace/intersect.py", "trace/traverse.py", "trace/singly.py", "tree/build.py", "shade/whitted.py"}
+    kernels = {"trace/intersect.py", "trace/traverse.py", "trace/single.py", "tree/build.py", "shade/whitted.py"}
     assert {"trace/layout.py", *kernels} <= changed
     assert not changed & {"numerics/simd.py", "jit/decorators.py", "errors.py", "mesh/mesh.py", "system/threads.py"}
 
 
-@pytest.mark.parametrize("edited", ["cli.py", "viewer/session.py", "scene/needs.py", "scene/material.py"])
+@pytest.mark.parametrize("edited", ["cli/main.py", "viewer/session.py", "scene/needs.py", "scene/material.py"])
 def test_an_edit_beside_the_kernels_changes_none_of_them(whole, edited):
     kernels = {
-        "trace/singly.py", "tree/build.py", "tree/subtree.py", "tree/refit.py", "tree/blocks.py",
-        "shade/whitted.py", "shade/tile.py", "inspect/face_phong.py",
+        "trace/single.py", "tree/build.py", "tree/subtree.py", "tree/refit.py", "tree/blocks.py",
+        "shade/whitted.py", "shade/tile.py", "diagnostics/face_phong.py",
     }  # fmt: skip
 
     assert not changed_by(whole, edited) & kernels

@@ -16,6 +16,8 @@ import pytest
 from renderer.picture.image import Image, check_picture_path, srgb, srgb_steps
 from renderer.system.files import write_atomically
 
+pytestmark = pytest.mark.judges("Image", "Image.save", "Image.srgb", "octree-render render --output", "srgb")
+
 
 def image(radiance: Any = None) -> Image:
     radiance = np.random.default_rng(1).uniform(-0.2, 1.3, (5, 7, 3)) if radiance is None else radiance

@@ -21,6 +21,12 @@ from renderer.scene.scene import Floor, RenderSettings, SceneObject
 from renderer.shade.records import KIND, PHONG
 from renderer.shade.surface import MAX_MEDIA
 
+pytestmark = pytest.mark.judges(
+    "Dielectric.passes_light", "Image", "Mirror.passes_light", "Needs", "Phong.passes_light", "Phong.receives_light",
+    "needs_of", "render",
+)  # fmt: skip
+
+
 MODULE = importlib.import_module("renderer.picture.prepare")
 SCENES = Path(__file__).parents[2] / "scenes"
 SUN = DirectionalLight(direction=(-1, -2, -1))

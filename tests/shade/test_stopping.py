@@ -30,6 +30,11 @@ from renderer.mesh.shapes import icosphere
 from renderer.picture import prepare as prepared_scene
 from renderer.trace.spawn import BOUNDED
 
+pytestmark = pytest.mark.judges(
+    "CutWarning", "PreparedScene.picture", "RenderSettings", "render", "scene.render.max_rays"
+)
+
+
 # Four half-mirrors one in another: a ray that meets one leaves two.
 TEXT = """
 [camera]

@@ -22,6 +22,9 @@ from renderer.scene.needs import needs_of
 from renderer.scene.scene import Floor, Scene, SceneObject
 from renderer.trace.spawn import MITSUBA_EPSILON
 
+pytestmark = pytest.mark.judges("Dielectric", "Phong", "PreparedScene.touching")
+
+
 REL = 2.0**-22
 GROUND = Phong(diffuse=0.0, ambient=0.5)
 GLASS, WATER = Dielectric(ior=1.5), Dielectric(ior=1.33)

@@ -270,6 +270,7 @@ def test_a_relative_path_in_a_folder_that_was_removed_is_named(tmp_path: Path, m
         check_writable("a.png")
 
 
+@pytest.mark.judges("Image", "render")
 @pytest.mark.parametrize("planes", [(), ("rays",), ("depth", "face"), ("normal",), PLANES])
 def test_planes_that_are_not_kept_have_no_pixels_and_others_the_same(tmp_path: Path, planes: tuple[str, ...]) -> None:
     scene = load_scene(STAIRS)
@@ -282,6 +283,7 @@ def test_planes_that_are_not_kept_have_no_pixels_and_others_the_same(tmp_path: P
         image.save(tmp_path / f"a.{suffix}")
 
 
+@pytest.mark.judges("render")
 @pytest.mark.parametrize("planes", ["depth", ["color"], ["depth", 3], np.array(4), None])
 def test_unknown_planes_are_refused(planes: Any) -> None:
     with pytest.raises(ValueError, match=r"^planes: expected some of radiance, depth, normal, face, rays, got "):

@@ -14,6 +14,8 @@ import pytest
 from renderer.system import threads as parallel
 from renderer.system.threads import available_threads, checked_threads, for_chunks
 
+pytestmark = pytest.mark.judges("Octree", "PreparedScene.picture", "octree-render render --threads", "render")
+
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
 @pytest.mark.parametrize("count, size", [(0, 4), (1, 4), (4, 4), (5, 4), (1000, 7), (3, 100)])

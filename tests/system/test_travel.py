@@ -119,6 +119,7 @@ def fields(answer: Any) -> list[bytes]:
     return [np.asarray(getattr(answer, name)).tobytes() for name in [*names, *more]]
 
 
+@pytest.mark.judges("Octree.refit")
 @by_any_way
 @pytest.mark.parametrize("query", ["closest_hit", "all_hits", "closest_point"])
 def test_answers_travel_with_the_mesh_that_they_are_of(query: str, way: str) -> None:
@@ -255,6 +256,7 @@ QUERIES: dict[str, Callable[[Any, Any], Any]] = {
 }
 
 
+@pytest.mark.judges("Octree.refit")
 @pytest.mark.parametrize("query", QUERIES)
 @pytest.mark.parametrize("kind", ["octree", "brute force", "mapped"])
 def test_a_refit_in_the_midst_of_a_query_changes_nothing_of_it(kind: str, query: str, tmp_path: Path) -> None:
@@ -267,6 +269,7 @@ def test_a_refit_in_the_midst_of_a_query_changes_nothing_of_it(kind: str, query:
     assert np.array_equal(target.mesh.vertices, moved) and after != before
 
 
+@pytest.mark.judges("Octree.refit", "Octree.save")
 def test_callers_on_other_threads_see_the_mesh_before_or_after_a_refit(tmp_path: Path) -> None:
     """Every query, every copy and every file, until each has seen both, while another thread refits."""
     ball = icosphere(4)

@@ -16,6 +16,9 @@ from renderer.trace.intersect import Ray, enter_boxes, make_slabs, room_of, roun
 from renderer.trace.layout import NODE_WORDS
 from validation.oracle import exact
 
+pytestmark = pytest.mark.judges("BruteForce", "Octree.closest_hit")
+
+
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
 ONE = np.array([[0, 1, 2]])
 BOTH = pytest.mark.parametrize("accelerator", [Octree, BruteForce])

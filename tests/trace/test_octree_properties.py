@@ -12,6 +12,9 @@ from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 from validation.oracle import exact
 
+pytestmark = pytest.mark.judges("BruteForce", "Hits", "Hits.normals", "Hits.points", "Octree", "Octree.closest_hit")
+
+
 SEEDS = st.integers(0, 2**20)
 
 

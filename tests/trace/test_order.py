@@ -60,12 +60,14 @@ def test_most_rays_beside_the_plane_hit_near_it(expected):
     assert abs(expected.t[expected.hit] - 1e-11).max() < 1e-15
 
 
+@pytest.mark.judges("Octree.closest_hit")
 @pytest.mark.parametrize("threads", [1, 2, 3])
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
 def test_rays_beside_a_plane_hit_the_same_with_any_threads(flat, expected, threads, split):
     assert_same_hits(Octree(*flat, split=split, threads=threads).closest_hit(*beside(1e-12)), expected)
 
 
+@pytest.mark.judges("BruteForce")
 def test_rays_beside_a_plane_hit_the_same_by_brute_force(flat, expected):
     assert_same_hits(BruteForce(*flat).closest_hit(*beside(1e-12)), expected)
 

@@ -18,6 +18,13 @@ from twins import CORNERS, FACES, MESH, NORMALS, Floats, Integers, dot, holding,
 from renderer import BruteForce, Mesh, Octree
 from renderer.queryable import Queries
 
+pytestmark = pytest.mark.judges(
+    "BruteForce.all_hits", "BruteForce.any_hit", "BruteForce.closest_hit", "BruteForce.count_hits",
+    "BruteForce.count_steps", "Octree.all_hits", "Octree.any_hit", "Octree.closest_hit", "Octree.count_hits",
+    "Octree.count_steps",
+)  # fmt: skip
+
+
 TARGETS = {
     "octree": Octree.from_mesh(MESH, threads=1),
     "sah": Octree.from_mesh(MESH, split="sah", leaf_size=1, threads=3),

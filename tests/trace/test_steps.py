@@ -9,6 +9,8 @@ from renderer.diagnostics.tree_boxes import visited
 from renderer.mesh.shapes import icosphere
 from renderer.trace.layout import BLOCK_FACES
 
+pytestmark = pytest.mark.judges("BruteForce", "Octree.count_steps", "Steps")
+
 
 @pytest.mark.parametrize("kind", ["lattice", "soup"])
 def test_each_ray_takes_the_steps_that_are_drawn(kind):

@@ -28,6 +28,9 @@ from renderer.system import files
 from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS
 from renderer.tree import store
 
+pytestmark = pytest.mark.judges("Mesh.viewing", "Octree.load", "Octree.save")
+
+
 MAPPED = pytest.mark.parametrize("mmap", [False, True], ids=["read", "mapped"])
 ORIGINS, DIRECTIONS = rays_at(*make_mesh("soup", 1, 50), 1, 12)
 

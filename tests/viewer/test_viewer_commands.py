@@ -46,6 +46,7 @@ def client(url: str) -> Iterator[Client]:
         yield client
 
 
+@pytest.mark.judges("octree-render render --change")
 @pytest.mark.parametrize(
     ("changes", "settings"),
     [

@@ -46,6 +46,11 @@ from renderer.viewer.session import SupersededError
 from renderer.viewer.shown import ShownScene, open_file
 from renderer.viewer.viewpoint import camera_of, camera_toml
 
+pytestmark = pytest.mark.judges(
+    "octree-render view", "octree-render view --no-browser", "octree-render view --port", "octree-render view scene",
+    "view",
+)  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:

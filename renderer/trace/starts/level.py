@@ -10,15 +10,16 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import as_pairs, dot_pairs, quotient
-from renderer.numerics.simd import get, larger, put, smaller
+from renderer.numerics.simd import get, larger, smaller
 from renderer.numerics.vec3 import add, barycentric, cross, dot, largest_component, largest_of_three, length, sub
 from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import blocks_of, octants_around, push_children
+from renderer.trace.leaf import octants_around
 from renderer.trace.starts.anchor import anchor_of
 from renderer.trace.starts.cone import MOST_HOLDERS, NUMBER, PLACE, ZEROS, holder, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
 from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
+from renderer.trace.walk import walk
 
 NO_MEMBER = -1
 # The share of the largest coordinate by which corners are off: 16 roundings.
@@ -178,6 +179,19 @@ def member_spot(tree, holders, k, spot, met):
     return spot if number == spot.face else _spot_of(tree, holder(holders, k, PLACE), number, met)
 
 
+class _Around(NamedTuple):
+    """A point where faces that touch others are looked for, the room around it, the box of both, which faces touch
+    others, and where those found are listed.
+    """
+
+    o: Any
+    room: float
+    low: Any
+    high: Any
+    touching: Any
+    holders: Any
+
+
 @kernel
 def list_near(tree, surfaces, spot, stack, holders):
     """List the faces that touch others and may hold a spot, as far as float64 tells; returns their number, mostly 1.
@@ -185,33 +199,28 @@ def list_near(tree, surfaces, spot, stack, holders):
     """
     corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
-    room, count, top = 4.0 * CORNER_ERROR * largest_of_three(*corners), 0, 1
+    room = 4.0 * CORNER_ERROR * largest_of_three(*corners)
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
-    if not tree.has_nodes:
-        return _list_in(tree, 0, tree.count, surfaces.touching, o, room, holders, count)
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, blocks = blocks_of(child)
-            count = _list_in(tree, first, blocks, surfaces.touching, o, room, holders, count)
-            continue
-        top = push_children(tree, child, octants_around(tree, child, low, high), stack, top)
-    return count
+    query = _Around(o, room, low, high, surfaces.touching, holders)
+    return walk(tree, stack, query, np.int64(0), _enter, _list_in)
 
 
 @inlined
-def _list_in(tree, first, blocks, touching, o, room, holders, count):
+def _enter(tree, query, node, count):
+    return count, octants_around(tree, node, query.low, query.high)
+
+
+@inlined
+def _list_in(tree, query, first, blocks, count):
     """List those of the faces of some blocks that touch others and may hold a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
         face = get(tree.faces, slot)
-        if face >= 0 and get(touching, face) != 0:
+        if face >= 0 and get(query.touching, face) != 0:
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
-            held = _hold_sign(corners_at(tree, place), o, room)
+            held = _hold_sign(corners_at(tree, place), query.o, query.room)
             if held >= 0:
-                count = _put_face(holders, count, place, np.int64(face), held)
-    return count
+                count = _put_face(query.holders, count, place, np.int64(face), held)
+    return count, False
 
 
 @kernel

@@ -10,26 +10,22 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.numerics.simd import extract, get, larger, local_doubles, lowest_bit, pointer, put, smaller, splat8
+from renderer.numerics.simd import extract, get, larger, local_doubles, lowest_bit, pointer, put, smaller
 from renderer.numerics.vec3 import add, largest_component, sub
 from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import (
     CORNER,
     Ray,
-    box_limit,
-    enter_boxes,
     hit_triangles,
-    largest_of,
     make_shear,
-    make_slabs,
     near_planes,
-    round_down,
     see_triangles,
     unsure_sides,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import NO_FACE, blocks_of, is_better, octants_around, push_children, tree_pointers
+from renderer.trace.leaf import NO_FACE, is_better, octants_around, tree_pointers
 from renderer.trace.resolve import settled
+from renderer.trace.single_ray import Found, SingleRay, enter_node, prepare_single
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
@@ -61,6 +57,7 @@ from renderer.trace.starts.record import (
     way_back,
 )
 from renderer.trace.starts.region import NOT_STOPPED, Behind, bounding_holder, holder_of, stopping_holder
+from renderer.trace.walk import walk
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
@@ -84,37 +81,47 @@ def _box_holds(tree, place, o):
     return holds
 
 
+class _Surroundings(NamedTuple):
+    """What is asked of the faces around a start: the anchor, as rounded too; the box around that; of a ray that leaves
+    it the direction, and the last two arguments of ``meet_face``; and where those that hold the anchor are listed.
+    """
+
+    anchor: Any
+    o: Any
+    low: Any
+    high: Any
+    d: Any
+    slope: int
+    dz: float
+    holders: Any
+
+
 @kernel
 def list_holders(tree, anchor, d, slope, dz, stack, holders):
     """List the faces that hold an anchor, from which a ray leaves in direction d; returns their number."""
-    o, count, top = rounded(anchor), 0, 1
+    o = rounded(anchor)
     room = largest_component(o) * _ROOM
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
-    if not tree.has_nodes:
-        return _add_holders(tree, 0, tree.count, anchor, o, d, slope, dz, holders, count)
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, blocks = blocks_of(child)
-            count = _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, count)
-            continue
-        top = push_children(tree, child, octants_around(tree, child, low, high), stack, top)
-    return count
+    query = _Surroundings(anchor, o, low, high, d, slope, dz, holders)
+    return walk(tree, stack, query, np.int64(0), _enter_around, _add_holders)
+
+
+@inlined
+def _enter_around(tree, query, node, count):
+    return count, octants_around(tree, node, query.low, query.high)
 
 
 @kernel
-def _add_holders(tree, first, blocks, anchor, o, d, slope, dz, holders, count):
+def _add_holders(tree, query, first, blocks, count):
     """List those faces of some blocks that hold an anchor."""
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
             face, place = get(tree.faces, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
-            if face >= 0 and _box_holds(tree, place, o):
-                met = meet_face(seen_from(tree, place, anchor), anchor, d, slope, dz)
+            if face >= 0 and _box_holds(tree, place, query.o):
+                met = meet_face(seen_from(tree, place, query.anchor), query.anchor, query.d, query.slope, query.dz)
                 if met.kind == HOLDS:
-                    count = add_holder(tree, holders, count, place, face, met.zeros)
-    return count
+                    count = add_holder(tree, query.holders, count, place, face, met.zeros)
+    return count, False
 
 
 @kernel
@@ -147,7 +154,7 @@ class Departure(NamedTuple):
 def depart(tree, starts, i, ray, stack, memory):
     """The ``Departure`` of ray ``i``, and the hit that stops it at its start, of NO_FACE for none.
 
-    ``ray`` is as ``rays.ray_at`` has it. ``stack`` is memory for ``singly.stack_size`` int64, and ``memory`` for
+    ``ray`` is as ``rays.ray_at`` has it. ``stack`` is memory for ``walk.stack_size`` int64, and ``memory`` for
     ``cone.HOLDERS_WORDS``.
     """
     start = start_at(starts, i, tree.scale)
@@ -227,6 +234,14 @@ def _nearest_from(tree, first, count, departure, shear, best):
     return best
 
 
+class _Query(NamedTuple):
+    """A ray that leaves a surface, and whether any hit ends its walk."""
+
+    departure: Departure
+    single: SingleRay
+    any_hit: bool
+
+
 @kernel
 def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
     """The closest hit (t, face, u, v, w) of ray ``i`` from its start, NO_FACE for none; with ``any_hit`` any one.
@@ -234,30 +249,23 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
     Arguments as for ``depart``; ``t_max`` is the ray's own. Also returns the number of nodes and blocks that it took.
     """
     departure, stopped = depart(tree, starts, i, ray, stack, memory)
-    best, steps = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(1)
     if stopped[1] != NO_FACE:
-        return stopped, steps
-    ray = departure.ray
-    largest = largest_of(ray)
-    slabs, shear = make_slabs(ray, largest), make_shear(ray)
-    if not tree.has_nodes:
-        return _nearest_from(tree, 0, tree.count, departure, shear, best), steps
-    lower, top = splat8(round_down(ray.t_min * largest)), 1
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, count = blocks_of(child)
-            best = _nearest_from(tree, first, count, departure, shear, best)
-            steps += count
-            if any_hit and best[1] != NO_FACE:
-                break
-            continue
-        _, bits = enter_boxes(tree.nodes, child, slabs, lower, splat8(box_limit(best[0], largest)))
-        top = push_children(tree, child, bits, stack, top)
-        steps += 1
-    return best, steps
+        return Found(stopped, np.int64(1))
+    query = _Query(departure, prepare_single(departure.ray), any_hit)
+    found = Found((t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(1))
+    return walk(tree, stack, query, found, _enter, _visit)
+
+
+@inlined
+def _enter(tree, query, node, found):
+    _, bits = enter_node(tree, node, query.single, found.best[0])
+    return Found(found.best, found.steps + 1), bits
+
+
+@inlined
+def _visit(tree, query, first, count, found):
+    best = _nearest_from(tree, first, count, query.departure, query.single.shear, found.best)
+    return Found(best, found.steps + count), query.any_hit and best[1] != NO_FACE
 
 
 @kernel

@@ -48,7 +48,7 @@ _CHANGES: dict[str, Change] = {
     "distances of scaled meshes keep the tree's units": Rule("point-in-tree-units", without("*", 0)),
     "distances whose products vanish are believed": Rule("lost-products", without("and", 0)),
     "distances are negative outside": after("signed.signed_distance", lambda distance: -distance),
-    "an end hides itself": after("visible._between", lambda rays: rays._replace(t_max=rays.t_max * (1.0 + 2.0**-30))),
+    "an end hides itself": Rule("room-before-end", without("-", 1)),
     "a way is seen to its middle": after("visible._between", lambda rays: rays._replace(t_max=rays.t_max * 0.5)),
     "points on the surface are inside without it": Wrapped("contains.contains", _with_boundary),
     "parity is taken as winding": Wrapped("contains.contains", _always_nonzero),

@@ -45,6 +45,7 @@ def judged(scene: Scene) -> list[Any]:
     return MediaJudge(prepare(scene), SIZE).judge(stack, pixels)
 
 
+@pytest.mark.judges("render")
 @pytest.mark.parametrize("why", SCENES)
 def test_geometry_says_why_the_rules_differ(why: str) -> None:
     found = judged(SCENES[why])

@@ -1,0 +1,51 @@
+"""One ray as it walks alone through a tree."""
+
+from typing import Any, NamedTuple
+
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import splat8
+from renderer.trace.intersect import (
+    Ray,
+    Shear,
+    Slabs,
+    box_limit,
+    enter_boxes,
+    largest_of,
+    make_shear,
+    make_slabs,
+    round_down,
+)
+
+
+class SingleRay(NamedTuple):
+    """A ray, prepared for the tests of triangles and of boxes.
+
+    lower    the distance at which t_min lies, eight times
+    largest  the largest component of the direction
+    """
+
+    ray: Ray
+    shear: Shear
+    slabs: Slabs
+    lower: Any
+    largest: float
+
+
+class Found(NamedTuple):
+    """The best hit so far, (t, face, u, v, w), and the number of nodes and blocks that it took."""
+
+    best: Any
+    steps: int
+
+
+@inlined
+def prepare_single(ray):
+    """The ``SingleRay`` of a ray."""
+    largest = largest_of(ray)
+    return SingleRay(ray, make_shear(ray), make_slabs(ray, largest), splat8(round_down(ray.t_min * largest)), largest)
+
+
+@inlined
+def enter_node(tree, node, single, t_max):
+    """The entry distances of a node's octants, and the bits of those that a ray meets up to ``t_max``."""
+    return enter_boxes(tree.nodes, node, single.slabs, single.lower, splat8(box_limit(t_max, single.largest)))
