@@ -60,7 +60,7 @@ lint: $(STAMP)
 clean:
 	rm -rf .venv build dist docs/examples sg_execution_times.rst *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
 	find renderer validation tests scenes -name __pycache__ -prune -exec rm -rf {} +
-	find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name baseline.json ! -name 'mutants*.json' -exec rm -rf {} +
+	find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name baseline.json -exec rm -rf {} +
 
 $(STAMP): pyproject.toml requirements.lock
 	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found; install Python 3.11 or newer, or set PYTHON=..." >&2; exit 1; }

@@ -226,6 +226,7 @@ class Octree(_Accelerator):
         stored = load_octree(path, flag_argument("mmap", mmap))
         octree = cls.__new__(cls)
         _Accelerator.__init__(octree, stored.mesh, stored.tree, threads)
+        # rule: repairs-of-file
         octree.repairs = stored.repairs
         return octree
 

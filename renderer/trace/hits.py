@@ -82,6 +82,7 @@ class Hits:
         if self.t.shape == shape:
             return self
         t, u, v = (values.reshape(shape) for values in (self.t, self.u, self.v))
+        # rule: bounds-in-shape
         t_error = None if self.t_error is None else self.t_error.reshape(shape)
         side = None if self.side is None else self.side.reshape(shape)
         pile = None if self._pile is None else self._pile.reshape(shape)

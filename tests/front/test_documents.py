@@ -104,7 +104,6 @@ NOT_RUN = {
     "make machines": "half an hour of all tests",
     "python -m validation [": "a line of usage",
     "python -m validation --defects [": "a line of usage",
-    "python -m validation --mutants": "a line of usage",
     "python -m validation --write-baseline [": "a line of usage",
 }
 NOT_HERE = (*RUN_ELSEWHERE, *NOT_RUN)

@@ -22,7 +22,8 @@ from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import SceneObject
 from renderer.shade.shading import reflect, refract
 from renderer.trace.spawn import OffsetRule
-from validation.defects.syntax import find_place, replaced
+from validation.defects.changes import Constant, Function, Rule
+from validation.defects.edits import compare
 from validation.stability.cases.case import ExtremeCase
 from validation.stability.cases.refraction import critical_angle, nested_radiance, snell_residual, steep_indices
 from validation.stability.cases.scenes import Vector, ball, eye_at, quad, scene_of
@@ -100,24 +101,30 @@ class TestJudgesFindABrokenRefraction:
         assert snell_residual(d, n, t, 1.0, 1.0) == pytest.approx(0.2 * 2.0**53, rel=1e-12)
 
 
-# Place, rule, and what it is replaced by; then the rows whose cases must notice.
-FAULTS = [
-    ("crossing._innermost_ior", "get(world.materials, get(media, count - 1) + IOR) if count > 0 else 1.0", "1.0"),
-    ("whitted._goes_on", "largest > 0.0 and largest >= min_weight", "largest > 0.02"),
-    ("see_light", "dot(n, to_light) <= error", "dot(n, to_light) < -1e-3"),
-    ("surface.phong", "dot(n, towards)", "abs(dot(n, towards))"),
-    ("lights.aim", "SHORT_OF_LIGHT", "2.0"),
-    ("shading.specular", "short = 0.5 * dot(difference, difference)", "short = 0.25 * dot(difference, difference)"),
-]
+# Faults, and the rows whose cases must notice them.
+FAULTS: list[Rule | Constant | Function] = [
+    Function("_innermost_ior", "def _innermost_ior(scene, media, count):\n    return 1.0"),
+    Function("_goes_on", "def _goes_on(weight, min_weight):\n    return largest_component(weight) > 0.02"),
+    Rule("light-in-front", compare("<", "-1e-3")),
+    Function("surface.phong", """
+        def phong(scene, m, n, d, towards):
+            return sound(scene, m, n if dot(n, towards) > 0.0 else scale(n, -1.0), d, towards)
+        """),
+    Constant("SHORT_OF_LIGHT", "2.0"),
+    Function("shading.specular", """
+        def specular(d, n, light, shininess):
+            return sound(d, n, light, 0.5 * shininess)
+        """),
+]  # fmt: skip
 NOTICED = [40, 41, 42, 43, 44, 45]
 
 
 def test_cases_find_faults_in_the_kernels(tmp_path: Path) -> None:
     """A copy of the package with six rules broken, run by itself; the kernels that no fault reaches come compiled."""
     copy = copy_package(tmp_path)
-    for name, rule, broken in FAULTS:
-        place = find_place(copy, name)
-        place.path.write_text(replaced(place, rule, broken), encoding="utf-8")
+    for fault in FAULTS:
+        altered = fault.altered(copy)
+        altered.path.write_text(altered.text, encoding="utf-8")
     program = (
         "import json, sys; sys.path[:0] = sys.argv[1:]; import renderer;"
         "from validation.stability.cases.shading import CASES;"

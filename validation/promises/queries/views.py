@@ -40,6 +40,7 @@ def check_views(rng: Generator) -> list[dict[str, Any]]:
         row("nothing is seen through a ball", "a ball is closed", np.concatenate(hidden)),
         row("what is in front of a face, however near, hides what stands on it", "planes by hand", _covered()),
         row("each pair of points has the room of its own coordinates", "a square by hand", _far()),
+        row("what is nearer to an end than 2^-40 of both ends' coordinates hides nothing", "a square by hand", _room()),
         row("a point sees what is in its own place", "nothing lies between", _same(rng)),
         row("corners at 0.0 and -0.0 are at one place", "a box is closed", _closed()),
     ]
@@ -75,6 +76,17 @@ def _covered() -> NDArray[np.bool_]:
             built = tracer.from_mesh(loose(corners))
             kept += [not built.visible(np.zeros(3), above, leaving=0, reaching=1)]
             kept += [bool(built.visible(height * above, above, leaving=2, reaching=1))]
+    return np.array(kept)
+
+
+def _room() -> NDArray[np.bool_]:
+    """A point close behind a square and one farther behind it, each from the origin and the other way round."""
+    mesh = squares(np.array([[(-1.0, -1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, 1.0), (-1.0, 1.0, 1.0)]]))
+    origin, close, behind = (np.array([0.25 * z, 0.125 * z, z]) for z in (0.0, 1.0 + 2.0**-42, 1.0 + 2.0**-38))
+    kept = []
+    for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+        kept += [tracer.visible(origin, close), tracer.visible(close, origin)]
+        kept += [~tracer.visible(origin, behind), ~tracer.visible(behind, origin)]
     return np.array(kept)
 
 
