@@ -1,4 +1,3 @@
-from .distance.closest import ClosestPoints as ClosestPoints
 from .errors import MeshError as MeshError
 from .errors import SceneError as SceneError
 from .mesh.load import load_mesh as load_mesh
@@ -13,6 +12,10 @@ from .picture.image import srgb as srgb
 from .picture.prepare import PreparedScene as PreparedScene
 from .picture.render import prepare as prepare
 from .picture.render import render as render
+from .results.closest_points import ClosestPoints as ClosestPoints
+from .results.hits import AllHits as AllHits
+from .results.hits import Hits as Hits
+from .results.steps import Steps as Steps
 from .scene.camera import OrthographicCamera as OrthographicCamera
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
 from .scene.light import DirectionalLight as DirectionalLight
@@ -27,8 +30,5 @@ from .scene.scene import RenderSettings as RenderSettings
 from .scene.scene import Scene as Scene
 from .scene.scene import SceneObject as SceneObject
 from .scene.scene import load_scene as load_scene
-from .trace.hits import AllHits as AllHits
-from .trace.hits import Hits as Hits
-from .trace.steps import Steps as Steps
 from .version import __version__ as __version__
 from .viewer.view import view as view

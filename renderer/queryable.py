@@ -9,21 +9,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.all_hits.all_hits import all_hits, count_hits
 from renderer.arguments.arrays import flag_argument
-from renderer.distance.closest import ClosestPoints, closest_point
+from renderer.distance.closest import closest_point
 from renderer.distance.signed import signed_distance
 from renderer.distance.visible import visible
 from renderer.errors import expect
 from renderer.inside.contains import contains
 from renderer.inside.winding import winding_number
 from renderer.mesh.mesh import Mesh, Repairs
+from renderer.results.closest_points import ClosestPoints
+from renderer.results.hits import AllHits, Hits, Passage
+from renderer.results.steps import Steps
 from renderer.system.threads import checked_threads
 from renderer.trace.batch import RayBatch, check_rays, moved_off
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.error import add_errors
-from renderer.trace.hits import AllHits, Hits, Passage
 from renderer.trace.layout import Tree
 from renderer.trace.leaving import check_leaving
-from renderer.trace.steps import Steps, count_steps
+from renderer.trace.steps import count_steps
 
 
 class Built(NamedTuple):

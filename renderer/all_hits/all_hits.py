@@ -22,10 +22,10 @@ from renderer.all_hits.gather import (
 from renderer.arguments.arrays import flag_argument
 from renderer.arguments.counts import count_argument
 from renderer.mesh.mesh import Mesh
+from renderer.results.hits import AllHits
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.closest import rays_against_blocks
-from renderer.trace.hits import AllHits
 from renderer.trace.layout import Tree
 from renderer.trace.traverse import make_memory
 

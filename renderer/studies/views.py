@@ -16,13 +16,13 @@ from renderer.distance.on_surface import on_surface
 from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
 from renderer.queryable import Queries
+from renderer.results.hits import Hits, points_on
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
 from renderer.studies.edge_on import are_edge_on
 from renderer.studies.share import check_directions, lengths_of, limits_of
 from renderer.system.terminal import progress_bar
 from renderer.trace.batch import Leaving, check_rays, moved_off
 from renderer.trace.closest import closest_hits
-from renderer.trace.hits import Hits, points_on
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import ANCHOR, CODE, FACE, HEAD, ROW, WAY
 from renderer.trace.starts.search import side_taken

@@ -10,8 +10,8 @@ from meshes import make_mesh
 
 from renderer import BruteForce, Octree
 from renderer.mesh.shapes import box, grid, icosphere, torus
+from renderer.results.hits import Hits
 from renderer.trace import batch
-from renderer.trace.hits import Hits
 from renderer.trace.intersect import CORNER
 from renderer.trace.starts.record import EDGE, HEAD, ROW, SLACK
 

@@ -15,7 +15,7 @@ from numpy.random import Generator
 from renderer.jit.decorators import kernel
 from renderer.numerics.simd import extract
 from renderer.octree import BruteForce, Octree
-from renderer.trace.hits import Hits
+from renderer.results.hits import Hits
 from renderer.trace.intersect import FAR_PADDING, Ray, box_limit, hit_triangles, largest_of, make_shear, round_down
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import tree_pointers
