@@ -154,7 +154,7 @@ def _search(tree, point, limit, scratch):
     query, none = _Query(point, scratch), Nearest(np.inf, np.int32(NO_FACE), 0.0, 0.0)
     put(scratch.near, 0, 0.0)
     found = walk_nearest_first(
-        tree, scratch.children, query, _Found(none, np.int64(0), limit), _reaches, _enter, _list_faces
+        tree, scratch.children, query, _Found(none, np.int64(0), limit), _reaches, _enter, _visit
     )
     return _settle(tree, query, found)
 
@@ -170,6 +170,11 @@ def _enter(tree, query, node, found, top):
         tree.nodes, node * NODE_WORDS, query.point, splat4(_squared(found.limit)), query.scratch.squares
     )  # fmt: skip
     return found, _push_nearest_last(tree, node, bits, query.scratch, top)
+
+
+@inlined
+def _visit(tree, query, first, count, found):
+    return _list_faces(tree, query, first, count, found), False
 
 
 @inlined
@@ -229,9 +234,7 @@ def _gap(nodes, row, x):
 
 @kernel
 def _list_faces(tree, query, first, count, found):
-    """List the faces of some blocks that may be within the limit, and lower that to what they bound; the search goes
-    on.
-    """
+    """List the faces of some blocks that may be within the limit, and lower that to what they bound."""
     scratch, best, listed, limit = query.scratch, found.best, found.listed, found.limit
     put(scratch.work, 0, get(scratch.work, 0) + count)
     for block in range(first, first + count):
@@ -245,7 +248,7 @@ def _list_faces(tree, query, first, count, found):
             if listed == LISTED:
                 best = _settle(tree, query, _Found(best, listed, limit))
                 limit, listed = smaller(limit, best.distance * _MORE), np.int64(0)
-    return _Found(best, listed, limit), False
+    return _Found(best, listed, limit)
 
 
 @kernel

@@ -112,12 +112,17 @@ def count_crossings(words, points, axis, middle, rows, out, stack, begin):
 @kernel
 def _search(tree, query, stack):
     """The ``_Crossings`` of a ray with all faces."""
-    return walk(tree, stack, query, _Crossings(np.int64(0), np.int64(0)), _enter, _cross_blocks)
+    return walk(tree, stack, query, _Crossings(np.int64(0), np.int64(0)), _enter, _visit)
 
 
 @inlined
 def _enter(tree, query, node, found):
     return found, _meet_boxes(tree.nodes, node * NODE_WORDS, query.ray)
+
+
+@inlined
+def _visit(tree, query, first, count, found):
+    return _cross_blocks(tree, query, first, count, found), False
 
 
 @inlined
@@ -133,9 +138,9 @@ def _meet_boxes(nodes, base, ray):
     return movemask(meets & (load8(nodes, z) <= splat8(round_up(ray.z))))
 
 
-@kernel
+@inlined
 def _cross_blocks(tree, query, first, count, found):
-    """Add the crossings with the faces of some blocks to ``found``; the search goes on."""
+    """``found`` and the crossings with the faces of some blocks."""
     ray, parts, winding, on = query.ray, query.parts, found.winding, found.on
     put(parts, PARTS, get(parts, PARTS) + count)
     for block in range(first, first + count):
@@ -149,7 +154,7 @@ def _cross_blocks(tree, query, first, count, found):
                 put(parts, PARTS, get(parts, PARTS) + _EXACTLY)
                 step, touches = _cross_exactly(tree, base + i, ray, parts)
                 winding, on = winding + step, on | touches
-    return _Crossings(winding, on), False
+    return _Crossings(winding, on)
 
 
 @inlined
