@@ -10,7 +10,7 @@ from validation.mutants.sites import Mutant
 
 Touched = Mapping[str, Mapping[str, Any]]
 # Tests that read the sources' text: any change of it fails them, whatever it does.
-_READERS = ("tests/validation/defects/", "tests/validation/mutants/", "tests/front/test_documents.py")
+_READERS = ("tests/validation/defects/", "tests/validation/mutants/", "tests/documents/test_documents.py")
 
 
 def read(folder: Path, root: Path) -> Touched:

@@ -79,14 +79,14 @@ RUN_ELSEWHERE = {
     "make test": (".ci/run", r"^step make test$"),
     "make docs": (".ci/run", r"^step make docs$"),
     "make validate QUICK=1": (".ci/run", r"^step make validate QUICK=1$"),
-    "python3 -m venv": ("tests/front/test_installing.py", r'\[sys\.executable, "-m", "venv", '),
-    "pip install": ("tests/front/test_installing.py", r"^PIP = re\.compile"),
-    "pre-commit install": ("tests/front/test_installing.py", r'"pre_commit", "install"'),
-    "python -m build": ("tests/front/test_installing.py", r'"python -m build --wheel"'),
-    "rm -r renderer/compiled": ("tests/front/test_installing.py", r'"rm -r renderer/compiled"'),
-    "python -m wheel tags": ("tests/front/test_installing.py", r'"python -m wheel tags '),
+    "python3 -m venv": ("tests/packaging/test_installing.py", r'\[sys\.executable, "-m", "venv", '),
+    "pip install": ("tests/packaging/test_installing.py", r"^PIP = re\.compile"),
+    "pre-commit install": ("tests/packaging/test_installing.py", r'"pre_commit", "install"'),
+    "python -m build": ("tests/packaging/test_installing.py", r'"python -m build --wheel"'),
+    "rm -r renderer/compiled": ("tests/packaging/test_installing.py", r'"rm -r renderer/compiled"'),
+    "python -m wheel tags": ("tests/packaging/test_installing.py", r'"python -m wheel tags '),
     "octree-render view": ("tests/viewer/test_viewer_server.py", r'"renderer\.cli", "view", .*"--no-browser"\]'),
-    "octree-render compile --level": ("tests/front/test_startup.py", r'"compile", "--queries", "--level", level, "-o"'),
+    "octree-render compile --level": ("tests/commands/test_startup.py", r'"compile", "--queries", "--level", level, "-o"'),
     "octree-render study sky city.ply -o sky.npy --cluster tcp://": (
         "tests/cluster/test_commands.py",
         r'"--cluster", client\.scheduler\.address\]\) == 0',
@@ -283,7 +283,7 @@ def workflows(host):
 
 @pytest.mark.parametrize(("page", "text"), workflows("GitHub"), ids=shown)
 def test_a_workflow_in_a_page_has_our_own_actions_and_options_that_there_are(page, text):
-    """Its commands are run by tests/front/test_installing.py."""
+    """Its commands are run by tests/packaging/test_installing.py."""
     used, own = (
         set(re.findall(r"uses: (\S+ # v[\d.]+)$", of, re.MULTILINE))
         for of in (text, (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))

@@ -108,7 +108,7 @@ def test_a_literal_in_a_link_or_a_title_is_not_free_however_deep_it_stands():
 def test_sources_that_the_text_names_are_pages():
     """Files and names in them; not a file that is not there, nor one that a folder does not tell apart."""
     nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
-    made, here = module("source_links"), "tests/front/test_site.py"
+    made, here = module("source_links"), "tests/documents/test_site.py"
     lines = (ROOT / here).read_text(encoding="utf-8").splitlines()
     (constant,) = (i for i, line in enumerate(lines, 1) if line.startswith("GALLERY = "))
     texts = [here, f"{here}::GALLERY", f"{here}::Entry", "tests/nowhere.py", "conf.py", "renderer/", "closest_hit"]
@@ -144,10 +144,10 @@ def linked(text):
 @pytest.mark.parametrize(
     "text",
     [
-        "tests/front/test_site.py::test_of_yesterday",
-        "tests/front/test_site.py::test_of_yesterday[x]",
-        "tests/front/test_site.py::json",  # imported
-        "tests/front/test_site.py::page",  # local
+        "tests/documents/test_site.py::test_of_yesterday",
+        "tests/documents/test_site.py::test_of_yesterday[x]",
+        "tests/documents/test_site.py::json",  # imported
+        "tests/documents/test_site.py::page",  # local
         "renderer/octree.py::Octree::gone",
         "renderer/octree.py::Octree.gone",
         "renderer/gone.py::Octree",
@@ -168,7 +168,7 @@ def test_a_name_that_its_file_has_not_is_an_error_of_the_build(text):
         ("renderer/octree.py::Octree.from_mesh", "    def from_mesh("),
         ("renderer/octree.py::Octree::from_mesh", "    def from_mesh("),
         (
-            "tests/front/test_site.py::test_a_name_within_a_class_or_a_pair_is_found[x]",
+            "tests/documents/test_site.py::test_a_name_within_a_class_or_a_pair_is_found[x]",
             "def test_a_name_within_a_class_or",
         ),
         (".github/workflows/ci.yml", None),
