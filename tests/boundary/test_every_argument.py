@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
+from cases import cases
 from numpy.typing import ArrayLike
 
 import renderer
@@ -102,7 +103,7 @@ def test_each_public_function_and_method_is_here() -> None:
     assert callable(import_module("renderer.viewer.view").view)
 
 
-@pytest.mark.parametrize("name", VARIED)
+@cases("name", VARIED)
 def test_its_optional_arguments_are_given_there(name: str) -> None:
     parameters = inspect.signature(public()[name]).parameters.values()
     optional = {p.name for p in parameters if p.default is not p.empty and p.kind is not p.VAR_KEYWORD}
@@ -110,8 +111,8 @@ def test_its_optional_arguments_are_given_there(name: str) -> None:
     assert name in text and optional - SHOWN - LISTENING.get(name, set()) <= words_of(text)
 
 
-@pytest.mark.parametrize("whole", [2**53 + 1, -(2**53) - 1, 2**63 - 1, -(2**63)])
-@pytest.mark.parametrize(("name", "argument"), sorted(array_arguments()))
+@cases("whole", [2**53 + 1, -(2**53) - 1, 2**63 - 1, -(2**63)])
+@cases(("name", "argument"), sorted(array_arguments()))
 def test_a_whole_number_that_float64_does_not_hold_is_refused(name: str, argument: str, whole: int) -> None:
     """By the name of its argument; the same numbers with another in its place are taken."""
     homes = (OCTREE, studies, Mesh, renderer, import_module(heightfield_mesh.__module__))

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+from cases import cases
 from signatures import SIGNATURES
 
 import renderer
@@ -47,7 +48,7 @@ def heavy_after(script: str) -> set[str]:
     return HEAVY & set(json.loads(output(f"{script}\n{tell}").splitlines()[-1]))
 
 
-@pytest.mark.parametrize(
+@cases(
     ("script", "needs"),
     [
         ("import renderer", set()),
@@ -294,7 +295,7 @@ print(digest.hexdigest(), compile_seconds())
     assert not list((tmp_path / "empty").rglob("*.kernel"))
 
 
-@pytest.mark.parametrize(
+@cases(
     ("arguments", "told"),
     [
         (["--level", "x86-64-v3"], "--output: expected a folder, as kernels for a level are not this machine's"),

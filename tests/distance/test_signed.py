@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Octree
 from renderer.mesh.shapes import box
@@ -10,7 +11,7 @@ from validation.stability.cases.queries.inside import closed_solids, points_at, 
 SOLIDS = closed_solids()
 
 
-@pytest.mark.parametrize("name", SOLIDS)
+@cases("name", SOLIDS)
 def test_the_sign_is_that_of_exact_arithmetic(name):
     mesh = SOLIDS[name]
     points = points_at(mesh, np.random.default_rng(2), 5)

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from cases import cases
 
 from renderer import Octree, load_scene
 from renderer.cli import main, make_parser
@@ -86,7 +87,10 @@ RUN_ELSEWHERE = {
     "rm -r renderer/compiled": ("tests/packaging/test_installing.py", r'"rm -r renderer/compiled"'),
     "python -m wheel tags": ("tests/packaging/test_installing.py", r'"python -m wheel tags '),
     "octree-render view": ("tests/viewer/test_viewer_server.py", r'"renderer\.cli", "view", .*"--no-browser"\]'),
-    "octree-render compile --level": ("tests/commands/test_startup.py", r'"compile", "--queries", "--level", level, "-o"'),
+    "octree-render compile --level": (
+        "tests/commands/test_startup.py",
+        r'"compile", "--queries", "--level", level, "-o"',
+    ),
     "octree-render study sky city.ply -o sky.npy --cluster tcp://": (
         "tests/cluster/test_commands.py",
         r'"--cluster", client\.scheduler\.address\]\) == 0',
@@ -192,9 +196,7 @@ def test_the_readme_has_python_to_run():
     assert any(page == README for page, _ in snippets())
 
 
-@pytest.mark.parametrize(
-    ("page", "line"), [(p, line) for p in PAGES for line in typed(p) if line.startswith("octree-render ")], ids=shown
-)
+@cases(("page", "line"), [(p, line) for p in PAGES for line in typed(p) if line.startswith("octree-render ")])
 def test_commands_in_a_page_are_ones_that_there_are(page, line):
     options = make_parser().parse_args(shlex.split(line)[1:])
     assert not hasattr(options, "scene") or str(options.scene) in OWN or (ROOT / options.scene).is_file()
@@ -339,7 +341,7 @@ def test_thresholds_in_a_page_are_ones_that_there_are(tmp_path):
     assert (thresholds.pictures.own.ssim, thresholds.hits.near_edge) == (0.997, 2)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=shown)
+@cases("page", PAGES)
 def test_every_block_is_of_a_kind_that_is_run(page):
     """Python is run above, TOML and YAML are read; what Sphinx and BibTeX read is neither's; nothing hides as text."""
     kinds = re.findall(r"^```(.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
@@ -348,7 +350,7 @@ def test_every_block_is_of_a_kind_that_is_run(page):
     assert kinds <= {"python", "toml", "yaml", "bibtex", *of_sphinx}
 
 
-@pytest.mark.parametrize(("page", "line"), commands("octree-", "python -m validation"), ids=shown)
+@cases(("page", "line"), commands("octree-", "python -m validation"))
 def test_options_in_a_page_are_ones_that_there_are(page, line):
     words = shlex.split(line.split(" [--")[0])  # of a usage line what comes before its options
     if any("..." in word for word in words):
@@ -367,7 +369,7 @@ def test_options_in_a_page_are_ones_that_there_are(page, line):
         assert ended.code == 0, f"{page}: {line}"  # --help
 
 
-@pytest.mark.parametrize(("page", "line"), commands("python "), ids=shown)
+@cases(("page", "line"), commands("python "))
 def test_programs_in_a_page_are_there(page, line):
     words = shlex.split(line)
     if words[1] == "-m":
@@ -376,7 +378,7 @@ def test_programs_in_a_page_are_there(page, line):
         assert (ROOT / words[1]).is_file() or (ROOT / words[1] / "__main__.py").is_file(), f"{page}: {line}"
 
 
-@pytest.mark.parametrize(("page", "line"), commands("make "), ids=shown)
+@cases(("page", "line"), commands("make "))
 def test_what_a_page_lets_make_make_is_a_target(page, line):
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     targets, variables = (
@@ -469,7 +471,7 @@ def links(page):
     return [link for link in LINK.findall(PYTHON.sub("", page.read_text(encoding="utf-8"))) if "://" not in link]
 
 
-@pytest.mark.parametrize(("page", "link"), [(p, link) for p in PAGES for link in links(p)], ids=shown)
+@cases(("page", "link"), [(p, link) for p in PAGES for link in links(p)])
 def test_a_link_leads_somewhere(page, link):
     path, _, anchor = link.partition("#")
     there = page.parent / path if path else page
@@ -500,7 +502,7 @@ def defined(path):
     return names
 
 
-@pytest.mark.parametrize("page", PAGES, ids=shown)
+@cases("page", PAGES)
 def test_what_a_page_names_is_there(page):
     """Files and folders, and with ``::`` a function, class, constant or test that stands in the file."""
     absent = []
@@ -513,7 +515,7 @@ def test_what_a_page_names_is_there(page):
     assert absent == []
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "found"),
     [
         ("`renderer/trace/query.py::closest_hits`", ("renderer/trace/query.py", "closest_hits")),
@@ -526,7 +528,7 @@ def test_names_are_found_in_a_sentence(text, found):
     assert NAMED.findall(text) == [found]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=shown)
+@cases("page", PAGES)
 def test_extreme_cases_and_gates_that_a_page_names_are_there(page):
     numbers = {case.number for case in CASES}
     assert {int(number) for number in re.findall(r"\b[Cc]ase (\d+)\b", page.read_text(encoding="utf-8"))} <= numbers

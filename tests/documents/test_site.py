@@ -13,6 +13,7 @@ from typing import NamedTuple
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from cases import cases
 
 import renderer
 
@@ -141,7 +142,7 @@ def linked(text):
     return next((link["refuri"] for link in page.findall(nodes.reference)), None)
 
 
-@pytest.mark.parametrize(
+@cases(
     "text",
     [
         "tests/documents/test_site.py::test_of_yesterday",
@@ -161,7 +162,7 @@ def test_a_name_that_its_file_has_not_is_an_error_of_the_build(text):
         assert str(error.value).startswith("docs/page: ")  # which names it
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "line"),
     [
         ("renderer/limits.py::SHORTEST", "SHORTEST"),  # one of two that a line defines
@@ -254,7 +255,7 @@ def test_wheel_and_source_are_built_for_the_site_without_a_network(tmp_path):
     assert made["listed"](files).count("<li>") == 2
 
 
-@pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)
+@cases("script", GALLERY)
 def test_a_script_is_short_and_named_by_its_title(script):
     _, head, code = script.read_text(encoding="utf-8").split('"""', 2)
     title, underline = head.strip().splitlines()[:2]
@@ -375,7 +376,7 @@ def test_links_that_lead_nowhere_are_found(tmp_path, capsys):
         assert main(tmp_path) == 1 and f"b.html: {broken}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
+@cases(
     "element",
     [
         '<iframe src="http://127.0.0.1:8123/"></iframe>',

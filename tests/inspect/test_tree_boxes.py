@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -136,7 +137,7 @@ def check_visits(octree: Octree, origin: Any, direction: Any, t_max: float) -> N
     assert told <= known
 
 
-@pytest.mark.parametrize("octree", octrees())
+@cases("octree", octrees())
 def test_what_the_ray_enters_before_its_hit_is_visited(octree: Octree) -> None:
     origins, directions = rays_at(octree.mesh.vertices, octree.mesh.faces, 5, count=4)
     for origin, direction in zip(origins, directions, strict=True):
@@ -194,13 +195,13 @@ def test_without_a_tree_there_is_nothing_to_show() -> None:
         assert visited(target, (0, 0, 9), (0, 0, -1)) == []
 
 
-@pytest.mark.parametrize("level", [-1, 1.0, True, None])
+@cases("level", [-1, 1.0, True, None])
 def test_a_bad_level_is_refused(level: Any) -> None:
     with pytest.raises(ValueError, match="level: expected an integer >= 0"):
         boxes_at(Octree.from_mesh(icosphere(0)), level)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("origin", "direction", "t_max", "named"),
     [
         ((0, 0, np.nan), (0, 0, 1), 1.0, "origins"),

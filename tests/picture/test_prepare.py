@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import settings as limits
 from hypothesis import strategies as st
@@ -31,8 +32,8 @@ def same(a, b):
     return all(getattr(a, name).tobytes() == getattr(b, name).tobytes() for name in names)
 
 
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("accelerator", ["octree", "brute"])
+@cases("name", SCENES)
+@cases("accelerator", ["octree", "brute"])
 def test_pictures_have_the_bits_of_the_scenes_own(name, accelerator):
     scene = load_scene(f"scenes/{name}.toml")
     ready = prepare(scene, accelerator=accelerator)

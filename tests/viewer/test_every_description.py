@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 import tomlkit
+from cases import cases
 from varied import VARIATIONS, Variation, write_meshes
 
 from renderer import load_mesh
@@ -37,13 +38,13 @@ def usual(folder: Path) -> dict[str, tuple[str, bytes]]:
     return {v.table["camera"]["type"]: fetched(folder, v.table) for v in (VARIATIONS[0], VARIATIONS[-1])}
 
 
-@pytest.mark.parametrize("other", VARIATIONS, ids=str)
+@cases("other", VARIATIONS)
 def test_a_page_is_told_of_another_value(folder: Path, usual: dict[str, tuple[str, bytes]], other: Variation) -> None:
     told = fetched(folder, other.varied())
     assert (told == usual[other.table["camera"]["type"]]) == (other.keys[-1] in UNTOLD)
 
 
-@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] in ("objects", "floor")], ids=str)
+@cases("other", [v for v in VARIATIONS if v.keys[0] in ("objects", "floor")])
 def test_each_object_has_the_faces_of_its_mesh_and_the_floor_two_for_each_square(
     folder: Path, other: Variation
 ) -> None:

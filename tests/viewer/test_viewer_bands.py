@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from viewer_page import CHROMIUM, SCENE, Viewer
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
@@ -28,7 +29,7 @@ def view(w: int, h: int, **settings: Any) -> CameraMessage:
     return CameraMessage(type="view", seq=1, mode="octree", m=M, fovy=0.7, w=w, h=h, settings=asked)
 
 
-@pytest.mark.parametrize(("w", "h"), [(4096, 2048), (2048, 4096), (1620, 1030), (1025, 1024), (4096, 257)])
+@cases(("w", "h"), [(4096, 2048), (2048, 4096), (1620, 1030), (1025, 1024), (4096, 257)])
 def test_the_bands_of_a_large_picture_are_its_rows(w: int, h: int) -> None:
     (*small,) = (p for p in passes_of(view(w, h)) if p.band is None)
     bands = [p for p in passes_of(view(w, h)) if p.band is not None]
@@ -126,7 +127,7 @@ def test_bands_are_drawn_over_the_whole_picture_before(dense: Viewer) -> None:
 
 
 @needs_browser
-@pytest.mark.parametrize(
+@cases(
     ("stage", "chosen", "density", "expected"),
     [
         ([980, 747], "1", 1, [980, 747]),

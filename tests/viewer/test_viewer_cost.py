@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from viewer_page import CHROMIUM, SCENE, Viewer
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
@@ -116,7 +117,7 @@ def page(browser: Any, url: str) -> Iterator[Viewer]:
 
 
 @needs_browser
-@pytest.mark.parametrize("aov", ["depth", "cost", "nodes", "triangles"])
+@cases("aov", ["depth", "cost", "nodes", "triangles"])
 def test_a_legend_shows_the_scale_of_colours(page: Viewer, aov: str) -> None:
     assert page.page.is_hidden("#legend")
     page.page.select_option("[name=aov]", aov)

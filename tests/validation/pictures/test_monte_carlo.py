@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from scipy.stats import norm
 
@@ -127,7 +128,7 @@ def test_a_sound_picture_passes_and_its_record_is_drawn() -> None:
     assert "1 / sqrt(N)" in page and "after" in page.lower() and "Left out" not in page
 
 
-@pytest.mark.parametrize(
+@cases(
     ("ours", "red"),
     [
         (with_glass(ior=1.51), {SLOPE, CHANCE}),

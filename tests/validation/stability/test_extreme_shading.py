@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_package import copy_package
@@ -32,7 +33,7 @@ from validation.stability.cases.spawned import missed_planes, self_hits, wrong_p
 ROOT = Path(__file__).parents[3]
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: str(case.number))
+@cases("case", CASES)
 def test_case_holds(case: ExtremeCase) -> None:
     outcome = case.run(True)
     assert outcome.holds, f"{case.construct}: expected {case.expected}, got {outcome.ours}"
@@ -280,8 +281,8 @@ def test_weights_that_overflow_make_no_nan(ambient: float) -> None:
     expect_finite(render(scene, resolution=(1, 1), max_depth=64, threads=1))
 
 
-@pytest.mark.parametrize("diffuse", [0.0, 1.0, (1.0, 0.0, 0.0)])
-@pytest.mark.parametrize("intensity", [1e30, 1e300])
+@cases("diffuse", [0.0, 1.0, (1.0, 0.0, 0.0)])
+@cases("intensity", [1e30, 1e300])
 def test_light_that_overflows_makes_no_nan(diffuse: Any, intensity: float) -> None:
     """A lamp of any brightness next to a wall that reflects some channels and others not."""
     wall = quad((0.3, 0.1, 1.0), (5, 0, 0), (0, 5, 0))
