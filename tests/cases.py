@@ -13,7 +13,7 @@ from typing import Any
 def cases(names: str | tuple[str, ...], values: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Run the test for each of ``values``, in order; a failure says of which case it is.
 
-    A case has a folder ``tmp_path`` of its own, undoes its changes by ``monkeypatch``, and reads by ``capsys`` its own output.
+    Each case has a folder ``tmp_path`` and an output ``capsys`` of its own, and undoes what it did by ``monkeypatch``.
     """
     arguments = [name.strip() for name in names.split(",")] if isinstance(names, str) else list(names)
     rows = [(value,) if len(arguments) == 1 else tuple(value) for value in values]
