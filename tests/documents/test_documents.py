@@ -88,7 +88,7 @@ RUN_ELSEWHERE = {
     "python -m wheel tags": ("tests/packaging/test_installing.py", r'"python -m wheel tags '),
     "octree-render view": ("tests/viewer/test_viewer_server.py", r'"renderer\.cli", "view", .*"--no-browser"\]'),
     "octree-render compile --level": (
-        "tests/commands/test_startup.py",
+        "tests/packaging/test_compiling_ahead.py",
         r'"compile", "--queries", "--level", level, "-o"',
     ),
     "octree-render study sky city.ply -o sky.npy --cluster tcp://": (
