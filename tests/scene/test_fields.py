@@ -171,11 +171,7 @@ FIELDS: dict[type, dict[str, Field]] = {
 }  # fmt: skip
 
 
-EACH = [
-    pytest.param(model, name, field, id=f"{model.__name__}.{name}")
-    for model, fields in FIELDS.items()
-    for name, field in fields.items()
-]
+EACH = [(model, name, field) for model, fields in FIELDS.items() for name, field in fields.items()]
 
 
 def made(model: Any, **changed: Any) -> Any:
