@@ -246,14 +246,14 @@ def test_ply_against_plyfile(tmp_path: Path, text: bool) -> None:
     assert mesh.faces.tolist() == expected
 
 
-def test_a_million_faces_load_in_two_seconds(tmp_path: Path) -> None:
-    """Quiet, it takes 0.15 s; the rest is room for a loaded machine."""
+def test_many_faces_load_without_a_step_a_face(tmp_path: Path) -> None:
+    """Quiet, it takes 0.03 s; the rest is room for a loaded machine. A step of Python a face takes longer."""
     path = tmp_path / "large.ply"
-    save_ply(torus(around=1000, across=500), path)
+    save_ply(torus(around=500, across=200), path)
     start = time.process_time()
     mesh = load_mesh(path)
-    assert time.process_time() - start < 2.0
-    assert len(mesh.faces) == 1_000_000
+    assert time.process_time() - start < 0.4
+    assert len(mesh.faces) == 200_000
 
 
 # --- PLY that is wrong ----------------------------------------------------------------------------------------
@@ -642,7 +642,7 @@ def test_obj_the_common_reader_is_used(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_obj_loads_no_slower_than_trimesh(tmp_path: Path) -> None:
     """It takes 0.6 of trimesh's processor time, which other processes hardly change."""
-    mesh = torus(around=150, across=100)
+    mesh = torus(around=75, across=50)
     vertices = "".join("v {:.9g} {:.9g} {:.9g}\n".format(*p) for p in mesh.vertices)
     corners = (mesh.faces + 1).tolist()
     for form, more in [("{0}", ""), ("{0}/{0}/{0}", "vt 0.5 0.25\nvn 0.6 0.8 0\n" * len(mesh.vertices))]:
