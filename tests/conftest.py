@@ -1,10 +1,12 @@
 """Settings that all tests share."""
 
 import signal
+from pathlib import Path
 from types import ModuleType
 
 import pytest
 from hypothesis import settings
+from varied import write_meshes
 
 from validation import timing
 
@@ -28,3 +30,11 @@ def mitsuba() -> ModuleType:
     mitsuba.set_variant("scalar_rgb")
     drjit.set_thread_count(max(2, drjit.thread_count()))
     return mitsuba
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the meshes of the scene whose fields are varied."""
+    folder = tmp_path_factory.mktemp("varied")
+    write_meshes(folder)
+    return folder

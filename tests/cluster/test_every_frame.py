@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import cases
-from varied import OTHERS, VARIATIONS, Variation, picture, scene_of, write_meshes
+from varied import OTHERS, VARIATIONS, Variation, picture, scene_of
 
 from renderer import PerspectiveCamera, RenderSettings, Scene, prepare, render
 from renderer.cluster import frames_on, pictures, render_on, workers
@@ -31,13 +31,6 @@ ARGUMENTS: dict[str, Any] = {
     **SETTINGS,
 }
 BITLESS = {"accelerator": "brute", "split": "sah", "progress": True}
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("frames")
-    write_meshes(folder)
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import tomlkit
 from cases import cases
-from varied import VARIATIONS, Variation, write_meshes
+from varied import VARIATIONS, Variation
 
 from renderer import load_mesh
 from renderer.viewer.payload import description, mesh_payload
@@ -23,13 +23,6 @@ def fetched(folder: Path, table: Any) -> tuple[str, bytes]:
     shown = open_file(folder / "a.toml")
     told = {key: value for key, value in description(shown).items() if key not in ("id", "octree", "needs")}
     return json.dumps(told), b"".join(mesh_payload(shown.prepared).pieces)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("described")
-    write_meshes(folder)
-    return folder
 
 
 @pytest.fixture(scope="module")

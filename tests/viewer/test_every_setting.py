@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import tomlkit
 from cases import cases
-from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of, write_meshes
+from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
 from viewer_ways import (
     INSIDE,
     WAYS,
@@ -92,13 +92,6 @@ OWN = {"refine", "aov", "pair"}
 ELSEWHERE = {"pixels"}
 # Those that no file of a scene has, nor a command's.
 UNWRITTEN = {"reflection", "refraction"}
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("shown")
-    write_meshes(folder)
-    return folder
 
 
 @pytest.fixture(scope="module")
