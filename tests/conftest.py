@@ -6,7 +6,6 @@ from types import ModuleType
 
 import pytest
 from hypothesis import settings
-from varied import write_meshes
 
 from validation import timing
 
@@ -35,6 +34,8 @@ def mitsuba() -> ModuleType:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the meshes of the scene whose fields are varied."""
+    from varied import write_meshes
+
     folder = tmp_path_factory.mktemp("varied")
     write_meshes(folder)
     return folder

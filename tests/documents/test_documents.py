@@ -77,6 +77,7 @@ IN_SHORT: dict[str, tuple[dict[str, str], str]] = {
 # Commands that another file runs, by how they begin: the file, and a pattern of the line there that runs it.
 RUN_ELSEWHERE = {
     "make lint": (".ci/run", r"^step make lint$"),
+    "make test-slow": (".ci/run", r"^step make test-slow$"),
     "make test": (".ci/run", r"^step make test$"),
     "make docs": (".ci/run", r"^step make docs$"),
     "make validate QUICK=1": (".ci/run", r"^step make validate QUICK=1$"),
@@ -382,7 +383,7 @@ def test_programs_in_a_page_are_there(page, line):
 def test_what_a_page_lets_make_make_is_a_target(page, line):
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     targets, variables = (
-        set(re.findall(r"^(\w+):", makefile, re.MULTILINE)),
+        set(re.findall(r"^([\w-]+):", makefile, re.MULTILINE)),
         set(re.findall(r"^(\w+)\s*\?=", makefile, re.M)),
     )
     target, *given = shlex.split(line)[1:]
@@ -399,7 +400,8 @@ def test_what_a_page_lets_make_make_is_a_target(page, line):
 
 # What each target calls at last; lint and docs have more than one command.
 CALLS = {
-    "validate": "python -m validation", "test": "python -m pytest", "machines": "python tests/machines.py",
+    "validate": "python -m validation", "test": "python -m pytest", "test-slow": "python -m pytest",
+    "machines": "python tests/machines.py",
     "bench": "python -m validation.benchmark", "conformance": "python -m validation.conformance",
     "docs": "python docs/links.py", "lint": "lint-imports",
 }  # fmt: skip
@@ -421,7 +423,7 @@ def test_make_passes_on_what_a_page_gives_it(page, line):
         assert "rm -rf .venv " in done.stdout
         return
     (called,) = [words for words in done.stdout.splitlines() if words.startswith(f".venv/bin/{CALLS[target]}")]
-    passed = called.removeprefix(f".venv/bin/{CALLS[target]}").split("--dist worksteal")[-1].strip()
+    passed = called.removeprefix(f".venv/bin/{CALLS[target]}").split("--ignore=tests/page")[-1].strip()
     quick = ["--quick"] * ("QUICK=1" in line)
     options = [word for text in shlex.split(line) if text.startswith("ARGS=") for word in shlex.split(text[5:])]
     if target in ("validate", "test", "machines", "bench"):
