@@ -9,7 +9,7 @@ needs no compiler. Kernels are compiled by their first call, which one line on s
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
 
-from renderer.kernels import loaded as _loaded  # noqa: F401  # before all others, to note the time
+from renderer.jit import loaded as _loaded  # noqa: F401  # before all others, to note the time
 
 if TYPE_CHECKING:
     from typing import Any

@@ -7,11 +7,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import flag_argument
+from renderer.arguments.arrays import flag_argument
 from renderer.errors import MeshError, expect
 from renderer.mesh.mesh import Mesh, Repairs
-from renderer.process.parallel import checked_threads
-from renderer.queries import Queries
+from renderer.queryable import Queries
+from renderer.system.threads import checked_threads
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 from renderer.tree.build import SPLITS, build_blocks, build_tree
 from renderer.tree.hierarchy import Rule

@@ -14,21 +14,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from renderer.diagnostics.face_phong import face_colors
+from renderer.diagnostics.ray_path import ray_path
+from renderer.diagnostics.tree_boxes import visited
 from renderer.errors import expect
-from renderer.inspect.face_phong import face_colors
-from renderer.inspect.ray_path import ray_path
-from renderer.inspect.tree_boxes import visited
-from renderer.kernels import store as kernel_store
-from renderer.kernels.jit import is_on_disk
-from renderer.kernels.notice import QUIET_VARIABLE
+from renderer.jit import cache as kernel_store
+from renderer.jit.decorators import is_on_disk
+from renderer.jit.notice import QUIET_VARIABLE
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.polygons import triangulate
 from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 from renderer.picture.prepare import PreparedScene, prepare_scene
 from renderer.picture.render import render
-from renderer.process import child
-from renderer.process.parallel import available_threads
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import PointLight
 from renderer.scene.material import Dielectric, Material, Phong
@@ -37,6 +35,8 @@ from renderer.scene.scene import Scene, SceneObject
 from renderer.shade.tile import render_tile
 from renderer.studies.hidden import occlusion
 from renderer.studies.views import scan, visible_faces
+from renderer.system import child
+from renderer.system.threads import available_threads
 
 _TRIANGLE = Mesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 # An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Mesh
-from renderer.cli import main as octree_render
+from renderer.cli.main import main as octree_render
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import lattice_faces
 

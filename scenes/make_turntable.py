@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 from tqdm import trange
 
-from renderer.inspect.tree_boxes import boxes_at
+from renderer.diagnostics.tree_boxes import boxes_at
 from renderer.picture.image import Image, srgb
 from renderer.picture.prepare import PreparedScene, prepare_scene
-from renderer.process.parallel import available_threads
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import load_scene
+from renderer.system.threads import available_threads
 from renderer.trace.spawn import BOUNDED
 
 Array = NDArray[np.float64]

@@ -11,11 +11,11 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "renderer"
-_NEEDED = ("__init__.py", "lazy.py", "kernels/*.py", "process/__init__.py", "process/files.py")
+_NEEDED = ("__init__.py", "lazy.py", "jit/*.py", "numerics/*.py", "system/__init__.py", "system/files.py")
 
 # One small kernel two imports away from the constant it uses, so that each run compiles in a second.
 UPPER = """
-from renderer.kernels.jit import kernel
+from renderer.jit.decorators import kernel
 from renderer.middle import (
     doubled,
 )
@@ -24,7 +24,7 @@ def answer(x):
     return doubled(x) + 1
 """
 MIDDLE = """
-from renderer.kernels.jit import kernel
+from renderer.jit.decorators import kernel
 from renderer.below.deep.bottom import STEP
 @kernel
 def doubled(x):

@@ -2,7 +2,7 @@
 
 SIGNATURES = """
 import sys
-from renderer.kernels.compiler import Kernel
+from renderer.jit.compiler import Kernel
 
 def signatures():
     modules = [module for name, module in sys.modules.items() if name.startswith("renderer.")]

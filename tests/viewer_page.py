@@ -79,7 +79,7 @@ materials = ["stone"]
 @contextmanager
 def served(scene: Path, port: int = 0) -> Iterator[str]:
     """Where `octree-render view` serves ``scene``, as long as the context lasts."""
-    command = [sys.executable, "-m", "renderer.cli", "view", str(scene), "--port", str(port), "--no-browser"]
+    command = [sys.executable, "-m", "renderer.cli.main", "view", str(scene), "--port", str(port), "--no-browser"]
     root = str(Path(__file__).parent.parent)
     environment = {**os.environ, "PYTHONPATH": root, "PYTHONUNBUFFERED": "1"}
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment)

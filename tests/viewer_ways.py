@@ -12,9 +12,9 @@ from PIL import Image as Pillow
 from varied import Table, picture, scene_of
 
 from renderer import PerspectiveCamera, Scene, load_scene, prepare, srgb
-from renderer.cli import main
-from renderer.inspect.face_phong import face_colors
-from renderer.inspect.ray_path import ray_path
+from renderer.cli.main import main
+from renderer.diagnostics.face_phong import face_colors
+from renderer.diagnostics.ray_path import ray_path
 from renderer.viewer.commands import command_of, saved, scene_text
 from renderer.viewer.compare import FEW, MANY, compared
 from renderer.viewer.export import still, turntable

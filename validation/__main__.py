@@ -1,26 +1,19 @@
 """``octree-validate``: judge hits and pictures, write the report, exit 1 when a gate fails.
 
 ``python -m validation`` does the same in a checkout: Python prefers a folder ``validation`` in the current folder.
-
-Exit codes:
-  0    every gate holds
-  1    a gate fails, nothing was judged, or nothing notices a mutant that has no reason to be left
-  2    a bad argument, a bad file (scene, mesh, thresholds, baseline, a record), a missing reference, or a process
-       that was ended from outside
-  130  Ctrl-C; the report that was there before is untouched
 """
 
 import argparse
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from renderer.errors import extra_hint
-from renderer.process.interrupt import interruptible
-from renderer.process.terminal import one_line
-from validation.output import add_output, check_output
+from renderer.system.interrupt import interruptible
+from renderer.system.terminal import one_line
+from validation.options import make_parser, program
+from validation.output import check_output
 from validation.sections import NAMES, choose
 
 if TYPE_CHECKING:
@@ -36,70 +29,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _check(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        return _run(options, f"{_program()} {shlex.join(given)}".strip())
+        return _run(options, f"{program()} {shlex.join(given)}".strip())
     except (ImportError, ValueError, OSError) as error:
         missing = f"; {extra_hint('validate')}" if isinstance(error, ImportError) else ""
         print(f"validation: {one_line(error)}{missing}", file=sys.stderr)
         return 2
-
-
-def _program() -> str:
-    """The command as it was given."""
-    return "octree-validate" if Path(sys.argv[0]).stem == "octree-validate" else "python -m validation"
-
-
-def make_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=_program(),
-        description="Judge hits and pictures by references that nobody here wrote; write a report.",
-        epilog=(__doc__ or "").partition("\n\n")[2],
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--quick", action="store_true", help="fewer rays and smaller pictures, a minute and a half")
-    parser.add_argument("--only", type=_sections, default=NAMES, metavar="A,B", help=f"of {', '.join(NAMES)}")
-    add_output(parser, "folder of the report")
-    parser.add_argument("--gate", type=Path, metavar="FILE", help="TOML file that moves thresholds")
-    for name, section in (("scene", "images"), ("mesh", "hits")):
-        parser.add_argument(
-            f"--{name}", type=Path, action="append", default=[], metavar="FILE",
-            help=f"judge this {name} and not the suite's own, in the section {section}; may be given again",
-        )  # fmt: skip
-    parser.add_argument(
-        "--random", type=_seed, metavar="SEED",
-        help="draw the scenes and meshes of the section random from this seed; default: 1",
-    )  # fmt: skip
-    parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about half an hour")
-    parser.add_argument(
-        "--mutants", type=_count, metavar="N",
-        help="only put N small faults into the source, one at a time, and see what notices each: hours; "
-        "what an earlier run judged is not judged again",
-    )  # fmt: skip
-    parser.add_argument(
-        "--of", choices=("renderer", "judges"), default="renderer", help="what the mutants break; default: renderer"
-    )
-    parser.add_argument("--seed", type=_seed, default=1, metavar="S", help="by which mutants are chosen; default: 1")
-    parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
-    return parser
-
-
-def _count(text: str) -> int:
-    if not (text.isdecimal() and int(text)):
-        raise argparse.ArgumentTypeError(f"expected a positive integer, got {text!r}")
-    return int(text)
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"expected an integer from 0, got {text!r}")
-    return int(text)
-
-
-def _sections(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    unknown = [name for name in names if name not in NAMES]
-    if unknown:
-        raise argparse.ArgumentTypeError(f"expected some of {', '.join(NAMES)}, got {unknown[0]!r}")
-    return names
 
 
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:

@@ -6,7 +6,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from renderer.process.parallel import available_threads
+from renderer.system.threads import available_threads
 
 PACKAGES = (
     "octree-renderer", "numpy", "numba", "llvmlite", "embreex", "libigl", "mitsuba", "drjit", "trimesh", "rtree",

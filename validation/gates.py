@@ -7,7 +7,10 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Gate:
-    """Passes when ``value`` is at most, or at least, ``threshold``; a NaN never passes."""
+    """Passes when ``value`` is at most, or at least, ``threshold``; a NaN never passes.
+
+    ``judged`` are the public names, see ``validation/promises/names.py``, that the gate would notice broken.
+    """
 
     section: str
     subject: str
@@ -16,6 +19,7 @@ class Gate:
     bound: Literal["at most", "at least"]
     threshold: float
     reason: str
+    judged: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -31,4 +35,4 @@ class Gate:
         """The gate as a table for JSON. JSON has no NaN or infinity, so a value that is not finite becomes None."""
         finite = math.isfinite(self.value)
         numbers = {"value": self.value if finite else None, "margin": self.margin if finite else None}
-        return asdict(self) | numbers | {"passed": self.passed}
+        return asdict(self) | numbers | {"judged": list(self.judged), "passed": self.passed}

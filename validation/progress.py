@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from renderer.process.terminal import on_terminal
+from renderer.system.terminal import on_terminal
 
 
 @contextmanager

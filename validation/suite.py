@@ -12,14 +12,15 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from renderer.mesh.load import load_mesh
-from renderer.process.files import write_atomically
-from renderer.process.parallel import available_threads
 from renderer.scene.scene import load_scene
+from renderer.system.files import write_atomically
+from renderer.system.threads import available_threads
 from validation import environment
 from validation.gates import Gate
 from validation.job import Job
 from validation.processes import Workers
 from validation.progress import say, steps
+from validation.promises import judges
 from validation.report import baseline, junit, page, schema, summary
 from validation.scenes import SCENES
 from validation.sections import Section, choose
@@ -69,6 +70,9 @@ def run(request: Request) -> dict[str, Any]:
         scenes, meshes, seed = request.scenes, request.meshes, request.seed
         job = Job(request.quick, thresholds, pictures, lambda _: None, scenes, meshes, seed, workers, say)
         records, gates = _sections(chosen, job)
+        if "promises" in records:
+            records["promises"]["names"], found = judges.check_names(gates, left_out)
+            gates += found
 
         # Collect the metrics and write the report.
         metrics = {

@@ -12,7 +12,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.patches import Rectangle
 
 from renderer import Octree, load_mesh
-from renderer.inspect.tree_boxes import boxes_at, levels
+from renderer.diagnostics.tree_boxes import boxes_at, levels
 
 DEEPEST = 6 if int(os.environ.get("GALLERY_SIZE", "400")) >= 400 else 2
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from renderer.errors import expect, extra_hint
-from renderer.process.parallel import checked_threads
+from renderer.system.threads import checked_threads
 
 # To wait for a scheduler's answer.
 SECONDS = 10

@@ -10,19 +10,19 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal
 
+from renderer.checkpoints.parts import remove_parts
+from renderer.checkpoints.pictures import Picture, PictureRun, checked_band, digest_of_scene
 from renderer.cluster.tasks import Task, results
 from renderer.cluster.workers import SentScene, render_rows
 from renderer.errors import expect
 from renderer.picture.image import PLANES, check_picture_path
 from renderer.picture.prepare import MediaRule
 from renderer.picture.render import check_tree, checked_view
-from renderer.process.files import are_apart, as_path, write_atomically
-from renderer.process.terminal import progress_bar
-from renderer.runs.parts import remove_parts
-from renderer.runs.pictures import Picture, PictureRun, checked_band, digest_of_scene
 from renderer.scene.camera import Camera
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene
+from renderer.system.files import are_apart, as_path, write_atomically
+from renderer.system.terminal import progress_bar
 
 
 def render_on(

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.checkpoints.parts import digest_of
 from renderer.cluster.workers import SentMesh
 from renderer.errors import expect
 from renderer.octree import Octree
-from renderer.runs.parts import digest_of
 
 # A row of the hits of ``closest_hit``, as ``renderer.Hits`` has them: inf, -1 and nan where a ray hits nothing.
 HIT = np.dtype([("t", "f8"), ("face", "i8"), ("u", "f8"), ("v", "f8")])

@@ -7,15 +7,15 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any, Literal
 
+from renderer.checkpoints.parts import Parts, digest_of
+from renderer.checkpoints.study import PART, Points, Study, parts_of
 from renderer.cluster.tasks import Task, results
 from renderer.cluster.workers import SentMesh, answer_part
 from renderer.errors import expect
 from renderer.octree import Octree
 from renderer.picture.render import check_tree
-from renderer.process.files import as_path
-from renderer.process.terminal import progress_bar
-from renderer.runs.parts import Parts, digest_of
-from renderer.runs.study import PART, Points, Study, parts_of
+from renderer.system.files import as_path
+from renderer.system.terminal import progress_bar
 
 
 def run_on(
@@ -29,9 +29,9 @@ def run_on(
     split: Literal["midpoint", "sah"] = "midpoint",
     progress: bool = False,
 ) -> Parts:
-    """``renderer.runs.study.run`` on the workers of ``client``, a ``distributed.Client``.
+    """``renderer.checkpoints.study.run`` on the workers of ``client``, a ``distributed.Client``.
 
-    points  where, as ``renderer.runs.chosen`` makes them
+    points  where, as ``renderer.checkpoints.study_points`` makes them
     folder  for the parts, a new one or that of a run that was killed; the caller removes it
     size    points of a part at least. It changes no bit
     split   the tree that workers build, as ``Octree.from_mesh`` takes it. It changes no bit
@@ -47,8 +47,8 @@ def run_on(
     >>> from tempfile import TemporaryDirectory
     >>> from renderer import Octree
     >>> from renderer.cluster import connected, run_on
-    >>> from renderer.runs.chosen import on_faces
-    >>> from renderer.runs.study import Study
+    >>> from renderer.checkpoints.study_points import on_faces
+    >>> from renderer.checkpoints.study import Study
     >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> with connected(workers=1) as client, TemporaryDirectory() as folder:
     ...     run_on(client, floor, Study("sky", {}), on_faces(floor).points, Path(folder) / "parts").joined().tolist()

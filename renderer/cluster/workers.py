@@ -9,10 +9,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.checkpoints.pictures import Picture
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.picture.prepare import PreparedScene, prepare_scene
-from renderer.runs.pictures import Picture
 from renderer.scene.needs import Needs
 from renderer.scene.scene import Scene
 
@@ -48,7 +48,7 @@ class SentMesh(NamedTuple):
 class SentScene(NamedTuple):
     """A scene as it travels: its digest, itself with its meshes in the world, what is to be ready, and its tree's kind.
 
-    ``digest`` is that of ``renderer.runs.pictures.digest_of_scene``, and the rest as ``renderer.render`` has it.
+    ``digest`` is that of ``renderer.checkpoints.pictures.digest_of_scene``, and the rest as ``renderer.render`` has it.
     """
 
     digest: str

@@ -7,8 +7,8 @@ rounding; where rounding misses that point they are wider, and still bounds.
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import least, magnitude, movemask, select, smaller, splat4, square_root
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import least, magnitude, movemask, select, smaller, splat4, square_root
 from renderer.trace.intersect import load_corners
 
 # Corners less the point, u, v and the nearest point err by 2^-53 each, of a corner's reach; together by 20 such errors
@@ -43,6 +43,7 @@ def bound_distances(tree, base, point, limit):
     low, high = select(distance <= zero, zero, along / distance - error), distance * splat4(_MORE) + error
     # Of an unused place all is NaN, which is not within any limit.
     within = low <= splat4(limit)
+    # rule: bound-of-block
     limit = smaller(limit, least(select(within, high, splat4(np.inf))))
     return movemask(within & (low <= splat4(limit))), low, limit
 

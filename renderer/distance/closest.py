@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_argument
+from renderer.arguments.arrays import real_argument
+from renderer.arguments.points import check_points, farthest_of
 from renderer.distance.nearest import LISTED, UNTOLD_FACE, find_nearest
 from renderer.distance.rational import nearest_exactly
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
-from renderer.points.argument import check_points, farthest_of
-from renderer.points.order import ask_in_order
+from renderer.ordering.cells import ask_in_order
+from renderer.trace.closest import rays_against_blocks
 from renderer.trace.hits import points_on
 from renderer.trace.layout import Tree
-from renderer.trace.query import rays_against_blocks
 from renderer.trace.rays import HIT_ROWS
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 
 # The fewest points of a chunk: some milliseconds of search.
 _LEAST = 1024

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.expansions import OUT_OF_RANGE, PARTS, expand_area, expand_volume, pair_of
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import (
     cross_pairs,
     dot_pairs,
     length_pair,
@@ -19,8 +18,9 @@ from renderer.kernels.pairs import (
     quotient,
     scaled_difference,
 )
-from renderer.kernels.signs import UNDECIDED, lies_within, volume_sign
-from renderer.kernels.simd import larger, put
+from renderer.numerics.expansions import OUT_OF_RANGE, PARTS, expand_area, expand_volume, pair_of
+from renderer.numerics.predicates import UNDECIDED, lies_within, volume_sign
+from renderer.numerics.simd import larger, put
 
 # Shares of the terms of a sum of products of pairs, which errs by 2^-98 of them. Below CANCELLED it loses so many
 # digits that it is computed as an expansion. Below LOST its sign is in doubt: a point so near an edge, as seen along
@@ -59,6 +59,7 @@ def distance_to_face(a, b, c, p, parts):
     wc = dot_pairs(seen.pa, cross_pairs(seen.ab, normal))[0]
     limit = _LOST * _largest(normal)
     on_a, on_b, on_c = limit * _largest(seen.bc), limit * _largest(seen.ca), limit * _largest(seen.ab)
+    # rule: over-face
     if wa > on_a and wb > on_b and wc > on_c:
         height, total = _height(seen, normal, a, b, c, p, parts), wa + wb + wc
         distance = _rounded(quotient(height, length_pair(normal)))
@@ -146,6 +147,7 @@ def _expanded(a, b, p, first, second, otherwise, parts):
 def _height(seen, normal, a, b, c, p, parts):
     """The distance of the point from the face's plane times the length of the normal."""
     height = dot_pairs(seen.pa, normal)
+    # rule: cancelled-height
     if abs(height[0]) < _CANCELLED * _largest(normal):
         count = expand_volume(a, b, c, p, parts)
         if count == OUT_OF_RANGE:
@@ -169,11 +171,13 @@ def _distance_to_edge(a, b, p, seen, edge, parts):
 def _distance_to_ordered(a, b, p, seen, edge, parts):
     pa, pb, ab = edge
     behind, ahead = -dot_pairs(pa, ab)[0], dot_pairs(pb, ab)[0]
+    # rule: nearest-corner
     if behind <= 0.0:
         return _rounded(length_pair(pa)), 0.0
     if ahead <= 0.0:
         return _rounded(length_pair(pb)), 1.0
     area = cross_pairs(pa, ab)
+    # rule: cancelled-area
     if _largest(area) < _CANCELLED * _largest(pa):
         area = _expanded(a, b, p, seen.to_reach, seen.to_side, area, parts)
     return _rounded(quotient(length_pair(area), length_pair(ab))), behind / (behind + ahead)

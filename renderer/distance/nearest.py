@@ -10,8 +10,8 @@ import numpy as np
 
 from renderer.distance.block_distance import bound_distances
 from renderer.distance.face_distance import UNTOLD, distance_to_face
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     at,
     extract,
     get,
@@ -26,12 +26,12 @@ from renderer.kernels.simd import (
     splat4,
     store,
 )
-from renderer.kernels.vec3 import three
-from renderer.points.point import Point
+from renderer.numerics.vec3 import three
+from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, tree_pointers
+from renderer.trace.point import Point
 from renderer.trace.rays import hit_pointers
-from renderer.trace.sides import corner
 
 # In place of a face: float64 cannot tell.
 UNTOLD_FACE = -2
@@ -85,12 +85,15 @@ def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
     for i in range(begin, count):
         p, row = at(pointer(points), 3 * i), rows[i]
         limit = limits[row if len(limits) > 1 else 0]
+        # rule: point-in-tree-units
         point = Point(0, 4, 8, tree.scale * get(p, 0), tree.scale * get(p, 1), tree.scale * get(p, 2))
         put(parts, UNTOLD, 0.0)
         distance, face, u, v = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), search)
         distance /= tree.scale
+        # rule: reach-is-closed
         hit = face != NO_FACE and distance <= limit
         put(found.t, row, distance if hit else np.inf)
+        # rule: lost-products
         told = get(parts, UNTOLD) == 0.0 and _is_scaled(point, p, tree.scale)
         put(found.face, row, np.int64((face if hit else -1) if told else UNTOLD_FACE))
         put(found.u, row, u if hit else np.nan)
@@ -232,6 +235,7 @@ def _settle(tree, point, search, best, listed, limit):
         f = get(tree.faces, place)
         d, du, dv = distance_to_face(corner(tree, base), corner(tree, base + 12), corner(tree, base + 24), p,
                                      search.parts)  # fmt: skip
+        # rule: equally-near
         if d < distance or (d == distance and f < face):
             distance, face, u, v = d, f, du, dv
     return distance, face, u, v

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, heads, power_below, scaled_difference
-from renderer.kernels.simd import pointer, smaller
-from renderer.kernels.vec3 import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import cross_pairs, heads, power_below, scaled_difference
+from renderer.numerics.simd import pointer, smaller
+from renderer.numerics.vec3 import (
     barycentric,
     cross,
     dot,

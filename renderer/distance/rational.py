@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.distance.nearest import tell_faces
-from renderer.points.rational import Vector, dot, exact, less
+from renderer.numerics.rational import Vector, dot, exact, less
 
 # What the few roundings of the bounds below may change.
 _MORE = 1.0 + 2.0**-48

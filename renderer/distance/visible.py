@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from renderer.arguments.points import check_points, farthest_of
 from renderer.distance.on_surface import SurfacePoints, are_on, check_on, on_surface, places_of
 from renderer.mesh.mesh import Mesh
-from renderer.points.argument import check_points, farthest_of
 from renderer.trace.batch import Leaving, RayBatch, broadcast_shape, check_faces, moved_off
+from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.layout import Tree
-from renderer.trace.query import any_hits, closest_hits
 
 Floats = NDArray[np.float64]
 # What is nearer to an end than this share of the largest coordinate of both is not looked at: ends that went through
@@ -80,6 +80,7 @@ def _picked(end: _Ends, rows: NDArray[np.int64]) -> _Ends:
 
 def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> RayBatch:
     """Rays from the one end to the other, both left out."""
+    # rule: room-at-ends
     room = _BESIDE * np.maximum(np.abs(start.points), np.abs(stop.points)).max(axis=1, initial=0.0)
     directions, reach = _way(start.points, stop.points)
     room = np.maximum(room / np.abs(directions).max(axis=1, initial=0.0), _LEAST)

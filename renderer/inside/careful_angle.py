@@ -12,12 +12,12 @@ import math
 
 import numpy as np
 
-from renderer.kernels.expansions import OUT_OF_RANGE, expand_area, pair_of
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, heads, power_below, scaled_difference
-from renderer.kernels.signs import UNDECIDED, balance, stretched, volume_sign
-from renderer.kernels.simd import larger
-from renderer.kernels.vec3 import cross, dot, largest_component, length, scale, sub
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import cross_pairs, heads, power_below, scaled_difference
+from renderer.numerics.expansions import OUT_OF_RANGE, expand_area, pair_of
+from renderer.numerics.predicates import UNDECIDED, balance, stretched, volume_sign
+from renderer.numerics.simd import larger
+from renderer.numerics.vec3 import cross, dot, largest_component, length, scale, sub
 
 # The real part of a face's number, for directions of size one, above which float64 tells its angle: both parts err by
 # 2^-49. Below it the largest angle between two corners is at least 108 degrees, and so the second at least 54.

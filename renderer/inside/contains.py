@@ -7,16 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import flag_argument
+from renderer.arguments.arrays import flag_argument
+from renderer.arguments.points import check_points
 from renderer.errors import expect
 from renderer.inside.crossings import ON_FACE, UNTOLD, count_crossings
 from renderer.inside.rational import crossings_of
 from renderer.inside.winding import exceeds_half
 from renderer.mesh.mesh import Mesh
-from renderer.points.argument import check_points
-from renderer.points.order import ask_in_order
+from renderer.ordering.cells import ask_in_order
 from renderer.trace.layout import Tree
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 
 # The fewest points of a chunk: a millisecond of work.
 _LEAST = 4096

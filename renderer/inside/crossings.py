@@ -9,10 +9,10 @@ of their rounding errors or by expansions, so the counts are those of real arith
 
 from typing import Any, NamedTuple
 
-from renderer.kernels.expansions import PARTS
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.signs import UNDECIDED, area_sign, differ, lies_within, volume_sign
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.expansions import PARTS
+from renderer.numerics.predicates import UNDECIDED, area_sign, differ, lies_within, volume_sign
+from renderer.numerics.simd import (
     at,
     count_bits,
     get,
@@ -26,10 +26,10 @@ from renderer.kernels.simd import (
     splat4,
     splat8,
 )
+from renderer.trace.edge_signs import coordinate
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
-from renderer.trace.sides import coordinate
 
 # In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot tell.
 ON_FACE, UNTOLD = -(2**31), -(2**31) + 1
@@ -196,8 +196,10 @@ def _cross_exactly(tree, place, column, parts):
     if side == 0 and (s0 != 0 or s1 != 0 or s2 != 0):
         return 0, 1
     if side == 0:
+        # rule: on-upright-face
         return 0, lies_within(a, b, c, p, parts)
     # The point moves by (e, e^2), so an edge that it lies on passes it on one side.
+    # rule: move-off-edge
     s0 = s0 if s0 != 0 else _moved_sign(b, c)
     s1 = s1 if s1 != 0 else _moved_sign(c, a)
     s2 = s2 if s2 != 0 else _moved_sign(a, b)

@@ -22,14 +22,14 @@ from renderer.inside.multipoles import (
     put_series,
     sum_lanes,
 )
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import extract, get, larger, pointer, put, select, splat4, square_root
-from renderer.process.parallel import for_chunks
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import extract, get, larger, pointer, put, select, splat4, square_root
+from renderer.system.threads import for_chunks
+from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree, cache_aligned
 from renderer.trace.leaf import blocks_of, tree_pointers
-from renderer.trace.sides import corner
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 
 # Nodes per chunk: some milliseconds, but for the first chunk, whose nodes hold all faces.
 _NODES = 256

@@ -15,8 +15,8 @@ import math
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import extract, get, load4, movemask, put, select, splat4, square_root
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import extract, get, load4, movemask, put, select, splat4, square_root
 
 # Even, for its power comes from squares. Of 4, 6 and 8 the quickest for tolerances from 1e-1 to 1e-3.
 ORDER = 6

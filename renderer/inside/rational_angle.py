@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.inside.careful_angle import PLAIN
-from renderer.points.rational import Vector, cross, dot, exact, less
+from renderer.numerics.rational import Vector, cross, dot, exact, less
 
 # Coordinates whose differences may overflow, and what they are multiplied by then.
 _HUGE, _LESS = 2.0**1000, 2.0**-10

@@ -10,8 +10,8 @@ import math
 from typing import Any, NamedTuple
 
 from renderer.inside.careful_angle import careful_angle
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     extract,
     get,
     lowest_bit,
@@ -21,9 +21,9 @@ from renderer.kernels.simd import (
     splat4,
     square_root,
 )
+from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.sides import corner
 
 # Both parts of a face's number, at most 4 in size, err by 2^-47: corners, lengths and directions by 2^-53 of themselves
 # each, then six products of three. Its angle errs by the share of that in its size: by 2^-44 of a turn at most where

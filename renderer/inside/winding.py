@@ -5,17 +5,17 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_argument
+from renderer.arguments.arrays import real_argument
+from renderer.arguments.points import check_points
 from renderer.errors import expect
 from renderer.inside.moments import moments_of
 from renderer.inside.rational_angle import number_of
 from renderer.inside.winding_search import exceed_half, sum_windings
 from renderer.mesh.mesh import Mesh
-from renderer.points.argument import check_points
-from renderer.points.order import ask_in_order
+from renderer.ordering.cells import ask_in_order
+from renderer.trace.closest import rays_against_blocks
 from renderer.trace.layout import Tree
-from renderer.trace.query import rays_against_blocks
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 
 Floats = NDArray[np.float64]
 # The fewest points of a chunk: some milliseconds of search.

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from renderer.arguments.limits import FARTHEST
 from renderer.inside.multipoles import MOMENT_WORDS, ROUNDING, see_octants, sum_lanes
 from renderer.inside.solid_angle import add_blocks, no_turn, turns_of
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, larger, local_doubles, pointer, put, smaller, splat4
-from renderer.limits import FARTHEST
-from renderer.points.point import Point
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, larger, local_doubles, pointer, put, smaller, splat4
 from renderer.trace.leaf import blocks_of, push_children, tree_pointers
+from renderer.trace.point import Point
 
 # The nodes and blocks that a call sums, beside those of one point: some milliseconds, so that Ctrl-C need not wait for
 # long.

@@ -3,7 +3,7 @@
 Source: Meisters, Polygons Have Ears, American Mathematical Monthly 82, 1975.
 """
 
-from renderer.kernels.jit import inlined, kernel
+from renderer.jit.decorators import inlined, kernel
 
 
 @kernel

@@ -33,6 +33,7 @@ def sides(
     Places and edges are told by position: what lies at one place has one number.
     """
     # 0.0 added, so that -0.0 is the same place.
+    # rule: zero-without-sign
     place = np.unique(np.ascontiguousarray(vertices + 0.0).view("V24").ravel(), return_inverse=True)[1].ravel()
     start, end = place[faces], place[np.roll(faces, -1, axis=1)]
     return start, end, np.minimum(start, end).astype(np.int64) * len(vertices) + np.maximum(start, end)

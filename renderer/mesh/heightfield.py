@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from renderer.arrays import real_argument
+from renderer.arguments.arrays import real_argument
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import lattice_faces

@@ -19,7 +19,7 @@ from renderer.mesh.mesh import Mesh, Repairs, RepairWarning, build_mesh
 from renderer.mesh.obj import parse_obj
 from renderer.mesh.ply import format_ply, parse_ply
 from renderer.mesh.stl import parse_stl
-from renderer.process.files import as_path, read_whole, write_atomically
+from renderer.system.files import as_path, read_whole, write_atomically
 
 
 def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: bool = False) -> Mesh:

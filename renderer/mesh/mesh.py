@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import plain_array, real_array
+from renderer.arguments.arrays import plain_array, real_array
 from renderer.errors import MeshError
 from renderer.lazy import lazy
 from renderer.mesh.edges import open_edges
@@ -269,6 +269,7 @@ class Mesh:
         for corner in range(3):
             angle = _angle(edges[corner], edges[corner - 1])
             for axis in range(3):
+                # rule: weight-by-angle
                 weighted[axis, :, corner] = normals[axis] * angle
         flat, count = self.faces.ravel(), len(self.vertices)
         sums = [np.bincount(flat, along.ravel(), minlength=count).astype(np.float64) for along in weighted]

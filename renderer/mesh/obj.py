@@ -67,6 +67,7 @@ def _mesh(content: _Content, repairs: list[Repairs] | None) -> Mesh:
     distinct, faces = distinct_rows(corners, len(positions))
     position, texcoord, normal = distinct.T
     normals, texcoords = None, None
+    # rule: all-have-normals
     if (normal >= 0).all():
         normals = content.normals[normal]
     if (texcoord >= 0).any():

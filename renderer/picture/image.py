@@ -10,10 +10,10 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_argument
+from renderer.arguments.arrays import real_argument
 from renderer.errors import expect
 from renderer.picture.exr import check_exr, exr_bytes
-from renderer.process.files import as_path, check_writable, write_atomically
+from renderer.system.files import as_path, check_writable, write_atomically
 
 # The arrays of an ``Image``; radiance is always there.
 PLANES = ("radiance", "depth", "normal", "face", "rays")
@@ -42,6 +42,7 @@ def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
 def _encoded(linear: ArrayLike) -> NDArray[np.uint8]:
     x = np.clip(np.asarray(linear, np.float64), 0.0, 1.0)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)
+    # rule: rounded-encoding
     return (encoded * 255.0 + 0.5).astype(np.uint8)
 
 

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
-from renderer.kernels.notice import Stopwatch
+from renderer.jit.notice import Stopwatch
 from renderer.lazy import lazy
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import media_around, pack
 from renderer.picture.touching import find_touching, touching_faces
-from renderer.process.parallel import available_threads, checked_threads, for_chunks
 from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.needs import Needs
 from renderer.scene.scene import RenderSettings, Scene
@@ -23,8 +22,9 @@ from renderer.shade.bundle import SIZE
 from renderer.shade.surface import MAX_MEDIA, SceneArrays
 from renderer.shade.tile import CUT, Film, render_tile, tile_memory
 from renderer.shade.whitted import Settings
+from renderer.system.threads import available_threads, checked_threads, for_chunks
+from renderer.trace.closest import rays_against_blocks
 from renderer.trace.layout import Tree, cache_aligned
-from renderer.trace.query import rays_against_blocks
 from renderer.trace.spawn import OffsetRule
 
 # The rule by which a ray knows the media on both sides of a surface: from the stack of those that it is in, or from the
@@ -194,6 +194,7 @@ def arrays_for(prepared: PreparedScene, camera: Camera, offset: OffsetRule, medi
     together where the rules cross each face by itself.
     """
     arrays = prepared.arrays
+    # rule: media-at-eye
     if prepared.needs.refraction and camera is not prepared.scene.camera:
         arrays = arrays._replace(media=media_around(prepared.scene, camera))
     if media == "normal":

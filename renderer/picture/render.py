@@ -8,11 +8,11 @@ from typing import Any, Literal, NamedTuple
 from renderer.errors import expect
 from renderer.picture.image import PLANES, CutWarning, Image
 from renderer.picture.prepare import MediaRule, PreparedScene, prepare_scene, tiles
-from renderer.process.parallel import checked_threads
-from renderer.process.terminal import progress_bar
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.scene.needs import Needs, checked_needs
 from renderer.scene.scene import RenderSettings, Scene, checked_settings
+from renderer.system.terminal import progress_bar
+from renderer.system.threads import checked_threads
 from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule
 from renderer.tree.build import SPLITS
 

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.process.parallel import for_chunks
 from renderer.scene.needs import Needs
 from renderer.shade.surface import SceneArrays
 from renderer.shade.touching import mark_touching
+from renderer.system.threads import for_chunks
 from renderer.trace.layout import Tree
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 
 _CHUNK = 4096
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, field_validator, model_validator
 
+from renderer.arguments.limits import FARTHEST
 from renderer.errors import expect
-from renderer.limits import FARTHEST
 from renderer.scene.fields import Fields, FiniteVector
 
 
@@ -49,6 +49,7 @@ class _Camera(Fields):
     @field_validator("eye")
     @classmethod
     def _is_near_enough(cls, eye: tuple[float, float, float]) -> tuple[float, float, float]:
+        # rule: eye-within-limit
         if max(map(abs, eye)) > FARTHEST:
             raise ValueError(f"expected coordinates within {FARTHEST:.3g}, as far as rays are traced")
         return eye

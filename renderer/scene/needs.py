@@ -71,6 +71,7 @@ def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
     present = [i for i in scene.instances if len(i.mesh.faces)]
     used = {i.material: scene.materials[i.material] for i in present}
     phong = {name: m for name, m in used.items() if isinstance(m, Phong)}
+    # rule: shining-lights
     shining = sum(any(light.row()[4:]) for light in scene.lights)
     faces = sum(len(i.mesh.faces) for i in present)
     receiving = _lit("shadows", "receives direct light", shining, (n for n, m in phong.items() if m.receives_light))

@@ -18,12 +18,12 @@ from renderer.errors import MeshError, SceneError, expect
 from renderer.lazy import lazy
 from renderer.mesh.load import MESH_SUFFIXES, load_mesh
 from renderer.mesh.mesh import Mesh
-from renderer.process.files import as_path, read_whole, write_atomically
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.showcase import showcase_text
+from renderer.system.files import as_path, read_whole, write_atomically
 
 
 def _typed(default: str) -> BeforeValidator:
@@ -366,6 +366,7 @@ def _floor_meshes(floor: Floor) -> list[tuple[Mesh, str]]:
     a = row * (nx + 1) + column
     b, c, d = a + nx + 1, a + nx + 2, a + 1
     faces = np.stack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)], 1)
+    # rule: floor-colour
     color = (row + column) % len(floor.materials)
     meshes = []
     for index, name in enumerate(floor.materials):

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import at, get, put
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import at, get, put
 from renderer.trace.starts.record import ROW
 
 # The side in pixels of the block that a bundle of camera rays covers, and the most rays of a bundle.

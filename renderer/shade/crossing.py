@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get, pointer, put, smaller
-from renderer.kernels.vec3 import dot
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import get, pointer, put, smaller
+from renderer.numerics.vec3 import dot
 from renderer.shade.records import IOR
 from renderer.shade.surface import Look, left_from, lets_through, look_at, scene_pointers
 from renderer.trace.leaf import tree_pointers
@@ -88,12 +88,14 @@ def _faces_together(tree, scene, spot, d, stack, memory):
     if near < 2:
         return Together(spot, spot, spot, 0)
     members, met = list_members(tree, scene, spot, d, holders, near)
+    # rule: touching-bodies
     if members.count < 2:
         return Together(spot, spot, spot, 0)
     for k in range(members.count - 1, -1, -1):
         at_ = member_spot(tree, holders, k, spot, met)
         look = look_at(scene, at_.face, at_.u, at_.v, d)
         put_holder(holders, k, PATH, _LEFT if dot(d, look.n_s) > 0.0 else _ENTERED)
+        # rule: opaque-stops-light
         if not lets_through(scene.materials, look.material):
             opaque = k
     seen = member_spot(tree, holders, 0 if opaque == NO_MEMBER else opaque, spot, met)
@@ -130,6 +132,7 @@ def _leave(media, count, material):
     """Take the innermost entry of a medium out of ``media`` in place, wherever it stands, so that overlapping bodies
     are left one by one; returns their number, which is the same where there is none.
     """
+    # rule: innermost-entry
     for k in range(count - 1, -1, -1):
         if get(media, k) == material:
             for j in range(k, count - 1):
@@ -169,6 +172,7 @@ def _cross_all(scene, members, media, beyond, memory):
     """``cross`` of all members: bodies are entered, lower faces first, before others are left, so that a sheet that is
     entered and left at once changes nothing.
     """
+    # rule: medium-of-crossing
     holders, count, n1 = make_holders(memory), media.count, _innermost_ior(scene, media.rows, media.count)
     for k in range(members):
         if holder(holders, k, PATH) == _ENTERED:

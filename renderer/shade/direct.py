@@ -5,9 +5,9 @@ k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import add, row3, three, times
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, put
+from renderer.numerics.vec3 import add, row3, three, times
 from renderer.shade.bundle import SIZE
 from renderer.shade.lights import aim, see_light
 from renderer.shade.records import DIELECTRIC, KIND, MIRROR, UNLIT
@@ -148,6 +148,7 @@ def light_surfaces(tree, scene, bundle, surfaces, lit, settings, work):
             _trace_shadows(tree, scene, bundle, lit, aimed, work)
         for k in range(aimed):
             i = get(lit, SIZE + k)
+            # rule: shadows
             if not (settings.shadows and get(work.found.hit, k)):
                 towards, arriving = three(shadows, _TOWARDS + 3 * k), three(shadows, _ARRIVING + 3 * k)
                 _add_light(scene, bundle, at(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)

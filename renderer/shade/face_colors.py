@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get, larger, pointer, smaller
-from renderer.kernels.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import get, larger, pointer, smaller
+from renderer.numerics.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
 from renderer.shade.lights import see_light
 from renderer.shade.records import AMBIENT
 from renderer.shade.surface import phong, scene_pointers

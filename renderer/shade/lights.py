@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get
-from renderer.kernels.vec3 import dot, normalized, scale, sub, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import get
+from renderer.numerics.vec3 import dot, normalized, scale, sub, three
 from renderer.shade.records import DIRECTIONAL, LIGHT_COLUMNS
 from renderer.shade.surface import scene_pointers
 from renderer.trace.spawn import spawn_origin
@@ -44,8 +44,10 @@ def see_light(lights, light, p, n, error):
         return SeenLight(dot(n, place) > 0.0, True, place, place, arriving)
     to_light = sub(place, p)
     # A light within rounding of the surface lies on it and does not light it; this also bounds 1 / r^2.
+    # rule: light-in-front
     if dot(n, to_light) <= error:
         return SeenLight(False, False, place, to_light, arriving)
+    # rule: inverse-square
     arriving = scale(arriving, 1.0 / dot(to_light, to_light))
     return SeenLight(True, False, place, normalized(to_light), arriving)
 

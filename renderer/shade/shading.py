@@ -5,8 +5,8 @@ Vectors are tuples of float64. ``n`` is the unit normal on the side of the incom
 
 import math
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.vec3 import add, dot, scale, sub
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.vec3 import add, dot, scale, sub
 
 
 @inlined
@@ -45,6 +45,7 @@ def fresnel(cos_i, cos_t, n1, n2):
         return 0.0  # also where both cosines are 0
     s = (n1 * cos_i - n2 * cos_t) / (n1 * cos_i + n2 * cos_t)
     p = (n1 * cos_t - n2 * cos_i) / (n1 * cos_t + n2 * cos_i)
+    # rule: both-polarisations
     return 0.5 * (s * s + p * p)
 
 
@@ -55,6 +56,7 @@ def specular(d, n, light, shininess):
     exp(n log1p(-|R - V|^2 / 2)) keeps its accuracy where R . V is close to 1 and the exponent large.
     """
     r = sub(scale(n, 2.0 * dot(n, light)), light)
+    # rule: highlight-in-front
     if -dot(r, d) <= 0.0:
         return 0.0
     difference = add(r, d)

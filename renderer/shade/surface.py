@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import get, pointer
-from renderer.kernels.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import get, pointer
+from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
 from renderer.trace.spawn import Facet, facet_of, offset_distance
@@ -120,6 +120,7 @@ def look_at(scene, face, u, v, d):
     if scene.has_smooth and get(scene.smooth, face):
         n = barycentric(row3(scene.normals, a), row3(scene.normals, b), row3(scene.normals, c), u, v)
         # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
+        # rule: unit-shading-normal
         n_s = normalized(n) if largest_component(n) > 0.0 else n_s
     return Look(barycentric(p0, p1, p2, u, v), facet, n_s, get(scene.material, face))
 

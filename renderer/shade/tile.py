@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, pointer, put, smaller
-from renderer.kernels.vec3 import add, normalized, row3, scale, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, pointer, put, smaller
+from renderer.numerics.vec3 import add, normalized, row3, scale, three
 from renderer.shade.bundle import SIDE, SIZE, append, clear, count_of
 from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
 from renderer.shade.surface import scene_pointers
@@ -76,6 +76,7 @@ def _shoot(camera, scene, bundle, place, block):
         i, j = _place(k)
         x, y = x0 + i, y0 + j
         if x < x1 and y < y1:
+            # rule: place-in-pixel
             px, py = x + place[0], y + place[1]
             rows = camera.rows
             o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     get,
     larger,
     load4,
@@ -20,11 +20,11 @@ from renderer.kernels.simd import (
     smaller,
     splat4,
 )
-from renderer.kernels.vec3 import largest_of_three, length, sub
+from renderer.numerics.vec3 import largest_of_three, length, sub
 from renderer.shade.surface import lets_through, scene_pointers
+from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import blocks_of, octants_around, push_children, tree_pointers
-from renderer.trace.sides import corner
 from renderer.trace.starts.level import CORNER_ERROR, plane_of
 
 # The share of a face's coordinates by which its box grows.

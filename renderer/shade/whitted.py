@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, put
+from renderer.numerics.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
 from renderer.shade.bundle import (
     BUNDLE_DOUBLES,
     BUNDLE_INTEGERS,
@@ -247,9 +247,12 @@ def _refract(scene, m, d, n, n1, n2):
     """
     materials = scene.materials
     k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
+    # rule: refraction
     cos_t, through = refract(d, n, n1, n2)
     if get(materials, m + KIND) == DIELECTRIC:
+        # rule: total-reflection
         f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
+        # rule: tint-of-glass
         k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
     return through, cos_t >= 0.0, k_r, k_t
 
@@ -317,6 +320,7 @@ def _may_leave(work, pixel, weight, settings):
     """Whether a ray of this weight is spawned. That depends on its pixel alone, not on others of its bundle."""
     if not _goes_on(weight, settings.min_weight):
         return False
+    # rule: ray-budget
     if get(work.traced, pixel) >= settings.max_rays:
         put(work.cut, pixel, 1)
         return False

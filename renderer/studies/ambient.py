@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.studies.directions import Pattern, check_count, cosine_hemisphere, fibonacci_sphere
 from renderer.studies.share import Asked, answer, check_asked, limits_of
 from renderer.studies.sweep import Sky

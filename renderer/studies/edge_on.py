@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.signs import UNDECIDED, volume_sign
-from renderer.kernels.simd import at, local_doubles, pointer
-from renderer.kernels.vec3 import row3
-from renderer.points.rational import cross, dot, exact, less
+from renderer.jit.decorators import kernel
+from renderer.numerics.predicates import UNDECIDED, volume_sign
+from renderer.numerics.rational import cross, dot, exact, less
+from renderer.numerics.simd import at, local_doubles, pointer
+from renderer.numerics.vec3 import row3
 
 Floats = NDArray[np.float64]
 

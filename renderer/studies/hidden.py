@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import flag_argument
+from renderer.arguments.arrays import flag_argument
 from renderer.errors import expect
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.studies.share import answer, answer_bits, check_asked, check_directions, check_weights, limits_of
 from renderer.studies.sweep import Sky
 

@@ -8,17 +8,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import flag_argument, real_argument
+from renderer.arguments.arrays import flag_argument, real_argument
+from renderer.arguments.limits import LONGEST, SHORTEST
+from renderer.arguments.points import check_points, farthest_of
 from renderer.distance.on_surface import check_on, on_surface
 from renderer.errors import expect
-from renderer.limits import LONGEST, SHORTEST
-from renderer.points.argument import check_points, farthest_of
-from renderer.points.curve import order_along_curve
-from renderer.process.parallel import checked_threads, for_chunks
-from renderer.process.terminal import progress_bar
-from renderer.queries import Queries
+from renderer.ordering.morton import order_along_curve
+from renderer.queryable import Queries
 from renderer.studies.density import are_dense
 from renderer.studies.sweep import TILE, Answers, Places, Sky, make_sweep_memory, sweep
+from renderer.system.terminal import progress_bar
+from renderer.system.threads import checked_threads, for_chunks
 from renderer.trace.batch import check_faces
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect, is_count
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.studies.directions import MOST, Pattern, fibonacci_hemisphere, reinhart, tregenza, turned
 from renderer.studies.share import (
     answer,
@@ -74,6 +74,7 @@ def sky_view_factor(
     asked = check_asked(octree, points, pole if normals is None else normals, leaving, threads, progress)
     pattern = _patches(patches)
     ways = turned(pattern.directions, pole)
+    # rule: cosine-of-patches
     cosine = definition == "cosine"
     values = pattern.weights / lengths_of(ways) if cosine else pattern.weights
     sky = Sky(ways, values, limits_of(distance, ways), False, cosine)

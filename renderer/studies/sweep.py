@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, pointer, put, smaller
-from renderer.kernels.vec3 import add, cross, dot, largest_component, normalized, row3, scale, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, pointer, put, smaller
+from renderer.numerics.vec3 import add, cross, dot, largest_component, normalized, row3, scale, three
 from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
@@ -270,6 +270,7 @@ def _start_ray(work, i, d, ray):
     if get(own, SLACK) == EDGE:
         return _start_on_edge(work, i, d, row)
     slope, code = dot(three(work.points, _FACING + 3 * i), d), np.int64(get(own, CODE))
+    # rule: side-of-study-ray
     above = slope >= 0.0
     if not above:
         _put3(work.origins, 3 * ray, three(work.points, _BELOW + 3 * i))
@@ -313,8 +314,10 @@ def _aim(places, sky, work, begun, count):
         elif has_horizon:
             height = dot(three(work.points, _FRAME + 9 * i + 6), given)
         if sky.cosine:
+            # rule: cosine-weight
             value *= abs(height)
         put(work.points, _WHOLE + i, get(work.points, _WHOLE + i) + value)
+        # rule: open-above-horizon
         seen = height > 0.0 and _start_ray(work, i, d, rays)
         if seen:
             _put3(work.directions, 3 * rays, d)

@@ -9,20 +9,20 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import flag_argument, real_array
+from renderer.arguments.arrays import flag_argument, real_array
+from renderer.arguments.points import check_points, farthest_of
 from renderer.distance.on_surface import on_surface
 from renderer.errors import expect, is_count
 from renderer.mesh.mesh import face_normals
-from renderer.points.argument import check_points, farthest_of
-from renderer.process.terminal import progress_bar
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
 from renderer.studies.edge_on import are_edge_on
 from renderer.studies.share import check_directions, lengths_of, limits_of
+from renderer.system.terminal import progress_bar
 from renderer.trace.batch import Leaving, check_rays, moved_off
+from renderer.trace.closest import closest_hits
 from renderer.trace.hits import Hits, points_on
-from renderer.trace.query import closest_hits
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import ANCHOR, CODE, FACE, HEAD, ROW, WAY
 from renderer.trace.starts.search import side_taken
@@ -96,6 +96,7 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
             left = begin + np.flatnonzero(face_normals(corners).any(axis=1) & ~are_edge_on(corners, place))
             for u, v in _centroids(int(cuts)):
                 points = points_on(mesh, left, np.full(len(left), u), np.full(len(left), v))
+                # rule: faces-in-view
                 reached = octree.visible(points, place, leaving=left)
                 seen[left[reached]] = True
                 left = left[~reached]
@@ -194,6 +195,7 @@ def _first_hits(octree: Queries, place: Floats, ways: Floats, reach: Floats, nor
     rays, _ = check_rays(place, ways, 0.0, reach)
     face, code, anchor = (part[0] for part in on_surface(tree, mesh, place[None], np.full(1, -1), octree.threads))
     if face >= 0:
+        # rule: outer-side-of-scanner
         outer = face_normals(mesh.vertices[mesh.faces[face : face + 1]])[0] if normal is None else normal
         row = _row_on_side(octree, face, code, anchor, outer)
         count, (face, code) = len(ways), row[[FACE, CODE]].astype(np.int64)

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_argument
+from renderer.arguments.arrays import real_argument
+from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.errors import expect
-from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.mesh.mesh import Mesh
-from renderer.process.parallel import for_chunks
+from renderer.system.threads import for_chunks
 from renderer.trace.spawn import FARTHEST_START, leave_faces
 from renderer.trace.starts.record import FACE, FACES, HEAD, ROW, ROW_STEP, VERTICES
 

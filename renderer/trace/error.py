@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.process.parallel import for_chunks
+from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch
 from renderer.trace.error_bounds import bound_errors
 from renderer.trace.hits import AllHits, Hits

@@ -8,8 +8,8 @@ meets the face within it.
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import (
     as_pairs,
     cross_pairs,
     dot_pairs,
@@ -19,8 +19,8 @@ from renderer.kernels.pairs import (
     product,
     scaled_difference,
 )
-from renderer.kernels.simd import get, larger, pointer, put, smaller
-from renderer.kernels.vec3 import dot, largest_component, largest_of_three, row3, scale, sub, three
+from renderer.numerics.simd import get, larger, pointer, put, smaller
+from renderer.numerics.vec3 import dot, largest_component, largest_of_three, row3, scale, sub, three
 from renderer.trace.intersect import CORNER, ROOM
 from renderer.trace.starts.record import EDGE, SLACK, slack_of, start_pointers
 

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import (
     get,
     is_negative,
     larger,
@@ -98,6 +98,7 @@ def round_both(x, room):
     The least float32 is never above +inf nor the greatest below -inf, so no difference with either is NaN.
     """
     y = larger(-LARGEST_FLOAT, smaller(LARGEST_FLOAT, narrow(x)))
+    # rule: origin-bounds
     step = magnitude(y) * (_STEP * _MORE) + room
     return y - step, y + step
 
@@ -266,6 +267,7 @@ def make_shear(ray):
     row_x, row_y, row_z = turned(axis, np.int64(0), np.int64(4), np.int64(8))
     ox, oy, oz = turned(axis, ray.ox, ray.oy, ray.oz)
     dx, dy, dz = turned(axis, ray.dx, ray.dy, ray.dz)
+    # rule: shear
     return Shear(row_x, row_y, row_z, ox, oy, oz, dx / dz, dy / dz, dz, ray.slack, ray.leaving)
 
 
@@ -346,6 +348,7 @@ def see_triangles(tree, base, ray):
     e1 = x0 * y2 - y0 * x2
     e2 = x1 * y0 - y1 * x0
     least, most = smaller(e0, smaller(e1, e2)), larger(e0, larger(e1, e2))
+    # rule: inside-edges
     seen = movemask((least >= zero) | (most <= zero))
     return Edges(x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, least, most, e0 + e1 + e2), seen
 
@@ -446,6 +449,7 @@ def _are_due(edges, sizes, fraction, doubt, blurred, t_within):
     within = (height + error >= splat4(t_min) * base) & (height - error <= splat4(t_max) * base)
     # A t that rounding made negative may be 0.
     ahead = (t >= zero) | (height <= error)
+    # rule: must-resolve
     return (blurred | (doubt & ahead & within)) & extended
 
 
@@ -455,6 +459,7 @@ def _may_be_on_edge(edges):
     x0, x1, x2, y0, y1, y2, _, _, _, e0, e1, e2, _, _, _ = edges
     zero = splat4(0.0)
     x0, x1, x2, y0, y1, y2 = x0 != zero, x1 != zero, x2 != zero, y0 != zero, y1 != zero, y2 != zero
+    # rule: rounded-edge
     on0 = (e0 == zero) & ((x2 & y1) | (y2 & x1))
     on1 = (e1 == zero) & ((x0 & y2) | (y0 & x2))
     return on0 | on1 | ((e2 == zero) & ((x1 & y0) | (y1 & x0)))

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     double_of,
     extract,
     float32_pointer,
@@ -20,7 +20,6 @@ from renderer.kernels.simd import (
     smaller,
     splat8,
 )
-from renderer.trace.doubt import settled
 from renderer.trace.intersect import hit_triangles, make_shear, room_of, round_both
 from renderer.trace.layout import (
     BLOCK_COUNT,
@@ -37,6 +36,7 @@ from renderer.trace.layout import (
     SCALE,
     WIDE,
 )
+from renderer.trace.resolve import settled
 
 
 class TreePointers(NamedTuple):
@@ -125,6 +125,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
             bits &= bits - 1
             ti = extract(t4, i)
             fi = get(tree.faces, block * BLOCK_FACES + i)
+            # rule: tie-in-blocks
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
                 t, face, u, v, w = ti, fi, extract(u4, i), extract(v4, i), extract(w4, i)
     return t, face, u, v, w, doubtful

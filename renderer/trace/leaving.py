@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.arrays import real_argument
+from renderer.arguments.arrays import real_argument
 from renderer.errors import expect
 from renderer.trace.batch import Leaving, check_faces
 from renderer.trace.hits import Hits, Passage

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     bits_float,
     count_bits,
     extract,
@@ -250,6 +250,7 @@ def trace_packet(tree, rays, stack, any_hit):
         base = node * NODE_WORDS
         t0, bits = enter_beam(nodes, base, beam, limit)
         if any_hit:
+            # rule: packet-stack
             top = _push_all(node, bits, t0, stack, top)
         elif bits != 0:
             top = push_sorted(node, bits, t0, _middle_entry(nodes, base, beam, rays, t0), stack, top)
@@ -267,6 +268,7 @@ def trace_packet(tree, rays, stack, any_hit):
             meeting = meet_octant(tree, rays, at)
             if meeting != 0:
                 doubtful |= test_leaf(tree, rays, meeting, node, any_hit)
+                # rule: packet-limit
                 limit = _most(floats, LIMIT)
 
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     address,
     alike,
     at,
@@ -51,7 +51,7 @@ from renderer.trace.ray_lanes import (
     shear_of,
 )
 from renderer.trace.rays import ray_at, starts8
-from renderer.trace.singly import search_carefully, stack_size
+from renderer.trace.single import search_carefully, stack_size
 from renderer.trace.starts.record import EDGE
 from renderer.trace.starts.record import FACE as START_FACE
 from renderer.trace.starts.record import SLACK as START_SLACK
@@ -224,6 +224,7 @@ def _list_leaves(tree, beam, limit, parallel, top):
                 top += 1
                 for line in range(0, NODE_WORDS, _LINE):
                     prefetch(tree.nodes, child * NODE_WORDS + line)
+    # rule: end-of-leaf-list
     _end_list(parallel, listed)
     return top, listed, entered
 
@@ -315,6 +316,7 @@ def _try_hiders(tree, rays, found, scratch, parallel, count, t_max):
             )  # fmt: skip
             first, blocks = blocks_of(leaf)
             none = t_max, face, 0.0, 0.0, 1.0
+            # rule: hider-is-tested
             _, face, _, _, _, _ = nearest_in_blocks(tree, first, blocks, 0.0, own, none)
         hidden = face != NO_FACE
         # Asked once more only where it hid the last ray: elsewhere that would cost open rays more than it saves.

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import alike, get, narrow, put, select, store
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import alike, get, narrow, put, select, store
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import LEAF_BITS, MAX_LEAF_BLOCKS
 from renderer.trace.leaf import NO_FACE, nearest_in_blocks
@@ -152,6 +152,7 @@ def nearest_in_leaf(tree, rays, r, leaf):
         shear_of(rays, r),
         best_of(rays, r),
     )
+    # rule: weights-of-hit
     put_best(rays, r, (t, face, u, v, w))
     put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
     return face != NO_FACE, doubts

@@ -4,8 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import (
+from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
     address,
     at,
     bool_pointer,
@@ -22,7 +23,6 @@ from renderer.kernels.simd import (
     select,
     smaller,
 )
-from renderer.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.trace.intersect import Ray
 from renderer.trace.leaf import NO_FACE
 from renderer.trace.starts.record import FACE, SLACK, StartPointers, start_pointers
@@ -119,6 +119,7 @@ def _are_good(rays, i):
     x, y, w = every8(d, i * z, z), every8(d, i * z + 1, z), every8(d, i * z + 2, z)
     x, y, w = magnitude(x), magnitude(y), magnitude(w)
     good = near & (x <= LONGEST) & (y <= LONGEST) & (w <= LONGEST)
+    # rule: range-of-eight
     return movemask(good & (larger(larger(x, y), w) >= SHORTEST)) == 0xFF
 
 
@@ -151,6 +152,7 @@ def eight_rays_at(rays, numbers):
     o, d, s, z = rays.origins, rays.directions, rays.origin_step, rays.direction_step
     origin = gather8(o, numbers, s, 0), gather8(o, numbers, s, 1), gather8(o, numbers, s, 2)
     direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
+    # rule: ends-of-eight
     t_min, t_max = _often_one(rays.t_min, numbers, rays.min_step, 0), _often_one(rays.t_max, numbers, rays.max_step, 0)
     return _scaled(origin, direction, t_min, t_max, rays.scale, *starts8(rays.starts, numbers))
 
@@ -191,6 +193,7 @@ def write_hit(found, i, scale, best, dz, any_hit):
         put(found.hit, i, hit)
         return
     # + 0.0 turns -0.0 into 0.0.
+    # rule: t-in-mesh-units
     put(found.t, i, t / scale + 0.0 if hit else np.inf)
     put(found.face, i, np.int64(face if hit else -1))
     put(found.u, i, u / w + 0.0 if hit else np.nan)

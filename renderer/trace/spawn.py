@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, larger, pointer, put, smaller
-from renderer.kernels.vec3 import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, larger, pointer, put, smaller
+from renderer.numerics.vec3 import (
     add,
     barycentric,
     cross,
@@ -24,8 +24,8 @@ from renderer.kernels.vec3 import (
     three,
     unit_and_length,
 )
-from renderer.trace.doubt import LINE, ROUNDING
 from renderer.trace.intersect import CORNER, DOUBT, SLANT
+from renderer.trace.resolve import LINE, ROUNDING
 from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
     ABOVE,
@@ -185,6 +185,7 @@ def offset_distance(p, p0, p1, p2, u, v, facet):
     # A weight times the double area is the distance from its edge times the edge's length.
     inside = smaller(u, smaller(v, w)) * double_area > _from_edges(p, side) * side
     inside = inside and double_area > side * LINE * side and error <= _FARTHEST_MOVE * side
+    # rule: slack-on-edges
     return error, slack_of(p, error) if inside else EDGE
 
 
@@ -218,6 +219,7 @@ def spawn_origin(p, error, n_g, w, offset):
     if not offset.bounded:
         distance = (1.0 + largest_component(p)) * offset.epsilon
         return add(p, scale(n_g, side * distance))
+    # rule: spawn-offset
     step = scale(n_g, side * error)
     return (_away(p[0], step[0], step[0]), _away(p[1], step[1], step[1]), _away(p[2], step[2], step[2]))
 
@@ -284,6 +286,7 @@ def _plane_near(p0, p1, p2, o):
     u, v = dot(cross(q, other), n), dot(cross(one, q), n)
     # A weight is the distance from its edge times the edge's length times the double area.
     least = smaller(u, smaller(v, whole - u - v))
+    # rule: start-inside-face
     inside = least > _from_edges(o, side) * side * area and needed <= _FARTHEST_MOVE * side
     n_g = scale(n, 1.0 / area)
     return _Plane(n_g, dot(n_g, q), needed, slack_of(o, needed), inside and area > _THIN * side * side)
@@ -293,6 +296,7 @@ def _plane_near(p0, p1, p2, o):
 def _moved(o, plane, away):
     """The point o near a face, moved along its normal to where it is off for certain; away = -1 is the other side."""
     out = scale(plane.normal, away)
+    # rule: move-off-face
     step = scale(out, plane.needed - away * plane.height)
     return (_away(o[0], step[0], out[0]), _away(o[1], step[1], out[1]), _away(o[2], step[2], out[2]))
 

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, lowest_bit, pointer, put, splat8, store
-from renderer.process.parallel import for_chunks
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, lowest_bit, pointer, put, splat8, store
+from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.intersect import box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, NODE_WORDS, Tree
 from renderer.trace.leaf import NO_FACE, blocks_of, nearest_carefully, tree_pointers
 from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 
 _WORD = 0xFFFFFFFF
 # The nodes and triangles that a call tests, beside those of one ray: some milliseconds, so that Ctrl-C need not wait

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import (
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import (
     at,
     bits_float,
     count_bits,
@@ -189,6 +189,7 @@ def meet_nodes(tree, rays, lanes, count):
 @inlined
 def resume(tree, rays, lanes, r):
     """Take the next child of ray ``r`` that is not beyond its best hit off its stack, and return it."""
+    # rule: resume-limit
     limit, top = get(rays.floats, LIMIT + r), get(rays.integers, TOP + r) - 1
     entry = get(lanes.stacks, top)
     while bits_float(entry >> 32) > limit:
@@ -235,6 +236,7 @@ def take_hits(tree, rays, lanes, k):
         i = lowest_bit(bits)
         bits &= bits - 1
         ti, fi = get(hits, i), get(tree.faces, block * BLOCK_FACES + i)
+        # rule: tie-in-streams
         if ti < t or (ti == t and fi < face):
             t, face = ti, fi
             u, v, w = get(hits, BLOCK_FACES + i), get(hits, 2 * BLOCK_FACES + i), get(hits, 3 * BLOCK_FACES + i)
@@ -247,6 +249,7 @@ def take_hits(tree, rays, lanes, k):
 def leave_leaf(tree, rays, lanes, r):
     """Choose the next child of ray ``r`` at a leaf: the rest of its blocks, else one off its stack. Returns it."""
     child = get(rays.integers, CHILD + r)
+    # rule: rest-of-leaf
     if ~child & (MAX_LEAF_BLOCKS - 1) != 0:
         # The first block is one further on, and the number of blocks one less.
         child -= MAX_LEAF_BLOCKS - 1

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import at, get, lowest_bit, pointer, put, smaller
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import at, get, lowest_bit, pointer, put, smaller
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import NO_FACE, search_all_blocks, tree_pointers
@@ -24,7 +24,7 @@ from renderer.trace.ray_lanes import (
     prepare_eight,
 )
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers
-from renderer.trace.singly import search_carefully, stack_size, write_best
+from renderer.trace.single import search_carefully, stack_size, write_best
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import EDGE
 from renderer.trace.stream import (
@@ -132,6 +132,7 @@ def _finish(tree, rays, found, scratch, r, any_hit):
     """
     best, (_, doubles, integers), steps = best_of(scratch.prepared, r), scratch.prepared, np.int64(0)
     i, slack = get(integers, NUMBER + r), get(doubles, SLACK + r)
+    # rule: resolve-uncertain
     if get(integers, DOUBTFUL + r) != 0 or slack == EDGE:
         best, steps = search_carefully(
             tree, rays, i, at(scratch.lanes.stacks, stack_of(scratch.lanes, r)), scratch.holders, any_hit

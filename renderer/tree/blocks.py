@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import float32_pointer, float64_pointer, put
-from renderer.process.parallel import for_chunks
+from renderer.jit.decorators import kernel
+from renderer.numerics.simd import float32_pointer, float64_pointer, put
+from renderer.system.threads import for_chunks
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, cache_aligned, locked
 
 # Vertices and blocks per chunk: a tenth of a millisecond, beside which taking a chunk costs nothing.

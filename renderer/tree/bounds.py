@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import extract, load8, select, splat8, store
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import extract, load8, select, splat8, store
 from renderer.trace.intersect import face_range
 
 # A box is eight 32-bit words: lower x, y, z, a face, and the negated upper x, y, z, and an unused one. The upper corner

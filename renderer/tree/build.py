@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.process.parallel import for_chunks
+from renderer.system.threads import for_chunks
 from renderer.trace.layout import BLOCK_FACES, NODE_WORDS, Tree, cache_aligned
 from renderer.tree.blocks import fill_blocks
 from renderer.tree.bounds import BOX, Faces, face_boxes, fit

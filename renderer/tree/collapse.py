@@ -6,8 +6,8 @@ Compressed Wide BVHs, HPG 2017, sec. 3.1), with leaves counted in blocks.
 
 import numpy as np
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import load8
+from renderer.jit.decorators import kernel
+from renderer.numerics.simd import load8
 from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX, half_area
 

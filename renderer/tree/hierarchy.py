@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import smaller
+from renderer.jit.decorators import kernel
+from renderer.numerics.simd import smaller
 from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import larger, load8, smaller, store
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import larger, load8, smaller, store
 from renderer.tree.bounds import BOX, double_centre, empty_box, united
 from renderer.tree.hierarchy import add_part
 

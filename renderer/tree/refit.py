@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import larger, smaller
-from renderer.process.parallel import for_chunks
+from renderer.jit.decorators import kernel
+from renderer.numerics.simd import larger, smaller
+from renderer.system.threads import for_chunks
 from renderer.trace.intersect import face_range
 from renderer.trace.layout import (
     BLOCK_FACES,

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.simd import larger, load8, smaller, store
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import larger, load8, smaller, store
 from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX, double_centre, empty_box, half_area, united
 from renderer.tree.hierarchy import add_part

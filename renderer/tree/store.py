@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from renderer.errors import expect, is_count
 from renderer.mesh.mesh import Mesh, Repairs
-from renderer.process.files import as_path, write_atomically
+from renderer.system.files import as_path, write_atomically
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, NODE_WORDS, Tree, cache_aligned, locked
 from renderer.tree.invariants import check_safe
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.kernels.jit import kernel
+from renderer.jit.decorators import kernel
 from renderer.trace.layout import BLOCK_FACES, NODE_WORDS
 from renderer.tree.bounds import BOX, fit
 from renderer.tree.collapse import collapse, leaf_cost

@@ -78,6 +78,7 @@ class RayMeshIntersector:
                 return it.named(first.face[rays]), rays, first.points[rays] if located else _NOWHERE
             if max_hits is not None and max_hits < 1:
                 return _NO_ROWS, _NO_ROWS, _NOWHERE
+            # rule: hits-of-drop-in
             found = it.octree.all_hits(origins, directions, max_hits=max_hits)
             return it.named(found.face), found.ray, found.points if located else _NOWHERE
 

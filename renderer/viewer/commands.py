@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from renderer.errors import expect
-from renderer.process.files import read_whole
 from renderer.scene.camera import Camera, OrthographicCamera
 from renderer.scene.fields import Fields
 from renderer.scene.light import DirectionalLight, Light
+from renderer.system.files import read_whole
 from renderer.viewer.protocol import AskCommand, SaveCamera, SaveScene, ViewSettings
 from renderer.viewer.shown import ShownScene, edited
 from renderer.viewer.viewpoint import camera_of, camera_toml

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.diagnostics.false_color import Limits, shades_of
 from renderer.errors import expect
-from renderer.inspect.false_color import Limits, shades_of
 from renderer.picture.prepare import tiles
 from renderer.scene.scene import Scene
 from renderer.trace.spawn import BOUNDED

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.inspect.face_phong import face_colors
-from renderer.inspect.false_color import Limits, false_color, limits_of, scale_colors, shades_of
-from renderer.inspect.ray_cost import camera_steps
+from renderer.diagnostics.face_phong import face_colors
+from renderer.diagnostics.false_color import Limits, false_color, limits_of, scale_colors, shades_of
+from renderer.diagnostics.ray_cost import camera_steps
 from renderer.picture.image import Image, srgb
 from renderer.picture.prepare import TILE, tiles
 from renderer.trace.spawn import BOUNDED

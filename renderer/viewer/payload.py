@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.diagnostics.tree_boxes import boxes_at, levels
 from renderer.errors import expect
-from renderer.inspect.tree_boxes import boxes_at, levels
 from renderer.mesh.mesh import face_normals
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.hide import FLOOR, object_names

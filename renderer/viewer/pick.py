@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from renderer.inspect.ray_path import Segment, ray_path
-from renderer.inspect.ray_step import Vector
-from renderer.inspect.tree_boxes import Visit, visited
+from renderer.diagnostics.ray_path import Segment, ray_path
+from renderer.diagnostics.ray_step import Vector
+from renderer.diagnostics.tree_boxes import Visit, visited
 from renderer.picture.prepare import PreparedScene
 from renderer.shade.records import MATERIAL_COLUMNS
 from renderer.shade.surface import surface_of

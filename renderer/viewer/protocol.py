@@ -5,7 +5,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator, model_validator
 
-from renderer.limits import FARTHEST
+from renderer.arguments.limits import FARTHEST
 from renderer.scene.camera import sample_offsets
 from renderer.scene.fields import FiniteVector
 from renderer.scene.scene import AnyLight, AnyMaterial

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
-from renderer.process import child
 from renderer.scene.scene import Scene
+from renderer.system import child
 
 GROUP = "octree_render.references"
 # Seconds between looks at whether a picture is still wanted while its reference says nothing.

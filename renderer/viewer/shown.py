@@ -12,13 +12,13 @@ from renderer.lazy import lazy
 from renderer.picture.pack import light_rows, repacked
 from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene, tree_for
 from renderer.precompile import touch_viewing
-from renderer.process.parallel import available_threads
 from renderer.scene.camera import unit
 from renderer.scene.hide import object_names, without
 from renderer.scene.needs import Needs, needs_of
 from renderer.scene.scene import RenderSettings, Scene, load_scene, mesh_files
 from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
+from renderer.system.threads import available_threads
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer.protocol import Edits, ViewSettings
 

@@ -36,6 +36,12 @@ from renderer import (
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
 
+pytestmark = pytest.mark.judges(
+    "BruteForce.from_mesh", "Hits.hit", "Mesh.concatenate", "Mesh.repaired", "Octree.all_hits", "Octree.count_steps",
+    "Octree.save", "Octree.signed_distance", "Octree.winding_number", "needs_of", "prepare", "render", "srgb",
+)  # fmt: skip
+
+
 VERTICES, FACES = make_mesh("lattice", 5, 30)
 ORIGINS, DIRECTIONS = rays_at(VERTICES, FACES, 5, 8)
 COUNT = len(ORIGINS)

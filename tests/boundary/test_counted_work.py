@@ -9,13 +9,19 @@ from numba import njit
 
 import renderer.octree
 from renderer import Mesh, Mirror, Octree, OrthographicCamera, RenderSettings, Scene, SceneObject, prepare
-from renderer.contacts import all_hits as gathering
+from renderer.all_hits import all_hits as gathering
 from renderer.distance import closest as nearest
 from renderer.inside import winding
-from renderer.kernels.simd import splat8
 from renderer.mesh.shapes import box, icosphere, torus
+from renderer.numerics.simd import splat8
 from renderer.trace.intersect import Ray, enter_boxes, largest_of, make_slabs
 from renderer.trace.spawn import BOUNDED
+
+pytestmark = pytest.mark.judges(
+    "Octree", "Octree.all_hits", "Octree.closest_point", "Octree.load", "Octree.refit", "Octree.winding_number",
+    "PreparedScene.picture", "Steps",
+)  # fmt: skip
+
 
 DOWN = [0.0, 0.0, -1.0]
 

@@ -295,7 +295,7 @@ def test_finds_a_process_that_damage_misleads(folder: Path, monkeypatch: pytest.
     if damage == "a wrong answer":
         (package / "below" / "deep" / "bottom.py").write_text("STEP = 11\n")
     elif damage == "not noticed":
-        store = package / "kernels" / "store.py"
+        store = package / "jit" / "cache.py"
         text = store.read_text(encoding="utf-8")
         assert text.count("if head != _HEADER or ") == 1
         store.write_text(text.replace("if head != _HEADER or ", "if "))

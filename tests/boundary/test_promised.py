@@ -1,4 +1,4 @@
-"""Sentences of the public docstrings and of the commands' help that no other test asked: one test each."""
+"""What the library and its commands do that no other file of tests asks."""
 
 import doctest
 import inspect
@@ -43,11 +43,11 @@ from renderer import (
     prepare,
     render,
 )
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.shapes import grid, icosphere
 from renderer.picture import prepare as preparing
-from renderer.process.parallel import available_threads
 from renderer.shade import records
+from renderer.system.threads import available_threads
 
 SCENES = Path(__file__).parents[2] / "scenes"
 GLASS, STAIRS, BLOCK = SCENES / "glass.toml", SCENES / "stairs.toml", SCENES / "models" / "block.ply"
@@ -63,45 +63,26 @@ def through(count: int) -> tuple[Any, Any]:
 # Queries
 
 
-def test_all_hits_have_integers_of_64_bits_and_a_face_each() -> None:
-    found = Octree.from_mesh(icosphere(2)).all_hits(*through(50))
-    assert found.face.dtype == found.offsets.dtype == found.ray.dtype == found.counts.dtype == np.int64
-    assert len(found.face) == len(found.t) == found.offsets[-1] == 100 and found.t_error is None
+Expected = dict[type, list[tuple[Any, tuple[int, ...]]]]
 
 
-def test_integers_have_64_bits_and_other_numbers_are_float64() -> None:
-    ball, rays = icosphere(2), through(9)
-    octree, broken = Octree.from_mesh(ball), ball.vertices.copy()
-    broken[3] = np.nan
-    near = [octree.closest_point(rays[0], limit).face for limit in (9.0, 0.1)]
-    hits, steps = octree.closest_hit(*rays), octree.count_steps(*rays)
-    repairs = Mesh.repaired(ball.vertices, ball.faces, normals=broken)[1]
-    assert (near[0] >= 0).all() and (near[1] == -1).all() and repairs.bad_normals.tolist() == [3]
-    for integers in (*near, hits.face, steps.nodes, steps.triangles, repairs.bad_normals):
-        assert integers.dtype == np.int64
-    single = ball.vertices.astype(np.float32)
-    for mesh in (
-        Mesh(single, ball.faces, single, None, single[:, :2]),
-        Mesh([[1, 2, 3]], [], [[0, 0, 1]], None, [[0, 1]]),
-    ):
-        for numbers in (mesh.vertices, mesh.normals, mesh.texcoords, mesh.triangles):
-            assert numbers is not None and numbers.dtype == np.float64
-
-
-Said = dict[type, list[tuple[Any, tuple[int, ...]]]]
-
-
-def assert_said(said: Said) -> None:
+def assert_arrays(expected: Expected) -> None:
     """Each array has the type under which it stands, and its shape; a number of Python's own is no array."""
-    for dtype, arrays in said.items():
+    for dtype, arrays in expected.items():
         for number, (array, shape) in enumerate(arrays):
             assert isinstance(array, np.ndarray | np.generic), (dtype, number)
             assert (array.dtype, array.shape) == (dtype, shape), (dtype, number)
 
 
+@pytest.mark.judges(
+    "AllHits", "AllHits.counts", "AllHits.normals", "AllHits.points", "AllHits.ray", "ClosestPoints",
+    "ClosestPoints.found", "ClosestPoints.points", "Hits", "Hits.hit", "Hits.normals", "Hits.points", "Octree.any_hit",
+    "Octree.contains", "Octree.count_hits", "Octree.signed_distance", "Octree.visible", "Octree.winding_number",
+    "Steps",
+)  # fmt: skip
 @pytest.mark.parametrize("kind", [Octree, BruteForce])
 @pytest.mark.parametrize("shape", [(), (5,), (4, 15)])
-def test_arrays_have_the_types_and_dimensions_that_they_are_said_to_have(kind: Any, shape: tuple[int, ...]) -> None:
+def test_answers_have_their_types_and_the_dimensions_of_what_is_asked(kind: Any, shape: tuple[int, ...]) -> None:
     """Of one ray, of a few, which go one by one, and of many, in two dimensions; some of them miss."""
     count = int(np.prod(shape))
     start = (3.0 * through(60)[0])[:count].reshape(*shape, 3)
@@ -111,7 +92,7 @@ def test_arrays_have_the_types_and_dimensions_that_they_are_said_to_have(kind: A
     assert count == 1 or 0 < hit < count
     near, far = target.closest_point(start), target.closest_point(start, 1e-3)
     assert near.found.all() and not far.found.any()
-    said: Said = {
+    expected: Expected = {
         np.float64: [
             *((numbers, shape) for numbers in (hits.t, hits.u, hits.v, hits.t_error)),
             *((numbers, (found,)) for numbers in (rows.t, rows.u, rows.v, rows.t_error)),
@@ -130,11 +111,14 @@ def test_arrays_have_the_types_and_dimensions_that_they_are_said_to_have(kind: A
             (target.visible(start, [0.0, 0.0, 9.0]), shape), (near.found, shape), (far.found, shape),
         ],
     }  # fmt: skip
-    assert_said(said)
+    assert_arrays(expected)
 
 
+@pytest.mark.judges(
+    "Mesh", "Mesh.bounds", "Mesh.extent", "Mesh.face_normals", "Mesh.triangles", "Mesh.vertex_normals", "Repairs"
+)
 @pytest.mark.parametrize("corners", [0, 3, None])
-def test_meshes_have_arrays_of_the_types_and_dimensions_that_they_are_said_to_have(corners: int | None) -> None:
+def test_arrays_of_meshes_have_their_types_and_dimensions(corners: int | None) -> None:
     """A mesh of many faces, one of vertices alone and one of nothing, made from lists, which have no type."""
     places = icosphere(2).vertices[:corners].tolist()
     triangles = icosphere(2).faces.tolist() if corners is None else []
@@ -143,7 +127,7 @@ def test_meshes_have_arrays_of_the_types_and_dimensions_that_they_are_said_to_ha
     repaired, repairs = Mesh.repaired(places, triangles, **given)
     count, faces = len(places), len(triangles)
     for mesh in (Mesh(places, triangles, **given), repaired):
-        said: Said = {
+        expected: Expected = {
             np.float64: [
                 *((vectors, (count, 3)) for vectors in (mesh.vertices, mesh.vertex_normals())),
                 (mesh.triangles, (faces, 3, 3)), (mesh.face_normals(), (faces, 3)), (mesh.extent, (3,)),
@@ -157,14 +141,18 @@ def test_meshes_have_arrays_of_the_types_and_dimensions_that_they_are_said_to_ha
                 *((none, (0,)) for none in (repairs.dropped_faces, repairs.bad_vertices, repairs.bad_normals)),
             ],
         }  # fmt: skip
-        assert_said(said)
+        assert_arrays(expected)
 
 
-def test_pictures_cameras_and_objects_have_arrays_of_the_types_and_dimensions_that_are_said() -> None:
+@pytest.mark.judges(
+    "Image", "Image.srgb", "OrthographicCamera.frame", "OrthographicCamera.rows", "PerspectiveCamera.frame",
+    "PerspectiveCamera.rows", "SceneObject.matrix",
+)  # fmt: skip
+def test_arrays_of_pictures_cameras_and_objects_have_their_types_and_dimensions() -> None:
     scene = load_scene(STAIRS)
     image, views = render(scene, resolution=SIZE), (scene.camera, load_scene(GLASS).camera)
     assert [view.type for view in views] == ["orthographic", "perspective"]
-    said: Said = {
+    expected: Expected = {
         np.float64: [
             (image.depth, (16, 24)), *((view.rows(24, 16), (6, 3)) for view in views),
             *((axis, (3,)) for view in views for axis in view.frame()),
@@ -174,7 +162,7 @@ def test_pictures_cameras_and_objects_have_arrays_of_the_types_and_dimensions_th
         np.int32: [(image.face, (16, 24)), (image.rays, (16, 24))],
         np.uint8: [(image.srgb, (16, 24, 3))],
     }  # fmt: skip
-    assert_said(said)
+    assert_arrays(expected)
 
 
 def test_the_examples_of_all_docstrings_hold() -> None:
@@ -190,6 +178,7 @@ def test_the_examples_of_all_docstrings_hold() -> None:
     assert runner.tries > 50 and runner.failures == 0
 
 
+@pytest.mark.judges("Octree.visible")
 def test_what_is_seen_at_the_least_angles_does_not_hide_its_own_points() -> None:
     """Points of a plain of many faces, turned at random, each with an eye that barely stands above it."""
     rng, plain = np.random.default_rng(6), grid(12, 12)
@@ -204,12 +193,14 @@ def test_what_is_seen_at_the_least_angles_does_not_hide_its_own_points() -> None
         assert octree.visible(points, eyes, leaving=faces).all() and octree.visible(eyes, points, reaching=faces).all()
 
 
+@pytest.mark.judges("AllHits.ray")
 def test_rays_of_several_dimensions_are_counted_in_c_order() -> None:
     origins = np.array([[[0.0, 0.0, 3.0], [9.0, 0.0, 3.0]], [[0.1, 0.0, 3.0], [0.2, 0.0, 3.0]]])
     found = Octree.from_mesh(icosphere(2)).all_hits(origins, [0.0, 0.0, -1.0], max_hits=1)
     assert found.ray.tolist() == [0, 2, 3] and found.counts.tolist() == [[1, 0], [1, 1]]
 
 
+@pytest.mark.judges("Octree.all_hits")
 def test_memory_of_all_hits_grows_with_what_is_found() -> None:
     vertices = np.tile([[-1.0, -1.0, 0.0], [2.0, -1.0, 0.0], [-1.0, 2.0, 0.0]], (400, 1))
     vertices[:, 2] = np.repeat(np.arange(400.0), 3)
@@ -227,6 +218,7 @@ def test_memory_of_all_hits_grows_with_what_is_found() -> None:
     assert peaks[0] < peaks[1] / 3
 
 
+@pytest.mark.judges("Octree.signed_distance")
 def test_signs_of_distances_are_those_of_libigl_and_not_of_trimesh() -> None:
     mesh = icosphere(2)
     points = np.random.default_rng(2).uniform(-1.4, 1.4, (200, 3))
@@ -237,12 +229,14 @@ def test_signs_of_distances_are_those_of_libigl_and_not_of_trimesh() -> None:
     assert np.allclose(ours, -theirs, atol=1e-7)
 
 
+@pytest.mark.judges("ClosestPoints")
 def test_u_and_v_of_nearest_points_weigh_the_second_and_third_corner() -> None:
     mesh = Mesh([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 8.0, 0.0]], [[0, 1, 2]])
     found = Octree.from_mesh(mesh).closest_point([[1.0, 2.0, 5.0], [3.0, -1.0, 1.0]])
     assert found.u.tolist() == [0.25, 0.75] and found.v.tolist() == [0.25, 0.0]
 
 
+@pytest.mark.judges("BruteForce.mesh", "Octree.mesh")
 def test_the_mesh_of_a_tree_is_the_one_built_over_and_then_the_moved_one() -> None:
     mesh = icosphere(1)
     for built in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
@@ -252,6 +246,7 @@ def test_the_mesh_of_a_tree_is_the_one_built_over_and_then_the_moved_one() -> No
         assert np.array_equal(built.mesh.faces, mesh.faces)
 
 
+@pytest.mark.judges("Octree.refit")
 def test_a_refit_keeps_what_belongs_to_vertices() -> None:
     mesh = icosphere(1)
     full = Mesh(mesh.vertices, mesh.faces, mesh.vertices, np.abs(mesh.vertices), mesh.vertices[:, :2])
@@ -264,17 +259,20 @@ def test_a_refit_keeps_what_belongs_to_vertices() -> None:
 # Meshes
 
 
+@pytest.mark.judges("Mesh")
 def test_meshes_compare_and_hash_by_identity() -> None:
     first, second = icosphere(0), icosphere(0)
     assert first != second and len({first, second, first}) == 2
 
 
+@pytest.mark.judges("Mesh.is_closed")
 def test_closed_is_told_by_index() -> None:
     mesh = icosphere(0)
     soup = Mesh(mesh.triangles.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
     assert mesh.is_closed() and not soup.is_closed()
 
 
+@pytest.mark.judges("Mesh.triangles")
 def test_triangles_are_a_new_array_each_time() -> None:
     mesh = icosphere(0)
     first, second = mesh.triangles, mesh.triangles
@@ -287,6 +285,7 @@ def named(edges: Any) -> list[list[int]]:
     return sorted(sorted(edge) for edge in edges.tolist())
 
 
+@pytest.mark.judges("Mesh.odd_edges", "Mesh.open_edges")
 def test_open_and_odd_edges_are_named_by_their_vertices() -> None:
     places = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]]
     square = Mesh(places, [[0, 1, 2], [1, 0, 3]])
@@ -303,6 +302,7 @@ def test_open_and_odd_edges_are_named_by_their_vertices() -> None:
     assert square.open_edges.dtype == np.int64 and icosphere(0).open_edges.shape == (0, 2)
 
 
+@pytest.mark.judges("Mesh.concatenate")
 def test_joined_meshes_have_texture_coordinates_where_all_have_them() -> None:
     ball = icosphere(0)
     mapped = Mesh(ball.vertices, ball.faces, texcoords=ball.vertices[:, :2])
@@ -341,6 +341,7 @@ def glb(material: bool, attributes: dict[str, NDArray[Any]]) -> bytes:
     return start + text + struct.pack("<I4s", len(data), b"BIN\0") + data
 
 
+@pytest.mark.judges("load_mesh")
 @pytest.mark.parametrize("material", [False, True])
 def test_a_glb_keeps_colours_without_and_texture_coordinates_with_a_material(tmp_path: Path, material: bool) -> None:
     colors, uv = (
@@ -362,6 +363,7 @@ def test_a_glb_keeps_colours_without_and_texture_coordinates_with_a_material(tmp
 # Scenes and pictures
 
 
+@pytest.mark.judges("Dielectric.row", "DirectionalLight.row", "Mirror.row", "Phong.row", "PointLight.row")
 def test_rows_for_kernels_have_their_columns() -> None:
     for material in (Dielectric(), Mirror(), Phong()):
         assert material.row().shape == (records.MATERIAL_COLUMNS,) and material.row().dtype == np.float64
@@ -369,12 +371,14 @@ def test_rows_for_kernels_have_their_columns() -> None:
         assert light.row().shape == (records.LIGHT_COLUMNS,) and light.row().dtype == np.float64
 
 
+@pytest.mark.judges("Phong.kind")
 def test_the_kind_of_phong_follows_its_colours() -> None:
     black, grey = (0.0, 0.0, 0.0), (0.5, 0.5, 0.5)
     kinds = [Phong(diffuse=d, specular=s).kind for d in (black, grey) for s in (black, grey)]
     assert kinds == [records.UNLIT, records.PHONG, records.LAMBERT, records.PHONG]
 
 
+@pytest.mark.judges("CutWarning", "Image", "Image.cut_message")
 def test_cut_counts_the_pixels_that_miss_rays_and_the_warning_says_it() -> None:
     scene = load_scene(GLASS)
     with warnings.catch_warnings(record=True) as said:
@@ -386,6 +390,7 @@ def test_cut_counts_the_pixels_that_miss_rays_and_the_warning_says_it() -> None:
     assert f"{image.cut:,} of {SIZE[0] * SIZE[1]:,} pixels" in image.cut_message(3)
 
 
+@pytest.mark.judges("Image", "PreparedScene")
 def test_a_prepared_scene_holds_what_it_says() -> None:
     scene = load_scene(GLASS)
     render(scene, resolution=SIZE)  # what is compiled counts for nothing
@@ -404,6 +409,7 @@ def test_a_prepared_scene_holds_what_it_says() -> None:
     assert prepared.build_seconds + brute.build_seconds + image.render_seconds <= elapsed
 
 
+@pytest.mark.judges("octree-render render --split", "render")
 @pytest.mark.parametrize("split", ["midpoint", "sah"])
 def test_split_is_that_of_the_tree(split: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are the same either way, so the tree is watched."""
@@ -420,6 +426,7 @@ def test_split_is_that_of_the_tree(split: Any, tmp_path: Path, monkeypatch: pyte
     assert built == [split, split]
 
 
+@pytest.mark.judges("Scene.altered")
 def test_a_change_of_the_floor_or_the_objects_changes_no_altered_scene() -> None:
     scene = load_scene(GLASS)
     for change in ({"floor": None}, {"objects": ()}, {"floor": Floor(min=(0, 0), max=(1, 1), materials=("floor",))}):
@@ -429,6 +436,7 @@ def test_a_change_of_the_floor_or_the_objects_changes_no_altered_scene() -> None
         assert np.array_equal(*pictures)
 
 
+@pytest.mark.judges("RenderSettings")
 def test_min_weight_bounds_no_error_where_rays_branch() -> None:
     """Panes that reflect half and let half through: the rays of each bounce carry 1 together, and the fewer each."""
     wall = np.array([[-6.0, -5.0, 0.0], [6.0, -5.0, 0.0], [0.2, 9.0, 0.0]])
@@ -443,6 +451,7 @@ def test_min_weight_bounds_no_error_where_rays_branch() -> None:
     assert (whole, cut) == (11.0, 4.0)  # weights from 1 to 1/8 are above 0.1
 
 
+@pytest.mark.judges("prepare", "render")
 def test_render_and_prepare_hand_on_their_options(monkeypatch: pytest.MonkeyPatch) -> None:
     """``split``, ``threads`` and ``needs``: pictures are the same anyhow, so what is built and who works is watched."""
     built, workers, scene = [], [], load_scene(STAIRS)
@@ -469,6 +478,7 @@ def test_render_and_prepare_hand_on_their_options(monkeypatch: pytest.MonkeyPatc
     assert workers == [3, available_threads(), 2] and built[-1] == ("midpoint", available_threads())
 
 
+@pytest.mark.judges("prepare")
 @pytest.mark.parametrize(
     ("argument", "value"),
     [("accelerator", "bvh"), ("split", "kd"), ("split", None), ("needs", {}), ("threads", 0), ("threads", 1.5)],
@@ -481,6 +491,7 @@ def test_prepare_refuses_what_it_does_not_know_and_names_it(argument: str, value
 # Commands
 
 
+@pytest.mark.judges("octree-render render --output")
 def test_the_command_writes_an_exr_file_of_the_librarys_bits(tmp_path: Path, mitsuba: Any) -> None:
     path = tmp_path / "a.exr"
     assert main(["render", str(GLASS), "--resolution", "24x16", "-o", str(path), "--quiet"]) == 0
@@ -495,6 +506,7 @@ class Terminal(io.StringIO):
         return True
 
 
+@pytest.mark.judges("octree-render render --quiet")
 @pytest.mark.parametrize("quiet", [False, True])
 def test_quiet_shows_no_bar_on_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quiet: bool) -> None:
     said, shown = Terminal(), Terminal()
@@ -506,6 +518,7 @@ def test_quiet_shows_no_bar_on_a_terminal(tmp_path: Path, monkeypatch: pytest.Mo
     assert not quiet or shown.getvalue() == said.getvalue() == ""
 
 
+@pytest.mark.judges("octree-render render --max-rays")
 def test_max_rays_of_the_command_is_that_of_the_library(tmp_path: Path) -> None:
     path = tmp_path / "a.npy"
     assert main(["render", str(GLASS), "--resolution", "24x16", "--max-rays", "3", "-o", str(path), "--quiet"]) == 0
@@ -516,6 +529,11 @@ def test_max_rays_of_the_command_is_that_of_the_library(tmp_path: Path) -> None:
     assert not np.array_equal(cut, render(load_scene(GLASS), resolution=SIZE).radiance)
 
 
+@pytest.mark.judges(
+    "octree-render render --accelerator", "octree-render render --max-depth", "octree-render render --max-rays",
+    "octree-render render --min-weight", "octree-render render --output", "octree-render render --resolution",
+    "octree-render render --samples", "octree-render render --split", "octree-render render --threads",
+)  # fmt: skip
 def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -547,6 +565,7 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
     assert [path.name for path in tmp_path.iterdir()] == ["out.png"]
 
 
+@pytest.mark.judges("octree-render render --max-depth", "octree-render render --min-weight")
 @pytest.mark.parametrize("flags", [("--max-depth", "1"), ("--min-weight", "0.3")])
 def test_a_bound_of_the_command_is_that_of_the_library(tmp_path: Path, flags: tuple[str, str]) -> None:
     path, name = tmp_path / "a.npy", flags[0].strip("-").replace("-", "_")
@@ -557,6 +576,7 @@ def test_a_bound_of_the_command_is_that_of_the_library(tmp_path: Path, flags: tu
     assert not np.array_equal(expected, render(load_scene(GLASS), resolution=SIZE).radiance)
 
 
+@pytest.mark.judges("octree-render view --host", "octree-render view --port", "octree-render view scene")
 def test_the_command_shows_a_scene_on_this_machine_at_any_free_port(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -571,6 +591,7 @@ def test_the_command_shows_a_scene_on_this_machine_at_any_free_port(
     assert [(options["host"], options["port"]) for options in told] == [("127.0.0.1", 0), ("::1", 8123)]
 
 
+@pytest.mark.judges("octree-render info --split")
 def test_info_cuts_the_octree_at_midpoints_unless_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(STAIRS)]) == 0
     assert "octree (midpoint): " in capsys.readouterr().out
@@ -585,6 +606,7 @@ def asked(url: str) -> int:
         return error.code
 
 
+@pytest.mark.judges("view")
 def test_a_view_that_other_machines_reach_wants_the_token() -> None:
     pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
     with renderer.view(STAIRS, host="0.0.0.0", browser=False) as viewing:
@@ -592,6 +614,7 @@ def test_a_view_that_other_machines_reach_wants_the_token() -> None:
         assert len(token) >= 32 and asked(viewing.url) == 200 and asked(plain) == 403
 
 
+@pytest.mark.judges("octree-render view --host", "octree-render view --write-scene")
 def test_the_command_view_takes_host_and_writes_the_scene_of_a_mesh(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -607,6 +630,7 @@ def test_the_command_view_takes_host_and_writes_the_scene_of_a_mesh(
     assert len(load_scene(written).instances) == len(load_scene(BLOCK).instances)
 
 
+@pytest.mark.judges("octree-render view --no-browser", "octree-render view scene")
 @pytest.mark.parametrize("browser", [True, False])
 def test_the_command_view_shows_a_mesh_file_and_opens_a_browser_unless_told_not_to(
     monkeypatch: pytest.MonkeyPatch, browser: bool
@@ -632,6 +656,7 @@ def test_the_command_view_shows_a_mesh_file_and_opens_a_browser_unless_told_not_
     assert told["name"] == "block.ply" and told["faces"] == len(own.faces) + 2 * 16**2 and len(told["lights"]) == 2
 
 
+@pytest.mark.judges("view")
 @pytest.mark.parametrize(
     ("argument", "value"), [("port", -1), ("port", 65536), ("port", "80"), ("host", 3), ("host", "no such host")]
 )
@@ -641,6 +666,7 @@ def test_view_refuses_other_addresses_and_names_the_argument(argument: str, valu
         renderer.view(STAIRS, browser=False, **{argument: value})
 
 
+@pytest.mark.judges("view")
 def test_view_raises_module_not_found_without_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in sys.modules if name.partition(".")[0] == "uvicorn" or "renderer.viewer." in name]:
         monkeypatch.delitem(sys.modules, name)
@@ -650,6 +676,9 @@ def test_view_raises_module_not_found_without_its_extra(monkeypatch: pytest.Monk
     assert caught.value.name == "uvicorn"
 
 
+@pytest.mark.judges(
+    "octree-render compile --all", "octree-render compile --pictures", "octree-render compile --queries"
+)
 @pytest.mark.parametrize("what", ["queries", "pictures", "all", None])
 def test_compile_compiles_what_it_is_told_and_all_by_default(what: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
     from renderer import precompile
@@ -662,8 +691,10 @@ def test_compile_compiles_what_it_is_told_and_all_by_default(what: str | None, m
     assert parts[0] < parts[1] < parts[2]
 
 
+@pytest.mark.judges("octree-render compile --quiet")
 def test_compile_is_quiet_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
-    from renderer import cli, precompile
+    from renderer import precompile
+    from renderer.cli import main as cli
 
     monkeypatch.setattr(precompile, "compile_ahead", lambda what, began: [began(str(part)) for part in "ab"])
     monkeypatch.setattr(cli, "on_terminal", lambda: True)

@@ -136,6 +136,7 @@ class TestNormals:
         np.testing.assert_array_equal(found.radiance, expected.radiance)
         np.testing.assert_array_equal(found.normal, expected.normal)
 
+    @pytest.mark.judges("Mesh.repaired", "Repairs")
     def test_normals_that_are_not_finite_are_recomputed_by_a_repair(self, tmp_path: Path) -> None:
         mesh = icosphere(2)
         normals = mesh.vertex_normals().copy()

@@ -17,11 +17,14 @@ from cases import cases
 from watched import Watched
 
 from renderer import Mesh, Octree, cluster
+from renderer.checkpoints.study import Study, run
+from renderer.checkpoints.study_points import on_faces
 from renderer.cluster import any_hit, closest_hit, connected, run_on
-from renderer.process.parallel import checked_threads
-from renderer.runs.chosen import on_faces
-from renderer.runs.study import Study, run
+from renderer.system.threads import checked_threads
 from validation.benchmark.measures.meshes import named
+
+pytestmark = pytest.mark.judges("cluster.any_hit", "cluster.closest_hit", "cluster.connected", "cluster.run_on")
+
 
 SIZE = 64
 

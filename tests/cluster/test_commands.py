@@ -9,9 +9,12 @@ from typing import Any
 import pytest
 from cases import cases
 
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.load import save_ply
 from validation.benchmark.measures.meshes import named
+
+pytestmark = pytest.mark.judges("cluster.connected", "cluster.render_on", "octree-render render --cluster")
+
 
 PICTURE = ["render", "scenes/glass.toml", "--resolution", "48x40", "--samples", "4"]
 
@@ -79,7 +82,7 @@ def test_parts_of_another_picture_are_refused_and_kept(tmp_path: Path, capsys: p
 
 def test_a_picture_without_a_cluster_imports_no_dask(tmp_path: Path) -> None:
     program = (
-        "import sys\nfrom renderer.cli import main\n"
+        "import sys\nfrom renderer.cli.main import main\n"
         f"code = main({[*PICTURE, '-o', str(tmp_path / 'a.npy'), '--quiet']!r})\n"
         "sys.exit(code or ('dask' in sys.modules or 'distributed' in sys.modules) * 9)"
     )

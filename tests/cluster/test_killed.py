@@ -17,12 +17,18 @@ import pytest
 from watched import Watched
 
 from renderer import Octree, Scene, load_scene, render
-from renderer.cli import main
+from renderer.checkpoints.study import Study
+from renderer.checkpoints.study_points import on_faces
+from renderer.cli.main import main
 from renderer.cluster import connected, render_on, run_on
 from renderer.mesh.load import save_ply
-from renderer.runs.chosen import on_faces
-from renderer.runs.study import Study
 from validation.benchmark.measures.meshes import named
+
+pytestmark = pytest.mark.judges(
+    "cluster.connected", "cluster.render_on", "cluster.run_on", "octree-render render --cluster",
+    "octree-render study --cluster",
+)  # fmt: skip
+
 
 GLASS: dict[str, Any] = {"resolution": (80, 60), "samples": 16}
 # Longer than any wait here; it ends a test that would hang.
@@ -31,7 +37,7 @@ PATIENCE = 60.0
 COMMAND = """
 import sys, time
 from renderer.cluster.studies import run_on
-from renderer.runs import parts, pictures
+from renderer.checkpoints import parts, pictures
 if __name__ == "__main__":
     most, own = int(sys.argv[1]), parts.Parts.write
     run_on.__kwdefaults__["size"], pictures.RAYS = 64, 80 * 16 * 8
@@ -39,7 +45,7 @@ if __name__ == "__main__":
         own(self, *part)
         while len(list(self.folder.glob("*.part"))) >= most: time.sleep(0.05)
     parts.Parts.write = write
-    from renderer.cli import main
+    from renderer.cli.main import main
     sys.argv[1:2] = []
     sys.exit(main())
 """
@@ -47,7 +53,7 @@ if __name__ == "__main__":
 # The command with small parts, whose workers are killed once, when the second part is there.
 KILLING = """
 import multiprocessing, sys
-from renderer.runs import parts, pictures
+from renderer.checkpoints import parts, pictures
 if __name__ == "__main__":
     pictures.RAYS, own, killed = 80 * 16 * 8, parts.Parts.write, []
     def write(self, *part):
@@ -57,7 +63,7 @@ if __name__ == "__main__":
             for worker in killed: worker.kill()
             print("killed", len(killed))
     parts.Parts.write = write
-    from renderer.cli import main
+    from renderer.cli.main import main
     sys.exit(main())
 """
 

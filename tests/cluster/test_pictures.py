@@ -15,6 +15,9 @@ from renderer.cluster import frames_on, render_on
 from renderer.picture.image import PLANES
 from renderer.scene.camera import Camera
 
+pytestmark = pytest.mark.judges("cluster.frames_on", "cluster.render_on")
+
+
 OPTIONS: dict[str, Any] = {"resolution": (60, 44), "samples": 4, "max_depth": 4}
 
 
@@ -141,7 +144,7 @@ def test_frames_go_on_where_the_parts_of_one_that_is_done_were_left(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr("renderer.runs.pictures.PictureRun.remove", stop)
+        patched.setattr("renderer.checkpoints.pictures.PictureRun.remove", stop)
         frames_on(client, scenes, outputs, folder, **OPTIONS)
     (done,) = (path for path in outputs if path.exists())
     before = done.stat().st_mtime_ns

@@ -13,10 +13,22 @@ import pytest
 from cases import cases
 
 import renderer
-from renderer.cli import _choose_processor, main
+from renderer.cli.main import _choose_processor, main
 from renderer.picture.render import render
 from renderer.precompile import compile_ahead
 from renderer.scene.scene import load_scene
+
+pytestmark = pytest.mark.judges(
+    "__version__", "octree-render --version", "octree-render compile", "octree-render compile --all",
+    "octree-render compile --level", "octree-render info", "octree-render info --split",
+    "octree-render info scene", "octree-render render",
+    "octree-render render --accelerator", "octree-render render --max-depth", "octree-render render --max-rays",
+    "octree-render render --min-weight", "octree-render render --output", "octree-render render --resolution",
+    "octree-render render --samples", "octree-render render --split", "octree-render render --threads",
+    "octree-render render --write-scene", "octree-render render scene", "octree-render view --port",
+    "octree-render view scene", "render",
+)  # fmt: skip
+
 
 ROOT = Path(__file__).parents[2]
 STAIRS = ROOT / "scenes" / "stairs.toml"
@@ -29,7 +41,7 @@ def _compiled() -> None:
 
 
 def run(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "renderer.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "renderer.cli.main", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=120, check=False, **options)
 
 
@@ -213,7 +225,7 @@ def test_a_disk_that_fills_up_is_one_line(
 # computed from then on: the clock's would depend on what else the machine does.
 INTERRUPTS_ITSELF = """
 import os, signal, sys, time
-from renderer import cli
+from renderer.cli import main as cli
 from renderer.picture import prepare
 traced, pressed = prepare.for_chunks, []
 
@@ -277,10 +289,10 @@ def test_compile_fails_where_nothing_can_be_kept(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     nowhere = str(tmp_path / "file" / "cache")
     script = (
-        "import sys, renderer.kernels.store as store, renderer.precompile as ahead\n"
+        "import sys, renderer.jit.cache as store, renderer.precompile as ahead\n"
         "store._folders = lambda sources: store.Folders(None, ())\n"
         "ahead.PARTS['queries'] = ahead.PARTS['queries'][-1:]\n"
-        "from renderer.cli import main; sys.exit(main(['compile', '--queries', '--quiet']))"
+        "from renderer.cli.main import main; sys.exit(main(['compile', '--queries', '--quiet']))"
     )
     done = subprocess.run(
         [sys.executable, "-P", "-c", script], capture_output=True, text=True, timeout=120, check=False,

@@ -18,9 +18,9 @@ from PIL import Image as Pillow
 from varied import BASE, Table, picture, scene_of, write_meshes
 
 from renderer import Octree, load_scene, srgb
-from renderer.cli import main, make_parser
-from renderer.cluster_command import on_cluster
-from renderer.kernels.levels import LEVELS
+from renderer.cli.cluster import on_cluster
+from renderer.cli.main import main, make_parser
+from renderer.jit.levels import LEVELS
 from renderer.picture.image import PLANES
 from renderer.picture.pack import pack
 
@@ -37,7 +37,7 @@ PICTURES: dict[str, tuple[str, Any]] = {
 }
 # Those that change no bit.
 BITLESS = {"--accelerator", "--split", "--threads"}
-# The options that other tests give alone; those of ``study`` are in tests/runs/test_every_option.py.
+# The options that other tests give alone; those of ``study`` are in tests/checkpoints/test_every_option.py.
 HERE = {
     "render": {*PICTURES, "scene", "--output", "--write-scene", "--quiet", "--cluster"},
     "info": {"scene", "--split"},
@@ -83,7 +83,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     pictures = import_module("renderer.cluster.pictures")
     monkeypatch.setattr(pictures, "results", results)
     monkeypatch.setattr("renderer.cluster.render_on", told(pictures.render_on))
-    monkeypatch.setattr("renderer.cluster_command.on_cluster", lambda options: nullcontext())
+    monkeypatch.setattr("renderer.cli.cluster.on_cluster", lambda options: nullcontext())
     module = import_module("renderer.picture.render")
     monkeypatch.setattr(module, "render", told(module.render))
     return asked
@@ -139,6 +139,7 @@ def test_a_picture_is_that_of_render_with_the_options_argument(
     assert (found.tobytes() != picture(scene).radiance.tobytes()) == (name not in BITLESS)
 
 
+@pytest.mark.judges("octree-render render --quiet")
 @pytest.mark.parametrize("where", [[], ["--cluster"]], ids=["here", "cluster"])
 @pytest.mark.parametrize("quiet", [True, False])
 def test_a_bar_is_shown_unless_quiet(
@@ -273,7 +274,7 @@ def test_kernels_are_compiled_that_are_named_where_they_are_to_be(
 @cases("level", LEVELS)
 def test_a_level_is_chosen_before_anything_is_compiled(monkeypatch: pytest.MonkeyPatch, level: str) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("renderer.cli._choose_processor", lambda *told: asked.append(told))
-    monkeypatch.setattr("renderer.cli._compile", lambda options: asked.append(options.what))
+    monkeypatch.setattr("renderer.cli.main._choose_processor", lambda *told: asked.append(told))
+    monkeypatch.setattr("renderer.cli.main._compile", lambda options: asked.append(options.what))
     assert main(["compile", "--level", level, "-o", "kernels"]) == 0
     assert asked == [(level, Path("kernels")), "all"]

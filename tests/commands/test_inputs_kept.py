@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from renderer import cli
+from renderer.cli import main as cli
 
 SCENES = Path(__file__).parents[2] / "scenes"
 MATERIAL = re.compile(r"^material = (.*)$", re.MULTILINE)
@@ -65,6 +65,7 @@ def test_a_link_to_another_picture_is_followed(folder):
     assert (folder / "other.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.judges("octree-render render --write-scene")
 def test_a_scene_that_is_there_is_not_written_again(folder, capsys):
     arguments = ["render", "m.ply", "--write-scene", "s.toml", "-o", "a.png", *SMALL]
     assert cli.main(arguments) == 0

@@ -12,9 +12,11 @@ from pathlib import Path
 import pytest
 
 import renderer
-from renderer.cli import main
+from renderer.cli.main import main
 
 ROOT = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.judges("octree-render render --quiet")
 HEAVY = {
     "numba",
     "numpy",
@@ -41,7 +43,7 @@ def output(script: str) -> str:
 
 STEPS = [
     ("import renderer", set()),
-    ("from renderer.cli import main", set()),
+    ("from renderer.cli.main import main", set()),
     ("try: main(['render', '--help'])\nexcept SystemExit: pass", set()),
     ("import renderer.studies", set()),
     ("from renderer import load_mesh, Mesh", {"numpy"}),
@@ -64,7 +66,7 @@ def test_a_render_of_the_command_line_loads_no_scipy_and_leaves_it_importable(tm
     """Where memory is scarce its OpenBLAS would wait for memory without end."""
     script = f"""
 import sys
-from renderer.cli import main
+from renderer.cli.main import main
 sys.argv = ["octree-render", "render", "scenes/stairs.toml", "-o", {str(tmp_path / "a.png")!r}, "--resolution", "8x8"]
 assert main() == 0
 assert not any(name.startswith("scipy") for name in sys.modules) and "numba" in sys.modules
@@ -111,7 +113,7 @@ def test_the_public_names_are_listed_and_others_are_errors():
 @pytest.mark.parametrize("seconds", [0.0, 1.3])
 def test_control_c_while_compiling_ends_with_130_and_no_traceback(tmp_path, seconds):
     picture = tmp_path / "a.png"
-    command = [sys.executable, "-m", "renderer.cli", "render", "scenes/three_models.toml", "-o", str(picture)]
+    command = [sys.executable, "-m", "renderer.cli.main", "render", "scenes/three_models.toml", "-o", str(picture)]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     running = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
     try:
@@ -130,7 +132,7 @@ def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatc
     log = logging.getLogger("renderer.jit")
     monkeypatch.setattr(log, "level", logging.CRITICAL)
     before = logging.CRITICAL, list(log.handlers)
-    monkeypatch.setattr("renderer.cli._render", lambda _options: log.warning("renderer: compiling %s", "it"))
+    monkeypatch.setattr("renderer.cli.main._render", lambda _options: log.warning("renderer: compiling %s", "it"))
     assert main(["render", "any.toml", *(["--quiet"] if quiet else [])]) == 0
     assert capsys.readouterr() == ("", "" if quiet else "octree-render: compiling it\n")
     assert (log.level, log.handlers) == before
@@ -140,7 +142,7 @@ def test_a_notice_stands_on_a_line_of_its_own_beside_a_progress_bar():
     script = """
 import io, logging, sys
 from tqdm import tqdm
-from renderer.cli import compile_notices
+from renderer.cli.main import compile_notices
 sys.stderr = io.StringIO()
 with compile_notices(silent=False), tqdm(total=3, file=sys.stderr, ncols=40):
     logging.getLogger("renderer.jit").warning("renderer: compiling it")

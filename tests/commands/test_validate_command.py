@@ -13,7 +13,7 @@ TRAP = "raise SystemExit('the user's own package ran')"
 
 def run(folder, *arguments, before="", package=ROOT):
     """The command in a folder, by the code of its console script, after some lines of Python."""
-    code = ["import sys", f"sys.path.insert(0, {str(package)!r})", before, "from renderer.validate import main"]
+    code = ["import sys", f"sys.path.insert(0, {str(package)!r})", before, "from renderer.cli.validate import main"]
     command = [sys.executable, "-P", "-c", "\n".join([*code, "sys.exit(main())"]), *arguments]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
 

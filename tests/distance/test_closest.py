@@ -18,6 +18,11 @@ from validation.oracle.distance import nearest, rational, ulps_from_root
 from validation.queries.distances import points_about
 from validation.stability.cases.queries.inside import closed_solids
 
+pytestmark = pytest.mark.judges(
+    "BruteForce.closest_point", "ClosestPoints", "ClosestPoints.found", "ClosestPoints.points", "Octree.closest_point"
+)
+
+
 SOLIDS = closed_solids()
 FIELDS = ("distance", "face", "u", "v")
 

@@ -17,7 +17,14 @@ from twins import CUBES, MESH, Flags, Floats, Integers, dot, holding, meetings, 
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box
-from renderer.queries import Queries
+from renderer.queryable import Queries
+
+pytestmark = pytest.mark.judges(
+    "BruteForce.closest_point", "BruteForce.contains", "BruteForce.signed_distance", "BruteForce.visible",
+    "BruteForce.winding_number", "Octree.closest_point", "Octree.contains", "Octree.signed_distance", "Octree.visible",
+    "Octree.winding_number",
+)  # fmt: skip
+
 
 # The cubes of the other twins, and one that is turned inside out.
 TURNED = box((12.0, 0.0, 0.0), (14.0, 2.0, 2.0))

@@ -8,6 +8,9 @@ from renderer import Octree
 from renderer.mesh.shapes import box
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
+pytestmark = pytest.mark.judges("Octree.signed_distance")
+
+
 SOLIDS = closed_solids()
 
 

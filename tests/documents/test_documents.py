@@ -22,7 +22,7 @@ import yaml
 from cases import cases
 
 from renderer import Octree, load_scene
-from renderer.cli import main, make_parser
+from renderer.cli.main import main, make_parser
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
 from validation.__main__ import make_parser as validation_parser
@@ -70,7 +70,7 @@ IN_SHORT: dict[str, tuple[dict[str, str], str]] = {
         "--rays 100",
     ),
     "python -m validation.benchmark.measures.studies": ({}, "--mesh city --faces 1000 --points 100"),
-    "python -m validation.benchmark.limits.counts": ({"city_1m": "city_2000"}, "--rays 2000"),
+    "python -m validation.benchmark.measures.cluster": ({}, "--mesh city_2000 --rounds 1"),
     "python tests/fuzz --inputs 100000": ({"100000": "20"}, ""),
     "python scenes/make_quarter.py": ({}, "--buildings 40"),
 }
@@ -96,12 +96,8 @@ RUN_ELSEWHERE = {
         "tests/cluster/test_commands.py",
         r'"--cluster", client\.scheduler\.address\]\) == 0',
     ),
-    "python -m validation.benchmark.measures.cluster": (
-        "tests/validation/benchmark/test_cluster_scaling.py",
-        r"cluster\.main\(\[.*\]\) == 0",
-    ),
     "python -m validation.benchmark.measures.versions": (
-        "tests/validation/benchmark/test_benchmark_versions.py",
+        "tests/validation/benchmark/test_versions.py",
         r"versions\.main\(\[.*\]\) == 0",
     ),
 }
@@ -109,7 +105,7 @@ RUN_ELSEWHERE = {
 # make would call is looked at.
 NOT_RUN = {
     "make validate": "minutes to hours; CI has the short run, whose sections are the same",
-    "make bench": "an hour; tests/validation/benchmark/test_benchmark_page.py runs the module in short",
+    "make bench": "an hour; tests/validation/benchmark/test_command.py runs the module in short",
     "make machines": "half an hour of all tests",
     "python -m validation [": "a line of usage",
     "python -m validation --defects [": "a line of usage",
@@ -148,6 +144,7 @@ def commands(*starts):
     return list(dict.fromkeys(pairs))
 
 
+@pytest.mark.judges("Hits.hit")
 @pytest.mark.parametrize(("page", "block"), snippets(), ids=shown)
 def test_python_in_a_page_runs_as_it_stands(page, block, tmp_path, monkeypatch):
     """In a checkout, of which nothing is changed: pictures go elsewhere."""
@@ -323,7 +320,7 @@ def test_what_is_not_run_here_is_run_where_it_is_said_to_be():
     for start, why in NOT_RUN.items():
         for path in re.findall(r"[\w.]+(?:/[\w.]+)+", why):
             assert (ROOT / path).is_file(), start
-    run = ROOT / "tests/validation/benchmark/test_benchmark_page.py"
+    run = ROOT / "tests/validation/benchmark/test_command.py"
     assert "command.main(arguments)" in run.read_text(encoding="utf-8")
 
 
@@ -520,7 +517,7 @@ def test_what_a_page_names_is_there(page):
 @cases(
     ("text", "found"),
     [
-        ("`renderer/trace/query.py::closest_hits`", ("renderer/trace/query.py", "closest_hits")),
+        ("`renderer/trace/closest.py::closest_hits`", ("renderer/trace/closest.py", "closest_hits")),
         ("see renderer/octree.py, and", ("renderer/octree.py", "")),
         ("in `scenes/`.", ("scenes/", "")),
         ("(tests/trace/test_order.py).", ("tests/trace/test_order.py", "")),

@@ -10,7 +10,7 @@ import pytest
 from cases import cases
 
 from renderer import SceneError
-from renderer.cli import make_parser
+from renderer.cli.main import make_parser
 from renderer.mesh.shapes import box
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight

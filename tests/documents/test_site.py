@@ -165,7 +165,7 @@ def test_a_name_that_its_file_has_not_is_an_error_of_the_build(text):
 @cases(
     ("text", "line"),
     [
-        ("renderer/limits.py::SHORTEST", "SHORTEST"),  # one of two that a line defines
+        ("renderer/arguments/limits.py::SHORTEST", "SHORTEST"),  # one of two that a line defines
         ("renderer/octree.py::Octree.from_mesh", "    def from_mesh("),
         ("renderer/octree.py::Octree::from_mesh", "    def from_mesh("),
         (

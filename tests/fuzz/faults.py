@@ -26,8 +26,8 @@ from renderer import Image, load_mesh, load_scene
 from renderer.mesh.load import save_ply
 from renderer.mesh.ply import format_ply
 from renderer.mesh.shapes import box
-from renderer.process import files
 from renderer.scene.scene import write_scene
+from renderer.system import files
 
 Values = dict[str, Any]
 

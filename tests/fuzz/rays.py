@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fuzz.values import NOT_FINITE, SIZES, Kind, expect_clear, extreme, vector
 from renderer import BruteForce, Hits, Mesh, MeshError, Octree
-from renderer.limits import LONGEST, SHORTEST
+from renderer.arguments.limits import LONGEST, SHORTEST
 from renderer.mesh.shapes import box
 
 Values = dict[str, Any]

@@ -32,7 +32,7 @@ from renderer import (
     prepare,
     render,
 )
-from renderer.limits import FARTHEST
+from renderer.arguments.limits import FARTHEST
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.image import PLANES
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from renderer.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 
 # A hundred times what the slowest valid input takes; beyond it something does not end.
 SECONDS = 2.0

@@ -13,10 +13,15 @@ from renderer.inside.crossings import count_crossings
 from renderer.inside.rational import _on_upright
 from renderer.mesh.shapes import box, torus
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
+
+pytestmark = pytest.mark.judges(
+    "BruteForce.contains", "BruteForce.tree", "Mesh.odd_edges", "Mesh.open_edges", "Octree.contains"
+)
+
 
 MESHES = closed_solids()
 

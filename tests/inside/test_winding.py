@@ -14,13 +14,16 @@ from meshes import KINDS, make_mesh
 from renderer import BruteForce, Mesh, Octree
 from renderer.inside.moments import moments_of
 from renderer.inside.winding_search import _FIRST, _point_at, _search
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import at, local_doubles, pointer
+from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
+from renderer.numerics.simd import at, local_doubles, pointer
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 from validation.references.igl import Igl
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
+
+pytestmark = pytest.mark.judges("BruteForce.winding_number", "Octree.contains", "Octree.winding_number")
+
 
 SOLIDS = closed_solids()
 TOLERANCES = (0.3, 1e-2, 1e-3, 1e-6, 1e-10, 0.0)

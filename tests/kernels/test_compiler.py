@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from renderer import Octree
-from renderer.kernels import compiler
-from renderer.kernels.notice import Stopwatch, compile_seconds
+from renderer.jit import compiler
+from renderer.jit.notice import Stopwatch, compile_seconds
 from renderer.mesh.shapes import icosphere
 
 ROOT = Path(__file__).parents[2]
@@ -183,7 +183,7 @@ def test_kernels_work_without_our_compiler_where_numba_has_changed(tmp_path, cha
 
 
 def test_only_the_first_of_several_kernels_is_told_of():
-    script = "from renderer.kernels.notice import compiling\nfor name in 'ab':\n    with compiling(name, None): pass\n"
+    script = "from renderer.jit.notice import compiling\nfor name in 'ab':\n    with compiling(name, None): pass\n"
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stderr.count("compiling kernels") == 1 == len(done.stderr.splitlines())
 

@@ -20,7 +20,7 @@ def package(tmp_path):
 def mine(package, text, arguments=""):
     """What a script with kernels of its own prints, run from its own file."""
     path = package.parent / "mine.py"
-    path.write_text(f"import sys\nfrom renderer.kernels.jit import kernel\n{text}")
+    path.write_text(f"import sys\nfrom renderer.jit.decorators import kernel\n{text}")
     return run(
         package, f"import runpy, sys; sys.argv = ['mine.py', *'{arguments}'.split()]; runpy.run_path({str(path)!r})"
     )
@@ -108,7 +108,7 @@ print(moved(10))
 def test_kernels_of_no_file_are_not_kept(package):
     """Every ``python -c`` is called <string>."""
     for step in (1, 200):
-        script = "from renderer.kernels.jit import _decorated as d\n"
+        script = "from renderer.jit.decorators import _decorated as d\n"
         script += f"exec('def f(x): return x + {step}')\nprint(d(f, False)(1))"
         assert run(package, script) == [str(1 + step)]
     assert not list(package.parent.rglob("*.kernel"))
@@ -151,7 +151,7 @@ def test_a_source_that_is_no_utf_8_is_read_all_the_same(package):
     path = package.parent / "latin.py"
     path.write_bytes(
         b"# -*- coding: latin-1 -*-\n# \xe9t\xe9\n"
-        b"from renderer.kernels.jit import kernel\n@kernel\ndef one(): return 1\n"
+        b"from renderer.jit.decorators import kernel\n@kernel\ndef one(): return 1\n"
     )
     assert run(package, "import latin; print(latin.one())") == ["1"]
 

@@ -11,8 +11,8 @@ import pytest
 from cases import cases
 from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, copy_package, run, start, write_package
 
-from renderer.kernels.levels import FEATURES, LEVELS, lacking
-from renderer.kernels.store import _user_cache, _versions, runnable_levels
+from renderer.jit.cache import _user_cache, _versions, runnable_levels
+from renderer.jit.levels import FEATURES, LEVELS, lacking
 
 TELL = """
 import logging, sys
@@ -180,7 +180,7 @@ def test_without_a_home_kernels_are_compiled(package, tmp_path):
 
 def test_a_full_disk_stops_nothing_and_is_said_once(package):
     full = """
-import errno, renderer.kernels.store as store
+import errno, renderer.jit.cache as store
 def refuse(path, write): raise OSError(errno.ENOSPC, "No space left on device")
 store.write_atomically = refuse
 from renderer.middle import doubled
@@ -283,6 +283,7 @@ class TestAhead:
         folder.rename(package / "compiled")
         assert run(package) == LOADED
 
+    @pytest.mark.judges("octree-render compile")
     def test_they_are_not_used_for_other_sources(self, package, folder):
         before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.iterdir()}
         bottom_of(package).write_text("STEP = 20\n")
@@ -291,7 +292,7 @@ class TestAhead:
         assert {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.iterdir()} == before
 
     def test_they_are_not_used_by_a_machine_that_lacks_the_level(self, package, folder):
-        pretend = "import renderer.kernels.store as store\nstore.runnable_levels = tuple\n"
+        pretend = "import renderer.jit.cache as store\nstore.runnable_levels = tuple\n"
         assert run(package, pretend + RUN, OCTREE_RENDERER_KERNELS=str(folder)) == COMPILED
 
     def test_they_are_never_written(self, package, folder):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from renderer.kernels import pairs
+from renderer.numerics import double_double as pairs
 
 # Products and their roundings must be normal numbers: users scale first.
 NUMBERS = st.floats(-(2.0**60), 2.0**60).filter(lambda x: x == 0.0 or abs(x) > 2.0**-60)

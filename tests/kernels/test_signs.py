@@ -4,10 +4,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from renderer.kernels.expansions import PARTS
-from renderer.kernels.jit import kernel
-from renderer.kernels.signs import UNDECIDED, lies_within
-from renderer.kernels.simd import pointer
+from renderer.jit.decorators import kernel
+from renderer.numerics.expansions import PARTS
+from renderer.numerics.predicates import UNDECIDED, lies_within
+from renderer.numerics.simd import pointer
 
 
 @kernel

@@ -5,7 +5,7 @@ import pytest
 from cases import cases
 from numba import njit
 
-from renderer.kernels.simd import (
+from renderer.numerics.simd import (
     alike,
     bits_float,
     double_of,

@@ -7,11 +7,11 @@ import pytest
 from cases import cases
 from kernel_package import MIDDLE, PACKAGE, bottom_of, run, write_package
 
-from renderer.kernels.digest import imported_files, source_digest
+from renderer.jit.digest import imported_files, source_digest
 
 TELL = """
 from pathlib import Path
-from renderer.kernels.digest import source_digest
+from renderer.jit.digest import source_digest
 for m in {modules!r}: print(source_digest(Path('renderer').resolve() / m))
 """
 
@@ -43,7 +43,7 @@ def test_an_edit_of_the_layout_changes_the_kernels_over_it_alone(whole):
     changed = changed_by(whole, "trace/layout.py")
     kernels = {"trace/intersect.py", "trace/traverse.py", "trace/singly.py", "tree/build.py", "shade/whitted.py"}
     assert {"trace/layout.py", *kernels} <= changed
-    assert not changed & {"kernels/simd.py", "kernels/jit.py", "errors.py", "mesh/mesh.py", "process/parallel.py"}
+    assert not changed & {"numerics/simd.py", "jit/decorators.py", "errors.py", "mesh/mesh.py", "system/threads.py"}
 
 
 @pytest.mark.parametrize("edited", ["cli.py", "viewer/session.py", "scene/needs.py", "scene/material.py"])
@@ -97,7 +97,12 @@ def test_every_import_in_the_package_has_the_form_that_the_digest_follows(path):
 
 @cases(
     "line",
-    ["from . import jit", "from .jit import kernel", "import renderer.kernels.jit as j", "import numpy, renderer.jit"],
+    [
+        "from . import jit",
+        "from .jit import kernel",
+        "import renderer.jit.decorators as j",
+        "import numpy, renderer.jit",
+    ],
 )
 def test_forms_that_the_digest_does_not_follow_are_found(tmp_path, line):
     (tmp_path / "a.py").write_text(line)
@@ -106,7 +111,7 @@ def test_forms_that_the_digest_does_not_follow_are_found(tmp_path, line):
 
 
 def test_an_unknown_module_has_the_digest_of_nothing():
-    assert source_digest(PACKAGE / "no_such_module.py") != source_digest(PACKAGE / "kernels" / "jit.py")
+    assert source_digest(PACKAGE / "no_such_module.py") != source_digest(PACKAGE / "jit" / "decorators.py")
 
 
 def test_a_renamed_module_shows(tmp_path):

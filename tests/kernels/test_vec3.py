@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cases import cases
 
-from renderer.kernels.vec3 import length, normalized
+from renderer.numerics.vec3 import length, normalized
 
 
 @cases("size", [5e-324, 1e-310, 1e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300])

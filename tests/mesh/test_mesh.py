@@ -16,6 +16,12 @@ from renderer.mesh import mesh as mesh_module
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere, torus
 
+pytestmark = pytest.mark.judges(
+    "Mesh", "Mesh.bounds", "Mesh.concatenate", "Mesh.extent", "Mesh.face_normals", "Mesh.is_closed", "Mesh.is_float32",
+    "Mesh.transformed", "Mesh.vertex_normals", "MeshError",
+)  # fmt: skip
+
+
 TRIANGLE: dict[str, Any] = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
 
 

@@ -27,6 +27,9 @@ from renderer.mesh.obj import parse_obj
 from renderer.mesh.ply import format_ply, parse_ply
 from renderer.mesh.shapes import box, torus
 
+pytestmark = pytest.mark.judges("Mesh", "Mesh.triangles", "MeshError", "load_mesh")
+
+
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 XYZ = ["float x", "float y", "float z"]
 INDICES = ["list uchar int vertex_indices"]

@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from renderer.mesh import ears, polygons
 from renderer.mesh.polygons import triangulate
 
+pytestmark = pytest.mark.judges("load_mesh")
+
+
 Outline = list[tuple[float, float]]
 
 SQUARE: Outline = [(0, 0), (1, 0), (1, 1), (0, 1)]

@@ -20,6 +20,11 @@ from renderer.mesh.mesh import Mesh, Repairs, RepairWarning
 from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 
+pytestmark = pytest.mark.judges(
+    "BruteForce", "BruteForce.from_mesh", "Mesh", "Mesh.repaired", "Octree", "RepairWarning", "Repairs", "load_mesh"
+)
+
+
 BAD = [np.nan, np.inf, -np.inf]
 # A good triangle, one with a bad vertex, two with indices out of range, a good one.
 VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, np.nan, 0], [0, 0, 1]]

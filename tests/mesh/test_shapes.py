@@ -34,6 +34,7 @@ def test_torus() -> None:
     assert mesh.bounds[1].tolist() == [2.5, 0.5, 2.5]
 
 
+@pytest.mark.judges("Mesh", "Mesh.face_normals")
 def test_box() -> None:
     mesh = box((-1, 0, 2), (1, 3, 4))
     assert mesh.is_closed() and signed_volume(mesh) == 12
@@ -41,6 +42,7 @@ def test_box() -> None:
     assert sorted(away.tolist()) == [1] * 8 + [1.5] * 4
 
 
+@pytest.mark.judges("Mesh")
 def test_grid() -> None:
     mesh = grid(2, 3, (6.0, 4.0))
     assert len(mesh.faces) == 12 and [b.tolist() for b in mesh.bounds] == [[-3, 0, -2], [3, 0, 2]]

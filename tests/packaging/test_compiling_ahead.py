@@ -6,10 +6,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from cases import cases
 from signatures import SIGNATURES
 
 ROOT = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.judges(
+    "octree-render compile", "octree-render compile --all", "octree-render compile --level",
+    "octree-render compile --output", "octree-render compile --pictures", "octree-render compile --queries",
+)  # fmt: skip
 
 
 def output(script):
@@ -26,10 +32,10 @@ from renderer.precompile import compile_ahead
 compile_ahead()
 before = signatures()
 from renderer import BruteForce, Octree, load_scene, needs_of, render
-from renderer.inspect.face_phong import face_colors
-from renderer.inspect.ray_path import ray_path
+from renderer.diagnostics.face_phong import face_colors
+from renderer.diagnostics.ray_path import ray_path
 from renderer.picture.prepare import prepare_scene
-from renderer.inspect.tree_boxes import visited
+from renderer.diagnostics.tree_boxes import visited
 from renderer.mesh.shapes import box
 for name in ("three_models", "stairs", "glass"):
     for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
@@ -69,7 +75,7 @@ compile_ahead("queries")
 before = signatures()
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.studies import ambient_occlusion, occlusion, scan, sky_view_factor, visible_faces
 ball, rng = icosphere(3), np.random.default_rng(1)
 # In float64 and in float32, of which the kernels of trees have two kinds.
@@ -114,13 +120,13 @@ print(len(before), *sorted(signatures() - before))
 
 def test_kernels_for_a_level_have_the_bits_of_native_ones_and_leave_nothing_to_compile(tmp_path):
     """Compiled in one process for any machine of the level, found by another one that may not write anywhere near."""
-    from renderer.kernels.store import runnable_levels
+    from renderer.jit.cache import runnable_levels
 
     folder, level = tmp_path / "kernels", runnable_levels()[-1]
     # Of all queries, which take half a minute, only those that are asked below.
     program = """
 import sys
-from renderer import cli
+from renderer.cli import main as cli
 choose = cli._choose_processor
 def choose_and_ask_less(*options):
     choose(*options)  # before Numba is imported
@@ -136,7 +142,7 @@ sys.exit(cli.main(sys.argv[1:]))
 import hashlib
 import numpy as np
 from renderer import Octree
-from renderer.kernels.notice import compile_seconds
+from renderer.jit.notice import compile_seconds
 from renderer.mesh.shapes import icosphere
 octree, rng = Octree.from_mesh(icosphere(5)), np.random.default_rng(1)
 origins, digest = 3.0 * rng.normal(size=(5000, 3)), hashlib.sha256()
@@ -178,7 +184,7 @@ def test_compile_shows_on_a_terminal_how_far_it_is():
 import io, sys
 class Terminal(io.StringIO):
     def isatty(self): return True
-from renderer.cli import main
+from renderer.cli.main import main
 sys.stderr = Terminal()
 assert main(["compile", "--queries"]) == 0
 shown = sys.stderr.getvalue()

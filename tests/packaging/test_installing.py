@@ -154,7 +154,7 @@ def test_the_workflow_of_the_guide_installs_from_git_and_judges(checkout, projec
 
 def test_the_exit_codes_of_the_guide(project):
     """Of a gate that fails, as the guide lets it, and of a bad file."""
-    asked = [sys.executable, "-P", "-c", "import sys; from renderer.validate import main; sys.exit(main())"]
+    asked = [sys.executable, "-P", "-c", "import sys; from renderer.cli.validate import main; sys.exit(main())"]
 
     def code(*arguments):
         done = subprocess.run(

@@ -13,7 +13,7 @@ from PIL import Image as Pillow
 from viewer_page import CHROMIUM, Viewer
 
 from renderer import load_scene, render
-from renderer.inspect.face_phong import face_colors
+from renderer.diagnostics.face_phong import face_colors
 from renderer.picture.image import Image, srgb
 from renderer.picture.prepare import PreparedScene, prepare_scene
 from renderer.scene.camera import PerspectiveCamera

@@ -15,7 +15,9 @@ import pytest
 from cases import cases
 
 from renderer.picture.image import Image, check_picture_path, srgb, srgb_steps
-from renderer.process.files import write_atomically
+from renderer.system.files import write_atomically
+
+pytestmark = pytest.mark.judges("Image", "Image.save", "Image.srgb", "octree-render render --output", "srgb")
 
 
 def image(radiance: Any = None) -> Image:

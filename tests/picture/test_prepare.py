@@ -18,6 +18,9 @@ from renderer.picture.prepare import Octree
 from renderer.scene.scene import checked_settings
 from renderer.trace.spawn import BOUNDED
 
+pytestmark = pytest.mark.judges("Image.srgb", "PreparedScene", "PreparedScene.picture", "prepare", "render")
+
+
 SCENES = ("glass", "stairs", "mirrors")
 CAMERAS = (
     None,

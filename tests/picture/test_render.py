@@ -22,6 +22,12 @@ from renderer.scene.needs import needs_of
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, checked_settings, load_scene
 from renderer.trace.spawn import BOUNDED
 
+pytestmark = pytest.mark.judges(
+    "DirectionalLight", "Image", "PreparedScene.picture", "RenderSettings", "render", "scene.render",
+    "scene.render.resolution", "scene.render.shadows",
+)  # fmt: skip
+
+
 SCENES = Path(__file__).parents[2] / "scenes"
 
 

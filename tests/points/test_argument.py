@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from renderer.points.argument import check_points
+from renderer.arguments.points import check_points
 
 
 def test_a_coordinate_at_the_limit_is_near_enough_and_one_beyond_is_named() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from renderer import Octree
 from renderer.mesh.shapes import icosphere
-from renderer.points import order
+from renderer.ordering import cells as order
 
 
 @pytest.mark.parametrize("query", ["contains", "closest_point", "winding_number"])

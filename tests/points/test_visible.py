@@ -7,6 +7,8 @@ from cases import cases
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
 
+pytestmark = pytest.mark.judges("BruteForce.visible", "Octree.visible")
+
 
 def test_a_convex_solid_hides_what_the_segment_passes():
     rng, ball = np.random.default_rng(4), icosphere(3)

@@ -17,6 +17,15 @@ from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, primary
 from renderer.scene.material import Phong
 from renderer.scene.scene import Scene, SceneObject
 
+pytestmark = pytest.mark.judges(
+    "OrthographicCamera", "OrthographicCamera.frame", "OrthographicCamera.rows", "PerspectiveCamera",
+    "PerspectiveCamera.frame", "PerspectiveCamera.rows", "scene.camera.orthographic.eye",
+    "scene.camera.orthographic.height", "scene.camera.orthographic.target", "scene.camera.orthographic.up",
+    "scene.camera.perspective.eye", "scene.camera.perspective.fov", "scene.camera.perspective.target",
+    "scene.camera.perspective.up",
+)  # fmt: skip
+
+
 U = 2.0**-53
 
 

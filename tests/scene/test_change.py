@@ -7,7 +7,7 @@ import pytest
 from cases import cases
 
 from renderer import DirectionalLight, Mirror, OrthographicCamera, Scene
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.shapes import box, icosphere
 from renderer.picture.image import srgb
 from renderer.scene.change import changed
@@ -21,6 +21,7 @@ SCENE = Scene(
 )
 
 
+@pytest.mark.judges("octree-render render --change")
 def test_what_is_named_changes_and_nothing_else() -> None:
     new = changed(
         SCENE, "camera = {type = 'orthographic', eye = [0, 0, 2], target = [0, 0, 0], height = 2}\nrender.samples = 9"
@@ -36,6 +37,7 @@ def test_what_is_named_changes_and_nothing_else() -> None:
     assert shiny.materials == {"grey": Mirror(reflectance=0.5), "glass": SCENE.materials["glass"]}
 
 
+@pytest.mark.judges("octree-render render --change")
 @cases(
     ("hidden", "left"),
     [([], [0, 1, 2, 3]), (["objects.0"], [1, 2, 3]), (["floor"], [0, 1]), (["floor", "objects.1"], [0])],
@@ -71,6 +73,7 @@ def test_what_is_wrong_is_said_on_one_line(text: str, said: str) -> None:
     assert "\n" not in str(told.value)
 
 
+@pytest.mark.judges("octree-render render --change")
 def test_the_command_renders_the_changed_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from PIL import Image as Pillow
 

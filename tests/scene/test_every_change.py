@@ -10,7 +10,7 @@ from cases import cases
 from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of, write_meshes
 
 from renderer import RenderSettings
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.scene.camera import Camera
 from renderer.scene.change import _Changes
 from renderer.scene.hide import object_names

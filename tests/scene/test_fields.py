@@ -24,6 +24,26 @@ from renderer import (
 )
 from renderer.mesh.shapes import box
 
+pytestmark = pytest.mark.judges(
+    "Floor", "OrthographicCamera", "RenderSettings", "Scene", "scene.ambient", "scene.background", "scene.camera",
+    "scene.camera.orthographic.eye", "scene.camera.orthographic.height", "scene.camera.orthographic.target",
+    "scene.camera.orthographic.type", "scene.camera.orthographic.up", "scene.camera.perspective.eye",
+    "scene.camera.perspective.fov", "scene.camera.perspective.target", "scene.camera.perspective.type",
+    "scene.camera.perspective.up", "scene.floor", "scene.floor.materials", "scene.floor.max", "scene.floor.min",
+    "scene.floor.squares", "scene.lights", "scene.lights.directional.direction", "scene.lights.directional.irradiance",
+    "scene.lights.directional.type", "scene.lights.point.intensity", "scene.lights.point.position",
+    "scene.lights.point.type", "scene.materials", "scene.materials.dielectric.ior",
+    "scene.materials.dielectric.reflectance", "scene.materials.dielectric.transmittance",
+    "scene.materials.dielectric.type", "scene.materials.mirror.reflectance", "scene.materials.mirror.type",
+    "scene.materials.phong.ambient", "scene.materials.phong.diffuse", "scene.materials.phong.ior",
+    "scene.materials.phong.reflectance", "scene.materials.phong.shininess", "scene.materials.phong.specular",
+    "scene.materials.phong.transmittance", "scene.materials.phong.type", "scene.objects", "scene.objects.material",
+    "scene.objects.mesh", "scene.objects.normals", "scene.objects.rotate", "scene.objects.scale",
+    "scene.objects.translate", "scene.render", "scene.render.max_depth", "scene.render.max_rays",
+    "scene.render.min_weight", "scene.render.resolution", "scene.render.samples", "scene.render.shadows",
+)  # fmt: skip
+
+
 BOX = box()
 NEEDED = object()
 # For each class the fields without which it cannot be.

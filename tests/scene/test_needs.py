@@ -10,7 +10,7 @@ import pytest
 from cases import cases
 
 from renderer import Image, Mesh, Needs, Scene, load_scene, needs_of, render
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.pack import pack
 from renderer.picture.prepare import build_octree, kernel_settings_of, tree_for
@@ -21,6 +21,12 @@ from renderer.scene.needs import FEW_FACES, examine
 from renderer.scene.scene import Floor, RenderSettings, SceneObject
 from renderer.shade.records import KIND, PHONG
 from renderer.shade.surface import MAX_MEDIA
+
+pytestmark = pytest.mark.judges(
+    "Dielectric.passes_light", "Image", "Mirror.passes_light", "Needs", "Phong.passes_light", "Phong.receives_light",
+    "needs_of", "render",
+)  # fmt: skip
+
 
 MODULE = importlib.import_module("renderer.picture.prepare")
 SCENES = Path(__file__).parents[2] / "scenes"

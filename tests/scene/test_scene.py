@@ -22,6 +22,17 @@ from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 from renderer.shade.records import MATERIAL_COLUMNS
 
+pytestmark = pytest.mark.judges(
+    "DirectionalLight.row", "Floor", "Mesh.transformed", "RenderSettings", "Scene", "Scene.instances", "SceneError",
+    "SceneObject", "SceneObject.matrix", "load_scene", "scene.camera", "scene.camera.orthographic.type",
+    "scene.camera.perspective.type", "scene.floor", "scene.floor.materials", "scene.floor.max", "scene.floor.min",
+    "scene.floor.squares", "scene.lights", "scene.lights.directional.type", "scene.lights.point.type",
+    "scene.materials", "scene.materials.dielectric.type", "scene.materials.mirror.type", "scene.materials.phong.type",
+    "scene.objects", "scene.objects.material", "scene.objects.mesh", "scene.objects.rotate", "scene.objects.scale",
+    "scene.objects.translate",
+)  # fmt: skip
+
+
 CAMERA = "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n"
 MATERIAL = "[materials.clay]\ndiffuse = 0.5\n"
 FULL = """\

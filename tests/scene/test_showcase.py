@@ -8,7 +8,7 @@ import pytest
 from cases import cases
 
 from renderer import Mesh, SceneError, load_scene, render
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.scene.scene import write_scene
@@ -27,6 +27,7 @@ def file_of(folder: Path, mesh: Mesh, scale: float = 1.0, offset: Any = (0, 0, 0
     return path
 
 
+@pytest.mark.judges("load_scene", "octree-render render scene", "octree-render view scene")
 @cases("shape", SHAPES)
 @cases("scale", [1e-6, 1.0, 1e6])
 @cases("offset", [(0, 0, 0), (30, -20, 10)])
@@ -42,6 +43,7 @@ def test_the_whole_mesh_is_seen_and_lit_and_large_enough(tmp_path: Path, shape: 
     assert (image.face[rows[-1] + 2] >= len(mesh.faces)).any()
 
 
+@pytest.mark.judges("octree-render render --write-scene")
 @cases("leads_to", [None, ".", "far/away", "models"])
 def test_the_written_scene_is_the_one_that_is_rendered(tmp_path: Path, leads_to: str | None) -> None:
     """Also where the scene is written through a link, into whichever folder it leads."""
@@ -56,6 +58,7 @@ def test_the_written_scene_is_the_one_that_is_rendered(tmp_path: Path, leads_to:
     assert found.radiance.tobytes() == expected.radiance.tobytes()
 
 
+@pytest.mark.judges("octree-render info scene", "octree-render render --write-scene", "octree-render render scene")
 @pytest.mark.parametrize("command", ["render", "info"])
 def test_the_command_line_takes_a_mesh(tmp_path: Path, capsys: Any, command: str) -> None:
     path, out, written = file_of(tmp_path, icosphere(2)), tmp_path / "out.png", tmp_path / "it.toml"

@@ -27,6 +27,7 @@ def slab(low: float, high: float) -> Mesh:
     return box((-5.0, low, -5.0), (5.0, high, 5.0))
 
 
+@pytest.mark.judges("render")
 def test_two_slabs_that_touch() -> None:
     """By the stack no air is between them. By Mitsuba's rules a ray meets one of the faces that coincide, the lower."""
     scene = straight_down((slab(0.0, 1.0), WATER), (slab(1.0, 2.0), GLASS))
@@ -36,6 +37,7 @@ def test_two_slabs_that_touch() -> None:
     np.testing.assert_allclose(normal, passed(0.0, 1.0, 1.5) * passed(0.0, 1.0, 1.33, 1.0), rtol=STORED)
 
 
+@pytest.mark.judges("render")
 def test_glass_without_a_back_wall() -> None:
     """The ray that enters open glass is in it to the end by the stack, and in air beyond its next front."""
     open_box = Mesh(slab(2.0, 3.0).vertices, slab(2.0, 3.0).faces[_upper(slab(2.0, 3.0))])
@@ -82,6 +84,7 @@ def test_an_eye_in_glass_in_water() -> None:
     np.testing.assert_allclose(normal, passed(0.0, 1.5, 1.0) * passed(0.0, 1.33, 1.0), rtol=STORED)
 
 
+@pytest.mark.judges("render")
 @pytest.mark.parametrize("name", ["glass", "checkered"])
 def test_closed_bodies_apart_have_the_same_bits_by_both_rules(name: str) -> None:
     scene = load_scene(SCENES / f"{name}.toml")

@@ -262,6 +262,7 @@ def random_hits(scale: float, shift: float, count: int) -> Any:
         yield *map(vector, corners), vector(n / np.linalg.norm(n)), u, v, vector(p)
 
 
+@pytest.mark.judges("render")
 @cases("scale", [1e-6, 1.0, 1e6])
 @cases("shift", [0.0, 1.0, 1e3, 1e6])
 def test_a_spawned_ray_starts_beyond_the_exact_plane(scale: float, shift: float) -> None:
@@ -303,6 +304,7 @@ def test_offset_does_not_vanish_on_a_plane_through_the_origin() -> None:
     assert spawn_origin((-1.0, 0.0, 1.0), error, UP, (0.3, -0.1, 0.2), BOUNDED)[1] <= -error
 
 
+@pytest.mark.judges("render")
 def test_mitsubas_rule() -> None:
     p, away, mitsuba = (3.0, -5.0, 1.0), (0.1, 0.9, 0.2), OffsetRule(False, MITSUBA_EPSILON)
     # (1 + max|p|) epsilon along n_g, to the side of the new ray; the bound is not read.

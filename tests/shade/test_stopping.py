@@ -25,10 +25,15 @@ from renderer import (
     prepare,
     render,
 )
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.shapes import icosphere
 from renderer.picture import prepare as prepared_scene
 from renderer.trace.spawn import BOUNDED
+
+pytestmark = pytest.mark.judges(
+    "CutWarning", "PreparedScene.picture", "RenderSettings", "render", "scene.render.max_rays"
+)
+
 
 # Four half-mirrors one in another: a ray that meets one leaves two.
 TEXT = """
@@ -209,7 +214,7 @@ def test_control_c_ends_a_command_whose_first_tile_never_ends(tmp_path: Path) ->
 
 
 def test_brute_force_in_small_chunks_has_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
-    from renderer.trace import query
+    from renderer.trace import closest as query
 
     brute, rays = BruteForce.from_mesh(icosphere(3), threads=2), np.random.default_rng(1).normal(size=(3000, 3)) * 2
     expected = brute.closest_hit(rays, -rays)

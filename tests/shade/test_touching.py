@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cases import cases
 
-from renderer.inspect.ray_path import MAX_RAYS, ray_path
+from renderer.diagnostics.ray_path import MAX_RAYS, ray_path
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.image import Image
@@ -22,6 +22,9 @@ from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Floor, Scene, SceneObject
 from renderer.trace.spawn import MITSUBA_EPSILON
+
+pytestmark = pytest.mark.judges("Dielectric", "Phong", "PreparedScene.touching")
+
 
 REL = 2.0**-22
 GROUND = Phong(diffuse=0.0, ambient=0.5)

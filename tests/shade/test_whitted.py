@@ -20,6 +20,19 @@ from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, Scene, SceneObject
 from renderer.trace.spawn import MITSUBA_EPSILON
 
+pytestmark = pytest.mark.judges(
+    "Dielectric", "DirectionalLight", "Image", "Mesh", "Mirror", "Mirror.passes_light", "Needs", "Phong",
+    "Phong.passes_light", "PointLight", "RenderSettings", "render", "scene.ambient", "scene.background",
+    "scene.lights", "scene.lights.directional.direction", "scene.lights.directional.irradiance",
+    "scene.lights.point.intensity", "scene.lights.point.position", "scene.materials.dielectric.ior",
+    "scene.materials.dielectric.reflectance", "scene.materials.dielectric.transmittance",
+    "scene.materials.mirror.reflectance", "scene.materials.phong.ambient", "scene.materials.phong.diffuse",
+    "scene.materials.phong.ior", "scene.materials.phong.reflectance", "scene.materials.phong.shininess",
+    "scene.materials.phong.specular", "scene.materials.phong.transmittance", "scene.objects.normals",
+    "scene.render.max_depth", "scene.render.min_weight", "scene.render.samples",
+)  # fmt: skip
+
+
 # Radiance is stored as float32: half an ulp, and as much again for the float64 sums before it.
 REL = 2.0**-23
 WHITE = Phong(diffuse=1.0, ambient=0.0)

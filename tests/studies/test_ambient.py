@@ -8,6 +8,9 @@ from renderer import Octree
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.studies import ambient_occlusion, cosine_hemisphere, face_points, openness
 
+pytestmark = pytest.mark.judges("studies.ambient_occlusion", "studies.openness")
+
+
 SAMPLES = [64, 256, 4096, 30000]
 FAR = 1e7
 

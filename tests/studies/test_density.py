@@ -5,7 +5,7 @@ import pytest
 
 from renderer import Octree
 from renderer.mesh.shapes import box
-from renderer.points.curve import order_along_curve
+from renderer.ordering.morton import order_along_curve
 from renderer.studies import density, face_points, occlusion, tregenza
 from validation.benchmark.measures.meshes import named
 

@@ -10,6 +10,13 @@ from cases import cases
 from renderer.studies import Pattern, cosine_hemisphere, fibonacci_hemisphere, fibonacci_sphere, reinhart, tregenza
 from renderer.studies.directions import turned
 
+pytestmark = pytest.mark.judges(
+    "studies.FacePoints", "studies.Pattern", "studies.ambient_occlusion", "studies.cosine_hemisphere",
+    "studies.fibonacci_hemisphere", "studies.fibonacci_sphere", "studies.reinhart", "studies.sun_hours",
+    "studies.tregenza",
+)  # fmt: skip
+
+
 MODULES = ["ambient", "directions", "hidden", "places", "sky", "views"]
 
 

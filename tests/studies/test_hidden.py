@@ -13,6 +13,8 @@ from renderer.mesh.shapes import box, icosphere, torus
 from renderer.studies import face_points, fibonacci_sphere, occlusion, tregenza
 from renderer.studies.sweep import RAYS, TILE
 
+pytestmark = pytest.mark.judges("studies.FacePoints", "studies.occlusion", "studies.openness", "studies.sun_hours")
+
 
 def written_down(octree, points, normals, directions, leaving=None, distance=np.inf):
     """(n, k) bools of the same question by rays that are all written down."""

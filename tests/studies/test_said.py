@@ -1,4 +1,4 @@
-"""Sentences of the studies' docstrings that no other test asked: one test each."""
+"""What studies do that no other file of tests asks."""
 
 import io
 import tracemalloc
@@ -25,6 +25,14 @@ from renderer.studies import (
     visible_faces,
 )
 from renderer.studies.share import check_asked
+
+pytestmark = pytest.mark.judges(
+    "studies.FacePoints", "studies.Pattern", "studies.Scan", "studies.ambient_occlusion", "studies.cosine_hemisphere",
+    "studies.depth_map", "studies.face_points", "studies.fibonacci_hemisphere", "studies.fibonacci_sphere",
+    "studies.occlusion", "studies.openness", "studies.scan", "studies.sky_view_factor", "studies.sun_hours",
+    "studies.visible_faces",
+)  # fmt: skip
+
 
 POINTS = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 3))
 ONE: dict[str, Any] = {
@@ -78,7 +86,7 @@ def test_spirals_have_equal_steps_of_height_or_of_its_square(count: int) -> None
         np.testing.assert_allclose(np.mod(turn, 2.0 * np.pi), golden, rtol=0, atol=1e-10)
 
 
-def test_scans_and_faces_have_arrays_of_the_types_and_dimensions_that_are_said() -> None:
+def test_arrays_of_scans_faces_and_depths_have_their_types_and_dimensions() -> None:
     octree = Octree.from_mesh(torus())
     for cloud in (scan(octree, [0, 3, 0.5], 500), scan(octree, [0, 3, 0.5], [[0, 1, 0]])):
         m = len(cloud.rays)

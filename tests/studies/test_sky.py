@@ -8,6 +8,9 @@ from renderer import Mesh, Octree
 from renderer.mesh.shapes import box, grid
 from renderer.studies import Pattern, face_points, fibonacci_hemisphere, fibonacci_sphere, sky_view_factor, sun_hours
 
+pytestmark = pytest.mark.judges("studies.sky_view_factor", "studies.sun_hours")
+
+
 SIZES = [145, 577, 2000, 20000]
 SIDES = 720
 

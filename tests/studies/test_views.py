@@ -22,6 +22,9 @@ from renderer.studies import (
 )
 from renderer.studies.edge_on import are_edge_on
 
+pytestmark = pytest.mark.judges("Image", "studies.Scan", "studies.depth_map", "studies.scan", "studies.visible_faces")
+
+
 CAMERAS = [
     PerspectiveCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), fov=40.0),
     OrthographicCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), height=2.5),

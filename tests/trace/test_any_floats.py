@@ -21,15 +21,15 @@ from renderer import (
     load_scene,
     render,
 )
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import bits_float
-from renderer.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import icosphere
+from renderer.numerics.simd import bits_float
 from renderer.octree import Octree
 from renderer.trace.batch import NO_STARTS, RayBatch
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
-from renderer.trace.singly import stack_size
+from renderer.trace.single import stack_size
 from renderer.trace.stream import _BOTTOM
 from renderer.trace.traverse import make_memory, make_scratch, search_blocks, trace
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from renderer import BruteForce, MeshError, Octree, PerspectiveCamera, Phong, Scene, SceneObject, prepare, render
-from renderer.kernels.notice import compile_seconds
+from renderer.jit.notice import compile_seconds
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
-from renderer.process import child
+from renderer.system import child
 from renderer.trace.layout import CACHE_LINE
 
 COPIES = {"deepcopy": copy.deepcopy, "copy": copy.copy, "pickle": lambda thing: pickle.loads(pickle.dumps(thing))}

@@ -16,6 +16,7 @@ RNG = np.random.default_rng(6)
 ORIGINS, DIRECTIONS = 2 * RNG.normal(size=(24, 3)), RNG.normal(size=(24, 3))
 
 
+@pytest.mark.judges("AllHits.counts", "Hits", "Hits.shaped", "Octree.any_hit")
 @cases("queries", QUERIES)
 @cases("shape", [(24,), (4, 6), (2, 3, 4), (24, 1), (1, 24)])
 def test_answers_have_the_dimensions_of_the_rays(queries, shape):
@@ -75,6 +76,7 @@ def test_hits_of_other_dimensions_have_all_that_hits_have():
     assert (hits.through().pile != hits.face).all()
 
 
+@pytest.mark.judges("Octree.any_hit", "Octree.closest_hit")
 @pytest.mark.parametrize("queries", QUERIES, ids=["octree", "brute"])
 def test_origins_and_directions_are_broadcast(queries):
     grid = queries.closest_hit(ORIGINS[:5, None], DIRECTIONS[None, :7])

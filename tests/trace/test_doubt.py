@@ -14,6 +14,7 @@ def only(vertices, origin, direction, **bounds):
     return Octree(np.array(vertices), [[0, 1, 2]]).closest_hit([origin], [direction], **bounds)
 
 
+@pytest.mark.judges("Octree.closest_hit")
 def test_a_ray_in_the_plane_of_a_face_does_not_hit_it_where_it_passes_beside():
     """t = 4.944 was reported, from a determinant that was rounding alone."""
     face = [

@@ -14,6 +14,8 @@ from validation.oracle import exact
 from validation.oracle.distance import cross, difference, dot
 from validation.oracle.starts import start_near
 
+pytestmark = pytest.mark.judges("AllHits", "Hits", "Octree.closest_hit")
+
 
 def true_t(corners, origin, direction):
     """Where a ray meets a face's plane, None where it is parallel."""

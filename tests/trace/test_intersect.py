@@ -9,13 +9,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from meshes import make_mesh, rays_at
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import splat8, store
+from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import box, grid
+from renderer.numerics.simd import splat8, store
 from renderer.octree import BruteForce, Octree
 from renderer.trace.intersect import Ray, enter_boxes, make_slabs, room_of, round_both, round_down, round_up
 from renderer.trace.layout import NODE_WORDS
 from validation.oracle import exact
+
+pytestmark = pytest.mark.judges("BruteForce", "Octree.closest_hit")
+
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
 ONE = np.array([[0, 1, 2]])

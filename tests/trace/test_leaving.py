@@ -16,6 +16,9 @@ from renderer.trace.hits import Hits
 from renderer.trace.intersect import CORNER
 from renderer.trace.starts.record import EDGE, HEAD, ROW, SLACK
 
+pytestmark = pytest.mark.judges("AllHits", "Hits", "Hits.through", "Octree.any_hit", "Octree.closest_hit")
+
+
 SCALES = (1e-12, 1.0, 1e12)
 OFFSETS = (0.0, 1e3, 1e8)
 

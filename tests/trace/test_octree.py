@@ -16,6 +16,11 @@ from renderer.octree import MAX_DEPTH, MAX_LEAF_SIZE, BruteForce, Octree
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, NODE_WORDS
 from renderer.tree.invariants import faults
 
+pytestmark = pytest.mark.judges(
+    "BruteForce.stats", "Hits", "Hits.normals", "Octree", "Octree.closest_hit", "Octree.from_mesh", "Octree.stats"
+)
+
+
 ROOT = Path(__file__).parents[2]
 SPLIT = pytest.mark.parametrize("split", ["midpoint", "sah"])
 

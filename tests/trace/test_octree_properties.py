@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pytest
 from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,6 +12,9 @@ from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at,
 from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 from validation.oracle import exact
+
+pytestmark = pytest.mark.judges("BruteForce", "Hits", "Hits.normals", "Hits.points", "Octree", "Octree.closest_hit")
+
 
 SEEDS = st.integers(0, 2**20)
 

@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from meshes import assert_same_hits, make_mesh, options, rays_at, separate
 from numpy.random import Generator
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import extract
+from renderer.jit.decorators import kernel
+from renderer.numerics.simd import extract
 from renderer.octree import BruteForce, Octree
-from renderer.trace.doubt import _meet_slab, settled
 from renderer.trace.hits import Hits
 from renderer.trace.intersect import FAR_PADDING, Ray, box_limit, hit_triangles, largest_of, make_shear, round_down
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import tree_pointers
+from renderer.trace.resolve import _meet_slab, settled
 from validation.oracle import exact
 
 SIDE = 100
@@ -61,12 +61,14 @@ def test_most_rays_beside_the_plane_hit_near_it(expected):
     assert abs(expected.t[expected.hit] - 1e-11).max() < 1e-15
 
 
+@pytest.mark.judges("Octree.closest_hit")
 @cases("threads", [1, 2, 3])
 @cases("split", ["midpoint", "sah"])
 def test_rays_beside_a_plane_hit_the_same_with_any_threads(flat, expected, threads, split):
     assert_same_hits(Octree(*flat, split=split, threads=threads).closest_hit(*beside(1e-12)), expected)
 
 
+@pytest.mark.judges("BruteForce")
 def test_rays_beside_a_plane_hit_the_same_by_brute_force(flat, expected):
     assert_same_hits(BruteForce(*flat).closest_hit(*beside(1e-12)), expected)
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at
 
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import pointer, splat8
+from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import icosphere
+from renderer.numerics.simd import pointer, splat8
 from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import RayBatch
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down

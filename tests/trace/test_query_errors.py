@@ -7,6 +7,9 @@ from cases import cases
 from renderer.errors import MeshError
 from renderer.octree import BruteForce, Octree
 
+pytestmark = pytest.mark.judges("BruteForce", "Octree", "Octree.any_hit", "Octree.closest_hit", "Octree.from_mesh")
+
+
 VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 FACES = [[0, 1, 2]]
 ACCELERATORS = [Octree(VERTICES, FACES), BruteForce(VERTICES, FACES)]

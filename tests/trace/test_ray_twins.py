@@ -16,7 +16,14 @@ from hypothesis import strategies as st
 from twins import CORNERS, FACES, MESH, NORMALS, Floats, Integers, dot, holding, meetings
 
 from renderer import BruteForce, Mesh, Octree
-from renderer.queries import Queries
+from renderer.queryable import Queries
+
+pytestmark = pytest.mark.judges(
+    "BruteForce.all_hits", "BruteForce.any_hit", "BruteForce.closest_hit", "BruteForce.count_hits",
+    "BruteForce.count_steps", "Octree.all_hits", "Octree.any_hit", "Octree.closest_hit", "Octree.count_hits",
+    "Octree.count_steps",
+)  # fmt: skip
+
 
 TARGETS = {
     "octree": Octree.from_mesh(MESH, threads=1),

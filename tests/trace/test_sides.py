@@ -7,7 +7,7 @@ from cases import cases
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from renderer.trace.sides import passes_within, products_sign
+from renderer.trace.edge_signs import passes_within, products_sign
 
 # Products of these may vanish or be denormal, but none overflows, as no product of a ray's and a face's does.
 NUMBERS = st.floats(-(2.0**500), 2.0**500)

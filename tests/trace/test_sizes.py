@@ -5,7 +5,7 @@ import pytest
 from cases import cases
 
 from renderer import BruteForce, MeshError, Octree
-from renderer.limits import SHORTEST
+from renderer.arguments.limits import SHORTEST
 from renderer.mesh.shapes import box, icosphere
 from renderer.octree import _LEAST_SIDE, _ROWS
 from validation.oracle import exact
@@ -56,6 +56,7 @@ def test_lines_and_points_of_any_size_are_taken_and_never_hit():
     assert not octree.any_hit([0, 0, 1], [[0, 0, -1], [1e-201, 0, -1]]).any()
 
 
+@pytest.mark.judges("Octree.refit")
 def test_a_refit_to_such_faces_is_refused_and_changes_nothing():
     vertices, faces = beside_a_triangle(1.0)
     octree = Octree(vertices, faces)

@@ -5,9 +5,11 @@ import pytest
 from meshes import make_mesh, rays_at
 
 from renderer import BruteForce, Mesh, Octree
-from renderer.inspect.tree_boxes import visited
+from renderer.diagnostics.tree_boxes import visited
 from renderer.mesh.shapes import icosphere
 from renderer.trace.layout import BLOCK_FACES
+
+pytestmark = pytest.mark.judges("BruteForce", "Octree.count_steps", "Steps")
 
 
 @pytest.mark.parametrize("kind", ["lattice", "soup"])

@@ -22,6 +22,9 @@ from renderer.tree.hierarchy import Rule, add_part, first_parts, new_hierarchy
 from renderer.tree.invariants import faults
 from renderer.tree.subtree import cut_once, new_room
 
+pytestmark = pytest.mark.judges("Octree")
+
+
 SPLIT = pytest.mark.parametrize("split", sorted(SPLITS))
 # Several subtrees and a top of several levels, which begin beyond 8192 faces.
 MANY = 30_000

@@ -16,6 +16,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS,
 from renderer.tree.invariants import check_safe, faults
 
 
+@pytest.mark.judges("Octree")
 @settings(max_examples=200)
 @given(meshes, options)
 def test_every_tree_is_sound(mesh, chosen):
@@ -151,6 +152,7 @@ def test_a_fault_in_a_child_is_found(fault, child):
     assert any(said.format(place=place) in found for found in broken.found())
 
 
+@pytest.mark.judges("Octree")
 @pytest.mark.parametrize("inject", [shrink_by_one_ulp, grow])
 def test_a_fault_in_a_leaf_of_a_lower_node_is_found(inject):
     broken = Broken("soup_float32")  # whose boxes are not rounded, so that one ulp matters

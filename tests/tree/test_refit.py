@@ -17,6 +17,9 @@ from renderer.octree import BruteForce, Octree
 from renderer.tree.invariants import faults
 from renderer.tree.refit import refit_tree
 
+pytestmark = pytest.mark.judges("BruteForce.refit", "Octree.refit")
+
+
 SPLIT = pytest.mark.parametrize("split", ["midpoint", "sah"])
 ACCELERATORS = pytest.mark.parametrize("accelerator", [Octree, BruteForce])
 

@@ -21,11 +21,15 @@ from meshes import answers, make_mesh, rays_at
 from numpy.typing import NDArray
 from signatures import SIGNATURES
 
-from renderer import Mesh, Octree, octree, queries
+from renderer import Mesh, Octree, octree
+from renderer import queryable as queries
 from renderer.mesh.shapes import icosphere
-from renderer.process import files
+from renderer.system import files
 from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS
 from renderer.tree import store
+
+pytestmark = pytest.mark.judges("Mesh.viewing", "Octree.load", "Octree.save")
+
 
 MAPPED = pytest.mark.parametrize("mmap", [False, True], ids=["read", "mapped"])
 ORIGINS, DIRECTIONS = rays_at(*make_mesh("soup", 1, 50), 1, 12)
@@ -209,7 +213,7 @@ def base(array: NDArray[Any]) -> NDArray[Any]:
 COMPILED = """
 import numpy as np
 from renderer import Octree
-from renderer.inspect.tree_boxes import visited
+from renderer.diagnostics.tree_boxes import visited
 from renderer.mesh.shapes import icosphere
 
 def use(octree):

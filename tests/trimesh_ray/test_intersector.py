@@ -21,6 +21,14 @@ from renderer.trimesh_ray import RayMeshIntersector, install, installed, trees, 
 from renderer.trimesh_ray.distinct import distinct_faces
 from renderer.trimesh_ray.solid import _parts
 
+pytestmark = pytest.mark.judges(
+    "trimesh_ray.RayMeshIntersector", "trimesh_ray.RayMeshIntersector.contains_points",
+    "trimesh_ray.RayMeshIntersector.intersects_any", "trimesh_ray.RayMeshIntersector.intersects_first",
+    "trimesh_ray.RayMeshIntersector.intersects_id", "trimesh_ray.RayMeshIntersector.intersects_location",
+    "trimesh_ray.install", "trimesh_ray.installed", "trimesh_ray.uninstall",
+)  # fmt: skip
+
+
 ROOT = Path(__file__).parents[2]
 DOWN = [[0.0, 0.0, -1.0]]
 # Two points inside of a unit ball, and one outside.

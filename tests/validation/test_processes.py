@@ -9,7 +9,7 @@ from multiprocessing import active_children
 
 import pytest
 
-from renderer.process import child
+from renderer.system import child
 from validation.processes import Workers
 
 

@@ -25,6 +25,14 @@ from validation.report import schema
 from validation.sections import NAMES, SECTIONS
 from validation.stability import section as stability
 
+pytestmark = pytest.mark.judges(
+    "octree-validate --defects", "octree-validate --gate", "octree-validate --mesh", "octree-validate --mutants",
+    "octree-validate --of", "octree-validate --only", "octree-validate --output", "octree-validate --quick",
+    "octree-validate --random", "octree-validate --scene", "octree-validate --seed",
+    "octree-validate --write-baseline",
+)  # fmt: skip
+
+
 SCENE = Path(__file__).parents[2] / "scenes" / "stairs.toml"
 MESH = SCENE.parent / "models" / "stairs.ply"
 
@@ -60,6 +68,7 @@ def sections(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathF
     fakes = {name: Fake(name) for name in report.PARTIALS}
     modules = {section.module: section.name for section in SECTIONS}
     monkeypatch.setattr(suite, "import_module", lambda name: fakes[modules[name]])
+    monkeypatch.setattr(suite.judges, "check_names", lambda gates, left_out: ({"left_out": "no section is real"}, []))
     return fakes
 
 
@@ -280,8 +289,8 @@ class Without:
 sys.meta_path.insert(0, Without())
 from pathlib import Path
 from validation import suite
-from validation.promises.contract import table
-assert suite._outcome({}, [], Path("nowhere"))["gates"] == [] and table.unjudged(table.read()) == []
+from validation.promises import judges
+assert suite._outcome({}, [], Path("nowhere"))["gates"] == [] and judges.check_names([], ())[0]["unknown"] == []
 """
     subprocess.run([sys.executable, "-c", program], cwd=SCENE.parents[1], check=True)
 

@@ -30,8 +30,8 @@ from viewer_ways import (
 )
 
 from renderer import Scene, srgb
-from renderer.inspect.false_color import false_color, shades_of
-from renderer.inspect.ray_cost import camera_steps
+from renderer.diagnostics.false_color import false_color, shades_of
+from renderer.diagnostics.ray_cost import camera_steps
 from renderer.picture.pack import media_around
 from renderer.viewer import compare, passes
 from renderer.viewer import shown as shown_module

@@ -18,7 +18,7 @@ from viewer_client import SIZE, Client, looking
 
 import renderer
 from renderer import load_scene
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.viewer.commands import command_of
 from renderer.viewer.protocol import AskCommand
 from renderer.viewer.shown import open_file
@@ -46,6 +46,7 @@ def client(url: str) -> Iterator[Client]:
         yield client
 
 
+@pytest.mark.judges("octree-render render --change")
 @pytest.mark.parametrize(
     ("changes", "settings"),
     [

@@ -13,8 +13,8 @@ from viewer_client import SIZE, Client, Got, looking, rendered
 
 import renderer
 from renderer import load_scene
-from renderer.inspect.false_color import shades_of
-from renderer.inspect.ray_cost import camera_steps
+from renderer.diagnostics.false_color import shades_of
+from renderer.diagnostics.ray_cost import camera_steps
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import primary_rays
 from renderer.viewer.shown import open_file
@@ -76,7 +76,7 @@ def test_brute_force_tests_all_triangles_and_no_node(client: Client, prepared: P
 def test_steps_are_counted_in_parts_that_are_the_whole(
     prepared: PreparedScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from renderer.inspect import ray_cost
+    from renderer.diagnostics import ray_cost
 
     camera, shares = prepared.scene.camera, list[float]()
     whole = camera_steps(prepared, camera, (64, 48))

@@ -20,7 +20,7 @@ from viewer_client import PATIENCE, SIZE, Client, fetched, looking, rendered
 
 import renderer
 from renderer import Dielectric, DirectionalLight, Mirror, Phong, PointLight, Scene, SceneObject, load_scene
-from renderer.cli import main
+from renderer.cli.main import main
 from renderer.mesh.shapes import icosphere
 from renderer.picture.image import srgb
 from renderer.scene.camera import PerspectiveCamera

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer import viewer
-from renderer.limits import FARTHEST
+from renderer.arguments.limits import FARTHEST
 from renderer.viewer.protocol import (
     FILE,
     JPEG,

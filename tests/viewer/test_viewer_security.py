@@ -375,6 +375,7 @@ def test_a_token_is_needed_where_other_machines_may_connect(shown: ShownScene, h
         assert asked(url.port, f"/scene?{url.query}", named, address=url.hostname).status == 200
 
 
+@pytest.mark.judges("view")
 def test_two_servers_have_two_tokens_of_256_bits(shown: ShownScene, wide: ViewerServer) -> None:
     with ViewerServer(shown, "0.0.0.0", 0, framed=False) as other:
         tokens = [re.fullmatch(r"token=([\w-]{43})", urlsplit(viewing.url).query)[1] for viewing in (wide, other)]

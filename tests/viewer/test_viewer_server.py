@@ -32,10 +32,10 @@ from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camer
 
 import renderer
 from renderer import load_scene, render
-from renderer.cli import main
-from renderer.inspect.face_phong import face_colors
-from renderer.inspect.false_color import false_color, limits_of
-from renderer.inspect.tree_boxes import boxes_at, visited
+from renderer.cli.main import main
+from renderer.diagnostics.face_phong import face_colors
+from renderer.diagnostics.false_color import false_color, limits_of
+from renderer.diagnostics.tree_boxes import boxes_at, visited
 from renderer.mesh.shapes import icosphere
 from renderer.picture.image import srgb
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
@@ -45,6 +45,11 @@ from renderer.viewer.passes import Answer
 from renderer.viewer.session import SupersededError
 from renderer.viewer.shown import ShownScene, open_file
 from renderer.viewer.viewpoint import camera_of, camera_toml
+
+pytestmark = pytest.mark.judges(
+    "octree-render view", "octree-render view --no-browser", "octree-render view --port", "octree-render view scene",
+    "view",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -637,7 +642,7 @@ def test_clients_that_do_not_read_take_little_memory(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 def test_the_command_prints_its_address_and_control_c_ends_it_in_the_middle_of_a_picture(folder: Path) -> None:
-    command = [sys.executable, "-m", "renderer.cli", "view", str(folder / "heavy.toml"), "--no-browser"]
+    command = [sys.executable, "-m", "renderer.cli.main", "view", str(folder / "heavy.toml"), "--no-browser"]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
     try:
@@ -667,7 +672,7 @@ def test_control_c_ends_the_command_well_once_its_address_stands_there(
         print(line, flush=flush)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("renderer.cli.say", interrupted)
+    monkeypatch.setattr("renderer.cli.main.say", interrupted)
     assert main(["view", str(folder / "blocks.toml"), "--no-browser"]) == 0
     out, err = capsys.readouterr()
     assert "is shown at" in out and err == ""

@@ -1,1 +1,1 @@
-"""The benchmark of ``make bench``: speed beside other systems, and error against run time."""
+"""The benchmark of ``make bench``: speed beside other systems."""

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from renderer.errors import extra_hint
-from renderer.process.interrupt import interruptible
-from renderer.process.terminal import one_line
+from renderer.system.interrupt import interruptible
+from renderer.system.terminal import one_line
 from validation.output import add_output, check_output
 
 # Rays or points of a family, in full and in quick runs.
@@ -49,8 +49,8 @@ def make_parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here, so that --help does not wait for it.
-    from renderer.process.files import check_writable, write_atomically
-    from validation.benchmark.page import history, page, record
+    from renderer.system.files import check_writable, write_atomically
+    from validation.benchmark.page import page, record
     from validation.progress import steps
 
     options.output.mkdir(parents=True, exist_ok=True)
@@ -58,7 +58,6 @@ def _run(options: argparse.Namespace, command: str) -> int:
     # Tried and read first, so that a fault is not told after an hour of measuring.
     for output in (drawn,) if options.page_only else (stored, drawn):
         check_writable(output)
-    ideas = history.read()
     if not options.page_only:
         missing = [path for path in options.mesh if not path.is_file()]
         if missing:
@@ -67,7 +66,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
             measured = measure(options.quick, options.huge, tuple(options.mesh), command, step)
         record.write(measured, stored)
     text = record.read(stored)
-    page_text = page.html(text, ideas)
+    page_text = page.html(text)
     write_atomically(drawn, lambda file: file.write(page_text.encode()))
     print(page.ratios(text))
     print(f"benchmark: {text['seconds']:.0f} s; see {drawn}")
@@ -78,10 +77,7 @@ def measure(
     quick: bool, huge: bool, paths: tuple[Path, ...], command: str, step: Callable[[str], None]
 ) -> dict[str, Any]:
     """The whole record; see ``validation.benchmark.page.record``."""
-    from validation.benchmark.limits import counts, machine
-    from validation.benchmark.limits.caches import caches
     from validation.benchmark.measures import (
-        ablation,
         calls,
         drop_in,
         first_answers,
@@ -89,25 +85,22 @@ def measure(
         meshes,
         processes,
         studies,
+        tree_options,
     )
-    from validation.benchmark.measures.queries import fits
     from validation.benchmark.page import record, targets
-    from validation.benchmark.parameters import study
     from validation.benchmark.peers.systems import available
 
     began, date, load = time.perf_counter(), datetime.now(UTC), record.load()
     step("contenders")
-    (systems, missing), of = available(), caches()
+    systems, missing = available()
     names = {system.name for system in systems}
     kinds: dict[str, str] = {}
-    rows: dict[str, list[Any]] = {"queries": [], "builds": [], "memory": [], "limits": []}
+    rows: dict[str, list[Any]] = {"queries": [], "builds": [], "memory": []}
     open_edges: dict[str, int] = {}
     for chosen in meshes.chosen(quick, huge, paths):
         mesh, kinds[chosen.mesh.name] = chosen.mesh, chosen.kind
         _measure_mesh(chosen, systems, QUICK_RAYS if quick else RAYS, rows, step)
-        rows["limits"] += counts.measure(mesh, QUICK_RAYS if quick else RAYS, of, step)
         open_edges |= {mesh.name: len(mesh.open_edges)} if not chosen.brief and len(mesh.open_edges) else {}
-    limits = {"caches": of.levels, "told": of.told, "rates": machine.rates(of), "rows": rows.pop("limits")}
     series = [name for name, kind in kinds.items() if kind == meshes.SERIES]
     llvm = "mitsuba_llvm" in names
     found: dict[str, Any] = {
@@ -115,13 +108,11 @@ def measure(
         "commit": record.commit(), "quick": quick, "environment": record.describe(_libllvm(llvm), load),
         "systems": record.described(systems), "missing": missing, "series": series, "kinds": kinds,
         "open_edges": open_edges, **rows,
-        "fits": fits(rows["queries"], series), "drop_in": drop_in.run(quick, step),
-        "calls": calls.measure(systems, step), "studies": studies.run(quick, step),
+        "drop_in": drop_in.run(quick, step), "calls": calls.measure(systems, step), "studies": studies.run(quick, step),
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
         "first_answers": first_answers.measure(step),
-        "ablation": ablation.run(quick, step), "knobs": study.run(quick, step),
-        "limits": limits,
+        "trees": tree_options.run(quick, step),
     }  # fmt: skip
     return found | {"targets": targets.judged(found), "seconds": time.perf_counter() - began}
 

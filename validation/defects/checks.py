@@ -123,7 +123,7 @@ def hits(job: Job) -> Iterator[Gate]:
     yield from check_refit(job)[1]
 
 
-def promised(checks: dict[str, Callable[[], promises.Rows]]) -> Callable[[Job], list[Gate]]:
+def promised(checks: dict[str, promises.Check]) -> Callable[[Job], list[Gate]]:
     """A check of some promises."""
     return lambda job: promises.gates(promises.judge(checks, job))
 

@@ -18,8 +18,8 @@ from types import CodeType, ModuleType
 from validation.defects.syntax import Place, find_place, replaced
 
 _PACKAGE = Path(__file__).resolve().parents[2] / "renderer"
-_DIGEST = "renderer.kernels.digest"
-_LOADED = "renderer.kernels.loaded"
+_DIGEST = "renderer.jit.digest"
+_LOADED = "renderer.jit.loaded"
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from renderer.process import child
+from renderer.system import child
 from validation.defects.answer import MARK
 from validation.defects.inject import Replacement
 from validation.defects.list import DEFECTS, Defect

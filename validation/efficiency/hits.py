@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.process.parallel import available_threads
+from renderer.system.threads import available_threads
 from renderer.trace.hits import Hits
 from validation.error_curves import front
 from validation.hits.compare import HitArrays

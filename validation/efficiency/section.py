@@ -12,8 +12,8 @@ import numpy as np
 from renderer.mesh.load import load_mesh
 from renderer.octree import Octree
 from renderer.picture.render import render
-from renderer.process.parallel import available_threads
 from renderer.scene.scene import load_scene
+from renderer.system.threads import available_threads
 from validation.efficiency import hits, pictures
 from validation.gates import Gate
 from validation.hits.rays import camera_rays, random_rays

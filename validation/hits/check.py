@@ -28,6 +28,7 @@ Ints = NDArray[np.int64]
 
 SEED = 2026
 EXACT = "exact arithmetic"
+_NAMES = ("Octree.closest_hit", "Octree.any_hit")
 
 # Families whose rays have no particular target. There a hit that float64 cannot decide (the ray passes an edge closer
 # than the rounding of the edge function) has a chance of 1e-9 a ray, so one would be suspicious. Rays that are aimed at
@@ -190,7 +191,7 @@ def _check(target: _Target, rays: RayFamily, effort: HitEffort, limits: HitLimit
         reason = "nothing aims there"
         quantities.append(("rays within float64 rounding of an edge", near_edge, limits.near_edge, reason))
     subject = f"{target.name}, {rays.name} rays"
-    return record, [Gate("hits", subject, q, float(v), "at most", most, why) for q, v, most, why in quantities]
+    return record, [Gate("hits", subject, q, float(v), "at most", most, why, _NAMES) for q, v, most, why in quantities]
 
 
 def _find(target: _Target, rays: RayFamily, ours: HitArrays, effort: HitEffort) -> _Findings:

@@ -15,8 +15,8 @@ from typing import Any
 import coverage
 import pytest
 
-from renderer.kernels.compiler import Kernel
-from renderer.kernels.digest import PACKAGE
+from renderer.jit.compiler import Kernel
+from renderer.jit.digest import PACKAGE
 from validation.mutants.workshop import TOUCHED
 
 

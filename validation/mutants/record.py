@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from renderer.process.files import write_atomically
+from renderer.system.files import write_atomically
 from validation.mutants.equivalent import EQUIVALENT, LEFT
 from validation.mutants.sites import Mutant
 from validation.mutants.verdict import Verdict

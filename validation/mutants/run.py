@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from renderer.process.files import write_atomically
+from renderer.system.files import write_atomically
 from validation.mutants.equivalent import EQUIVALENT
 from validation.mutants.judge import GROUPS, gates, judge, noticed_by_gates
 from validation.mutants.record import Record, digest, judging_files, summary

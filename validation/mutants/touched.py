@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from renderer.kernels.digest import PACKAGE, reached
+from renderer.jit.digest import PACKAGE, reached
 from validation.mutants.sites import Mutant
 
 Touched = Mapping[str, Mapping[str, Any]]

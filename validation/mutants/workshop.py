@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from renderer.process import child
+from renderer.system import child
 from validation.mutants.sites import Mutant, text_of
 
 _FOLDERS = ("renderer", "validation", "tests", "scenes", "docs", ".ci", ".github")

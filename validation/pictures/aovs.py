@@ -36,7 +36,7 @@ def compare(
         shares[f"pixels whose {quantity} is off"] = float(np.sum(beyond) / hit.size)
     reason = f"{limits.depth} of the distance, normals {limits.normal} rad; a float32 ray may flip an edge pixel"
     found = [
-        Gate("images", f"{name}, AOVs", quantity, share, "at most", limits.share, reason)
+        Gate("images", f"{name}, AOVs", quantity, share, "at most", limits.share, reason, ("Image",))
         for quantity, share in shares.items()
     ]
     largest = {quantity: float(np.nanmax(error, initial=_NONE)) for quantity, error in errors.items()}

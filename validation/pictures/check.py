@@ -70,7 +70,7 @@ def _gates(subject: str, pair: Pair, result: ImageComparison, job: Job) -> list[
     limits = pictures.matched if pair.rule == "matched" else pictures.own
     # A picture without foreground shows nothing of the scene and must not pass.
     shown = Gate("images", subject, SHOWN, float((pair.ours.face >= 0).sum()), "at least", 1.0,
-                 "a picture of nothing shows no error")  # fmt: skip
+                 "a picture of nothing shows no error", ("render",))  # fmt: skip
     found = [shown]
     for quantity, limit in limits.model_dump().items():
         if limit is None or not (job.own or f"pictures.{pair.rule}.{quantity}" in moved):
@@ -78,7 +78,7 @@ def _gates(subject: str, pair: Pair, result: ImageComparison, job: Job) -> list[
         value = getattr(result, quantity)
         bound: Literal["at least", "at most"] = "at least" if quantity.startswith("ssim") else "at most"
         number = math.nan if value is None else value
-        found.append(Gate("images", subject, quantity, number, bound, limit, REASONS[quantity]))
+        found.append(Gate("images", subject, quantity, number, bound, limit, REASONS[quantity], ("render",)))
     if job.own and limits.max_error is not None:
         reason = "the maximum is judged outside these pixels, so they must stay few"
         share = result.fragile_share
@@ -91,7 +91,9 @@ def _encoding(subject: str, pair: Pair) -> Gate:
     radiance = pair.reference.astype(np.float32)
     off = np.abs(_saved(replace(pair.ours, radiance=radiance)) - 255.0 * compare.srgb(radiance)).max()
     reason = "a saved picture is the formula's sRGB, rounded"
-    return Gate("images", subject, "8-bit steps from the formula", float(off), "at most", _STEPS, reason)
+    return Gate(
+        "images", subject, "8-bit steps from the formula", float(off), "at most", _STEPS, reason, ("Image.save",)
+    )
 
 
 def _saved(image: Image) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.picture.image import srgb, write_exr
-from renderer.process.files import write_atomically
+from renderer.system.files import write_atomically
 from validation.pictures.compare import ImageComparison, Picture
 
 # This makes one step of an 8-bit picture a visible grey.

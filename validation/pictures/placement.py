@@ -61,15 +61,17 @@ def check(name: str, scene: Scene) -> tuple[dict[str, Any], list[Gate]]:
     # Make the record and the gates.
     record = {"reference": NAME, "objects": len(vertices), "smooth": len(normals), "left_out": left_out}
     record["seconds"] = time.perf_counter() - began
-    gates = []
+    gates, where = [], f"{name}, objects"
     if vertices:
         reason = "a file is read and placed as its scene says; Mitsuba is given our meshes"
         quantity = "vertices off trimesh's, of the radius"
-        gates.append(Gate("images", f"{name}, objects", quantity, max(vertices), "at most", _VERTICES, reason))
+        judged: tuple[str, ...] = ("Scene.instances", "load_mesh")
+        gates.append(Gate("images", where, quantity, max(vertices), "at most", _VERTICES, reason, judged))
     if normals:
         reason = "vertex normals are weighted by angles; Mitsuba is given ours"
         quantity = "vertex normals off trimesh's"
-        gates.append(Gate("images", f"{name}, objects", quantity, max(normals), "at most", _NORMALS, reason))
+        judged = ("Mesh.vertex_normals", "Mesh.transformed")
+        gates.append(Gate("images", where, quantity, max(normals), "at most", _NORMALS, reason, judged))
     return record | {gate.quantity: gate.value for gate in gates}, gates
 
 

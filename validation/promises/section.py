@@ -2,17 +2,15 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from validation.gates import Gate
 from validation.job import Job, Task
-from validation.promises.contract import table
 from validation.promises.hits.alone import check_alone
 from validation.promises.hits.batches import check_batches, check_refits
 from validation.promises.hits.bounds import check_bounds
-from validation.promises.hits.builds import check_builds
 from validation.promises.hits.counts import check_counts
 from validation.promises.hits.errors import check_errors
 from validation.promises.hits.files import check_files
@@ -60,53 +58,84 @@ def _random() -> np.random.Generator:
     return np.random.default_rng(_SEED)
 
 
-HITS: dict[str, Callable[[], Rows]] = {
-    "places of hits": lambda: check_places(_random(), _RAYS),
-    "bounds of rays": lambda: check_bounds(_random(), _RAYS),
-    "planes from afar": check_planes,
-    "errors of t": lambda: check_errors(_random()),
-    "ends of float64": check_limits,
-    "starts": lambda: check_starts(_random()),
-    "sizes of batches": check_batches,
-    "rays alone": lambda: check_alone(_random()),
-    "refits": check_refits,
-    "trees": lambda: check_trees(_random()),
-    "builds": lambda: check_builds(_random()),
-    "counts": lambda: check_counts(_random()),
-    "files": check_files,
-    "formats": lambda: check_formats(_random()),
-    "changed meshes": check_meshes,
-    "kept arrays": lambda: check_kept(_random()),
-    "shapes of rays": lambda: check_shapes(_random()),
-    "refusals": lambda: check_refusals(_random()),
-    "polygons": lambda: check_outlines(_random(), _POLYGONS),
+class Check(NamedTuple):
+    """A check, and the public names that each of its promises judges."""
+
+    ask: Callable[[], Rows]
+    judged: tuple[str, ...]
+
+
+def _of_both(*queries: str) -> tuple[str, ...]:
+    """The public names of queries that a check asks a tree and brute force."""
+    return tuple(f"{kind}.{query}" for query in queries for kind in ("Octree", "BruteForce"))
+
+
+_RAYS_ASKED = _of_both("closest_hit", "any_hit", "count_hits", "all_hits")
+HITS = {
+    "places of hits": Check(
+        lambda: check_places(_random(), _RAYS),
+        (*_of_both("closest_hit", "all_hits"), "Hits.points", "Hits.normals", "AllHits.points", "AllHits.normals"),
+    ),
+    "bounds of rays": Check(lambda: check_bounds(_random(), _RAYS), _of_both("closest_hit", "any_hit", "count_hits")),
+    "planes from afar": Check(check_planes, ("Octree.closest_hit", "Octree.any_hit")),
+    "errors of t": Check(lambda: check_errors(_random()), _of_both("closest_hit", "all_hits")),
+    "ends of float64": Check(check_limits, _RAYS_ASKED),
+    "starts": Check(lambda: check_starts(_random()), _RAYS_ASKED),
+    "sizes of batches": Check(
+        check_batches,
+        (
+            "Octree.closest_hit",
+            "Octree.any_hit",
+            "Octree.count_hits",
+            "Octree.all_hits",
+            "AllHits.ray",
+            "Octree.closest_point",
+            "Octree.visible",
+        ),
+    ),
+    "rays alone": Check(lambda: check_alone(_random()), ("Octree.closest_hit", "Octree.any_hit")),
+    "refits": Check(check_refits, ("Octree.refit",)),
+    "trees": Check(lambda: check_trees(_random()), ("Octree", "Octree.tree", "Octree.refit")),
+    "counts": Check(lambda: check_counts(_random()), ("Octree.stats", "Octree.from_mesh", *_of_both("count_steps"))),
+    "files": Check(check_files, ("load_mesh", "Octree.save", "Octree.load")),
+    "formats": Check(lambda: check_formats(_random()), ("load_mesh",)),
+    "changed meshes": Check(check_meshes, ("Octree",)),
+    "kept arrays": Check(lambda: check_kept(_random()), ("Mesh", "Octree.save", "Octree.load", "Octree.refit")),
+    "shapes of rays": Check(lambda: check_shapes(_random()), (*_RAYS_ASKED, *_of_both("closest_point"))),
+    "refusals": Check(lambda: check_refusals(_random()), (*_RAYS_ASKED, *_of_both("count_steps", "refit"))),
+    "polygons": Check(lambda: check_outlines(_random(), _POLYGONS), ("load_mesh",)),
 }
-QUERIES: dict[str, Callable[[], Rows]] = {
-    "points inside": lambda: check_inside(_random()),
-    "open edges": lambda: check_edges(_random()),
-    "winding numbers": lambda: check_angles(_random()),
-    "sides of a half": lambda: check_halves(_random()),
-    "series": lambda: check_series(_random()),
-    "nearest faces": lambda: check_nearest(_random()),
-    "signed distances": lambda: check_signed(_random()),
-    "views": lambda: check_views(_random()),
-    "piles of hits": lambda: check_piles(_random()),
+QUERIES = {
+    "points inside": Check(lambda: check_inside(_random()), _of_both("contains")),
+    "open edges": Check(
+        lambda: check_edges(_random()), ("Mesh.is_closed", "Mesh.open_edges", "Mesh.odd_edges", "Octree.contains")
+    ),
+    "winding numbers": Check(lambda: check_angles(_random()), ("Octree.winding_number",)),
+    "sides of a half": Check(lambda: check_halves(_random()), ("Octree.contains", "Octree.winding_number")),
+    "series": Check(lambda: check_series(_random()), ("Octree.winding_number",)),
+    "nearest faces": Check(lambda: check_nearest(_random()), (*_of_both("closest_point"), "ClosestPoints")),
+    "signed distances": Check(lambda: check_signed(_random()), _of_both("signed_distance")),
+    "views": Check(lambda: check_views(_random()), _of_both("visible")),
+    "piles of hits": Check(lambda: check_piles(_random()), _of_both("all_hits")),
 }
-PICTURES: dict[str, Callable[[], Rows]] = {
-    "cameras": lambda: check_cameras(_random(), _PLACED),
-    "objects placed": lambda: check_placing(_random(), _PLACED),
-    "floors and samples": check_floors,
-    "bounces": check_bounces,
-    "lights": check_shining,
-    "planes of pictures": lambda: check_images(_random()),
-    "files of pictures": check_saved,
-    "nested media": check_nesting,
-    "refraction": lambda: check_refraction(_random(), _REFRACTED),
-    "codes": check_codes,
-    "boxes shown": lambda: check_openings(_random(), _OPENED),
+PICTURES = {
+    "cameras": Check(lambda: check_cameras(_random(), _PLACED), ("PerspectiveCamera", "OrthographicCamera", "Image")),
+    "objects placed": Check(
+        lambda: check_placing(_random(), _PLACED), ("SceneObject", "Scene.instances", "Mesh.transformed")
+    ),
+    "floors and samples": Check(
+        check_floors, ("Floor", "scene.floor.materials", "scene.floor.squares", "scene.render.samples")
+    ),
+    "bounces": Check(check_bounces, ("scene.render.max_depth", "scene.render.min_weight", "prepare")),
+    "lights": Check(check_shining, ("DirectionalLight", "PointLight")),
+    "planes of pictures": Check(lambda: check_images(_random()), ("Image", "scene.render.max_rays")),
+    "files of pictures": Check(check_saved, ("Image.save",)),
+    "nested media": Check(check_nesting, ("Dielectric",)),
+    "refraction": Check(lambda: check_refraction(_random(), _REFRACTED), ("Dielectric",)),
+    "codes": Check(check_codes, ("srgb",)),
+    "boxes shown": Check(lambda: check_openings(_random(), _OPENED), ()),
 }
 _CHECKS = {**HITS, **QUERIES, **PICTURES}
-_COVERED = "what nobody judges may be broken unseen"
 _REASON = "a promise holds each time that it is asked"
 
 
@@ -118,29 +147,25 @@ def steps(job: Job) -> int:
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask everything; returns a record for JSON, and a gate for each promise that it was never broken."""
     parts = job.each([Task(_step(name), partial(_asked, name)) for name in _CHECKS])
-    rows, promises = [row for part in parts for row in part], table.read()
-    missing = table.unjudged(promises)
-    covered = Gate("promises", "the public contract", "pieces without a judge", len(missing), "at most", 0.0, _COVERED)
-    record = {
-        "rows": rows,
-        "table": promises,
-        "unjudged": [piece._asdict() for piece in missing],
-        "costs": dict.fromkeys(row["judge"] for row in rows),
-    }
-    return record, [*gates(rows), covered]
+    rows = [row for part in parts for row in part]
+    return {"rows": rows, "costs": dict.fromkeys(row["judge"] for row in rows)}, gates(rows)
 
 
-def judge(checks: dict[str, Callable[[], Rows]], job: Job) -> Rows:
+def judge(checks: dict[str, Check], job: Job) -> Rows:
     """The rows of some checks."""
     rows: Rows = []
     for name, check in checks.items():
         job.step(_step(name))
-        rows += check()
+        rows += _rows(check)
     return rows
 
 
 def _asked(name: str) -> Rows:
-    return _CHECKS[name]()
+    return _rows(_CHECKS[name])
+
+
+def _rows(check: Check) -> Rows:
+    return [row | {"judged": check.judged} for row in check.ask()]
 
 
 def _step(name: str) -> str:
@@ -149,4 +174,7 @@ def _step(name: str) -> str:
 
 def gates(rows: Rows) -> list[Gate]:
     """A gate for each row."""
-    return [Gate("promises", row["promise"], "times broken", row["broken"], "at most", 0.0, _REASON) for row in rows]
+    return [
+        Gate("promises", row["promise"], "times broken", row["broken"], "at most", 0.0, _REASON, row["judged"])
+        for row in rows
+    ]

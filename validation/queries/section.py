@@ -50,16 +50,24 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
 
 def judge(effort: QueryEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """``run`` with so much effort."""
-    rows = [
-        *check_inside(effort.random, effort.nasty, effort.beside, job),
-        *check_distances(effort.distances, job),
-        *check_contacts(effort.rays, job),
-    ]
+    inside = check_inside(effort.random, effort.nasty, effort.beside, job)
+    distances = check_distances(effort.distances, job)
+    contacts = check_contacts(effort.rays, job)
     drop_in = check_drop_in(effort.drop_in, job)
+    rows = [*inside, *distances, *contacts]
     gates = [
-        Gate("queries", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0,
-             _DISTANCE if "ulps" in row else _REASON)
-        for row in (*rows, *drop_in)
-    ]  # fmt: skip
+        *_gates(inside, _REASON, "Octree.contains"),
+        *_gates(distances, _DISTANCE, "Octree.closest_point"),
+        *_gates(contacts, _REASON, "Octree.all_hits", "Octree.count_hits", "AllHits"),
+        *_gates(drop_in, _REASON, "trimesh_ray.RayMeshIntersector.intersects_location"),
+    ]
     costs = dict.fromkeys(("exact arithmetic", *peers()))
     return {"rows": rows, "drop_in": drop_in, "peers": list(peers()), "costs": costs}, gates
+
+
+def _gates(rows: list[dict[str, Any]], reason: str, *judged: str) -> list[Gate]:
+    """A gate for each row, on the public names that its answers are of."""
+    return [
+        Gate("queries", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, reason, judged)
+        for row in rows
+    ]

@@ -26,6 +26,7 @@ class GateRecord(_Strict):
     threshold: float
     margin: float | None
     reason: str
+    judged: list[str]
     passed: bool
 
     @model_validator(mode="after")

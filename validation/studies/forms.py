@@ -29,6 +29,7 @@ SLOPE = -0.6
 class Form:
     """A study whose answers are known: ``found`` answers with so many directions what ``known`` holds."""
 
+    study: str
     name: str
     source: str
     known: Floats
@@ -73,7 +74,13 @@ def streets() -> list[Form]:
 
 def _sky(name: str, source: str, mesh: Mesh, known: Any, **asked: Any) -> Form:
     octree = Octree.from_mesh(mesh)
-    return Form(name, source, np.atleast_1d(known), lambda count: sky_view_factor(octree, patches=count, **asked))
+    return Form(
+        "sky_view_factor",
+        name,
+        source,
+        np.atleast_1d(known),
+        lambda count: sky_view_factor(octree, patches=count, **asked),
+    )
 
 
 @functools.cache
@@ -87,23 +94,24 @@ def forms() -> list[tuple[Form, Callable[[int], float]]]:
     below = walls("z")
     skies = [
         *streets(),
-        Form("bottom of a round shaft", "form factor of a disc, r^2 / (r^2 + h^2)", np.array([1.0 / (1.0 + 2.25)]),
-             lambda n: sky_view_factor(disc, [[0.0, 0.0, 0.0]], patches=n)),
-        Form("bottom of a round shaft, solid angle", "1 - h / sqrt(r^2 + h^2)", np.array([1.0 - 1.5 / np.sqrt(3.25)]),
+        Form("sky_view_factor", "bottom of a round shaft", "form factor of a disc, r^2 / (r^2 + h^2)",
+             np.array([1.0 / (1.0 + 2.25)]), lambda n: sky_view_factor(disc, [[0.0, 0.0, 0.0]], patches=n)),
+        Form("sky_view_factor", "bottom of a round shaft, solid angle", "1 - h / sqrt(r^2 + h^2)",
+             np.array([1.0 - 1.5 / np.sqrt(3.25)]),
              lambda n: sky_view_factor(disc, [[0.0, 0.0, 0.0]], patches=n, definition="geometric")),
-        Form("beside an endless wall", "1/2", np.array([0.5]),
+        Form("sky_view_factor", "beside an endless wall", "1/2", np.array([0.5]),
              lambda n: sky_view_factor(wall, [[0.01, 0.0, 0.0]], leaving=[1], patches=n)),
         _sky("tilted planes in the open", "(1 + cos b) / 2", below, (1.0 + np.cos(tilts)) / 2.0,
              points=np.tile([0.0, 0.0, 9.0], (6, 1)), normals=normals),
     ]  # fmt: skip
     corners = [
-        Form("ambient light in the corner of a box", "1/4", np.array([0.25]),
+        Form("ambient_occlusion", "ambient light in the corner of a box", "1/4", np.array([0.25]),
              lambda n: ambient_occlusion(corner, [[1e-3, 1e-3, 0.0]], [0, 0, 1], samples=n, leaving=2)),
-        Form("ambient light beside a wall", "1/2", np.array([0.5]),
+        Form("ambient_occlusion", "ambient light beside a wall", "1/2", np.array([0.5]),
              lambda n: ambient_occlusion(wall, [[1e-3, 1e-3, 0.0]], [0, 0, 1], samples=n, leaving=1)),
     ]  # fmt: skip
     # The ball of triangles is a little smaller than the sphere: by 4e-4 of its radius, which hides as much less.
-    around = Form("openness beside a ball", "(1 + cos asin(r / d)) / 2 +- 4e-4",
+    around = Form("openness", "openness beside a ball", "(1 + cos asin(r / d)) / 2 +- 4e-4",
                   np.array([(1.0 + np.sqrt(1.0 - away**-2)) / 2.0]),
                   lambda n: openness(ball, [[0.0, 0.0, away]], samples=n))  # fmt: skip
     return [
@@ -116,14 +124,11 @@ def check_form(index: int, quick: bool) -> dict[str, Any]:
     """A row: the largest error over its places for each number of directions, and the worst share of the bound."""
     form, bound = forms()[index]
     lattice = COUNTS[:-1] if quick else COUNTS
-    counts = sorted({*lattice, *(PATCHES if "sky" in _kind(index) else ())})
+    counts = sorted({*lattice, *(PATCHES if form.study == "sky_view_factor" else ())})
     errors = [float(np.abs(form.found(count) - form.known).max()) for count in counts]
     worst = max(error / bound(count) for error, count in zip(errors, counts, strict=True))
-    return {"subject": form.name, "source": form.source, "counts": counts, "errors": errors, "share_of_bound": worst}
-
-
-def _kind(index: int) -> str:
-    return "sky" if forms()[index][1] is sky_bound else "samples"
+    return {"subject": form.name, "study": form.study, "source": form.source, "counts": counts, "errors": errors,
+            "share_of_bound": worst}  # fmt: skip
 
 
 def check_slope(quick: bool) -> dict[str, Any]:

@@ -3,16 +3,16 @@
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.checkpoints.study import Study
+from renderer.checkpoints.study_points import of_file, on_grid
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.octree import Octree
-from renderer.runs.chosen import of_file, on_grid
-from renderer.runs.study import Study
 from renderer.scene.camera import OrthographicCamera
 from renderer.studies import (
     ambient_occlusion,
@@ -278,24 +278,38 @@ def _near(found: Floats, known: Floats) -> NDArray[np.bool_]:
     return (found == known) | close
 
 
-CHECKS: dict[str, Callable[[], Asked]] = {
-    "moved to UTM coordinates": moved_to_utm,
-    "threads, order and company": threads_order_and_company,
-    "light through walls that touch": no_light_through_touching_walls,
-    "shade among faces of a plane": no_shade_among_faces_of_a_plane,
-    "two sides of a thin plate": two_sides_of_a_thin_plate,
-    "points inside bodies": dark_inside_bodies,
-    "hours of sun in a street": hours_behind_walls,
-    "weights and distances": weights_and_distances_of_directions,
-    "faces that an eye sees": faces_that_an_eye_sees,
-    "clouds and depths": clouds_and_depths,
-    "clouds from a roof": clouds_from_a_roof,
-    "places of a grid": places_of_a_grid,
-    "edges from both sides": edges_from_both_sides,
+class Check(NamedTuple):
+    """What must hold, and the public names that it judges."""
+
+    ask: Callable[[], Asked]
+    judged: tuple[str, ...]
+
+
+CHECKS = {
+    "moved to UTM coordinates": Check(moved_to_utm, ("studies.sky_view_factor", "studies.occlusion")),
+    "threads, order and company": Check(threads_order_and_company, ("studies.sky_view_factor",)),
+    "light through walls that touch": Check(no_light_through_touching_walls, ("studies.occlusion",)),
+    "shade among faces of a plane": Check(
+        no_shade_among_faces_of_a_plane, ("studies.sky_view_factor", "studies.ambient_occlusion")
+    ),
+    "two sides of a thin plate": Check(two_sides_of_a_thin_plate, ("studies.sky_view_factor",)),
+    "points inside bodies": Check(
+        dark_inside_bodies,
+        ("studies.openness", "studies.sky_view_factor", "studies.ambient_occlusion", "studies.occlusion"),
+    ),
+    "hours of sun in a street": Check(hours_behind_walls, ("studies.sun_hours",)),
+    "weights and distances": Check(weights_and_distances_of_directions, ("studies.occlusion",)),
+    "faces that an eye sees": Check(faces_that_an_eye_sees, ("studies.visible_faces",)),
+    "clouds and depths": Check(clouds_and_depths, ("studies.scan", "studies.depth_map")),
+    "clouds from a roof": Check(clouds_from_a_roof, ("studies.scan",)),
+    "places of a grid": Check(places_of_a_grid, ()),
+    "edges from both sides": Check(edges_from_both_sides, ("Octree.visible",)),
 }
 
 
 def check(name: str) -> dict[str, Any]:
     """A row: answers asked, and how many are not as they must be."""
-    asked, wrong = CHECKS[name]()
-    return {"subject": name, "says": " ".join((CHECKS[name].__doc__ or "").split()), "asked": asked, "wrong": wrong}
+    ask, judged = CHECKS[name]
+    asked, wrong = ask()
+    says = " ".join((ask.__doc__ or "").split())
+    return {"subject": name, "says": says, "asked": asked, "wrong": wrong, "judged": judged}

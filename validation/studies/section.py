@@ -35,15 +35,18 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     held = [next(found) for _ in holds.CHECKS]
     drawn = next(found)
     gates = [
-        *(Gate("studies", row["subject"], "error over its bound", row["share_of_bound"], "at most", 1.0, _BOUND)
+        *(Gate("studies", row["subject"], "error over its bound", row["share_of_bound"], "at most", 1.0, _BOUND,
+               (f"studies.{row['study']}",))
           for row in shares),
-        *(Gate("studies", row["subject"], "slope of the error", row["slope"], "at most", forms.SLOPE, _SLOPE)
+        *(Gate("studies", row["subject"], "slope of the error", row["slope"], "at most", forms.SLOPE, _SLOPE,
+               ("studies.sky_view_factor",))
           for row in slopes),
-        *(Gate("studies", row["subject"], "wrong bits", float(row["wrong"]), "at most", 0.0, _BITS)
+        *(Gate("studies", row["subject"], "wrong bits", float(row["wrong"]), "at most", 0.0, _BITS,
+               ("studies.occlusion",))
           for row in (*bit_rows, *corner_rows)),
         *(Gate("studies", row["subject"], "points with another sky where their face is named", float(row["unlike"]),
-               "at most", 0.0, _NAMED) for row in corner_rows),
-        *(Gate("studies", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, _HOLDS)
+               "at most", 0.0, _NAMED, ("studies.sky_view_factor",)) for row in corner_rows),
+        *(Gate("studies", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, _HOLDS, row["judged"])
           for row in held),
     ]  # fmt: skip
     record = {"forms": shares, "slopes": slopes, "bits": bit_rows, "corners": corner_rows, "holds": held,

@@ -5,8 +5,8 @@ So the start is known to 2^-100 of the face's size, however far the face is from
 
 from typing import Any, NamedTuple
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import (
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import (
     cross_pairs,
     dot_pairs,
     exact_sum,
@@ -18,8 +18,8 @@ from renderer.kernels.pairs import (
     quotient,
     scaled_difference,
 )
-from renderer.kernels.simd import larger
-from renderer.kernels.vec3 import largest_component, largest_of_three, sub
+from renderer.numerics.simd import larger
+from renderer.numerics.vec3 import largest_component, largest_of_three, sub
 from renderer.trace.starts.record import BARYCENTRIC
 
 _LEAST_NORMAL = 2.0**-1022

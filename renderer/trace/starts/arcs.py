@@ -5,10 +5,10 @@ Such is the foot of a wall within a floor. Arcs are holders too, behind those of
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, heads, negative, power_below
-from renderer.kernels.simd import at
-from renderer.kernels.vec3 import largest_component
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import cross_pairs, heads, negative, power_below
+from renderer.numerics.simd import at
+from renderer.numerics.vec3 import largest_component
 from renderer.trace.starts.cone import (
     FIRST_NODE,
     FIRST_WAY,
@@ -55,6 +55,7 @@ def arcs_of(tree, anchor, holders, count):
 @kernel
 def _cut(tree, anchor, holders, count):
     """List the arcs behind the cones; returns their number, 0 where none is cut or there is no room for all."""
+    # rule: foot-of-wall
     if not _are_cut(tree, anchor, holders, count):
         return 0
     end = count

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import cross_pairs, dot_pairs, heads, plus, power_below, product, scaled_difference
-from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import largest_component, sub
-from renderer.trace.sides import corner
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import cross_pairs, dot_pairs, heads, plus, power_below, product, scaled_difference
+from renderer.numerics.simd import at, get, put
+from renderer.numerics.vec3 import largest_component, sub
+from renderer.trace.edge_signs import corner
 from renderer.trace.starts.anchor import from_anchor
 from renderer.trace.starts.meeting import lean_sign, seen_from, turn_sign
 

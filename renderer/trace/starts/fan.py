@@ -6,10 +6,10 @@ products; where rounding may have made one of them, ``region`` decides.
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import heads
-from renderer.kernels.simd import at, get, put
-from renderer.kernels.vec3 import cross, dot, largest_component, normalized, three
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import heads
+from renderer.numerics.simd import at, get, put
+from renderer.numerics.vec3 import cross, dot, largest_component, normalized, three
 from renderer.trace.starts.cone import (
     FIRST_NODE,
     FREE_PATH,
@@ -76,6 +76,7 @@ def write_fan(tree, anchor, holders, count, nodes, k, side, table, room):
     for attempt in range(ATTEMPTS):
         sound = path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH)
         if sound and _write_rows(tree, anchor, holders, count, heads(hub_of(attempt)), table):
+            # rule: closed-fan
             put(table, _CLOSED, np.float64(_are_closed(holders, count, nodes)))
             put(table, _COUNT, np.float64(count))
             return

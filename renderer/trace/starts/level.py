@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs, dot_pairs, quotient
-from renderer.kernels.simd import get, larger, put, smaller
-from renderer.kernels.vec3 import add, barycentric, cross, dot, largest_component, largest_of_three, length, sub
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import as_pairs, dot_pairs, quotient
+from renderer.numerics.simd import get, larger, put, smaller
+from renderer.numerics.vec3 import add, barycentric, cross, dot, largest_component, largest_of_three, length, sub
+from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import blocks_of, octants_around, push_children
-from renderer.trace.sides import corner
 from renderer.trace.starts.anchor import anchor_of
 from renderer.trace.starts.cone import MOST_HOLDERS, NUMBER, PLACE, ZEROS, holder, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction

@@ -9,12 +9,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, heads, power_below, quotient, scaled_difference
-from renderer.kernels.signs import UNDECIDED, slope_sign, volume_sign
-from renderer.kernels.simd import larger, local_doubles
-from renderer.kernels.vec3 import largest_component, largest_of_three, scale, sub
-from renderer.trace.sides import corner
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import (
+    as_pairs,
+    cross_pairs,
+    dot_pairs,
+    heads,
+    power_below,
+    quotient,
+    scaled_difference,
+)
+from renderer.numerics.predicates import UNDECIDED, slope_sign, volume_sign
+from renderer.numerics.simd import larger, local_doubles
+from renderer.numerics.vec3 import largest_component, largest_of_three, scale, sub
+from renderer.trace.edge_signs import corner
 from renderer.trace.starts.anchor import from_anchor
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
@@ -211,6 +219,7 @@ def _height(face, anchor):
         return 0
     if shared == 2:
         third = _third(a, b) if c == NONE else (_third(b, c) if a == NONE else _third(a, c))
+        # rule: start-on-edge
         if (anchor.zeros >> third) & 1 != 0:
             return 0
         p0, p1, p2 = face.corners

@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined
-from renderer.kernels.simd import address, at, float64_pointer, get, int32_pointer, pointer
-from renderer.kernels.vec3 import largest_component, row3, scale, three
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import address, at, float64_pointer, get, int32_pointer, pointer
+from renderer.numerics.vec3 import largest_component, row3, scale, three
 
 # The head of an array of starts, int64: the float64 of a row that each ray is after the one before, 0 where no ray
 # starts on the surface; and the addresses of the mesh's vertices and faces.

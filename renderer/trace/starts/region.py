@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs, dot_pairs, heads
-from renderer.kernels.vec3 import dot, normalized
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import as_pairs, dot_pairs, heads
+from renderer.numerics.vec3 import dot, normalized
 from renderer.trace.starts.cone import (
     FIRST_NODE,
     FREE,
@@ -218,6 +218,7 @@ def stopping_holder(tree, anchor, arcs, count, nodes, behind, d):
         last = holder(arcs, j, NUMBER)
         facing = -slope_of(cone_of(tree, anchor, arcs, j).face, d)
         for k in range(count):
+            # rule: bounds-one-side
             if (
                 facing != 0
                 and holder(arcs, k, NUMBER) == last
@@ -256,6 +257,7 @@ def _arc_ahead(tree, anchor, arcs, count, own, behind, d):
     for j in range(count):
         number = holder(arcs, j, NUMBER)
         sooner = best == NOT_STOPPED or _is_after(holder(arcs, best, NUMBER), number, behind.pile)
+        # rule: coincident-order
         if _is_after(number, behind.face, behind.pile) and sooner and coincide(tree, anchor, arcs, own, j):
             best = j
     return best

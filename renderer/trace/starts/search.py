@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.kernels.jit import inlined, kernel
-from renderer.kernels.pairs import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.kernels.simd import extract, get, larger, local_doubles, lowest_bit, pointer, put, smaller, splat8
-from renderer.kernels.vec3 import add, largest_component, sub
-from renderer.trace.doubt import settled
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
+from renderer.numerics.simd import extract, get, larger, local_doubles, lowest_bit, pointer, put, smaller, splat8
+from renderer.numerics.vec3 import add, largest_component, sub
+from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import (
     CORNER,
     Ray,
@@ -29,7 +29,7 @@ from renderer.trace.intersect import (
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import NO_FACE, blocks_of, is_better, octants_around, push_children, tree_pointers
-from renderer.trace.sides import corner
+from renderer.trace.resolve import settled
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
@@ -160,6 +160,7 @@ def depart(tree, starts, i, ray, stack, memory):
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
         dz, holders = make_shear(ray).direction_z, make_holders(memory)
         count = list_holders(tree, anchor, d, slope, dz, stack, holders)
+        # rule: side-of-start
         behind = Behind(
             start.face, 1 if start.code & ABOVE != 0 else -1, start.code & THROUGH != 0, np.int64(start.anchor[2]),
             start.code & BACK != 0, way_back(starts, i),
@@ -195,6 +196,7 @@ def near_bits(tree, block, departure, shear, seen):
 def meet_near(tree, place, departure, dz):
     """The hit (t, u, v, w) of a face that is met from the exact start, t = NaN for none, and its ``Meeting.zeros``."""
     met = meet_face(seen_from(tree, place, departure.anchor), departure.anchor, departure.d, departure.slope, dz)
+    # rule: met-once
     t = larger(met.t / departure.unit, _LEAST_T) if met.kind == IS_HIT else np.nan
     return (t, met.u, met.v, met.w), met.zeros
 
@@ -298,6 +300,7 @@ def take_side(tree, starts, n, stack, memory, table, room):
         return
     write_fan(tree, anchor, arcs, number, nodes, k, side, table, room)
     row = starts.rows
+    # rule: side-of-normal
     put(row, CODE, np.float64(start.code | KNOWN | BACK | (ABOVE if side > 0 else 0)))
     if holder(arcs, k, NUMBER) == start.face:
         return

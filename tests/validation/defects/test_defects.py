@@ -70,10 +70,10 @@ class TestSeam:
     def test_kernels_follow_though_the_cache_holds_sound_ones(self, tmp_path: Path) -> None:
         """The digest of ``shading`` and of what imports it changes; that of ``simd`` does not."""
         call = (
-            "from renderer.shade.shading import fresnel; from renderer.kernels.digest import source_digest\n"
+            "from renderer.shade.shading import fresnel; from renderer.jit.digest import source_digest\n"
             "from pathlib import Path; import json\n"
             "digests = [source_digest(Path('renderer').resolve() / f'{m}.py')"
-            " for m in ('shade/shading', 'shade/direct', 'kernels/simd')]\n"
+            " for m in ('shade/shading', 'shade/direct', 'numerics/simd')]\n"
             "print(json.dumps([fresnel(1.0, 1.0, 1.0, 1.5), *digests]))"
         )
         alter = (

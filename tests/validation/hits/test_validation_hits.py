@@ -89,6 +89,7 @@ def _swap_two_faces(octree: Octree) -> None:
     faces[[0, BLOCK_FACES * 40]] = faces[[BLOCK_FACES * 40, 0]]
 
 
+@pytest.mark.judges("Octree.tree")
 @pytest.mark.parametrize("change", [_drop_a_face, _scale_vertices, _swap_two_faces])
 def test_a_broken_octree_turns_a_gate_red(change: Callable[[Octree], None], monkeypatch: pytest.MonkeyPatch) -> None:
     broken(monkeypatch, change)

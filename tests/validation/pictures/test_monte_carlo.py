@@ -128,6 +128,7 @@ def test_a_sound_picture_passes_and_its_record_is_drawn() -> None:
     assert "1 / sqrt(N)" in page and "after" in page.lower() and "Left out" not in page
 
 
+@pytest.mark.judges("Scene.altered")
 @cases(
     ("ours", "red"),
     [

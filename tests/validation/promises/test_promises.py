@@ -10,11 +10,11 @@ import pytest
 from cases import cases
 
 from renderer import octree
-from renderer.inspect import tree_boxes
+from renderer.diagnostics import tree_boxes
 from renderer.mesh import ears, obj, polygons
 from renderer.octree import Octree
 from renderer.picture import image, pack, prepare
-from renderer.queries import Queries
+from renderer.queryable import Queries
 from renderer.scene import scene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.trace import hits
@@ -24,7 +24,6 @@ from validation.promises.hits import (
     alone,
     batches,
     bounds,
-    builds,
     counts,
     errors,
     files,
@@ -76,7 +75,6 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "batches": lambda: batches.check_batches((17, 1025)),
     "refits": batches.check_refits,
     "trees": lambda: trees.check_trees(np.random.default_rng(5)),
-    "builds": lambda: builds.check_builds(np.random.default_rng(5)),
     "outlines": lambda: outlines.check_outlines(np.random.default_rng(5), 1500),
     "openings": lambda: openings.check_openings(np.random.default_rng(5), 20),
     "cameras": lambda: cameras.check_cameras(np.random.default_rng(5), 20),
@@ -225,12 +223,6 @@ def test_a_depth_overstated_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     octree._built = octree.mesh, replace(octree.tree, depth=octree.tree.depth + 1)
     monkeypatch.setattr(trees, "_octrees", lambda rng: [octree])
     assert broken("trees") == {"the depth"}
-
-
-@pytest.mark.parametrize("changed", [{"split": "sah"}, {"leaf_size": 6}, {"max_depth": 3}])
-def test_a_build_of_another_rule_is_found(changed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(builds, "Octree", lambda *given, **options: Octree(*given, **{**options, **changed}))
-    assert broken("builds") == {"a tree", "leaves hold"}
 
 
 def test_fans_over_notches_are_found(monkeypatch: pytest.MonkeyPatch) -> None:

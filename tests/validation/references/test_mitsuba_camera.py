@@ -13,6 +13,7 @@ PERSPECTIVE = PerspectiveCamera(eye=(1.0, 2.0, 5.0), target=(0.2, 0.5, 0.0), fov
 ORTHOGRAPHIC = OrthographicCamera(type="orthographic", eye=(3.0, 4.0, 5.0), target=(0.0, 1.0, 0.0), height=4.0)
 
 
+@pytest.mark.judges("OrthographicCamera.rows", "PerspectiveCamera", "PerspectiveCamera.rows")
 @pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
 def test_our_rays_are_mitsubas(camera: PerspectiveCamera | OrthographicCamera) -> None:
     assert largest_distance(camera, 96) < CAMERA_PIXELS

@@ -8,8 +8,8 @@ import pytest
 from cases import cases
 
 from renderer import Octree
-from renderer.runs.chosen import Chosen
-from renderer.runs.study import Points
+from renderer.checkpoints.study import Points
+from renderer.checkpoints.study_points import Chosen
 from validation.job import Job
 from validation.report import page, studies_figures
 from validation.studies import bits, bodies, corners, forms, holds, section

@@ -1,4 +1,4 @@
-"""Seconds to build, up to the first query less the time of a warm one, and to refit where the octree can."""
+"""Seconds to build, up to the first query less the time of a warm one, and to refit the octree."""
 
 import statistics
 import time
@@ -21,9 +21,7 @@ def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) 
     step(f"{mesh.name}: builds")
     peers = [s for s in systems if s.times_build and s.name != ours.OURS and s.takes(len(mesh.faces))]
     contenders = ours.builds() + peers
-    calls = {system.name: _build_clock(system, mesh) for system in contenders}
-    if hasattr(Octree, "refit"):
-        calls[REFIT] = _refit_clock(mesh)
+    calls = {system.name: _build_clock(system, mesh) for system in contenders} | {REFIT: _refit_clock(mesh)}
     runs = _LARGE_RUNS if len(mesh.faces) > _LARGE else RUNS
     seconds = interleaved(calls, runs)
     own = f"{ours.OURS}_midpoint"
@@ -32,7 +30,7 @@ def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) 
         "faces": len(mesh.faces),
         "contenders": {n: {"seconds": s, "median": statistics.median(s)} for n, s in seconds.items()},
         "ratios": {name: ratio(s, seconds[own]) for name, s in seconds.items() if name != own},
-        "ratios_refit": {peer.name: ratio(seconds[peer.name], seconds[REFIT]) for peer in peers if REFIT in seconds},
+        "ratios_refit": {peer.name: ratio(seconds[peer.name], seconds[REFIT]) for peer in peers},
     }
 
 
@@ -52,7 +50,7 @@ def _build_clock(system: System, mesh: Mesh) -> Callable[[], float]:
 
 def _refit_clock(mesh: Mesh) -> Callable[[], float]:
     """An octree whose vertices move back and forth by a power of two, so that float32 holds both positions."""
-    octree: Any = Octree.from_mesh(mesh)
+    octree = Octree.from_mesh(mesh)
     places = [mesh.vertices * 0.5, mesh.vertices.copy()]
 
     def seconds() -> float:

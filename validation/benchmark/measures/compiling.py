@@ -42,7 +42,7 @@ def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
     """Seconds by stage, by kernel and in total of compiling ``what``; for a process that has compiled nothing."""
     from numba.core import compiler_machinery, lowering
 
-    from renderer.kernels import compiler
+    from renderer.jit import compiler
     from renderer.precompile import compile_ahead, compile_into
 
     stages, kernels = _Clocks(), _Clocks()

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from renderer.kernels.levels import AHEAD_VARIABLE
-from renderer.process import child
+from renderer.jit.levels import AHEAD_VARIABLE
+from renderer.system import child
 from validation.scenes import SCENES
 
 _RUNS = 3
@@ -81,7 +81,7 @@ def _one_round(cache: Path, ahead: Path) -> dict[str, float]:
 
 def _spend(command: list[str], **more: str) -> Spent:
     """Run a process as our child, so that the system counts it and its children."""
-    import resource  # only where ``supported``
+    import resource  # POSIX only, as ``measure`` asks
 
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     environment = child.environment(OCTREE_RENDERER_QUIET="1", **more)
@@ -93,7 +93,7 @@ def _spend(command: list[str], **more: str) -> Spent:
 
 def _kernels_ahead(folder: Path) -> tuple[str, Path]:
     """The level for which kernels are compiled ahead, and a folder of all kernels for it."""
-    from renderer.kernels.store import runnable_levels
+    from renderer.jit.cache import runnable_levels
 
     levels = runnable_levels()
     # Most machines of today have x86-64-v3; without it, the best level that this machine runs.
@@ -146,15 +146,13 @@ def trace() -> None:
     from renderer import Octree
     from validation.benchmark.measures.families import families
     from validation.benchmark.measures.meshes import displaced_spheres
+    from validation.timing import RUNS, median_seconds, timed
 
     octree, digest, found = Octree.from_mesh(displaced_spheres(100_000)), hashlib.sha256(), {}
     for family in families(octree, 200_000):
         if family.name in ("camera", "random"):
-            times = []
-            for _ in range(5):
-                began = time.perf_counter()
-                hits = octree.closest_hit(family.origins, family.directions)
-                times.append(time.perf_counter() - began)
-            found[family.name] = statistics.median(times)
+            ask = timed(octree.closest_hit, family.origins, family.directions)
+            found[family.name] = median_seconds({"": ask}, RUNS)[""]
+            hits = octree.closest_hit(family.origins, family.directions)
             digest.update(np.concatenate([hits.t, hits.face, hits.u, hits.v]).tobytes())
     print(json.dumps(found | {"digest": digest.hexdigest()}))

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from renderer.mesh.mesh import Mesh
-from renderer.process import child
+from renderer.system import child
 from validation.benchmark.measures.meshes import displaced_spheres
 from validation.benchmark.peers import ours
 from validation.benchmark.peers.contender import System
-from validation.benchmark.peers.systems import available
+from validation.benchmark.peers.systems import named
 
 _STATUS = Path("/proc/self/status")
 
@@ -94,4 +94,4 @@ def _bytes(field: str) -> int:
 
 def answer(name: str, folder: str) -> None:
     """Entry point of the child process of ``measure``: print one system's memory."""
-    print(json.dumps(grown(next(s for s in available()[0] if s.name == name), Path(folder))))
+    print(json.dumps(grown(named(name), Path(folder))))

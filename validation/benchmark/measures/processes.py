@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable
 from typing import Any
 
-from renderer.process import child
+from renderer.system import child
 from validation.scenes import SCENES
 from validation.timing import interleaved, timed
 

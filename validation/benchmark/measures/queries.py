@@ -12,7 +12,6 @@ from typing import Any
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.benchmark.measures.families import MISSES, families, points
-from validation.benchmark.measures.fit import log_fit
 from validation.benchmark.measures.kinds import FIRST, KINDS, Asked, Kind, briefly, title
 from validation.benchmark.measures.meshes import named
 from validation.benchmark.peers.contender import Peer, Query, System
@@ -125,19 +124,6 @@ def _efficiency(each: dict[str, list[float]], threads: int) -> float | None:
 def _answer(query: Query | None) -> Any:
     assert query is not None, "ours offers every query"
     return query.read(query.trace())
-
-
-def fits(rows: Sequence[dict[str, Any]], series: Sequence[str]) -> list[dict[str, Any]]:
-    """ns a ray = a log2 N + b over the meshes named in ``series``, for each family, query and contender."""
-    found = []
-    keys = dict.fromkeys((r["family"], r["query"], name) for r in rows for name in r["contenders"])
-    for family, kind, name in keys:
-        of = [r for r in rows if (r["family"], r["query"]) == (family, kind) and r["mesh"] in series]
-        of = [r for r in of if name in r["contenders"]]
-        fit = log_fit([r["faces"] for r in of], [r["contenders"][name]["ns"] for r in of])
-        if fit is not None:
-            found.append({"family": family, "query": kind, "contender": name} | fit._asdict())
-    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -6,27 +6,31 @@ some bits differ. Memory is measured in processes of their own. Ours has the tre
 """
 
 import argparse
+import itertools
 import json
 import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.cli.study import SPLIT
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.points.curve import order_along_curve
-from renderer.process import child
-from renderer.process.parallel import available_threads
+from renderer.ordering.morton import order_along_curve
 from renderer.studies import occlusion, tregenza
 from renderer.studies.directions import turned
-from renderer.study_command import SPLIT
+from renderer.system import child
+from renderer.system.threads import available_threads
 from validation.benchmark.measures.families import families
 from validation.benchmark.measures.forms import FORMS
 from validation.benchmark.measures.memory import most_resident, resident
+from validation.timing import RUNS, median_seconds, timed
 
 Floats = NDArray[np.float64]
 Test = Callable[[NDArray[np.float32]], NDArray[np.bool_]]
@@ -35,14 +39,51 @@ _SEED = 1
 _UP = np.array([0.0, 1.0, 0.0])
 # Points of one call of a peer: fewer take longer in Python, more do not stay in the caches. The best counts.
 _BATCHES = (300, 1000, 3000)
-_RUNS = 5
 # As a share of the width of a face: what moves a peer's rays off the surface.
 _EPSILON = 1e-4
 # Rays that are written down, for the rate of ``Octree.any_hit``.
 _WRITTEN = 16_000
+# Points of the rounds that are not timed.
+_WARM = 2_000
 # The kinds of mesh that studies are made for; their faces, and as many points, in full and in quick runs.
 KINDS = ("city", "terrain")
 SIZE, QUICK_SIZE = 1_000_000, 50_000
+
+
+class Views(NamedTuple):
+    """Points spread evenly over a mesh, which look in the directions of Tregenza's sky.
+
+    points, normals, faces   where, the normal there, and the face
+    directions               unit vectors
+    """
+
+    mesh: Mesh
+    points: Floats
+    normals: Floats
+    faces: NDArray[np.int64]
+    directions: Floats
+
+    def first(self, count: int) -> "Views":
+        """The same of the first points alone, for a round that is not timed."""
+        return self._replace(points=self.points[:count], normals=self.normals[:count], faces=self.faces[:count])
+
+    def above(self, rows: Any) -> NDArray[np.bool_]:
+        """Which directions are above the horizons of the points of some rows."""
+        up: NDArray[np.bool_] = self.normals[rows] @ self.directions.T > 0.0
+        return up
+
+    def hidden(self, octree: Octree, threads: int) -> NDArray[Any]:
+        """Ours: the bits of what is hidden from each point."""
+        return occlusion(octree, self.points, self.normals, self.directions, leaving=self.faces, packed=True,
+                         threads=threads)  # fmt: skip
+
+
+class PeerAnswer(NamedTuple):
+    """Seconds of a peer's bare calls and of all that its user does, and the bits of what is hidden."""
+
+    bare: float
+    whole: float
+    bits: NDArray[np.uint8]
 
 
 def run(quick: bool, step: Callable[[str], None]) -> list[dict[str, Any]]:
@@ -51,8 +92,8 @@ def run(quick: bool, step: Callable[[str], None]) -> list[dict[str, Any]]:
     return [measure(kind, size, size, available_threads(), step) for kind in KINDS]
 
 
-def scene(form: str, faces: int, count: int) -> tuple[Any, Floats, Floats, NDArray[np.int64], Floats]:
-    """Mesh, points spread evenly over its surface, their normals and faces, and the directions of the sky."""
+def views(form: str, faces: int, count: int) -> Views:
+    """Of ``count`` points on a mesh of a kind of ``FORMS``."""
     mesh, rng = FORMS[form](faces), np.random.default_rng(_SEED)
     corners = mesh.triangles
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
@@ -61,10 +102,10 @@ def scene(form: str, faces: int, count: int) -> tuple[Any, Floats, Floats, NDArr
     u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
     a, b, c = np.moveaxis(corners[on], 1, 0)
     points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-    return mesh, points, mesh.face_normals()[on], on, turned(tregenza().directions, _UP)
+    return Views(mesh, points, mesh.face_normals()[on], on, turned(tregenza().directions, _UP))
 
 
-def testers(mesh: Any, threads: int) -> dict[str, Test]:
+def testers(mesh: Mesh, threads: int) -> dict[str, Test]:
     """The any-hit queries of the peers that are installed: rays (n, 6) float32 to bools."""
     try:
         from validation.benchmark.peers.open3d import occlusion_test
@@ -73,17 +114,14 @@ def testers(mesh: Any, threads: int) -> dict[str, Test]:
     return {"open3d": occlusion_test(mesh.vertices, mesh.faces, threads)}
 
 
-def ask_peer(
-    test: Test, where: tuple[Floats, Floats, Floats], epsilon: float, batch: int, by_direction: bool
-) -> tuple[float, float, NDArray[np.uint8]]:
-    """Seconds of the bare calls and of all, and the bits of what is hidden; points in the order of a curve."""
-    points, normals, ways = where
-    bits, bare, began = np.zeros((len(points), -(-len(ways) // 8)), np.uint8), 0.0, time.perf_counter()
-    order = order_along_curve(points)[0]
-    single = ways.astype(np.float32)
-    for first in range(0, len(points), batch):
+def ask_peer(test: Test, of: Views, epsilon: float, batch: int, by_direction: bool) -> PeerAnswer:
+    """Ask for ``batch`` points a call, in the order of a curve; rays in the order of directions or of points."""
+    bits, bare, began = np.zeros((len(of.points), -(-len(of.directions) // 8)), np.uint8), 0.0, time.perf_counter()
+    order = order_along_curve(of.points)[0]
+    single = of.directions.astype(np.float32)
+    for first in range(0, len(of.points), batch):
         rows = order[first : first + batch]
-        start, up = (points[rows] + epsilon * normals[rows]).astype(np.float32), normals[rows] @ ways.T > 0.0
+        start, up = (of.points[rows] + epsilon * of.normals[rows]).astype(np.float32), of.above(rows)
         seen = up.T if by_direction else up
         rays = np.empty((*seen.shape, 6), np.float32)
         rays[..., :3] = start if by_direction else start[:, None]
@@ -96,77 +134,64 @@ def ask_peer(
         hidden[seen] = hit
         hidden = hidden.T if by_direction else hidden
         bits[rows] = np.packbits(hidden, axis=1)
-    return bare, time.perf_counter() - began, bits
+    return PeerAnswer(bare, time.perf_counter() - began, bits)
 
 
 def measure(form: str, faces: int, count: int, threads: int, step: Callable[[str], None]) -> dict[str, Any]:
     """One row: seconds of ours (the median) and of each peer (its best way), differing bits, rates and memory."""
-    mesh, points, normals, on, ways = scene(form, faces, count)
+    of = views(form, faces, count)
     step(f"{form}: octree")
-    octree, name = Octree.from_mesh(mesh, split=SPLIT, threads=threads), f"{form}, {len(mesh.faces)} faces"
-
-    def ours() -> NDArray[Any]:
-        return occlusion(octree, points, normals, ways, leaving=on, packed=True, threads=threads)
-
-    occlusion(octree, points[:2000], normals[:2000], ways, leaving=on[:2000], packed=True, threads=threads)
-    bits, times, peers = ours(), [], {}
-    tests, epsilon = testers(mesh, threads), _EPSILON * 2.0 / (faces / 12.0) ** 0.5
-    for label, test in tests.items():
-        ask_peer(test, (points[:2000], normals[:2000], ways), epsilon, 1000, True)
+    octree = Octree.from_mesh(of.mesh, split=SPLIT, threads=threads)
+    of.first(_WARM).hidden(octree, threads)
+    bits, ours, times, peers = of.hidden(octree, threads), timed(of.hidden, octree, threads), [], {}
+    for label, test in testers(of.mesh, threads).items():
+        ask_peer(test, of.first(_WARM), _off(faces), 1000, True)
         answers = {}
-        for batch in _BATCHES:
-            for by_direction in (True, False):
-                step(f"{form}: {label}, {batch} points a call, {'directions' if by_direction else 'points'} first")
-                answers[batch, by_direction] = ask_peer(test, (points, normals, ways), epsilon, batch, by_direction)
-                # In turn with the peer's, so that both see the same machine.
-                began = time.perf_counter()
-                ours()
-                times.append(time.perf_counter() - began)
-        way = min(answers, key=lambda key: answers[key][1])
+        for way in itertools.product(_BATCHES, (True, False)):
+            step(f"{form}: {label}, {way[0]} points a call, {'directions' if way[1] else 'points'} first")
+            answers[way] = ask_peer(test, of, _off(faces), *way)
+            # In turn with the peer's, so that both see the same machine.
+            times.append(ours())
+        best = min(answers, key=lambda way: answers[way].whole)
+        differing = np.unpackbits(bits ^ answers[best].bits, axis=1, count=len(of.directions))
         peers[label] = {
-            "bare": min(answer[0] for answer in answers.values()), "whole": answers[way][1],
-            "batch": way[0], "by_direction": way[1],
-            "differing": int(np.unpackbits(bits ^ answers[way][2], axis=1, count=len(ways)).sum()),
+            "bare": min(answer.bare for answer in answers.values()), "whole": answers[best].whole,
+            "batch": best[0], "by_direction": best[1], "differing": int(differing.sum()),
         }  # fmt: skip
-    while len(times) < _RUNS:
-        began = time.perf_counter()
-        ours()
-        times.append(time.perf_counter() - began)
-    live = int(sum((normals[a : a + 10_000] @ ways.T > 0.0).sum() for a in range(0, count, 10_000)))
+    times += [ours() for _ in range(len(times), RUNS)]
     step(f"{form}: memory")
     return {
-        "mesh": name, "points": count, "directions": len(ways), "rays": live, "threads": threads,
+        "mesh": f"{form}, {len(of.mesh.faces)} faces", "points": count, "directions": len(of.directions),
+        "rays": sum(int(of.above(slice(a, a + 10_000)).sum()) for a in range(0, count, 10_000)), "threads": threads,
         "seconds": statistics.median(times), "peers": peers,
-        "written": written(octree, (points, normals, ways), on), "shadow": shadow(octree, count),
-        "memory": memory(form, faces, count, threads), "array": 24 * count * len(ways),
+        "written": written(octree, of), "shadow": shadow(octree, count),
+        "memory": memory(form, faces, count, threads), "array": 24 * count * len(of.directions),
     }  # fmt: skip
 
 
-def written(octree: Octree, where: tuple[Floats, Floats, Floats], on: NDArray[np.int64]) -> float:
+def _off(faces: int) -> float:
+    """What moves a peer's rays off the surface: a share of the width of a face, of which twelve are a block."""
+    return _EPSILON * 2.0 / (faces / 12.0) ** 0.5
+
+
+def written(octree: Octree, of: Views) -> float:
     """Rays a second of ``Octree.any_hit`` with rays that are written down, direction by direction along the curve."""
-    points, normals, ways = where
-    order = order_along_curve(points)[0]
+    order = order_along_curve(of.points)[0]
     middle = order[len(order) // 2 :][:_WRITTEN]
-    direction, row = np.nonzero((normals[middle] @ ways.T > 0.0).T)
+    direction, row = np.nonzero(of.above(middle).T)
     rows = middle[row]
-    starts, toward, leaving = points[rows], ways[direction], on[rows]
-    times = []
-    for _ in range(_RUNS):
-        began = time.perf_counter()
-        octree.any_hit(starts, toward, leaving=leaving)
-        times.append(time.perf_counter() - began)
-    return len(rows) / statistics.median(times)
+    return _rate(partial(octree.any_hit, of.points[rows], of.directions[direction], leaving=of.faces[rows]), len(rows))
 
 
 def shadow(octree: Octree, count: int) -> float:
     """Shadow rays a second, of as many as points: from what a camera sees to one light, in the order of pixels."""
     family = families(octree, count)[1]
-    times = []
-    for _ in range(1 + _RUNS):
-        began = time.perf_counter()
-        octree.any_hit(family.origins, family.directions, t_max=family.t_max)
-        times.append(time.perf_counter() - began)
-    return count / statistics.median(times[1:])
+    return _rate(partial(octree.any_hit, family.origins, family.directions, t_max=family.t_max), count)
+
+
+def _rate(call: Callable[[], Any], rays: int) -> float:
+    """Rays a second of a call that asks so many."""
+    return rays / median_seconds({"": timed(call)}, RUNS)[""]
 
 
 def memory(form: str, faces: int, count: int, threads: int) -> int:
@@ -178,11 +203,11 @@ def memory(form: str, faces: int, count: int, threads: int) -> int:
 
 def grow(form: str, faces: str, count: str, threads: str) -> None:
     """Entry point of the child process of ``memory``: print the bytes."""
-    mesh, points, normals, on, ways = scene(form, int(faces), int(count))
-    octree = Octree.from_mesh(mesh, split=SPLIT)
-    occlusion(octree, points[:2000], normals[:2000], ways, leaving=on[:2000], packed=True, threads=int(threads))
+    of = views(form, int(faces), int(count))
+    octree = Octree.from_mesh(of.mesh, split=SPLIT)
+    of.first(_WARM).hidden(octree, int(threads))
     before = resident()
-    occlusion(octree, points, normals, ways, leaving=on, packed=True, threads=int(threads))
+    of.hidden(octree, int(threads))
     print(json.dumps(most_resident() - before))
 
 

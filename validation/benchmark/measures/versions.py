@@ -1,7 +1,7 @@
 """Two commits of the renderer beside each other: the same rays in turn, in a process each.
 
 ``python -m validation.benchmark.measures.versions BEFORE AFTER --mesh city_100k`` prints for each family the time
-before over the time after, and whether the answers have the same bits. The rows of ``history.toml`` come from it.
+before over the time after, and whether the answers have the same bits. The ratios of ``docs/history.md`` come from it.
 """
 
 import argparse

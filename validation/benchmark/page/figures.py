@@ -1,12 +1,10 @@
-"""The benchmark's curves, drawn from its record alone."""
+"""The benchmark's curves against the number of faces, drawn from its record alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from validation.benchmark.measures.fit import Fit
 from validation.benchmark.measures.kinds import title as title_of
-from validation.benchmark.peers.ours import OURS
-from validation.report.plots import PLAIN, Panel, Series, draw
+from validation.report.plots import Panel, Series, draw
 
 Record = Mapping[str, Any]
 # The memory of smaller meshes is a few pages of 4 kB, or none where the allocator had free ones.
@@ -14,80 +12,66 @@ _FEWEST_FACES = 5_000
 
 
 def query_figures(record: Record) -> list[dict[str, str]]:
-    """For each family and kind: rays or points a second, and nanoseconds for one with the fit through ours."""
-    keys = dict.fromkeys((r["family"], r["query"]) for r in record["queries"])
-    return [figure for key in keys if (figure := _query_figure(record, *key)) is not None]
-
-
-def _query_figure(record: Record, family: str, kind: str) -> dict[str, str] | None:
-    rows = _series(record, [r for r in record["queries"] if (r["family"], r["query"]) == (family, kind)])
-    if not rows:
-        return None
-    fit = next((f for f in record["fits"] if (f["family"], f["query"], f["contender"]) == (family, kind, OURS)), None)
-    ns = _curves(record, rows, lambda c: c["ns"], slow=False)
-    said = ""
-    if fit is not None:
-        x = [r["faces"] for r in rows]
-        curve = Fit(fit["a"], fit["b"], fit["residual"])
-        ns.append(Series("fit to ours", x, [curve.at(n) for n in x], PLAIN))
-        said = f" Ours: {curve.a:.1f} log2 N {curve.b:+.0f} ns, residual {curve.residual:.1f} ns."
-    panels = [Panel(_curves(record, rows, lambda c: c["mrays"], slow=True), "million a second"),
-              Panel(ns, "ns for one", linear=True)]  # fmt: skip
-    name = title_of(family, kind)
-    title = f"{name}: million a second, and below nanoseconds for one by the fast contenders, against faces.{said}"
-    return {"title": title, "svg": draw(panels, x_label="faces", title=name)}
+    """For each family and kind of query: rays or points a second."""
+    rows = _series(record, record["queries"])
+    found = []
+    for family, kind in dict.fromkeys((r["family"], r["query"]) for r in rows):
+        of = [r for r in rows if (r["family"], r["query"]) == (family, kind)]
+        curves = _curves(record, of, "contenders", lambda c, _: c["mrays"])
+        name = title_of(family, kind)
+        svg = draw([Panel(curves, "million a second")], x_label="faces", title=name)
+        found.append({"title": f"{name}: million a second against faces.", "svg": svg})
+    return found
 
 
 def build_figures(record: Record) -> list[dict[str, str]]:
     """Build time against faces, and memory a face."""
-    rows = _series(record, record["builds"])
-    names = dict.fromkeys(name for r in rows for name in r["contenders"])
-    seconds = [Series(_label(record, n), *_seconds(rows, n)) for n in names]
     found = []
-    if rows:
-        svg = draw([Panel(seconds, "seconds")], x_label="faces", title="Build time")
+    if rows := _series(record, record["builds"]):
+        curves = _curves(record, rows, "contenders", lambda c, _: c["median"])
+        svg = draw([Panel(curves, "seconds")], x_label="faces", title="Build time")
         title = "Seconds to build (to the first answered query, less a warm one) against faces."
         found.append({"title": title, "svg": svg})
-    rows = [r for r in _series(record, record["memory"]) if r["faces"] >= _FEWEST_FACES]
-    if rows:
-        found.append(_memory_figure(record, rows))
+    if rows := [r for r in _series(record, record["memory"]) if r["faces"] >= _FEWEST_FACES]:
+        rest = _curves(record, rows, "systems", lambda s, faces: s["rest"] / faces)
+        peak = _curves(record, rows, "systems", lambda s, faces: s["peak"] / faces)
+        panels = [Panel(rest, "bytes a face, rest", linear=True), Panel(peak, "bytes a face, peak", linear=True)]
+        svg = draw(panels, x_label="faces", title="Memory a face")
+        title = (
+            "Resident memory by which a fresh process grows, in bytes a face: at rest once built, below at its peak."
+        )
+        found.append({"title": title, "svg": svg})
     return found
 
 
-def _memory_figure(record: Record, rows: Sequence[Record]) -> dict[str, str]:
-    names = dict.fromkeys(name for r in rows for name in r["systems"])
-    panels = [
-        Panel(
-            [Series(_label(record, n), *_a_face(rows, n, key), _look(record, n)) for n in names],
-            f"bytes a face, {key}",
-            linear=True,
-        )
-        for key in ("rest", "peak")
-    ]
-    title = "Resident memory by which a fresh process grows, in bytes a face: at rest once built, below at its peak."
-    return {"title": title, "svg": draw(panels, x_label="faces", title="Memory a face")}
+def tree_figures(record: Record) -> list[dict[str, str]]:
+    """For each family of rays: time and bytes of trees with other options, against the time to build them."""
+    of = record["trees"]
+    points = {p["name"]: p for p in of["points"]}
+    rows = {sweep: [points[name] for name in names] for sweep, names in of["sweeps"].items()}
+    seconds = {sweep: [p["build_seconds"] for p in row] for sweep, row in rows.items()}
+    found = []
+    for family, names in of["fronts"].items():
+        panels = [
+            Panel(
+                [Series(k, seconds[k], [p["ns_per_ray"][family] for p in row]) for k, row in rows.items()], "ns a ray"
+            ),
+            Panel([Series(k, seconds[k], [p["bytes"] for p in row]) for k, row in rows.items()], "bytes"),
+        ]
+        name = f"Options of the tree, {family} rays"
+        title = f"{name}: nanoseconds a ray and bytes against seconds to build. On the front: {'; '.join(names)}."
+        found.append({"title": title, "svg": draw(panels, x_label="build, seconds", title=name)})
+    return found
 
 
-def _a_face(rows: Sequence[Record], name: str, key: str) -> tuple[list[float], list[float | None]]:
-    of = [r for r in rows if name in r["systems"]]
-    return [r["faces"] for r in of], [r["systems"][name][key] / r["faces"] for r in of]
-
-
-def _curves(record: Record, rows: Sequence[Record], value: Any, slow: bool) -> list[Series]:
-    """One curve a contender; ``slow`` says whether those with fewer rays are shown too."""
-    names = dict.fromkeys(name for r in rows for name in r["contenders"])
-    shown = [n for n in names if slow or record["systems"][n]["most_rays"] is None]
+def _curves(record: Record, rows: Sequence[Record], key: str, value: Callable[[Record, int], float]) -> list[Series]:
+    """One curve for each contender under ``key`` of the rows: ``value`` of its entry and the number of faces."""
     curves = []
-    for name in shown:
-        of = [r for r in rows if name in r["contenders"]]
-        y = [value(r["contenders"][name]) for r in of]
+    for name in dict.fromkeys(name for r in rows for name in r[key]):
+        of = [r for r in rows if name in r[key]]
+        y = [value(r[key][name], r["faces"]) for r in of]
         curves.append(Series(_label(record, name), [r["faces"] for r in of], y, _look(record, name)))
     return curves
-
-
-def _seconds(rows: Sequence[Record], name: str) -> tuple[list[float], list[float | None]]:
-    of = [r for r in rows if name in r["contenders"]]
-    return [r["faces"] for r in of], [r["contenders"][name]["median"] for r in of]
 
 
 def _series(record: Record, rows: Sequence[Record]) -> list[Record]:

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from validation.benchmark.measures import calls
-from validation.benchmark.measures.builds import REFIT
 from validation.benchmark.measures.kinds import FIRST, KINDS, title
 from validation.benchmark.peers.ours import OURS
 
@@ -119,8 +118,7 @@ def first_hits(record: Record) -> dict[str, Any]:
 def others(record: Record) -> dict[str, Any]:
     """Build, refit and memory in the same form: ``columns`` are what, and by whom; ``rows`` have a cell for each."""
     builds, memory = ({row["mesh"]: row for row in record[key]} for key in ("builds", "memory"))
-    has_refit = any(REFIT in row["contenders"] for row in record["builds"])
-    what = ("build", *(("refit",) if has_refit else ()), "memory at rest")
+    what = ("build", "refit", "memory at rest")
     rows = []
     for mesh, faces in _meshes(record, record["builds"]):
         found = {"build": builds[mesh]["ratios"], "refit": builds[mesh]["ratios_refit"],

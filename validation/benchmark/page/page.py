@@ -1,15 +1,13 @@
-"""The benchmark's page and its table of ratios on the terminal, from the record and the history."""
+"""The benchmark's page and its table of ratios on the terminal, from the record alone."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
-from validation.benchmark.limits import roofline
-from validation.benchmark.measures.kinds import DIGITS, FIRST, KINDS, title
-from validation.benchmark.page import bounds, figures, heat, pareto
-from validation.benchmark.page.history import Idea
+from validation.benchmark.measures.kinds import DIGITS, FIRST, KINDS
+from validation.benchmark.page import figures, heat
 from validation.benchmark.peers.ours import OURS, OURS_ONE
 from validation.report.page import number
 
@@ -19,25 +17,19 @@ BUSY = 0.5
 _TEMPLATES = Path(__file__).resolve().parents[2] / "report" / "templates"
 
 
-def html(record: Mapping[str, Any], ideas: Sequence[Idea] = ()) -> str:
-    """The page: tables and figures in light and dark; ``ideas`` are those of ``history``."""
+def html(record: Mapping[str, Any]) -> str:
+    """The page: tables and figures in light and dark."""
     plots = {
         "query_figures": figures.query_figures(record),
         "build_figures": figures.build_figures(record),
-        "parameter_figures": pareto.figures(record["knobs"]) if record["knobs"] else [],
+        "tree_figures": figures.tree_figures(record),
     }
     shown: dict[str, Any] = dict(zip(("rays", "others"), _tables(record), strict=True))
     shown |= {"heat": {"shades": heat.SHADES, "legend": heat.legend(), "least": heat.MEAN_FACES,
                        "first": heat.first_hits(record), "summary": heat.summary(record),
                        "others": heat.others(record), "few": heat.few(record)}}  # fmt: skip
-    shown |= {"limits": {"rows": bounds.rows(record), "bytes": roofline.RAY_BYTES, "threads": roofline.THREADS}}
-    shown |= {"said": {name: kind.said for name, kind in KINDS.items()}, "digits": DIGITS} | _by_fate(ideas)
+    shown |= {"said": {name: kind.said for name, kind in KINDS.items()}, "digits": DIGITS}
     return _template("benchmark.html").render(m=record, ours=OURS, busy=BUSY, **shown, **plots)
-
-
-def ideas_tables(ideas: Sequence[Idea]) -> str:
-    """The page's tables of ideas, kept and dropped, alone."""
-    return _template("benchmark_ideas.html").render(_by_fate(ideas))
 
 
 def ratios(record: Mapping[str, Any]) -> str:
@@ -51,10 +43,6 @@ def _template(name: str) -> Template:
     )
     environment.filters |= {"number": number, "ratio": heat.text}
     return environment.get_template(name)
-
-
-def _by_fate(ideas: Sequence[Idea]) -> dict[str, list[Idea]]:
-    return {"kept": [i for i in ideas if i.kept], "dropped": [i for i in ideas if not i.kept]}
 
 
 def _tables(record: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -89,10 +77,6 @@ def _lines(record: Mapping[str, Any]) -> Iterator[str]:
     frame = record["frames"]
     found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in frame["ratios"].items())
     yield f"frame {frame['size']} x {frame['size']}, peer's seconds over ours: {found}"
-    for fit in record["fits"]:
-        if fit["contender"] == OURS:
-            yield (f"{title(fit['family'], fit['query'])}: {fit['a']:.2f} log2 N {fit['b']:+.1f} ns, "
-                   f"residual {fit['residual']:.2f} ns")  # fmt: skip
     for t in record["targets"]:
         verdict = {None: "not measured", True: "met", False: "NOT met"}[t["met"]]
         measured = _times(t["measured"]) + ("" if t["mean"] is None else f", mean {t['mean']:.2f},")

@@ -1,4 +1,4 @@
-"""The record of a run, ``benchmark.json``: its keys, reading and writing. The page is drawn from it and ``history``.
+"""The record of a run, ``benchmark.json``: its keys, reading and writing. The page is drawn from it alone.
 
 schema            SCHEMA; another number is refused
 command, date, commit, quick, seconds      how the record was made; commit is null outside a git checkout
@@ -23,7 +23,6 @@ queries[]         one a mesh, family and kind of query
   ratios_one_thread by peer that has one thread: its time over ours_one_thread
   efficiency        of first hits: the time of one thread of ours over twice that of two; null for other queries and
                     on one processor
-fits[]            family, query, contender, and a, b, residual of ns = a log2 N + b
 drop_in[]         call, faces, rays; seconds a ray by contender (all runs), ratios: theirs over the drop-in's
 calls[]           rays; micros a call by contender (all runs), median; ratios by peer: its time over ours with all
                   threads, and over ours_one_thread where it has one
@@ -37,10 +36,9 @@ frames            scene, size, max_depth, faces, labels, contenders, ratios, ray
                   mean_error, pixel_share against ours
 processes         by name: command, seconds, median
 first_answers     level, for which kernels were compiled ahead; rows by name: unit, values, median; null where not run
-ablation, knobs   see ``ablation.run`` and ``study.run``; null where not run
-limits            caches: bytes and ways of the data caches, and told: whether the system told them
-  rates           what ``limits.machine.rates`` measured
-  rows[]          mesh, faces, family; ours, embree: counts a ray, see ``limits.counts.counted``
+trees             faces, rays (one thread); differing_rays: with other bits than the default tree's, of all trees
+  points[]        name, build_seconds, bytes, ns_per_ray (by family), differing_rays
+  sweeps, fronts  names of points: by option, in its order; by family, those that none beats in build and rays
 targets[]         see ``targets.Target``; met and aimed are null where nothing was measured
 heat map          is none of the keys: ``heat`` takes it from queries, builds, memory and calls
 """
@@ -53,15 +51,15 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from renderer.process.files import write_atomically
+from renderer.system.files import write_atomically
 from validation import environment
 from validation.benchmark.peers.contender import System
 
-SCHEMA = 7
+SCHEMA = 8
 KEYS = (
     "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series",
-    "kinds", "open_edges", "queries", "fits", "drop_in", "calls", "studies", "builds", "memory", "frames", "processes",
-    "first_answers", "ablation", "knobs", "limits", "targets",
+    "kinds", "open_edges", "queries", "drop_in", "calls", "studies", "builds", "memory", "frames", "processes",
+    "first_answers", "trees", "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 

@@ -11,7 +11,7 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.process.parallel import available_threads
+from renderer.system.threads import available_threads
 from validation.benchmark.peers.contender import Faces, Floats, Peer, Points, Query, System
 
 

@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from renderer.process.parallel import available_threads
+from renderer.system.threads import available_threads
 from validation.benchmark.peers.contender import Faces, Family, Floats, Peer, Query, System
 from validation.benchmark.peers.mitsuba_variant import LLVM, SCALAR, libllvm_path, using
 

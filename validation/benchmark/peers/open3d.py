@@ -7,7 +7,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from renderer.process.parallel import available_threads
+from renderer.system.threads import available_threads
 from validation.benchmark.peers.contender import Faces, Family, Floats, HitLists, Peer, Points, Query, System
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.process.parallel import available_threads
+from renderer.system.threads import available_threads
 from renderer.tree.build import SPLITS
 from validation.benchmark.peers.contender import Faces, Family, Floats, HitLists, Peer, Points, Query, System
 

@@ -1,5 +1,6 @@
 """The installed contenders, and how to install the others."""
 
+from collections.abc import Iterator
 from importlib import import_module
 
 from validation.benchmark.peers import libllvm, ours
@@ -18,12 +19,25 @@ _PEERS = {
 
 def available() -> tuple[list[System], dict[str, str]]:
     """Ours and every peer that can be imported; and by name how to install the others."""
-    found, missing = ours.systems(), {}
-    for name, (module, how) in _PEERS.items():
-        try:
-            found += import_module(f"validation.benchmark.peers.{module}").systems()
-        except ImportError:
-            missing[name] = how
+    missing: dict[str, str] = {}
+    found = list(_installed(missing))
     if not any(system.name == "mitsuba_llvm" for system in found):
         missing["mitsuba_llvm"] = libllvm.HOW
     return found, missing
+
+
+def named(name: str) -> System:
+    """One contender that can be imported, without importing those that come after it."""
+    return next(system for system in _installed({}) if system.name == name)
+
+
+def _installed(missing: dict[str, str]) -> Iterator[System]:
+    """Ours, then those of each peer as it is imported; ``missing`` gets how to install the others."""
+    yield from ours.systems()
+    for name, (module, how) in _PEERS.items():
+        try:
+            peer = import_module(f"validation.benchmark.peers.{module}")
+        except ImportError:
+            missing[name] = how
+        else:
+            yield from peer.systems()

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.inspect.ray_step import steps_of
+from renderer.diagnostics.ray_step import steps_of
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.material import Material, Mirror
 from renderer.scene.scene import Scene

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.inspect.ray_step import Aim, Met, Ray, Steps
+from renderer.diagnostics.ray_step import Aim, Met, Ray, Steps
 from renderer.shade.records import DIELECTRIC, KIND, TRANSMITTANCE
 from renderer.trace.batch import check_rays
-from renderer.trace.query import closest_hits
+from renderer.trace.closest import closest_hits
 from renderer.trace.starts.level import Spot
 from validation.references.ray_tree import Node, Shadow, Vector
 

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.inspect.ray_step import steps_of
+from renderer.diagnostics.ray_step import steps_of
 from renderer.picture.image import Image
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import primary_rays

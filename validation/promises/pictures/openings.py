@@ -7,8 +7,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from renderer.inspect.tree_boxes import Visit, boxes_at, visited
-from renderer.inspect.tree_boxes import levels as count_levels
+from renderer.diagnostics.tree_boxes import Visit, boxes_at, visited
+from renderer.diagnostics.tree_boxes import levels as count_levels
 from renderer.octree import Octree
 from validation.promises import levels
 from validation.promises.row import row

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from renderer.inside.moments import moments_of
 from renderer.inside.multipoles import COEFFICIENTS, RADIUS, SIZE, SPREAD, see_octants, sum_lanes
-from renderer.kernels.jit import kernel
-from renderer.kernels.simd import pointer
+from renderer.jit.decorators import kernel
 from renderer.mesh.mesh import Mesh
+from renderer.numerics.simd import pointer
 from renderer.octree import Octree
-from renderer.points.point import Point
+from renderer.trace.point import Point
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 
 from renderer import CutWarning, Mesh, OrthographicCamera, PerspectiveCamera, Phong, SceneError, render
-from renderer.limits import FARTHEST
+from renderer.arguments.limits import FARTHEST
 from renderer.mesh.shapes import icosphere
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.scenes import close, eye_at, quad, scene_of

@@ -21,7 +21,7 @@ from renderer import (
     prepare,
     render,
 )
-from renderer.inspect.ray_step import Aim, Ray, Steps
+from renderer.diagnostics.ray_step import Aim, Ray, Steps
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.scene.scene import Floor, RenderSettings
 from validation.pictures.explain.pixels import Explainer

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from renderer import Dielectric, PerspectiveCamera, Phong, Scene, SceneObject, prepare, render
-from renderer.inspect.ray_step import Steps
+from renderer.diagnostics.ray_step import Steps
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from validation.pictures.explain import media
@@ -45,6 +45,7 @@ def judged(scene: Scene) -> list[Any]:
     return MediaJudge(prepare(scene), SIZE).judge(stack, pixels)
 
 
+@pytest.mark.judges("render")
 @pytest.mark.parametrize("why", SCENES)
 def test_geometry_says_why_the_rules_differ(why: str) -> None:
     found = judged(SCENES[why])

@@ -1,0 +1,1 @@
+"""All hits of rays, in compressed rows."""

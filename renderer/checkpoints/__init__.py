@@ -1,0 +1,1 @@
+"""Long studies and pictures, kept on disk part by part."""

@@ -1,0 +1,207 @@
+"""The parts of a long run on disk: what is done stays done when the run is killed, and is not done again.
+
+A folder beside the result has ``manifest.json``, which says what is computed of what, and a file for each part that is
+done: its rows as they are in memory, and behind them the SHA-256 of the manifest, the part's number and the rows. Each
+file is written beside and renamed, so a part is whole or absent; one that a disk has spoilt counts as absent, and so
+does one of another run, left where the removal of its folder was cut short. The result is made of all parts, and the
+folder removed.
+
+A part's rows need not follow each other in the result: an order says which row each place of the parts is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.system.files import write_atomically
+
+_MANIFEST = "manifest.json"
+_DIGEST_BYTES = 32
+# Of a result that is written at once, where its rows are not in the order of the parts.
+_MOST_BYTES = 1 << 26
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run computes, in parts.
+
+    rows       of the result, one a point of a study, or a row of pixels
+    size       rows of a part; the last may have fewer
+    width      values of a row; 0: the result has one dimension
+    dtype      of the values, as NumPy spells it
+    made_of    all that the values depend on: numbers, texts, and digests of arrays
+    """
+
+    rows: int
+    size: int
+    width: int
+    dtype: str
+    made_of: Mapping[str, Any]
+
+    @property
+    def parts(self) -> int:
+        """How many there are; one without rows where the result has none."""
+        return max(1, -(-self.rows // self.size))
+
+    def span(self, part: int) -> tuple[int, int]:
+        """The places of a part: begin and end."""
+        return part * self.size, min(self.rows, (part + 1) * self.size)
+
+    def shape(self, rows: int) -> tuple[int, ...]:
+        """The shape of so many rows."""
+        return (rows, self.width) if self.width else (rows,)
+
+
+class Parts:
+    """The folder of a run under way."""
+
+    def __init__(self, folder: Path, plan: Plan, order: NDArray[np.int64] | None = None) -> None:
+        """Begin it, or go on where an earlier run of the same plan was killed.
+
+        order  (rows,) the row of the result at each place of the parts, each row once; None: as they are. The plan's
+               ``made_of`` must tell two orders apart
+
+        Raises ``ValueError`` where the folder is of another plan, and says what differs.
+        """
+        self.folder, self.plan, self.order = folder, plan, order
+        self._manifest = json.dumps(asdict(plan), indent=1, sort_keys=True).encode()
+        path = folder / _MANIFEST
+        if not path.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            write_atomically(path, lambda file: file.write(self._manifest))
+            return
+        differing = _differing(_read_manifest(path), json.loads(self._manifest))
+        if differing:
+            raise ValueError(
+                f"{folder}: expected the parts of this run, got those of another, whose {', '.join(differing)} "
+                "differ; remove the folder to begin anew"
+            )
+
+    def missing(self) -> list[int]:
+        """The parts that are still to be computed."""
+        return [part for part in range(self.plan.parts) if self._read(part) is None]
+
+    def rows(self, part: int) -> slice | NDArray[np.int64]:
+        """The rows of the result that a part has."""
+        here = slice(*self.plan.span(part))
+        return here if self.order is None else self.order[here]
+
+    def write(self, part: int, values: NDArray[Any]) -> None:
+        """Keep a part; of the shape and type of the plan."""
+        begin, end = self.plan.span(part)
+        assert values.shape == self.plan.shape(end - begin) and values.dtype == self.plan.dtype
+        content = np.ascontiguousarray(values).tobytes()
+        write_atomically(self._path(part), lambda file: file.write(content + self._digest(part, content)))
+
+    def read(self, part: int) -> NDArray[Any]:
+        """The values of a part. Raises ``OSError`` where it is absent."""
+        begin, end = self.plan.span(part)
+        return np.frombuffer(self._whole(part), self.plan.dtype).reshape(self.plan.shape(end - begin))
+
+    def join(self, path: Path) -> None:
+        """Write the result as ``.npy``, some of it at a time. Raises ``OSError`` where a part is absent."""
+        write_atomically(path, self._join)
+
+    def joined(self) -> NDArray[Any]:
+        """The result in memory."""
+        values = np.empty(self.plan.shape(self.plan.rows), self.plan.dtype)
+        for part in range(self.plan.parts):
+            values[self.rows(part)] = self.read(part)
+        return values
+
+    def count(self, value: float) -> int:
+        """How many values of all parts are this one."""
+        return sum(int(np.count_nonzero(self.read(part) == value)) for part in range(self.plan.parts))
+
+    def remove(self) -> None:
+        """Remove the folder."""
+        remove_parts(self.folder)
+
+    def _join(self, file: BinaryIO) -> None:
+        header = {"descr": np.dtype(self.plan.dtype).str, "fortran_order": False,
+                  "shape": self.plan.shape(self.plan.rows)}  # fmt: skip
+        np.lib.format.write_array_header_1_0(file, header)
+        blocks = map(self.read, range(self.plan.parts)) if self.order is None else self._reordered(self.order)
+        for values in blocks:
+            file.write(values.tobytes())
+
+    def _reordered(self, order: NDArray[np.int64]) -> Iterator[NDArray[Any]]:
+        """The result's rows, as many at a time as are little memory; parts are read again for each."""
+        row = max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
+        most = max(1, _MOST_BYTES // row)
+        for first in range(0, self.plan.rows, most):
+            values = np.empty(self.plan.shape(min(most, self.plan.rows - first)), self.plan.dtype)
+            for part in range(self.plan.parts):
+                rows = order[slice(*self.plan.span(part))] - first
+                here = (rows >= 0) & (rows < len(values))
+                if here.any():
+                    values[rows[here]] = self.read(part)[here]
+            yield values
+
+    def _whole(self, part: int) -> bytes:
+        content = self._read(part)
+        if content is None:
+            raise OSError(f"{self._path(part)}: expected a part of the run, got none that is whole")
+        return content
+
+    def _read(self, part: int) -> bytes | None:
+        """A part's values, None where it is absent or not what was written."""
+        try:
+            content = self._path(part).read_bytes()
+        except FileNotFoundError:
+            return None
+        begin, end = self.plan.span(part)
+        values, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
+        size = (end - begin) * max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
+        return values if len(values) == size and self._digest(part, values) == digest else None
+
+    def _digest(self, part: int, values: bytes) -> bytes:
+        found = hashlib.sha256(self._manifest)
+        found.update(f"{part};".encode())
+        found.update(values)
+        return found.digest()
+
+    def _path(self, part: int) -> Path:
+        return self.folder / f"{part:08d}.part"
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove the folder of a run, or what is left of it."""
+    with suppress(FileNotFoundError):
+        shutil.rmtree(folder)
+
+
+def digest_of(*arrays: NDArray[Any]) -> str:
+    """A digest of arrays: of their shapes, types and bytes."""
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(f"{array.shape} {array.dtype.str};".encode())
+        found.update(np.ascontiguousarray(array).data)
+    return found.hexdigest()
+
+
+def _read_manifest(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, UnicodeDecodeError):
+        found = None
+    if not isinstance(found, dict):
+        raise ValueError(f"{path}: expected the manifest of a run, got something else; remove its folder")
+    return found
+
+
+def _differing(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """The names of what is not the same in two manifests, those of ``made_of`` by their own names."""
+    flat = [dict(m) | (m["made_of"] if isinstance(m.get("made_of"), dict) else {}) for m in (stored, wanted)]
+    names = [n for n in sorted(flat[0].keys() | flat[1].keys()) if n != "made_of"]
+    return [n.replace("_", " ") for n in names if flat[0].get(n) != flat[1].get(n)]

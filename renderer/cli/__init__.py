@@ -1,0 +1,1 @@
+"""The commands ``octree-render`` and ``octree-validate``."""

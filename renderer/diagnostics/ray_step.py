@@ -1,0 +1,207 @@
+"""One step of Whitted's recursion by the kernel's own functions: what a ray meets, and the rays that leave there.
+
+The rays have the bits of those of a picture under the same rules.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.numerics.vec3 import add, dot, normalized, scale, times
+from renderer.picture.pack import media_around
+from renderer.picture.prepare import MediaRule, PreparedScene, arrays_for, media_limit
+from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at, surface_together_of, together_of
+from renderer.shade.lights import aim_from
+from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG
+from renderer.shade.shading import reflect
+from renderer.shade.surface import SceneArrays, Surface, phong_of, surface_of
+from renderer.shade.whitted import passes_light_of, refract_from
+from renderer.trace.batch import check_rays, make_starts
+from renderer.trace.closest import closest_hits
+from renderer.trace.hits import Hits
+from renderer.trace.single import stack_size
+from renderer.trace.spawn import BOUNDED, OffsetRule, Place, spawn_origin, start_row
+from renderer.trace.starts.cone import HOLDERS_WORDS
+from renderer.trace.starts.level import Spot
+from renderer.trace.starts.record import HEAD, ROW
+
+Vector = tuple[float, float, float]
+Floats = NDArray[np.float64]
+Kind = Literal["camera", "reflected", "refracted"]
+# The start of a ray that starts on no surface.
+_NO_START = np.empty(0)
+
+
+class Ray(NamedTuple):
+    """A ray to be traced, in a unit direction; the pixel receives ``weight`` of what comes along it.
+
+    depth  bounces before it
+    media  rows of the materials that it is in, outermost first
+    start  its row of ``starts.record``, empty where it starts on no surface
+    """
+
+    kind: Kind
+    depth: int
+    origin: Vector
+    direction: Vector
+    weight: Vector
+    media: tuple[int, ...]
+    start: Floats
+
+
+class Met(NamedTuple):
+    """What a ray met: t, the faces that are crossed together, the place where they are seen, the surface there, the
+    normal that faces the ray, and the material's row with its columns; and where light passes, the change of media and
+    those beyond.
+    """
+
+    t: float
+    together: Together
+    place: Place
+    surface: Surface
+    n: Vector
+    inside: bool
+    row: int
+    material: Floats
+    change: Change
+    beyond: tuple[int, ...]
+
+
+class Aim(NamedTuple):
+    """A shadow ray to a light, its end if nothing hides the light, and the radiance that it then adds to the pixel."""
+
+    light: int
+    origin: Vector
+    direction: Vector
+    t_max: float
+    end: Vector
+    radiance: Vector
+    start: Floats
+
+
+@dataclass(frozen=True)
+class Steps:
+    """A prepared scene under rules for offsets and media: make one with ``steps_of``."""
+
+    prepared: PreparedScene
+    arrays: SceneArrays
+    offset: OffsetRule
+    media: int
+
+    def camera_ray(self, origin: Vector, direction: Vector) -> Ray:
+        """The ray from the eye, in the media there."""
+        return Ray("camera", 0, origin, normalized(direction), (1.0, 1.0, 1.0), self._media_at(origin), _NO_START)
+
+    def meet(self, ray: Ray) -> Met | None:
+        """The nearest surface that the ray meets."""
+        hits = self.closest(ray.origin, ray.direction, np.inf, ray.start)
+        if not hits.hit[0]:
+            return None
+        return self.meet_at(ray, Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0])), float(hits.t[0]))
+
+    def meet_at(self, ray: Ray, spot: Spot, t: float) -> Met:
+        """What the ray meets at t, where it hits a face at barycentrics."""
+        d, arrays, tree = ray.direction, self.arrays, self.prepared.tree
+        stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
+        together = together_of(tree.words, arrays, spot, d, stack, memory)
+        surface = Surface(*surface_together_of(arrays, together, d))
+        inside, row = dot(d, surface.n_s) > 0.0, int(surface.material)
+        media, beyond = np.array(ray.media, np.int64), np.zeros(self.media + SPARE, np.int64)
+        change = Change(1.0, 1.0, 0)
+        if passes_light_of(arrays, row):
+            change = change_of(arrays, together, row, inside, media, beyond, memory)
+        n, columns = scale(surface.n_s, -1.0) if inside else surface.n_s, arrays.materials[row // MATERIAL_COLUMNS]
+        place = place_at(Spot(*together.near), surface, d)
+        left = tuple(beyond[: change.left].tolist())
+        return Met(t, together, place, surface, n, inside, row, columns, change, left)
+
+    def background(self, ray: Ray) -> Vector:
+        """What the pixel receives of a ray that meets nothing."""
+        return times(ray.weight, color_at(self.arrays.colors[1], 0))
+
+    def ambient(self, ray: Ray, met: Met) -> Vector:
+        """What the pixel receives of the ambient light on a surface."""
+        return times(ray.weight, times(color_at(met.material, AMBIENT), color_at(self.arrays.colors[0], 0)))
+
+    def aims(self, ray: Ray, met: Met) -> list[Aim]:
+        """The shadow rays to the lights that the surface faces."""
+        if met.material[KIND] not in (PHONG, LAMBERT):
+            return []
+        aims = []
+        for light in range(len(self.arrays.lights)):
+            seen, (o, way, t_max) = aim_from(self.arrays, met.surface, met.n, light, self.offset)
+            if not seen.faces:
+                continue
+            end = self.beyond(o, way) if seen.directional else seen.place
+            share = phong_of(self.arrays, met.row, met.n, ray.direction, seen.towards)
+            radiance = times(ray.weight, times(share, seen.arriving))
+            start = self._start(met.place, met.surface.n_g, way, ray.direction)
+            aims.append(Aim(light, o, way, float(t_max), end, radiance, start))
+        return aims
+
+    def bounce(self, ray: Ray, met: Met) -> list[Ray]:
+        """The rays that leave the surface: the reflected one, then the refracted one where light passes."""
+        change, m, d = met.change, met.row, ray.direction
+        through, passes, k_r, k_t = refract_from(self.arrays, m, d, met.n, change.n1, change.n2)
+        mirrored, weight = reflect(d, met.n), times(ray.weight, k_r)
+        children = [self._child("reflected", ray, met.surface, met.place, mirrored, weight, ray.media)]
+        if passes_light_of(self.arrays, m) and passes:
+            last, surface, place = Spot(*met.together.far), met.surface, met.place
+            if last.face != int(met.place.face):
+                surface = surface_of(self.arrays, *last, d)
+                place = place_at(last, surface, d)
+            children.append(self._child("refracted", ray, surface, place, through, times(ray.weight, k_t), met.beyond))
+        return children
+
+    def closest(self, origin: Vector, direction: Vector, t_max: float, start: Floats) -> Hits:
+        """The closest hit of one ray as a picture traces it."""
+        rays, _ = check_rays([origin], [direction], 0.0, [t_max])
+        if len(start):
+            starts = make_starts(1, self.prepared.mesh)
+            starts[HEAD:].view(np.float64)[:] = start
+            rays = rays._replace(starts=starts)
+        return closest_hits(self.prepared.tree, rays, self.prepared.mesh, 1)
+
+    def beyond(self, origin: Vector, direction: Vector) -> Vector:
+        """The point in unit ``direction`` at which the sphere around all faces is left behind for certain."""
+        mesh = self.prepared.mesh
+        lower, upper = mesh.bounds if len(mesh.faces) else (np.zeros(3), np.ones(3))
+        reach = np.linalg.norm(origin - (lower + upper) / 2.0) + np.linalg.norm(upper - lower) / 2.0
+        return add(origin, scale(direction, float(reach)))
+
+    def _media_at(self, eye: Vector) -> tuple[int, ...]:
+        """The media around the eye, as pictures have them for a camera there."""
+        if not self.media:
+            return ()
+        scene = self.prepared.scene
+        return tuple(media_around(scene, scene.camera.model_copy(update={"eye": eye})).tolist())
+
+    def _start(self, place: Place, n_g: Vector, direction: Vector, came: Vector) -> Floats:
+        """The row of the start of a ray that leaves a surface of normal n_g, where one in direction ``came`` ended."""
+        if not self.offset.bounded:
+            return _NO_START
+        row = np.empty(ROW)
+        start_row(row, place, n_g, direction, came)
+        return row
+
+    def _child(
+        self, kind: Kind, ray: Ray, surface: Surface, place: Place, direction: Vector, weight: Vector,
+        media: tuple[int, ...],
+    ) -> Ray:  # fmt: skip
+        w, (p, error, n_g, *_) = normalized(direction), surface
+        start = self._start(place, n_g, w, ray.direction)
+        return Ray(kind, ray.depth + 1, spawn_origin(p, error, n_g, w, self.offset), w, weight, media, start)
+
+
+def steps_of(prepared: PreparedScene, offset: OffsetRule = BOUNDED, media: MediaRule = "stack") -> Steps:
+    """The steps of rays in a prepared scene, under rules as of ``render``."""
+    arrays = arrays_for(prepared, prepared.scene.camera, offset, media)
+    return Steps(prepared, arrays, offset, media_limit(prepared.needs, media))
+
+
+def color_at(columns: Floats, first: int) -> Vector:
+    """Three columns of a row."""
+    x, y, z = columns[first : first + 3].tolist()
+    return x, y, z

@@ -1,0 +1,1 @@
+"""Kernels: how they are compiled, kept on disk and found again."""

@@ -1,0 +1,331 @@
+"""Compiled kernels on disk: one file for each kernel, argument types, sources, Python, Numba and processor.
+
+Files are found by their names, so there is no index to keep in step. A file that cannot be read counts as absent, and a
+kernel that cannot be written is compiled in each process; neither stops a run. A folder made ahead of time
+(``octree-render compile -o FOLDER``) is only read, after the user's own.
+"""
+
+import hashlib
+import os
+import pickle
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from logging import getLogger
+from pathlib import Path
+from stat import S_ISREG
+from types import CodeType, ModuleType
+from typing import Any
+
+import llvmlite  # type: ignore[import-untyped]
+import llvmlite.binding as llvm  # type: ignore[import-untyped]
+import numba
+from numba.core import config
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from renderer.jit.digest import PACKAGE, is_ours, source_digest
+from renderer.jit.levels import AHEAD_VARIABLE, LEVELS, lacking
+from renderer.lazy import lazy
+from renderer.system.files import write_atomically
+
+# The kernels that a wheel for one platform contains.
+_CARRIED = PACKAGE / "compiled"
+_SUFFIX = ".kernel"
+_HEADER = b"octree-renderer kernel 1\n"
+# To be changed when older machine code is no longer right, for a reason that no digest of kernels' sources shows.
+_FORM = "private pieces"
+_LOG = getLogger("renderer.jit")
+
+
+@dataclass(frozen=True)
+class Folders:
+    """The folders for kernels of one source folder: ``written`` (None where nothing can be), and all that are read."""
+
+    written: Path | None
+    read: tuple[Path, ...]
+
+
+class KernelStore:
+    """The files of one kernel, with the interface that Numba's dispatchers expect of a cache."""
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+        self._source = Path(function.__code__.co_filename)
+        # All kernels of this package share a folder, so their names begin with the whole name of the module.
+        ours = is_ours(self._source)
+        self._home = PACKAGE if ours else self._source.parent
+        module = function.__module__ if ours else self._source.stem
+        self._name = f"{module}.{function.__qualname__}".replace("<", "").replace(">", "")
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder that new kernels go to, or None."""
+        written = _folders(self._home).written
+        return None if written is None or self._digest is None else str(written)
+
+    @lazy
+    def _digest(self) -> str | None:
+        """The digest of all that the kernel's code depends on; None where that is not known.
+
+        For files of this package their text is enough. Elsewhere one name may stand for many functions, so the
+        function's code and the values that it finds around it count too.
+        """
+        digest = source_digest(self._source)
+        if digest is None or is_ours(self._source):
+            return digest
+        try:
+            return digest + _fingerprint(self._function)
+        except Exception as error:  # whatever pickling may raise
+            _warn_once("unknown", f"{self._name} is not kept: {type(error).__name__}: {error}")
+            return None
+
+    def is_stored(self) -> bool:
+        """Whether a file of these sources is there for any types of arguments, so that a later run need not compile.
+
+        True, too, where nothing can be written: then no process can help another.
+        """
+        folders = _folders(self._home)
+        if folders.written is None or self._digest is None:
+            return True
+        begin = f"{self._prefix()}{_short(self._digest)}-"
+        return any(name.startswith(begin) for folder in (*folders.read, *ahead_folders()) for name in _names(folder))
+
+    def load_overload(self, signature: Any, context: Any) -> CompileResult | None:
+        """The kernel compiled for the types in ``signature``, or None where it must be compiled."""
+        if self._digest is None:
+            return None
+        for path, key in self._places(signature, context.codegen().magic_tuple()):
+            payload = _read(path, key)
+            if payload is not None:
+                with _tolerant(path):
+                    return CompileResult._rebuild(context, *payload)
+        return None
+
+    def save_overload(self, signature: Any, compiled: CompileResult) -> None:
+        """Keep a kernel for later processes, and remove those that were compiled from other sources."""
+        folder = _folders(self._home).written
+        if folder is None or self._digest is None or compiled.library.has_dynamic_globals:
+            _Count.lost += 1
+            return
+        key = self._key(signature, compiled.library.codegen.magic_tuple())
+        path = folder / self._file(key)
+        try:
+            _write(path, key, dumps(compiled._reduce()))
+        except OSError as error:
+            _Count.lost += 1
+            _warn_once("unwritable", f"compiled kernels cannot be kept: {path}: {error.strerror}")
+            return
+        current = f"{self._prefix()}{_of_sources(key[1])}"
+        for name in _names(folder):
+            if name.startswith(self._prefix()) and not name.startswith(current):
+                with suppress(OSError):
+                    (folder / name).unlink()
+
+    def _places(self, signature: Any, machine: tuple[str, ...]) -> Iterable[tuple[Path, tuple[str, ...]]]:
+        own = self._key(signature, machine)
+        for folder in _folders(self._home).read:
+            yield folder / self._file(own), own
+        ahead = ahead_folders()
+        for processor in ("", *runnable_levels()) if ahead else ():
+            level = (machine[0], LEVELS[processor], "") if processor else machine
+            key = self._key(signature, level)
+            for folder in ahead:
+                yield folder / self._file(key), key
+
+    def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
+        return (str(signature), str(self._digest), _versions(), *machine, f"svml {config.USING_SVML}")
+
+    def _prefix(self) -> str:
+        short = hashlib.sha256(_versions().encode()).hexdigest()[:8]
+        return f"{self._name}-{short}-"
+
+    def _file(self, key: tuple[str, ...]) -> str:
+        return f"{self._prefix()}{_short(key[1])}-{_hash(key)}{_SUFFIX}"
+
+
+def keep_in(folder: Path) -> None:
+    """From now on keep compiled kernels in ``folder`` alone, and look for them nowhere else."""
+    _Chosen.folders = Folders(folder, (folder,))
+
+
+def ahead_folders() -> tuple[Path, ...]:
+    """Folders of kernels compiled ahead that exist: those of the environment, then the package's own."""
+    return () if _Chosen.folders else _named_folders()
+
+
+def lost() -> int:
+    """The number of kernels that this process compiled and could not keep."""
+    return _Count.lost
+
+
+class _Count:
+    """The number of kernels that could not be kept."""
+
+    lost = 0
+
+
+class _Chosen:
+    """The folders that ``keep_in`` chose, None for the usual ones."""
+
+    folders: Folders | None = None
+
+
+@cache
+def _named_folders() -> tuple[Path, ...]:
+    named = [Path(text) for text in os.environ.get(AHEAD_VARIABLE, "").split(os.pathsep) if text]
+    return tuple(folder for folder in (*named, _CARRIED) if _is_folder(folder))
+
+
+@cache
+def runnable_levels() -> tuple[str, ...]:
+    """The levels whose kernels this machine can run, best first."""
+    arm = llvm.get_process_triple().startswith(("aarch64", "arm64"))
+    return tuple(name for name in LEVELS if (name == "aarch64") == arm and not lacking(name))
+
+
+def stored_in(folder: Path) -> int:
+    """The number of kernels in a folder."""
+    return len(_names(folder))
+
+
+def _fingerprint(function: Any) -> str:
+    """A digest of a function's code, enclosed values and the values of globals that it names.
+
+    It differs between functions of one name.
+    """
+    code = function.__code__
+    enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
+    named = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
+    values = {name: value for name, value in named.items() if not (callable(value) or isinstance(value, ModuleType))}
+    return hashlib.sha256(dumps((_shape(code), enclosed, values))).hexdigest()
+
+
+def _shape(code: CodeType) -> tuple[object, ...]:
+    """A function's code without what an edit elsewhere in its file changes."""
+    constants = tuple(_shape(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts)
+    return code.co_code, constants, code.co_names, code.co_varnames, code.co_freevars
+
+
+@cache
+def _versions() -> str:
+    tag = sys.implementation.cache_tag or sys.implementation.name
+    flags = getattr(sys, "abiflags", "")
+    return f"{tag}{flags} numba {numba.__version__} llvmlite {llvmlite.__version__} {_FORM}"
+
+
+def _of_sources(digest: str) -> str:
+    """The part of a file's name that differs between sources."""
+    return digest[:8]
+
+
+def _short(digest: str) -> str:
+    return _of_sources(digest) + digest[-8:]
+
+
+def _hash(key: tuple[str, ...]) -> str:
+    return hashlib.sha256("\0".join(key).encode()).hexdigest()[:16]
+
+
+def _folders(sources: Path) -> Folders:
+    """The folders in which kernels of the sources in one folder are kept and looked for."""
+    return _Chosen.folders or _usual_folders(sources)
+
+
+@cache
+def _usual_folders(sources: Path) -> Folders:
+    """The folder that NUMBA_CACHE_DIR names, alone if it can be written; else the sources' own and the user's too."""
+    own, places = f"{sources.name}_{hashlib.sha256(os.fsencode(sources)).hexdigest()[:16]}", []
+    if config.CACHE_DIR:
+        chosen = Path(config.CACHE_DIR).absolute() / own
+        if _can_write(chosen):
+            return Folders(chosen, (chosen,))
+        places.append(chosen)
+    places.append(sources / "__pycache__")
+    with suppress(RuntimeError):  # no home
+        places.append(_user_cache() / "octree-renderer" / own)
+    written = next((place for place in places if _can_write(place)), None)
+    return Folders(written, tuple(place for place in places if _is_folder(place)))
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+
+
+def _is_folder(path: Path) -> bool:
+    """``path.is_dir()``, and False where this user has no access."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
+def _can_write(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def _names(folder: Path) -> list[str]:
+    try:
+        return [name for name in os.listdir(folder) if name.endswith(_SUFFIX)]
+    except OSError:
+        return []
+
+
+def _read(path: Path, key: tuple[str, ...]) -> Any:
+    """The content of a file, or None where it is absent, damaged or of another key."""
+    try:
+        if not S_ISREG(path.stat().st_mode):  # reading a pipe would wait
+            return None
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        _warn_once("unreadable", f"a compiled kernel cannot be read and is compiled anew: {path}: {error.strerror}")
+        return None
+    head, body = content[: len(_HEADER)], content[len(_HEADER) + 32 :]
+    with _tolerant(path):
+        if head != _HEADER or hashlib.sha256(body).digest() != content[len(_HEADER) : len(_HEADER) + 32]:
+            raise ValueError("its content is not what was written")
+        stored, payload = pickle.loads(body)
+        # Two keys may share a file's name, though hardly ever.
+        return pickle.loads(payload) if stored == key else None
+    return None
+
+
+@contextmanager
+def _tolerant(path: Path) -> Iterator[None]:
+    """A context in which an error means that a stored kernel is of no use: it is logged once."""
+    try:
+        yield
+    except Exception as error:
+        _warn_once("damaged", f"a compiled kernel is damaged and is compiled anew: {path}: {error}")
+
+
+def _write(path: Path, key: tuple[str, ...], payload: bytes) -> None:
+    body = pickle.dumps((key, payload))
+    if path.exists() and not path.is_file():  # a pipe, say, which would be written to
+        with suppress(OSError):
+            path.unlink()
+    write_atomically(path, lambda file: file.write(_HEADER + hashlib.sha256(body).digest() + body))
+
+
+_said: set[str] = set()
+
+
+def _warn_once(kind: str, message: str) -> None:
+    """Log the first message of each kind: a fault of one kernel's file is mostly a fault of all."""
+    if kind not in _said:
+        _said.add(kind)
+        _LOG.warning(message)

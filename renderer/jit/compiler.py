@@ -1,0 +1,310 @@
+"""Kernels through Numba at a third of its usual cost: only what Python calls is optimised and compiled.
+
+Numba takes each function, however small, through its whole pipeline: LLVM optimises and compiles it alone, again within
+each of its callers, and a wrapper lets Python call it. Here a function that kernels call stays a *piece*: typed and
+lowered to LLVM's code, but not optimised. A function that Python calls is an *entry*: its piece and all below it linked
+into one module, which LLVM optimises once.
+
+This relies on Numba's internals, which ``probe`` tests. ``jit`` calls it for versions of Numba that were not tested,
+and does without this module where it fails.
+"""
+
+import os
+import pickle
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from functools import update_wrapper
+from typing import Any
+
+import llvmlite.binding as llvm  # type: ignore[import-untyped]
+from numba.core import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, CompileResult, compile_result
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
+from numba.core.environment import lookup_environment
+from numba.core.registry import CPUDispatcher
+from numba.core.serialize import dumps
+from numba.core.typed_passes import (
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
+
+from renderer.jit.cache import KernelStore
+from renderer.jit.notice import compiling
+from renderer.lazy import lazy
+
+# No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
+# Every option is set, because Numba would take an unset one from the kernel whose compiling asked for this one.
+if hasattr(os, "register_at_fork"):
+    # A child forked while another thread compiles or loads would wait for ever for Numba's lock.
+    os.register_at_fork(
+        before=global_compiler_lock.acquire,
+        after_in_parent=global_compiler_lock.release,
+        after_in_child=global_compiler_lock.release,
+    )
+
+OPTIONS = {
+    "nopython": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "forceinline": False,
+    "_nrt": False,
+    "no_cfunc_wrapper": True,
+}
+
+
+class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """A function's module as it was lowered, neither optimised nor compiled."""
+
+    _merged: Any = None
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        self._finalized = True
+
+    def _get_module_for_linking(self) -> Any:
+        """This module with all below it, for kernels that Numba compiles by itself."""
+        if self._merged is None:
+            module = self._final_module.clone()
+            _link_all(module, self._linking_libraries)
+            for function in module.functions:
+                if not function.is_declaration:
+                    function.linkage = "linkonce_odr"
+            self._merged = module
+        return self._merged
+
+
+class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """A wrapper for Python and all pieces behind it, optimised together."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        self._codegen._check_llvm_bugs()
+        module = self._final_module
+        outer = [function.name for function in module.functions if not function.is_declaration]
+        _link_all(module, self._linking_libraries)
+        for function in module.functions:
+            if not function.is_declaration and function.name not in outer:
+                # Private, so that it is dropped where it is inlined everywhere, and has no symbol. An internal function
+                # has one, by which another kernel's call of the same piece would find this function, whose arguments
+                # the optimiser may have changed.
+                function.linkage = "private"
+        # Each function alone first, as Numba does: what is inlined then is small. Worth 2 % of tracing.
+        for function in module.functions:
+            passes, builder = self._codegen._function_pass_manager()
+            passes.run(function, builder)
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(module, builder)
+        module.verify()
+        self._finalize_final_module()
+
+    def serialize_using_object_code(self) -> Any:
+        """The machine code. Of the module only the names remain: kernels that call this one link its piece."""
+        names = [f.name for f in self._final_module.functions if not f.is_declaration and f.linkage.name == "external"]
+        stub = llvm.parse_assembly("\n".join(f'define void @"{name}"() {{ ret void }}' for name in names))
+        return (self.name, "object", (self._get_compiled_object(), stub.as_bitcode()))
+
+
+def _link_all(module: Any, libraries: list[Any]) -> None:
+    """Link libraries and all that they are linked with into ``module``, each once."""
+    done: set[int] = set()
+    pending = list(libraries)
+    while pending:
+        library = pending.pop()
+        if id(library) in done:
+            continue
+        done.add(id(library))
+        if isinstance(library, _PieceLibrary):
+            module.link_in(library._final_module, preserve=True)
+            pending += library._linking_libraries
+        else:  # a function of Numba's own
+            module.link_in(library._get_module_for_linking(), preserve=True)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LowerPiece(NativeLowering):  # type: ignore[misc]
+    """Lower a function for other kernels alone."""
+
+    _name = "renderer_lower_piece"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _PieceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        state.flags.no_cpython_wrapper = True
+        super().run_pass(state)
+        key = object()  # by which callers find it, in place of a function that Python can call
+        state.cr = state.cr._replace(cfunc=key)
+        state.targetctx.insert_user_function(key, state.cr.fndesc, [state.library])
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LinkEntry(LoweringPass):  # type: ignore[misc]
+    """Make a function's piece one that Python can call."""
+
+    _name = "renderer_link_entry"
+
+    def __init__(self) -> None:
+        LoweringPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        kernel, context = _kernels[state.func_id.func], state.targetctx
+        with kernel.notice():
+            piece = kernel.piece.compiled(state.args)
+            library = _EntryLibrary(context.codegen(), state.func_id.func_qualname)
+            library.enable_object_caching()
+            library.add_linking_library(piece.library)
+            context.create_cpython_wrapper(
+                library, piece.fndesc, piece.environment, piece.call_helper, state.flags.release_gil
+            )
+            function = context.get_executable(library, piece.fndesc, piece.environment)
+            _set_environments(library)
+        state.cr = compile_result(
+            typing_context=state.typingctx,
+            target_context=context,
+            entry_point=function,
+            typing_error=None,
+            library=library,
+            call_helper=piece.call_helper,
+            signature=piece.signature,
+            objectmode=False,
+            lifted=(),
+            fndesc=piece.fndesc,
+            environment=piece.environment,
+            metadata=state.metadata,
+            reload_init=[],
+        )
+        return True
+
+
+def _set_environments(library: Any) -> None:
+    for variable in library._final_module.global_variables:
+        environment = lookup_environment(variable.name) if variable.name.startswith("_ZN08NumbaEnv") else None
+        if environment is not None:
+            library.codegen.set_env(variable.name, environment)
+
+
+# The passes of Numba that kernels need: they have no closures, no ``with``, no array expressions, no object mode.
+_PIECE_PASSES = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    GenericRewrites,
+    ReconstructSSA,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    IRLegalization,
+    _LowerPiece,
+    NoPythonBackend,
+)
+
+
+class _PieceCompiler(CompilerBase):  # type: ignore[misc]
+    def define_pipelines(self) -> list[PassManager]:
+        return [_pipeline("piece", _PIECE_PASSES)]
+
+
+class _EntryCompiler(CompilerBase):  # type: ignore[misc]
+    def define_pipelines(self) -> list[PassManager]:
+        return [_pipeline("entry", (_LinkEntry,))]
+
+
+def _pipeline(name: str, passes: tuple[Any, ...]) -> PassManager:
+    manager = PassManager(name)
+    for one in passes:
+        manager.add_pass(one, one.__name__)
+    manager.finalize()
+    return manager
+
+
+class _Piece(CPUDispatcher):  # type: ignore[misc]
+    """A function as kernels call it."""
+
+    def add_overload(self, compiled: Any) -> None:
+        # Left out of the dispatcher's table of functions that Python may call.
+        self.overloads[tuple(compiled.signature.args)] = compiled
+
+    def compiled(self, arguments: Any) -> Any:
+        """The compiled piece for arguments of these types; compiles it if it was not compiled before."""
+        self.compile(tuple(arguments))
+        return self.overloads[tuple(arguments)]
+
+    def get_call_template(self, arguments: Any, keywords: Any) -> Any:
+        # Numba would compile a kernel for each constant that a caller writes as a literal.
+        plain = [types.unliteral(a) for a in arguments]
+        return super().get_call_template(plain, {k: types.unliteral(v) for k, v in keywords.items()})
+
+
+class Kernel:
+    """A function that Python and kernels call; its dispatcher for each is made at the first use.
+
+    Numba's dispatchers take a third of a millisecond to make, and most kernels are never called by Python, nor by
+    kernels that are compiled now.
+    """
+
+    def __init__(self, function: Callable[..., Any], forceinline: bool = False, kept: bool = True) -> None:
+        self.py_func = function
+        self.kept = kept
+        self._options = {**OPTIONS, "forceinline": forceinline}
+        _kernels[function] = self
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.entry(*arguments)
+
+    @lazy
+    def entry(self) -> Any:
+        """The dispatcher that Python calls."""
+        entry = CPUDispatcher(self.py_func, targetoptions=self._options, pipeline_class=_EntryCompiler)
+        if self.kept:
+            entry._cache = self.store
+        return entry
+
+    @lazy
+    def piece(self) -> _Piece:
+        """The dispatcher that kernels call."""
+        return _Piece(self.py_func, targetoptions=self._options, pipeline_class=_PieceCompiler)
+
+    @lazy
+    def store(self) -> KernelStore:
+        """The files of its machine code."""
+        return KernelStore(self.py_func)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """Its type in a kernel that calls it, which Numba asks for."""
+        return types.Dispatcher(self.piece)
+
+    def notice(self) -> AbstractContextManager[None]:
+        """The context in which it is compiled."""
+        return compiling(self.py_func.__qualname__, self.store.cache_path) if self.kept else nullcontext()
+
+
+_kernels: dict[Callable[..., Any], Kernel] = {}
+
+
+def probe() -> None:
+    """Compile, call, store and load a kernel that calls another; raises an error where this Numba does not fit."""
+
+    def doubled(x):  # type: ignore[no-untyped-def]
+        return x + x
+
+    def answer(x):  # type: ignore[no-untyped-def]
+        return inner(x) + 1
+
+    inner, outer = Kernel(doubled, forceinline=True, kept=False), Kernel(answer, kept=False)
+    if outer(20) != 41:
+        raise RuntimeError(f"a kernel answered {outer(20)} for 41")
+    (compiled,) = outer.entry.overloads.values()
+    stored = CompileResult._rebuild(outer.entry.targetctx, *pickle.loads(dumps(compiled._reduce())))
+    if stored.entry_point(20) != 41:
+        raise RuntimeError(f"a stored kernel answered {stored.entry_point(20)} for 41")

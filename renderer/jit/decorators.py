@@ -1,0 +1,65 @@
+"""The decorators that make a kernel: no GIL, no fastmath, C's rules for division, machine code kept on disk.
+
+A kernel is called by Python and by other kernels alike. It allocates nothing and raises nothing; the caller keeps its
+arrays alive. A kernel may stand in another package too: its machine code then follows the edits of its own file and of
+all files of this package, but not those of other files that it imports.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from logging import getLogger
+from typing import Any
+
+import numba
+
+# The versions of Numba whose insides ``compiler`` was tested with; any other is tried before it is relied upon.
+_TESTED = ("0.68.",)
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile ``function`` as a kernel; LLVM decides where a call of it is inlined."""
+    return _decorated(function, forceinline=False)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """A kernel that LLVM must inline: for the innermost loops, whose vectors a call would pass through memory."""
+    return _decorated(function, forceinline=True)
+
+
+def is_on_disk(kernel: Any) -> bool:
+    """Whether a kernel is kept for some types of arguments, so that another process need not compile it.
+
+    True, too, where nothing can be kept: then no process can help another.
+    """
+    store = getattr(kernel, "store", None)
+    return store is None or bool(store.is_stored())
+
+
+def _decorated(function: Callable[..., Any], forceinline: bool) -> Any:
+    compiler = _compiler()
+    if compiler is None:
+        return numba.njit(nogil=True, error_model="numpy", forceinline=forceinline)(function)
+    return compiler.Kernel(function, forceinline)
+
+
+@cache
+def _compiler() -> Any:
+    """The module ``compiler``, or None where it does not fit this version of Numba, which is logged once."""
+    if numba.config.DISABLE_JIT:
+        raise ImportError("renderer: NUMBA_DISABLE_JIT is set, but kernels run only compiled: unset it")
+    try:
+        from renderer.jit import compiler
+
+        if not numba.__version__.startswith(_TESTED):
+            compiler.probe()
+    except Exception as error:
+        getLogger("renderer.jit").warning(
+            "renderer: Numba %s is not one of those that this version was made for (%s*): %s: %s. Kernels work, but "
+            "every process compiles them anew, for a minute or more",
+            numba.__version__,
+            "*, ".join(_TESTED),
+            type(error).__name__,
+            " ".join(str(error).split()),
+        )
+        return None
+    return compiler

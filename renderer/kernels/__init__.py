@@ -1,1 +1,0 @@
-"""Kernels: the decorators that compile them, the store of their machine code, SIMD and vectors."""

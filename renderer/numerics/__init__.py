@@ -1,0 +1,1 @@
+"""Arithmetic of kernels: vectors, SIMD, double-double numbers, expansions and exact predicates."""

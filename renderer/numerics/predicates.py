@@ -1,0 +1,90 @@
+"""Exact signs of areas and volumes: on which side of a line or plane a point lies, and whether on a face."""
+
+import numpy as np
+
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import power_below
+from renderer.numerics.expansions import OUT_OF_RANGE, expand_area, expand_slope, expand_volume, sign_of
+from renderer.numerics.simd import larger, smaller
+
+# What all functions here say where products would vanish or overflow.
+UNDECIDED = 2
+# An axis is stretched by that at most, so that none becomes infinite.
+_MOST = 2.0**1000
+
+
+@kernel
+def area_sign(a, b, p, parts):
+    """The sign of (a - p) x (b - p) of points (x, y), 1, 0, -1, or UNDECIDED; ``parts`` is memory for an expansion."""
+    count = expand_area(a, b, p, parts)
+    if count == OUT_OF_RANGE:
+        x, y = balance(a[0], b[0], b[0], p[0]), balance(a[1], b[1], b[1], p[1])
+        count = expand_area((a[0] * x, a[1] * y), (b[0] * x, b[1] * y), (p[0] * x, p[1] * y), parts)
+    return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
+
+
+@kernel
+def volume_sign(a, b, c, p, parts):
+    """The sign of (a - p) . ((b - p) x (c - p)), as of ``area_sign``."""
+    count = expand_volume(a, b, c, p, parts)
+    if count == OUT_OF_RANGE:
+        s = balance(a[0], b[0], c[0], p[0]), balance(a[1], b[1], c[1], p[1]), balance(a[2], b[2], c[2], p[2])
+        count = expand_volume(stretched(a, s), stretched(b, s), stretched(c, s), stretched(p, s), parts)
+    return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
+
+
+@kernel
+def slope_sign(a, b, c, d, parts):
+    """The sign of ((b - a) x (c - a)) . d, as of ``area_sign``."""
+    count = expand_slope(a, b, c, d, parts)
+    if count == OUT_OF_RANGE:
+        s = balance(a[0], b[0], c[0], d[0]), balance(a[1], b[1], c[1], d[1]), balance(a[2], b[2], c[2], d[2])
+        count = expand_slope(stretched(a, s), stretched(b, s), stretched(c, s), stretched(d, s), parts)
+    return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
+
+
+@kernel
+def balance(a, b, c, d):
+    """The power of two by which an axis is stretched, which turns no sign, so that its least and largest coordinates
+    are as far from 1: beside one of 1e-310 products with one of 1 are in range then.
+    """
+    least, most = np.inf, 0.0
+    for x in (abs(a), abs(b), abs(c), abs(d)):
+        least, most = (smaller(least, x) if x != 0.0 else least), larger(most, x)
+    return power_below(smaller(1.0 / (np.sqrt(least) * np.sqrt(most)), _MOST)) if most != 0.0 else 1.0
+
+
+@inlined
+def stretched(a, s):
+    """A point whose axes are stretched."""
+    return a[0] * s[0], a[1] * s[1], a[2] * s[2]
+
+
+@inlined
+def differ(s0, s1, s2):
+    """Whether signs contradict each other, 0 none."""
+    return (s0 > 0 or s1 > 0 or s2 > 0) and (s0 < 0 or s1 < 0 or s2 < 0)
+
+
+@kernel
+def lies_within(a, b, c, p, parts):
+    """Whether a point in the plane of a face lies on the face, or UNDECIDED.
+
+    Along each axis it is seen within the face's outline. A face that is seen as a line each time is one, and then all
+    coordinates tell.
+    """
+    informed = False
+    for _ in range(3):
+        a, b, c, p = (a[1], a[2], a[0]), (b[1], b[2], b[0]), (c[1], c[2], c[0]), (p[1], p[2], p[0])
+        s0, s1, s2 = area_sign(b, c, p, parts), area_sign(c, a, p, parts), area_sign(a, b, p, parts)
+        if s0 == UNDECIDED or s1 == UNDECIDED or s2 == UNDECIDED:
+            return UNDECIDED
+        if differ(s0, s1, s2):
+            return 0
+        informed = informed or s0 != 0 or s1 != 0 or s2 != 0
+    if informed:
+        return 1
+    for k in range(3):
+        if p[k] < min(a[k], b[k], c[k]) or p[k] > max(a[k], b[k], c[k]):
+            return 0
+    return 1

@@ -1,0 +1,106 @@
+"""Arithmetic on 3-vectors held as tuples of float64, for kernels."""
+
+import math
+
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import get, larger
+
+
+@kernel
+def dot(a, b):
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):
+    """Vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@kernel
+def add(a, b):
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@kernel
+def sub(a, b):
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@kernel
+def scale(a, s):
+    """a times a number."""
+    return (a[0] * s, a[1] * s, a[2] * s)
+
+
+@kernel
+def _product(x, y):
+    return x * y if x > 0.0 and y > 0.0 else 0.0
+
+
+@kernel
+def times(a, b):
+    """Component by component, as weights multiply colours: none is negative, and 0 times infinite light is 0."""
+    return (_product(a[0], b[0]), _product(a[1], b[1]), _product(a[2], b[2]))
+
+
+@inlined
+def largest_component(a):
+    """The largest of three numbers without their signs."""
+    return larger(abs(a[0]), larger(abs(a[1]), abs(a[2])))
+
+
+@inlined
+def largest_of_three(a, b, c):
+    """The ``largest_component`` of three vectors."""
+    return larger(largest_component(a), larger(largest_component(b), largest_component(c)))
+
+
+# The reciprocal of a denormal number overflows.
+_SMALL, _RAISE = 2.0**-1000, 2.0**100
+
+
+@kernel
+def unit_and_length(a):
+    """a / |a| and |a|, scaled first so that no square overflows or vanishes; the zero vector stays."""
+    largest, raised = largest_component(a), 1.0
+    if largest == 0.0:
+        return a, 0.0
+    if largest < _SMALL:
+        a, largest, raised = scale(a, _RAISE), largest * _RAISE, _RAISE
+    b = scale(a, 1.0 / largest)
+    root = math.sqrt(dot(b, b))
+    return scale(b, 1.0 / root), largest * root / raised
+
+
+@kernel
+def normalized(a):
+    """a / |a|; the zero vector stays."""
+    return unit_and_length(a)[0]
+
+
+@kernel
+def length(a):
+    """|a|."""
+    return unit_and_length(a)[1]
+
+
+@inlined
+def three(base, at):
+    """Three numbers of a ``pointer``, from ``at``."""
+    return (get(base, at), get(base, at + 1), get(base, at + 2))
+
+
+@inlined
+def row3(base, i):
+    """Row i of a ``pointer`` to rows of three."""
+    return three(base, 3 * i)
+
+
+@kernel
+def barycentric(a, b, c, u, v):
+    """(1 - u - v) a + u b + v c."""
+    return add(add(scale(a, 1.0 - u - v), scale(b, u)), scale(c, v))

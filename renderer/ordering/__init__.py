@@ -1,0 +1,1 @@
+"""Orders of points in which neighbours follow each other."""

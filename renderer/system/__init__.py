@@ -1,0 +1,1 @@
+"""The operating system: threads, processes, files, terminal and signals."""

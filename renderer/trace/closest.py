@@ -1,0 +1,126 @@
+"""Closest and any hits of a batch of rays: in chunks, on threads."""
+
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.mesh.mesh import Mesh
+from renderer.system.threads import for_chunks
+from renderer.trace.batch import CHUNK, NO_STARTS, RayBatch, reject
+from renderer.trace.hits import Hits
+from renderer.trace.layout import BLOCK_FACES, Tree
+from renderer.trace.ray_lanes import WIDTH
+from renderer.trace.rays import HIT_ROWS
+from renderer.trace.single import FEW_DEPTH, stack_size, trace_few
+from renderer.trace.traverse import Memory, make_memory, search_chunk, trace_chunk
+
+# Few rays go in smaller chunks, sixteen per thread, so that no thread has much more to do than another.
+_LEAST_CHUNK = 1024
+# A chunk of brute force is so many tests of a ray against a block, at some nanoseconds per test.
+_BLOCK_TESTS = 1 << 22
+# Fewer rays than a packet holds go one by one, by a kernel that compiles in a fraction of the time.
+FEW = WIDTH - 1
+# The room for the faces that hold a start, where no ray starts on the surface.
+_NO_ROOM = np.empty(1, np.int64)
+
+
+def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
+    """Closest hits of a batch."""
+    if _are_few(tree, rays):
+        out = _trace_few(tree, rays)
+    else:
+        out = np.empty((HIT_ROWS, rays.number))
+        _run(tree, rays, out, threads, any_hit=False)
+    t, u, v, face, side, pile = out
+    return Hits(t, face.view(np.int64), u, v, mesh, None, side.view(np.int64), pile.view(np.int64))
+
+
+def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
+    """Whether each ray of a batch hits anything."""
+    if _are_few(tree, rays):
+        return _trace_few(tree, rays)[3].view(np.int64) >= 0
+    # In whole words, so that kernels are compiled for one kind of output.
+    out = np.empty((1, -(-rays.number // 8)))
+    _run(tree, rays, out, threads, any_hit=True)
+    return out.view(np.bool_)[0, : rays.number]
+
+
+def _are_few(tree: Tree, rays: RayBatch) -> bool:
+    """Whether the rays are traced one by one."""
+    return tree.has_nodes and rays.number <= FEW and tree.depth <= FEW_DEPTH
+
+
+def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
+    """Closest hits of a few rays on the caller's thread, as ``singly.trace_few`` writes them."""
+    out = np.empty((HIT_ROWS, rays.number))
+    if rays.starts is NO_STARTS:
+        row = trace_few(tree.words, rays, out, _NO_ROOM)
+    else:
+        memory = _take_memory(tree.depth)
+        row = trace_few(tree.words, rays, out, memory.holders)
+        _local.memory = memory
+    if row >= 0:
+        reject(rays, row, tree.scale)
+    return out
+
+
+def rays_against_blocks(tree: Tree) -> int:
+    """The number of rays in a chunk of brute force: some 10 ms of work, so that Ctrl-C and other threads need not wait
+    for long.
+    """
+    return max(1, _BLOCK_TESTS * BLOCK_FACES // max(1, len(tree.faces)))
+
+
+def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any_hit: bool) -> None:
+    count = rays.number
+    size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
+    if not tree.has_nodes:
+        size = min(size, rays_against_blocks(tree))
+    bad: list[int] = []
+
+    def trace(begin: int, end: int) -> Iterator[None]:
+        # Only chunks after a bad ray are left out, so the first bad ray is always found.
+        if bad and bad[0] < begin:
+            return
+        if not tree.has_nodes:
+            memory = _take_memory(tree.depth)
+            row = search_chunk(tree.words, rays, out, begin, end, any_hit, memory.holders)
+            _local.memory = memory
+            if row >= 0:
+                bad.append(row)
+            return
+        memory, state = _take_memory(tree.depth), (begin, 0, 0)
+        while state[0] < end or state[1] < state[2]:
+            state, row = trace_chunk(tree.words, rays, out, state, end, any_hit, memory)
+            if row >= 0:
+                bad.append(row)
+                break
+            yield
+        _local.memory = memory
+
+    if count <= size:
+        for _ in trace(0, count):
+            pass
+    else:
+        for_chunks(trace, count, size, threads)
+    if bad:
+        reject(rays, min(bad), tree.scale)
+
+
+class _Local(threading.local):
+    """Memory in which a thread traces its next chunk, kept from the last one: 100 kB are used."""
+
+    memory: Memory | None = None
+
+
+_local = _Local()
+
+
+def _take_memory(depth: int) -> Memory:
+    """The thread's memory, or new: taken, because a handler of a signal may trace rays while a chunk is half done."""
+    memory, _local.memory = _local.memory, None
+    if memory is None or memory.stack_size < stack_size(depth):
+        memory = make_memory(depth, CHUNK)
+    return memory

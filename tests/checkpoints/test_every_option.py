@@ -1,0 +1,217 @@
+"""Each option of ``octree-render study``, given alone: what is asked, what a run of it keeps, and what is written."""
+
+import argparse
+import json
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import asdict
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomlkit
+from cases import cases
+from scenery import scenery
+
+from renderer import Mesh, Octree, load_mesh
+from renderer.checkpoints.study import KINDS
+from renderer.cli.main import main, make_parser
+from renderer.mesh.load import save_ply
+from renderer.studies import face_points
+
+CAMERA = {"eye": [3.0, -4.0, 5.0], "target": [0.0, 0.0, 0.5], "up": [0.0, 0.0, 1.0], "fov": 50.0}
+# The words of a study, and the arguments of its function; {} is the folder of files.
+FUNCTIONS: dict[str, tuple[str, list[str], dict[str, Any]]] = {
+    "--patches": ("sky", ["--patches", "100"], {"patches": 100}),
+    "--definition": ("sky", ["--definition", "geometric"], {"definition": "geometric"}),
+    "--distance": ("sky", ["--distance", "0.6"], {"distance": 0.6}),
+    "--distance of sun": ("sun", ["--suns", "{}/suns.txt", "--distance", "0.6"], {"distance": 0.6}),
+    "--distance of ao": ("ao", ["--distance", "0.6"], {"distance": 0.6}),
+    "--suns": ("sun", ["--suns", "{}/more.txt"], {"sun_directions": [[1, 0.2, 0.7], [0, 0.5, 0.4]], "weights": [2, 1]}),
+    "--samples": ("ao", ["--samples", "64"], {"samples": 64}),
+}
+# What changes neither the points nor what is asked of them, so that parts of a run may be taken over.
+BITLESS: dict[str, list[str]] = {
+    "--faces": ["--faces"],
+    "--vertices": ["--vertices"],
+    "--output": ["-o", "{}/more.ply"],
+    "--camera": ["-o", "{}/more.png", "--resolution", "9x9", "--camera", "{}/scene.toml"],
+    "--resolution": ["-o", "{}/more.png", "--resolution", "30x20"],
+    "--cluster": ["--cluster"],
+    "--threads": ["--threads", "1"],
+    "--quiet": ["--quiet"],
+}
+# What changes the points.
+PLACES: dict[str, list[str]] = {
+    "--grid": ["--grid", "0.7"],
+    "--points": ["--points", "{}/points.npy"],
+    "--points with normals": ["--points", "{}/normals.npy"],
+    "mesh": ["other.ply"],
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files that options name."""
+    folder = tmp_path_factory.mktemp("study")
+    mesh = scenery()
+    save_ply(mesh, folder / "mesh.ply")
+    save_ply(Mesh(mesh.vertices + np.eye(len(mesh.vertices), 3) * 2.0**-9, mesh.faces), folder / "other.ply")
+    (folder / "suns.txt").write_text("1 0.2 0.7 2\n-0.6 0.5 0.4 3.5\n")
+    (folder / "more.txt").write_text("1 0.2 0.7 2\n0 0.5 0.4 1\n")
+    points = np.array([[0.5, 0.5, 0.25], [-1.0, 0.75, 0.5], [0.1, 0.2, 2.0]])
+    np.save(folder / "points.npy", points)
+    np.save(folder / "normals.npy", np.hstack([points, [[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]]]))
+    (folder / "scene.toml").write_text(tomlkit.dumps({"camera": CAMERA, "materials": {}}))
+    return folder
+
+
+@pytest.fixture
+def bars() -> list[bool]:
+    """Whether runs show a bar."""
+    return []
+
+
+@pytest.fixture(autouse=True)
+def asked(monkeypatch: pytest.MonkeyPatch, bars: list[bool]) -> list[str]:
+    """The plans of runs, which answer as ever; the cluster is this process."""
+    asked: list[str] = []
+
+    def told(of: Callable[..., Any], first: int) -> Callable[..., Any]:
+        def run(*arguments: Any, **options: Any) -> Any:
+            octree, study, points = arguments[first : first + 3]
+            asked.append(json.dumps(asdict(study.plan(octree.mesh, points, points.order()))))
+            bars.append(options["progress"])
+            return of(*arguments, **options)
+
+        return run
+
+    def results(_client: object, function: Callable[..., Any], tasks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
+        for task in tasks:
+            yield task.name, function(task.shared, *task.arguments)
+
+    here, there = import_module("renderer.checkpoints.study"), import_module("renderer.cluster.studies")
+    monkeypatch.setattr(there, "results", results)
+    monkeypatch.setattr(here, "run", told(here.run, 0))
+    monkeypatch.setattr("renderer.cluster.run_on", told(there.run_on, 1))
+    monkeypatch.setattr("renderer.cli.study.on_cluster", lambda options: nullcontext())
+    return asked
+
+
+def study(folder: Path, kind: str, words: Sequence[str], output: Path) -> int:
+    """The exit code of the command, of a kind with the usual files and quiet."""
+    told = [word.replace("{}", str(folder)) for word in words if word != "other.ply"]
+    told += ["--suns", str(folder / "suns.txt")] if kind == "sun" and "--suns" not in words else []
+    mesh = folder / ("other.ply" if "other.ply" in words else "mesh.ply")
+    return main(["study", kind, str(mesh), "-o", str(output), "--quiet", *told])
+
+
+def on_faces(folder: Path, kind: str, **given: Any) -> Any:
+    """What the function of a kind says of the middles of faces."""
+    octree = Octree.from_mesh(load_mesh(folder / "mesh.ply"))
+    points, normals, faces = face_points(octree.mesh)
+    suns = {"sun_directions": [[1, 0.2, 0.7], [-0.6, 0.5, 0.4]], "weights": [2, 3.5]} if kind == "sun" else {}
+    found = np.full(len(octree.mesh.faces), np.nan)
+    found[faces] = KINDS[kind](octree, points, normals, leaving=faces, **(suns | given))
+    return found
+
+
+def test_every_option_has_a_case() -> None:
+    (choice,) = (action for action in make_parser()._actions if isinstance(action, argparse._SubParsersAction))
+    actions = [action for action in choice.choices["study"]._actions if action.dest != "help"]
+    known = {name.partition(" ")[0] for name in (*FUNCTIONS, *BITLESS, *PLACES, "kind")}
+    assert {max(action.option_strings, key=len, default=action.dest) for action in actions} == known
+
+
+@pytest.mark.judges(
+    "octree-render study", "octree-render study --definition", "octree-render study --distance",
+    "octree-render study --faces", "octree-render study --patches", "octree-render study --samples",
+    "octree-render study kind",
+)  # fmt: skip
+@cases("where", [[], ["--cluster"]])
+@cases("name", [*FUNCTIONS, *KINDS])
+def test_the_answers_are_those_of_the_function_with_the_options_argument(
+    folder: Path, tmp_path: Path, name: str, where: list[str]
+) -> None:
+    kind, words, given = FUNCTIONS.get(name, (name, [], {}))
+    assert study(folder, kind, [*words, *where], tmp_path / "a.npy") == 0
+    found = np.load(tmp_path / "a.npy")
+    assert found.tobytes() == on_faces(folder, kind, **given).tobytes()
+    assert name in KINDS or found.tobytes() != on_faces(folder, kind).tobytes()
+
+
+@pytest.mark.parametrize("name", ["points", "normals"])
+def test_points_of_a_file_are_answered_with_their_normals(folder: Path, tmp_path: Path, name: str) -> None:
+    """Those without normals look up."""
+    assert study(folder, "sky", ["--points", f"{{}}/{name}.npy"], tmp_path / "a.npy") == 0
+    rows = np.load(folder / f"{name}.npy")
+    normals = rows[:, 3:] if name == "normals" else [0.0, 0.0, 1.0]
+    expected = KINDS["sky"](Octree.from_mesh(load_mesh(folder / "mesh.ply")), rows[:, :3], normals)
+    assert np.load(tmp_path / "a.npy").tobytes() == expected.tobytes()
+
+
+@pytest.fixture
+def killed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands end before they remove the parts of their runs."""
+    monkeypatch.setattr("renderer.checkpoints.parts.remove_parts", lambda folder: None)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *told: Any) -> bool:
+    """Whether the command ends because parts of another run are there."""
+    return study(*told) == 2 and "got those of another, whose" in capsys.readouterr().err
+
+
+def test_no_run_takes_over_the_parts_of_another(
+    folder: Path, tmp_path: Path, killed: None, asked: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whatever option of it is another one: also where it has no part in common."""
+    runs = {kind: (kind, list[str]()) for kind in KINDS}
+    runs |= {name: (kind, words) for name, (kind, words, _) in FUNCTIONS.items()}
+    runs |= {name: ("sky", words) for name, words in PLACES.items()}
+    for name, (kind, words) in runs.items():
+        assert study(folder, kind, words, tmp_path / f"{name}.npy") == 0
+        assert name == "sky" or refused(capsys, folder, kind, words, tmp_path / "sky.npy")
+    assert len(set(asked)) == len(runs)
+
+
+@pytest.mark.parametrize(
+    ("words", "file", "other"),
+    [([], "mesh.ply", "other.ply"), (PLACES["--points"], "points.npy", "normals.npy"), ([], "suns.txt", "more.txt")],
+)
+def test_no_run_takes_over_the_parts_of_a_file_as_it_was(
+    folder: Path,
+    tmp_path: Path,
+    killed: None,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    file: str,
+    other: str,
+) -> None:
+    own = Path(shutil.copytree(folder, tmp_path / "files"))
+    assert study(own, "sun", words, tmp_path / "a.npy") == 0
+    shutil.copy(own / other, own / file)
+    assert refused(capsys, own, "sun", words, tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize("name", BITLESS)
+def test_a_run_goes_on_whatever_else_is_asked_for(
+    folder: Path, tmp_path: Path, killed: None, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """No part is computed again."""
+    assert study(folder, "sky", [], tmp_path / "a.npy") == 0
+    before = np.load(tmp_path / "a.npy")
+    monkeypatch.setattr("renderer.checkpoints.parts.Parts.write", None)
+    assert study(folder, "sky", BITLESS[name], tmp_path / "a.npy") == 0
+    if name != "--vertices":
+        np.testing.assert_array_equal(np.load(tmp_path / "a.npy"), before)
+
+
+@pytest.mark.parametrize("where", [[], ["--cluster"]], ids=["here", "cluster"])
+def test_a_bar_is_shown_unless_quiet(folder: Path, tmp_path: Path, where: list[str], bars: list[bool]) -> None:
+    for quiet in ([], ["--quiet"]):
+        words = ["study", "sky", str(folder / "mesh.ply"), "-o", str(tmp_path / "a.npy"), *where, *quiet]
+        assert main(words) == 0
+    assert bars == [True, False]

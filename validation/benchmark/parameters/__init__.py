@@ -1,1 +1,0 @@
-"""Speed and error as functions of the parameters."""

@@ -1,1 +1,0 @@
-"""What more workers than two would do: arithmetic and a simulation, both from what ``measures.cluster`` measured."""

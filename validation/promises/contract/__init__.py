@@ -1,1 +1,0 @@
-"""The public contract, piece by piece, and who judges each piece."""
