@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import meshes, options, rays_at
@@ -113,7 +114,7 @@ def test_laws(mesh, chosen, seed):
     assert_laws(Octree(*mesh, **chosen), BruteForce(*mesh, threads=1), (origins, directions, *bounds))
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-6, 1.0, 1e6, 1e150])
+@cases("scale", [1e-300, 1e-6, 1.0, 1e6, 1e150])
 def test_laws_at_any_size(scale):
     rng = np.random.default_rng(1)
     for mesh in (icosphere(2), loose(torus(around=12, across=8).triangles)):
@@ -213,7 +214,7 @@ def test_faces_are_left():
     ) == [1]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("options", "told"),
     [
         ({"max_hits": 0}, "max_hits: expected an integer >= 1 or None, got 0"),
@@ -258,7 +259,7 @@ def test_many_callers_while_one_refits():
     assert not wrong
 
 
-@pytest.mark.parametrize("count", [LISTED - 1, LISTED, LISTED + 1, LISTED + 2])
+@cases("count", [LISTED - 1, LISTED, LISTED + 1, LISTED + 2])
 def test_a_ray_may_meet_as_many_blocks_as_are_listed_and_one_more(count):
     layers = np.tile([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], (count, 1))
     layers[:, 2] = np.repeat(np.arange(count), 3)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 from numpy.typing import NDArray
 from twins import CORNERS, MESH, NORMALS, meetings
 
@@ -80,7 +81,7 @@ def test_a_grid_stands_on_the_upper_side_of_a_sheet_that_is_turned_down() -> Non
     )
 
 
-@pytest.mark.parametrize("kind", ["<f8", ">f4", "<i2", "Fortran"])
+@cases("kind", ["<f8", ">f4", "<i2", "Fortran"])
 def test_points_of_a_file_are_read_in_their_rows(tmp_path: Path, kind: str) -> None:
     rows = np.array([[1, 2, 3, 0, 0, -2], [4, 5, 6, 1, 0, 0], [7, 8, 9, 0, 3, 4]])
     written = np.asfortranarray(rows.astype("<f8")) if kind == "Fortran" else rows.astype(kind)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import tomlkit
 import trimesh
+from cases import cases
 from PIL import Image as Pillow
 from scenery import scenery
 
@@ -44,11 +45,16 @@ def colors_of(values: Any) -> Any:
     return colors
 
 
-@pytest.mark.parametrize(
+@cases(
     ("where", "element"),
-    [([], "face"), (["--faces"], "face"), (["--vertices"], "vertex"), (["--points", "{}/points.npy"], "vertex"),
-     (["--grid", "0.7"], "vertex")],
-)  # fmt: skip
+    [
+        ([], "face"),
+        (["--faces"], "face"),
+        (["--vertices"], "vertex"),
+        (["--points", "{}/points.npy"], "vertex"),
+        (["--grid", "0.7"], "vertex"),
+    ],
+)
 def test_trimesh_reads_values_and_colours_of_a_ply(
     folder: Path, tmp_path: Path, where: list[str], element: str
 ) -> None:
@@ -75,9 +81,9 @@ def test_trimesh_reads_values_and_colours_of_a_ply(
         assert np.array_equal(read.vertices, np.load(folder / "points.npy"))
 
 
-@pytest.mark.parametrize("where", ["--faces", "--vertices"])
-@pytest.mark.parametrize("camera", [None, "{}/scene.toml"])
-@pytest.mark.parametrize("size", [(48, 36), (30, 40)])
+@cases("where", ["--faces", "--vertices"])
+@cases("camera", [None, "{}/scene.toml"])
+@cases("size", [(48, 36), (30, 40)])
 def test_a_picture_has_the_values_colours_where_its_camera_sees_them(
     folder: Path, tmp_path: Path, where: str, camera: str | None, size: tuple[int, int]
 ) -> None:

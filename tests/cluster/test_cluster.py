@@ -13,6 +13,7 @@ from typing import Any
 import dask.array as da
 import numpy as np
 import pytest
+from cases import cases
 from watched import Watched
 
 from renderer import Mesh, Octree, cluster
@@ -142,7 +143,7 @@ def test_a_local_cluster_has_a_worker_of_one_thread_for_each_processor() -> None
     assert client.status == "closed"
 
 
-@pytest.mark.parametrize("address", ["nonsense", "", "x://y:1", "tcp://127.0.0.1", 3])
+@cases("address", ["nonsense", "", "x://y:1", "tcp://127.0.0.1", 3])
 def test_what_is_no_address_is_told_at_once(address: Any) -> None:
     said = "address: expected a scheduler's, such as 'tcp://host:8786', got "
     with pytest.raises(ValueError, match=said), connected(address):
@@ -155,13 +156,18 @@ def test_without_the_extra_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPa
         pass
 
 
-@pytest.mark.parametrize(
+@cases(
     "bad, said",
-    [({"client": None}, "client: expected a distributed.Client, got NoneType"), ({"size": 0}, "size: expected an int"),
-     ({"split": "x"}, "split: expected one of"), ({"study": "sky"}, "study: expected a Study, got str"),
-     ({"points": np.zeros((1, 3))}, "points: expected Points, got ndarray"),
-     ({"folder": 3}, "folder: expected a string"), ({"octree": 1}, "octree: expected an Octree")],
-)  # fmt: skip
+    [
+        ({"client": None}, "client: expected a distributed.Client, got NoneType"),
+        ({"size": 0}, "size: expected an int"),
+        ({"split": "x"}, "split: expected one of"),
+        ({"study": "sky"}, "study: expected a Study, got str"),
+        ({"points": np.zeros((1, 3))}, "points: expected Points, got ndarray"),
+        ({"folder": 3}, "folder: expected a string"),
+        ({"octree": 1}, "octree: expected an Octree"),
+    ],
+)
 def test_bad_arguments_of_a_study_are_named(
     client: Any, octree: Octree, tmp_path: Path, bad: dict[str, Any], said: str
 ) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
+from cases import cases
 from pydantic import BaseModel
 
 import renderer
@@ -143,7 +143,7 @@ def content(thing: Any) -> Any:
     return thing
 
 
-@pytest.mark.parametrize("name", THINGS)
+@cases("name", THINGS)
 def test_a_copy_holds_and_answers_the_same(name: str) -> None:
     thing = THINGS[name]
     expected = content(thing)

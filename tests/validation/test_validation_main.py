@@ -9,6 +9,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
+from cases import cases
 
 from validation import __main__ as command
 from validation import suite
@@ -168,7 +169,7 @@ class TestUserFiles:
         assert "pictures.own.ssim" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
+@cases(
     ("arguments", "words"),
     [
         (["--only", "hits,magic"], "'magic'"),

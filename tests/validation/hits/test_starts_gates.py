@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
+from cases import cases
 from lawful import Lawful
 
 from renderer.mesh.mesh import Mesh
@@ -40,7 +40,7 @@ SAMPLES = {
 }
 
 
-@pytest.mark.parametrize("name", SAMPLES)
+@cases("name", SAMPLES)
 def test_who_keeps_the_law_is_never_wrong(name):
     found = checked(SAMPLES[name])
     assert found.rays > 600 and found.exact > 100
@@ -94,7 +94,7 @@ class Farther(Lawful):
         return found
 
 
-@pytest.mark.parametrize(
+@cases(
     ("make", "name", "red"),
     [
         (NoSides, "tetrahedron", {"at_once"}),
@@ -168,7 +168,7 @@ def test_a_ray_that_is_lost_or_stays_is_counted(monkeypatch):
     assert mirrors.reflected(Leaky(mesh.vertices, mesh.faces), rays.origins, rays.directions)[0] == 8
 
 
-@pytest.mark.parametrize("name", ["tetrahedron", "stack", "boxes", "notched", "soup"])
+@cases("name", ["tetrahedron", "stack", "boxes", "notched", "soup"])
 def test_a_ray_meets_all_on_its_way_once(name):
     assert walks.walk(SAMPLES[name], 30, np.random.default_rng(4), Lawful) == 0
     assert walks.walk(SAMPLES[name], 30, np.random.default_rng(4), Leaky) > 0

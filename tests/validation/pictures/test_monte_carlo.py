@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from scipy.stats import norm
 
@@ -128,7 +129,7 @@ def test_a_sound_picture_passes_and_its_record_is_drawn() -> None:
 
 
 @pytest.mark.judges("Scene.altered")
-@pytest.mark.parametrize(
+@cases(
     ("ours", "red"),
     [
         (with_glass(ior=1.51), {SLOPE, CHANCE}),

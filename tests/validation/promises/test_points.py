@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
@@ -35,8 +36,8 @@ def broken(name: str) -> set[str]:
     return {" ".join(row["promise"].split()[:3]) for row in rows(name) if row["broken"]}
 
 
-@pytest.mark.parametrize("seed", [5, 6])
-@pytest.mark.parametrize("name", CHECKS)
+@cases("seed", [5, 6])
+@cases("name", CHECKS)
 def test_the_sound_renderer_keeps_all_promises(name: str, seed: int) -> None:
     found = rows(name, seed)
     assert found and all(row["asked"] > 0 for row in found)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import octree
 from renderer.diagnostics import tree_boxes
@@ -83,7 +84,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
 }
 
 
-@pytest.mark.parametrize("name", CHECKS)
+@cases("name", CHECKS)
 def test_the_sound_renderer_keeps_all_promises(name: str) -> None:
     rows = CHECKS[name]()
     assert rows and all(row["asked"] > 0 for row in rows)
@@ -196,7 +197,7 @@ def one_block_twice(boxes: Any, links: Any, faces: Any) -> None:
     links[node, place] = ~((~links[node, place] >> 3 << 3) - 8)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("change", "expected"),
     [
         (one_leaf_wider, "a leaf's"),
@@ -474,8 +475,8 @@ def test_a_renderer_that_hits_nothing_is_judged_too() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # an infinity less itself, where a hit is lost
-@pytest.mark.parametrize("every", [1, 2], ids=["all of them", "every other one"])
-@pytest.mark.parametrize("name", ["places", "bounds", "errors", "limits", "alone", "planes", "batches", "refits"])
+@cases("every", [1, 2])
+@cases("name", ["places", "bounds", "errors", "limits", "alone", "planes", "batches", "refits"])
 def test_hits_that_are_lost_are_broken_promises_and_no_exceptions(
     name: str, every: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -495,8 +496,8 @@ def test_hits_that_are_lost_are_broken_promises_and_no_exceptions(
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of the last place of an infinity
-@pytest.mark.parametrize("member", ["t", "t_error"])
-@pytest.mark.parametrize("value", [np.nan, np.inf])
+@cases("member", ["t", "t_error"])
+@cases("value", [np.nan, np.inf])
 def test_hits_at_no_number_are_broken_promises(member: str, value: float, monkeypatch: pytest.MonkeyPatch) -> None:
     for query in ("closest_hit", "all_hits"):
         sound = getattr(Queries, query)

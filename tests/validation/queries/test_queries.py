@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Octree
 from renderer.trimesh_ray import RayMeshIntersector
@@ -80,7 +81,7 @@ def test_wrong_distances_are_counted(monkeypatch, name):
     assert len(wrong(check_distances(6, JOB))) == len(meshes())
 
 
-@pytest.mark.parametrize("query", ["all_hits", "count_hits", "closest_hit", "any_hit"])
+@cases("query", ["all_hits", "count_hits", "closest_hit", "any_hit"])
 def test_wrong_contacts_are_counted(monkeypatch, query):
     asked = getattr(Octree, query)
 

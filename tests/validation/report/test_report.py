@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 from jinja2 import UndefinedError
 
 from validation.gates import Gate
@@ -169,7 +170,7 @@ def test_every_key_of_the_schema_is_in_the_readme() -> None:
     assert keys == set(described())
 
 
-@pytest.mark.parametrize(
+@cases(
     ("value", "text"),
     [
         (None, "–"),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Octree
 from renderer.studies.points import Chosen, Points
@@ -52,7 +53,7 @@ def test_errors_that_do_not_fall_have_no_slope(monkeypatch):
     assert all(row["slope"] > forms.SLOPE for row in forms.check_slope(False)["curves"])
 
 
-@pytest.mark.parametrize("name", ["town", "terrain", "balls", "loose triangles", "slivers"])
+@cases("name", ["town", "terrain", "balls", "loose triangles", "slivers"])
 def test_a_wrong_bit_is_counted(monkeypatch, name):
     own = bits.occlusion
 
@@ -67,7 +68,7 @@ def test_a_wrong_bit_is_counted(monkeypatch, name):
     assert bits.check_bits(name, 40, 64)["wrong"] == 8
 
 
-@pytest.mark.parametrize("name", corners.MESHES)
+@cases("name", corners.MESHES)
 def test_a_wrong_bit_at_a_vertex_is_counted(monkeypatch, name):
     own, index = corners.occlusion, list(corners.CHECKS).index((name, "vertices"))
     monkeypatch.setattr(corners, "_QUICK", 20)
@@ -145,7 +146,7 @@ BROKEN = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", BROKEN)
+@cases("name", BROKEN)
 def test_what_does_not_hold_is_counted(monkeypatch, name):
     study, broken = BROKEN[name]
     assert BROKEN.keys() == holds.CHECKS.keys()

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from fuzz import faults, files, run, scenes
 from numpy.random import default_rng
 
@@ -64,7 +65,7 @@ def test_the_seed_files_load(folder: Path, name: str) -> None:
     assert files.check(folder / name, files.SEEDS[name], 0) == ("counted" if counted else "loaded")
 
 
-@pytest.mark.parametrize("name", files.SEEDS)
+@cases("name", files.SEEDS)
 def test_inputs_are_the_same_again_and_differ_from_each_other(name: str) -> None:
     inputs = [files.mutated(name, 3, index) for index in range(40)]
     assert inputs == [files.mutated(name, 3, index) for index in range(40)]
@@ -164,7 +165,7 @@ def test_extreme_inputs_are_refused_or_right(folder: Path, name: str) -> None:
     assert among <= set(judged(folder, name, inputs))
 
 
-@pytest.mark.parametrize("name", SHORT)
+@cases("name", SHORT)
 def test_extreme_inputs_are_the_same_again(name: str) -> None:
     make = run.KINDS[name].make
     inputs = [repr(make(3, index)) for index in range(40)]

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from cases import cases
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 from viewer_page import CHROMIUM, SCENE, Viewer, served
@@ -182,8 +183,8 @@ def test_the_card_of_the_ray_comes_along(file: Saved, made: Made) -> None:
     assert not file.pixels("gl").any()
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-@pytest.mark.parametrize("width", [390, 760, 1280, 1920])
+@cases("scheme", ["dark", "light"])
+@cases("width", [390, 760, 1280, 1920])
 def test_it_fits_every_screen_in_both_themes(browser: Any, made: Made, scheme: str, width: int) -> None:
     page = Saved(browser, made.path, viewport={"width": width, "height": 800}, color_scheme=scheme).open()
     try:

@@ -89,7 +89,7 @@ def test_each_pip_install_of_a_checkout_works(checkout):
 
 
 def test_a_wheel_for_one_platform_is_made_as_the_page_says(checkout):
-    """With a file in the place of kernels, which tests/front/test_startup.py compiles for a level."""
+    """With a file in the place of kernels, which tests/packaging/test_compiling_ahead.py compiles for a level."""
     page = (ROOT / "docs" / "first-answers.md").read_text(encoding="utf-8")
     build, tag = "python -m build --wheel", "python -m wheel tags --remove"
     (line,) = re.findall(rf"^    {build} && (.*)$", page, re.MULTILINE)

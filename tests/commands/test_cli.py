@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 import renderer
 from renderer.cli.compiling import choose_processor
@@ -100,9 +101,7 @@ def test_as_a_module(tmp_path: Path) -> None:
     assert done.returncode == 2 and done.stdout == "" and len(done.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--help"], ["--version"], ["render", "--help"], ["info", "--help"], ["compile", "--help"]]
-)
+@cases("arguments", [["--help"], ["--version"], ["render", "--help"], ["info", "--help"], ["compile", "--help"]])
 def test_help_and_version(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(arguments)
@@ -112,7 +111,7 @@ def test_help_and_version(capsys: pytest.CaptureFixture[str], arguments: list[st
     assert re.fullmatch(r"\d+\.\d+\.\d+", renderer.__version__)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("arguments", "says"),
     [
         (["none.toml"], ["none.toml", "No such file"]),
@@ -173,7 +172,7 @@ def test_a_scene_without_objects_or_lights_renders(tmp_path: Path) -> None:
     assert (np.load(out) == 0.5).all()
 
 
-@pytest.mark.parametrize(
+@cases(
     "arguments",
     [
         [],
@@ -271,7 +270,7 @@ def shell(line: str, **more: str) -> "subprocess.CompletedProcess[str]":
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&-", ">&- 2>&- <&-"])
+@cases("closed", ["2>&-", ">&-", "<&-", ">&- 2>&- <&-"])
 def test_a_closed_stream_stops_no_picture(tmp_path: Path, closed: str) -> None:
     path = tmp_path / "a.png"
     done = shell(f"octree render {STAIRS} -o {path} --resolution 8x8 {closed}")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomlkit
+from cases import cases
 from PIL import Image as Pillow
 from varied import BASE, Table, picture, scene_of, write_meshes
 
@@ -227,8 +228,8 @@ def test_the_cluster_is_the_one_that_is_named(
         pass
 
 
-@pytest.mark.parametrize("split", [None, "midpoint", "sah"])
-@pytest.mark.parametrize("scene", ["scene.toml", "ball.ply"])
+@cases("split", [None, "midpoint", "sah"])
+@cases("scene", ["scene.toml", "ball.ply"])
 def test_what_is_said_of_a_scene_is_of_its_own_tree(
     folder: Path, capsys: pytest.CaptureFixture[str], scene: str, split: Any
 ) -> None:
@@ -251,9 +252,9 @@ def test_a_viewer_is_shown_where_it_is_told(
     assert viewed == [(folder / "scene.toml", usual | given), *(["browser"] if browser else []), "wait"]
 
 
-@pytest.mark.parametrize("what", [None, "queries", "pictures", "all"])
-@pytest.mark.parametrize("output", [None, "kernels"])
-@pytest.mark.parametrize("quiet", [True, False])
+@cases("what", [None, "queries", "pictures", "all"])
+@cases("output", [None, "kernels"])
+@cases("quiet", [True, False])
 def test_kernels_are_compiled_that_are_named_where_they_are_to_be(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], what: str | None, output: str | None,
     quiet: bool,
@@ -270,7 +271,7 @@ def test_kernels_are_compiled_that_are_named_where_they_are_to_be(
     assert said == "" if quiet else said.startswith("compiled in ") and ("in kernels" in said) == bool(output)
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@cases("level", LEVELS)
 def test_a_level_is_chosen_before_anything_is_compiled(monkeypatch: pytest.MonkeyPatch, level: str) -> None:
     asked: list[Any] = []
     monkeypatch.setattr("renderer.cli.main.choose_processor", lambda *told: asked.append(told))

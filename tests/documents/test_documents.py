@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from cases import cases
 
 from renderer import Octree, load_scene
 from renderer.cli.main import main, make_parser
@@ -76,17 +77,21 @@ IN_SHORT: dict[str, tuple[dict[str, str], str]] = {
 # Commands that another file runs, by how they begin: the file, and a pattern of the line there that runs it.
 RUN_ELSEWHERE = {
     "make lint": (".ci/run", r"^step make lint$"),
+    "make test-slow": (".ci/run", r"^step make test-slow$"),
     "make test": (".ci/run", r"^step make test$"),
     "make docs": (".ci/run", r"^step make docs$"),
     "make validate QUICK=1": (".ci/run", r"^step make validate QUICK=1$"),
-    "python3 -m venv": ("tests/front/test_installing.py", r'\[sys\.executable, "-m", "venv", '),
-    "pip install": ("tests/front/test_installing.py", r"^PIP = re\.compile"),
-    "pre-commit install": ("tests/front/test_installing.py", r'"pre_commit", "install"'),
-    "python -m build": ("tests/front/test_installing.py", r'"python -m build --wheel"'),
-    "rm -r renderer/compiled": ("tests/front/test_installing.py", r'"rm -r renderer/compiled"'),
-    "python -m wheel tags": ("tests/front/test_installing.py", r'"python -m wheel tags '),
+    "python3 -m venv": ("tests/packaging/test_installing.py", r'\[sys\.executable, "-m", "venv", '),
+    "pip install": ("tests/packaging/test_installing.py", r"^PIP = re\.compile"),
+    "pre-commit install": ("tests/packaging/test_installing.py", r'"pre_commit", "install"'),
+    "python -m build": ("tests/packaging/test_installing.py", r'"python -m build --wheel"'),
+    "rm -r renderer/compiled": ("tests/packaging/test_installing.py", r'"rm -r renderer/compiled"'),
+    "python -m wheel tags": ("tests/packaging/test_installing.py", r'"python -m wheel tags '),
     "octree-render view": ("tests/viewer/test_viewer_server.py", r'"renderer\.cli", "view", .*"--no-browser"\]'),
-    "octree-render compile --level": ("tests/front/test_startup.py", r'"compile", "--queries", "--level", level, "-o"'),
+    "octree-render compile --level": (
+        "tests/packaging/test_compiling_ahead.py",
+        r'"compile", "--queries", "--level", level, "-o"',
+    ),
     "octree-render study sky city.ply -o sky.npy --cluster tcp://": (
         "tests/cluster/test_commands.py",
         r'"--cluster", client\.scheduler\.address\]\) == 0',
@@ -188,9 +193,7 @@ def test_the_readme_has_python_to_run():
     assert any(page == README for page, _ in snippets())
 
 
-@pytest.mark.parametrize(
-    ("page", "line"), [(p, line) for p in PAGES for line in typed(p) if line.startswith("octree-render ")], ids=shown
-)
+@cases(("page", "line"), [(p, line) for p in PAGES for line in typed(p) if line.startswith("octree-render ")])
 def test_commands_in_a_page_are_ones_that_there_are(page, line):
     options = make_parser().parse_args(shlex.split(line)[1:])
     assert not hasattr(options, "scene") or str(options.scene) in OWN or (ROOT / options.scene).is_file()
@@ -279,7 +282,7 @@ def workflows(host):
 
 @pytest.mark.parametrize(("page", "text"), workflows("GitHub"), ids=shown)
 def test_a_workflow_in_a_page_has_our_own_actions_and_options_that_there_are(page, text):
-    """Its commands are run by tests/front/test_installing.py."""
+    """Its commands are run by tests/packaging/test_installing.py."""
     used, own = (
         set(re.findall(r"uses: (\S+ # v[\d.]+)$", of, re.MULTILINE))
         for of in (text, (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
@@ -335,7 +338,7 @@ def test_thresholds_in_a_page_are_ones_that_there_are(tmp_path):
     assert (thresholds.pictures.own.ssim, thresholds.hits.near_edge) == (0.997, 2)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=shown)
+@cases("page", PAGES)
 def test_every_block_is_of_a_kind_that_is_run(page):
     """Python is run above, TOML and YAML are read; what Sphinx and BibTeX read is neither's; nothing hides as text."""
     kinds = re.findall(r"^```(.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
@@ -344,7 +347,7 @@ def test_every_block_is_of_a_kind_that_is_run(page):
     assert kinds <= {"python", "toml", "yaml", "bibtex", *of_sphinx}
 
 
-@pytest.mark.parametrize(("page", "line"), commands("octree-", "python -m validation"), ids=shown)
+@cases(("page", "line"), commands("octree-", "python -m validation"))
 def test_options_in_a_page_are_ones_that_there_are(page, line):
     words = shlex.split(line.split(" [--")[0])  # of a usage line what comes before its options
     if any("..." in word for word in words):
@@ -363,7 +366,7 @@ def test_options_in_a_page_are_ones_that_there_are(page, line):
         assert ended.code == 0, f"{page}: {line}"  # --help
 
 
-@pytest.mark.parametrize(("page", "line"), commands("python "), ids=shown)
+@cases(("page", "line"), commands("python "))
 def test_programs_in_a_page_are_there(page, line):
     words = shlex.split(line)
     if words[1] == "-m":
@@ -372,11 +375,11 @@ def test_programs_in_a_page_are_there(page, line):
         assert (ROOT / words[1]).is_file() or (ROOT / words[1] / "__main__.py").is_file(), f"{page}: {line}"
 
 
-@pytest.mark.parametrize(("page", "line"), commands("make "), ids=shown)
+@cases(("page", "line"), commands("make "))
 def test_what_a_page_lets_make_make_is_a_target(page, line):
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     targets, variables = (
-        set(re.findall(r"^(\w+):", makefile, re.MULTILINE)),
+        set(re.findall(r"^([\w-]+):", makefile, re.MULTILINE)),
         set(re.findall(r"^(\w+)\s*\?=", makefile, re.M)),
     )
     target, *given = shlex.split(line)[1:]
@@ -393,7 +396,8 @@ def test_what_a_page_lets_make_make_is_a_target(page, line):
 
 # What each target calls at last; lint and docs have more than one command.
 CALLS = {
-    "validate": "python -m validation", "test": "python -m pytest", "machines": "python tests/machines.py",
+    "validate": "python -m validation", "test": "python -m pytest", "test-slow": "python -m pytest",
+    "machines": "python tests/machines.py",
     "bench": "python -m validation.benchmark", "conformance": "python -m validation.conformance",
     "docs": "python docs/links.py", "lint": "lint-imports",
 }  # fmt: skip
@@ -415,7 +419,7 @@ def test_make_passes_on_what_a_page_gives_it(page, line):
         assert "rm -rf .venv " in done.stdout
         return
     (called,) = [words for words in done.stdout.splitlines() if words.startswith(f".venv/bin/{CALLS[target]}")]
-    passed = called.removeprefix(f".venv/bin/{CALLS[target]}").split("--dist worksteal")[-1].strip()
+    passed = called.removeprefix(f".venv/bin/{CALLS[target]}").split("--ignore=tests/page")[-1].strip()
     quick = ["--quick"] * ("QUICK=1" in line)
     options = [word for text in shlex.split(line) if text.startswith("ARGS=") for word in shlex.split(text[5:])]
     if target in ("validate", "test", "machines", "bench"):
@@ -465,7 +469,7 @@ def links(page):
     return [link for link in LINK.findall(PYTHON.sub("", page.read_text(encoding="utf-8"))) if "://" not in link]
 
 
-@pytest.mark.parametrize(("page", "link"), [(p, link) for p in PAGES for link in links(p)], ids=shown)
+@cases(("page", "link"), [(p, link) for p in PAGES for link in links(p)])
 def test_a_link_leads_somewhere(page, link):
     path, _, anchor = link.partition("#")
     there = page.parent / path if path else page
@@ -496,7 +500,7 @@ def defined(path):
     return names
 
 
-@pytest.mark.parametrize("page", PAGES, ids=shown)
+@cases("page", PAGES)
 def test_what_a_page_names_is_there(page):
     """Files and folders, and with ``::`` a function, class, constant or test that stands in the file."""
     absent = []
@@ -509,7 +513,7 @@ def test_what_a_page_names_is_there(page):
     assert absent == []
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "found"),
     [
         ("`renderer/trace/closest.py::closest_hits`", ("renderer/trace/closest.py", "closest_hits")),
@@ -522,7 +526,7 @@ def test_names_are_found_in_a_sentence(text, found):
     assert NAMED.findall(text) == [found]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=shown)
+@cases("page", PAGES)
 def test_extreme_cases_and_gates_that_a_page_names_are_there(page):
     numbers = {case.number for case in CASES}
     assert {int(number) for number in re.findall(r"\b[Cc]ase (\d+)\b", page.read_text(encoding="utf-8"))} <= numbers

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from cases import cases
 
 import renderer
 
@@ -108,7 +109,7 @@ def test_a_literal_in_a_link_or_a_title_is_not_free_however_deep_it_stands():
 def test_sources_that_the_text_names_are_pages():
     """Files and names in them; not a file that is not there, nor one that a folder does not tell apart."""
     nodes = pytest.importorskip("docutils.nodes", reason="pip install '.[docs]'")
-    made, here = module("source_links"), "tests/front/test_site.py"
+    made, here = module("source_links"), "tests/documents/test_site.py"
     lines = (ROOT / here).read_text(encoding="utf-8").splitlines()
     (constant,) = (i for i, line in enumerate(lines, 1) if line.startswith("GALLERY = "))
     texts = [here, f"{here}::GALLERY", f"{here}::Entry", "tests/nowhere.py", "conf.py", "renderer/", "closest_hit"]
@@ -141,13 +142,13 @@ def linked(text):
     return next((link["refuri"] for link in page.findall(nodes.reference)), None)
 
 
-@pytest.mark.parametrize(
+@cases(
     "text",
     [
-        "tests/front/test_site.py::test_of_yesterday",
-        "tests/front/test_site.py::test_of_yesterday[x]",
-        "tests/front/test_site.py::json",  # imported
-        "tests/front/test_site.py::page",  # local
+        "tests/documents/test_site.py::test_of_yesterday",
+        "tests/documents/test_site.py::test_of_yesterday[x]",
+        "tests/documents/test_site.py::json",  # imported
+        "tests/documents/test_site.py::page",  # local
         "renderer/octree.py::Octree::gone",
         "renderer/octree.py::Octree.gone",
         "renderer/gone.py::Octree",
@@ -161,14 +162,14 @@ def test_a_name_that_its_file_has_not_is_an_error_of_the_build(text):
         assert str(error.value).startswith("docs/page: ")  # which names it
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "line"),
     [
         ("renderer/arguments/limits.py::SHORTEST", "SHORTEST"),  # one of two that a line defines
         ("renderer/octree.py::Octree.from_mesh", "    def from_mesh("),
         ("renderer/octree.py::Octree::from_mesh", "    def from_mesh("),
         (
-            "tests/front/test_site.py::test_a_name_within_a_class_or_a_pair_is_found[x]",
+            "tests/documents/test_site.py::test_a_name_within_a_class_or_a_pair_is_found[x]",
             "def test_a_name_within_a_class_or",
         ),
         (".github/workflows/ci.yml", None),
@@ -254,7 +255,7 @@ def test_wheel_and_source_are_built_for_the_site_without_a_network(tmp_path):
     assert made["listed"](files).count("<li>") == 2
 
 
-@pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)
+@cases("script", GALLERY)
 def test_a_script_is_short_and_named_by_its_title(script):
     _, head, code = script.read_text(encoding="utf-8").split('"""', 2)
     title, underline = head.strip().splitlines()[:2]
@@ -375,7 +376,7 @@ def test_links_that_lead_nowhere_are_found(tmp_path, capsys):
         assert main(tmp_path) == 1 and f"b.html: {broken}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
+@cases(
     "element",
     [
         '<iframe src="http://127.0.0.1:8123/"></iframe>',

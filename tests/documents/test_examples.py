@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 
 import renderer
 from renderer import cluster, studies
@@ -69,7 +70,7 @@ def test_a_member_without_an_example_is_found(monkeypatch: pytest.MonkeyPatch) -
         assert names_without(dict(members(renderer.Mesh))) == {"Mesh.area"}
 
 
-@pytest.mark.parametrize("name", sorted(set(DOCUMENTED) - set(WITHOUT)))
+@cases("name", sorted(set(DOCUMENTED) - set(WITHOUT)))
 def test_an_example_works_as_a_reader_pastes_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a new session, at the root of the repository."""
     monkeypatch.chdir(ROOT)

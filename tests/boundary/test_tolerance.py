@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import (
     BruteForce,
@@ -229,7 +230,7 @@ class TestGlb:
             load_mesh(glb(tmp_path, **changes))
 
 
-@pytest.mark.parametrize("split", ["kd", "", None, 3, ["sah"]])
+@cases("split", ["kd", "", None, 3, ["sah"]])
 def test_a_rule_of_splitting_that_is_none_is_refused_by_name(split: Any) -> None:
     with pytest.raises(ValueError, match=r"^split: expected one of \['midpoint', 'sah'\], got "):
         Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], split=split)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from cases import cases
 from packaging.requirements import Requirement
 
 import renderer
@@ -146,7 +147,7 @@ def test_the_recipe_asks_for_what_the_package_asks_for():
     assert recipe["build"]["python"]["entry_points"] == [f"{k} = {v}" for k, v in PROJECT["scripts"].items()]
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / ".github").rglob("*.yml")), ids=lambda path: path.name)
+@cases("path", sorted((ROOT / ".github").rglob("*.yml")))
 def test_workflows_and_forms_are_yaml_and_actions_are_pinned_by_commit(path):
     text = path.read_text(encoding="utf-8")
     assert isinstance(yaml.safe_load(text), dict)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import SceneError
 from renderer.cli.main import make_parser
@@ -80,7 +81,7 @@ def test_each_kind_of_table_is_there() -> None:
     assert set(found) == set(KINDS)
 
 
-@pytest.mark.parametrize("title", KINDS)
+@cases("title", KINDS)
 def test_keys_and_defaults_are_the_loaders(title: str) -> None:
     rows = tables(text_of("scenes-and-materials"))[title]
     kind, place, needed = KINDS[title]

@@ -1,13 +1,12 @@
-"""Each public function and method has a test that varies its arguments: a new one, or a new argument, needs one too."""
+"""Whole numbers that float64 does not hold are refused by each public function and method that takes an array."""
 
-import ast
 import inspect
 from importlib import import_module
-from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 import pytest
+from cases import cases
 from numpy.typing import ArrayLike
 
 import renderer
@@ -15,32 +14,6 @@ from renderer import Mesh, Octree, studies
 from renderer.mesh.heightfield import heightfield_mesh
 from renderer.trimesh_ray import RayMeshIntersector
 
-TESTS = Path(__file__).parents[1]
-RAYS, POINTS = "trace/test_ray_twins.py", "distance/test_point_twins.py"
-STUDIES, VIEWS, STATES = "studies/test_study_twins.py", "studies/test_view_twins.py", "process/test_travel_states.py"
-# The files where the arguments of each are varied; of methods, by their names, in whatever class.
-VARIED = {
-    **dict.fromkeys(["closest_hit", "any_hit", "all_hits", "count_hits", "count_steps"], RAYS),
-    **dict.fromkeys(["contains", "winding_number", "closest_point", "signed_distance", "visible"], POINTS),
-    **dict.fromkeys(["occlusion", "sky_view_factor", "sun_hours", "ambient_occlusion", "openness"], STUDIES),
-    "visible_faces": VIEWS, "depth_map": VIEWS, "scan": f"{VIEWS} studies/test_said.py",
-    **dict.fromkeys(["fibonacci_hemisphere", "fibonacci_sphere", "cosine_hemisphere"], "studies/test_said.py"),
-    **dict.fromkeys(["tregenza", "reinhart"], "studies/test_directions.py"), "face_points": "studies/test_said.py",
-    **dict.fromkeys(["intersects_id", "intersects_location", "intersects_first", "intersects_any", "contains_points"],
-                    "trimesh_ray/test_twins.py"),
-    "refit": "tree/test_refit.py", "save": "tree/test_store.py", "load": "tree/test_store.py", "from_mesh": RAYS,
-    "load_mesh": "mesh/test_repair.py", "load_scene": "scene/test_scene.py", "repaired": "mesh/test_repair.py",
-    "concatenate": "mesh/test_mesh.py", "transformed": "mesh/test_mesh.py", "viewing": "mesh/test_mesh.py",
-    "face_normals": "mesh/test_mesh.py", "vertex_normals": "mesh/test_mesh.py", "is_closed": "mesh/test_mesh.py",
-    "render": "picture/test_render.py scene/test_needs.py shade/test_media.py",
-    "prepare": f"{STATES} front/test_promised.py", "needs_of": "scene/test_needs.py",
-    "srgb": "picture/test_image.py", "view": "viewer/test_viewer_commands.py",
-    "through": RAYS, "shaped": STATES,
-}  # fmt: skip
-# What is shown while it runs is asked by other tests than those of answers.
-SHOWN = {"progress"}
-# Not given by any test: where a viewer listens, which the command's own tests ask.
-LISTENING = {"view": {"host", "port"}}
 CLASSES = [renderer.Octree, renderer.BruteForce, renderer.Mesh, renderer.Hits, renderer.AllHits, RayMeshIntersector]
 # Whole numbers for each argument that stands for an array.
 THREE, UP, CORNERS = [0, 0, 0], [0, 0, 1], [[0, 0, 1], [1, 0, 1], [0, 1, 1]]
@@ -85,33 +58,8 @@ def array_arguments() -> list[tuple[str, str]]:
     ]
 
 
-def text_of(files: str) -> str:
-    return "\n".join((TESTS / file).read_text(encoding="utf-8") for file in files.split())
-
-
-def words_of(text: str) -> set[str]:
-    """Names of arguments that a file gives, and its strings, which may be names that are drawn."""
-    nodes = list(ast.walk(ast.parse(text)))
-    return {node.arg for node in nodes if isinstance(node, ast.keyword) and node.arg} | {
-        node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    }
-
-
-def test_each_public_function_and_method_is_here() -> None:
-    assert public().keys() == VARIED.keys()
-    assert callable(import_module("renderer.viewer.view").view)
-
-
-@pytest.mark.parametrize("name", VARIED)
-def test_its_optional_arguments_are_given_there(name: str) -> None:
-    parameters = inspect.signature(public()[name]).parameters.values()
-    optional = {p.name for p in parameters if p.default is not p.empty and p.kind is not p.VAR_KEYWORD}
-    text = text_of(VARIED[name])
-    assert name in text and optional - SHOWN - LISTENING.get(name, set()) <= words_of(text)
-
-
-@pytest.mark.parametrize("whole", [2**53 + 1, -(2**53) - 1, 2**63 - 1, -(2**63)])
-@pytest.mark.parametrize(("name", "argument"), sorted(array_arguments()))
+@cases("whole", [2**53 + 1, -(2**53) - 1, 2**63 - 1, -(2**63)])
+@cases(("name", "argument"), sorted(array_arguments()))
 def test_a_whole_number_that_float64_does_not_hold_is_refused(name: str, argument: str, whole: int) -> None:
     """By the name of its argument; the same numbers with another in its place are taken."""
     homes = (OCTREE, studies, Mesh, renderer, import_module(heightfield_mesh.__module__))

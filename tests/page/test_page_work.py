@@ -8,6 +8,7 @@ from urllib.parse import parse_qs, urlencode
 
 import numpy as np
 import pytest
+from cases import cases
 from viewer_page import CHROMIUM, MODELS, SCENE, Viewer, served
 
 from renderer import Mirror, Phong, PointLight, load_scene, render
@@ -373,7 +374,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize("wrong", WRONG)
+@cases("wrong", WRONG)
 def test_what_is_no_view_in_an_address_is_left_out(browser: Any, url: str, scenes: Path, wrong: dict[str, str]) -> None:
     page = Viewer(browser, url)
     try:

@@ -1,122 +1,27 @@
-"""Start-up: what is imported when, what is said about compiling, and that compiling ahead leaves nothing to compile."""
+"""Compiling ahead: it leaves nothing to compile, and kernels for a level of processors have the bits of native ones."""
 
-import json
-import logging
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from cases import cases
 from signatures import SIGNATURES
 
-import renderer
-from renderer.cli.main import main
+ROOT = Path(__file__).parents[2]
 
 pytestmark = pytest.mark.judges(
     "octree-render compile", "octree-render compile --all", "octree-render compile --level",
     "octree-render compile --output", "octree-render compile --pictures", "octree-render compile --queries",
-    "octree-render render --quiet",
 )  # fmt: skip
 
 
-ROOT = Path(__file__).parents[2]
-HEAVY = {
-    "numba",
-    "numpy",
-    "pydantic",
-    "trimesh",
-    "PIL",
-    "tqdm",
-    "scipy.linalg",
-    "matplotlib",
-    "mitsuba",
-    "embreex",
-    "starlette",
-    "uvicorn",
-    "websockets",
-}
-
-
-def output(script: str) -> str:
+def output(script):
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done.stdout
-
-
-def heavy_after(script: str) -> set[str]:
-    """The heavy packages that a fresh process has imported after ``script``."""
-    tell = "import json, sys\nprint(json.dumps(sorted(sys.modules)))"
-    return HEAVY & set(json.loads(output(f"{script}\n{tell}").splitlines()[-1]))
-
-
-@pytest.mark.parametrize(
-    ("script", "needs"),
-    [
-        ("import renderer", set()),
-        ("from renderer.cli.main import main", set()),
-        ("from renderer.cli.main import main\ntry: main(['render', '--help'])\nexcept SystemExit: pass", set()),
-        ("from renderer import load_mesh, Mesh", {"numpy"}),
-        ("from renderer import Octree", {"numpy", "numba"}),
-        ("import renderer.studies", set()),
-        ("from renderer.studies import tregenza", {"numpy"}),
-        ("from renderer.studies import *", {"numpy", "numba"}),
-        ("from renderer import *", {"numpy", "numba", "pydantic"}),
-    ],
-)
-def test_an_import_brings_only_what_it_needs(script, needs):
-    assert heavy_after(script) == needs
-
-
-def test_a_render_of_the_command_line_loads_no_scipy_and_leaves_it_importable(tmp_path):
-    """Where memory is scarce its OpenBLAS would wait for memory without end."""
-    script = f"""
-import sys
-from renderer.cli.main import main
-sys.argv = ["octree-render", "render", "scenes/stairs.toml", "-o", {str(tmp_path / "a.png")!r}, "--resolution", "8x8"]
-assert main() == 0
-assert not any(name.startswith("scipy") for name in sys.modules) and "numba" in sys.modules
-import scipy.linalg
-"""
-    output(script)
-
-
-def test_the_kernel_is_loaded_before_a_picture_takes_its_memory():
-    """Where there is none left to load it, LLVM ends the process."""
-    script = """
-import renderer.picture.prepare as prepare
-from renderer import load_scene, render
-make, loaded = prepare._film, []
-def make_film(width, height, planes, first=0):
-    loaded.append((height, bool(vars(prepare.render_tile).get("entry") and prepare.render_tile.entry.signatures)))
-    return make(width, height, planes, first)
-prepare._film = make_film
-render(load_scene("scenes/stairs.toml"), resolution=(8, 8))
-assert loaded[-1] == (8, True), loaded
-"""
-    output(script)
-
-
-def test_the_public_names_are_there_whatever_was_imported_first():
-    script = (
-        "import renderer, renderer.scene.scene\nfrom renderer.picture.render import prepare\nfrom renderer import *"
-    )
-    tell = """\
-public = {name: getattr(renderer, name) for name in renderer.__all__ if name != "__version__"}
-print(callable(render), *[f"{name}:{found.__module__}" for name, found in public.items()])"""
-    is_callable, *names = output(f"{script}\n{tell}").split()
-    assert is_callable == "True" and "render:renderer.picture.render" in names and "Mesh:renderer.mesh.mesh" in names
-
-
-def test_the_public_names_are_listed_and_others_are_errors():
-    assert dir(renderer) == sorted(renderer.__all__)
-    with pytest.raises(AttributeError, match="module 'renderer' has no attribute 'Octre'"):
-        _ = renderer.Octre
-    with pytest.raises(ImportError, match="Octre"):
-        from renderer import Octre  # noqa: F401
 
 
 def test_compiling_ahead_leaves_nothing_to_compile():
@@ -213,49 +118,6 @@ print(len(before), *sorted(signatures() - before))
     assert int(count) > 20 and not new
 
 
-@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-@pytest.mark.parametrize("seconds", [0.0, 0.5, 1.3])
-def test_control_c_while_compiling_ends_with_130_and_no_traceback(tmp_path, seconds):
-    picture = tmp_path / "a.png"
-    command = [sys.executable, "-m", "renderer.cli.main", "render", "scenes/three_models.toml", "-o", str(picture)]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    running = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
-    try:
-        assert "octree-render: compiling " in running.stderr.readline()
-        time.sleep(seconds)
-        running.send_signal(signal.SIGINT)
-        _, err = running.communicate(timeout=60)
-    finally:
-        running.kill()
-    assert running.returncode == 130 and "Traceback" not in err and "ignored" not in err
-    assert err.endswith("octree-render: interrupted\n") and not picture.exists()
-
-
-@pytest.mark.parametrize("quiet", [False, True])
-def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatch, quiet):
-    log = logging.getLogger("renderer.jit")
-    monkeypatch.setattr(log, "level", logging.CRITICAL)
-    before = logging.CRITICAL, list(log.handlers)
-    monkeypatch.setattr("renderer.cli.render._render", lambda _options: log.warning("renderer: compiling %s", "it"))
-    assert main(["render", "any.toml", *(["--quiet"] if quiet else [])]) == 0
-    assert capsys.readouterr() == ("", "" if quiet else "octree-render: compiling it\n")
-    assert (log.level, log.handlers) == before
-
-
-def test_a_notice_stands_on_a_line_of_its_own_beside_a_progress_bar():
-    script = """
-import io, logging, sys
-from tqdm import tqdm
-from renderer.cli.main import compile_notices
-sys.stderr = io.StringIO()
-with compile_notices(silent=False), tqdm(total=3, file=sys.stderr, ncols=40):
-    logging.getLogger("renderer.jit").warning("renderer: compiling it")
-print("\\roctree-render: compiling it\\n" in sys.stderr.getvalue().replace(" " * 2, ""))
-print(repr(sys.stderr.getvalue()))
-"""
-    assert output(script).splitlines()[0] == "True"
-
-
 def test_kernels_for_a_level_have_the_bits_of_native_ones_and_leave_nothing_to_compile(tmp_path):
     """Compiled in one process for any machine of the level, found by another one that may not write anywhere near."""
     from renderer.jit.cache import runnable_levels
@@ -301,7 +163,7 @@ print(digest.hexdigest(), compile_seconds())
     assert not list((tmp_path / "empty").rglob("*.kernel"))
 
 
-@pytest.mark.parametrize(
+@cases(
     ("arguments", "told"),
     [
         (["--level", "x86-64-v3"], "--output: expected a folder, as kernels for a level are not this machine's"),

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 from viewer_page import CHROMIUM, Viewer
 
 pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
@@ -84,7 +85,7 @@ CUT = """() => [...document.querySelectorAll("button, select, input, summary, .h
     }).map((one) => one.id || one.name || one.innerText.slice(0, 20))"""
 
 
-@pytest.mark.parametrize("size", SIZES)
+@cases("size", SIZES)
 def test_nothing_is_cut_off_at_any_width(browser: Any, url: str, size: tuple[int, int]) -> None:
     touch = {"has_touch": True, "is_mobile": True} if size[0] < 500 else {}
     page = opened(browser, url, size=size, **touch)
@@ -119,7 +120,7 @@ HANDLE = """() => {
 }"""
 
 
-@pytest.mark.parametrize("size", [*SIZES, (320, 568), (1000, 700), (1400, 900)])
+@cases("size", [*SIZES, (320, 568), (1000, 700), (1400, 900)])
 def test_what_stands_on_the_picture_does_not_overlap(browser: Any, url: str, size: tuple[int, int]) -> None:
     page = opened(browser, url, size=size, folded=True)
     try:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from meshes import assert_same_hits, make_mesh, rays_at
 from numpy.typing import NDArray
 
@@ -131,13 +132,13 @@ WRONG_KINDS: dict[str, Callable[[NDArray[Any]], Any]] = {
 }
 
 
-@pytest.mark.parametrize("kind", WRONG_KINDS)
-@pytest.mark.parametrize(("name", "argument"), ARRAYS)
+@cases("kind", WRONG_KINDS)
+@cases(("name", "argument"), ARRAYS)
 def test_other_kinds_are_refused(name: str, argument: str, kind: str) -> None:
     refusal(name, argument, WRONG_KINDS[kind](np.asarray(CALLS[name].good[argument])))
 
 
-@pytest.mark.parametrize(("name", "argument"), [pair for pair in ARRAYS if pair[1] not in OPTIONAL])
+@cases(("name", "argument"), [pair for pair in ARRAYS if pair[1] not in OPTIONAL])
 def test_none_is_refused_where_it_means_nothing(name: str, argument: str) -> None:
     refusal(name, argument, None)
 
@@ -161,17 +162,17 @@ WRONG_SHAPES: dict[str, Callable[[NDArray[Any]], Any]] = {
 SHAPED = {"origins", "directions", "points", "targets"}
 
 
-@pytest.mark.parametrize("shape", WRONG_SHAPES)
-@pytest.mark.parametrize(("name", "argument"), [pair for pair in ARRAYS if pair[1] not in BOUNDS])
+@cases("shape", WRONG_SHAPES)
+@cases(("name", "argument"), [pair for pair in ARRAYS if pair[1] not in BOUNDS])
 def test_other_shapes_are_refused(name: str, argument: str, shape: str) -> None:
     if argument in SHAPED and shape in {"3-d", "empty 3-d"}:
         return
     assert "shape" in refusal(name, argument, WRONG_SHAPES[shape](np.asarray(CALLS[name].good[argument])))
 
 
-@pytest.mark.parametrize("name", [name for name, call in CALLS.items() if call.good is RAYS])
-@pytest.mark.parametrize("bound", sorted(BOUNDS))
-@pytest.mark.parametrize("shape", [(COUNT - 1,), (COUNT + 1,), (1,), (0,), (COUNT, 1), (1, COUNT), (COUNT, 3)])
+@cases("name", [name for name, call in CALLS.items() if call.good is RAYS])
+@cases("bound", sorted(BOUNDS))
+@cases("shape", [(COUNT - 1,), (COUNT + 1,), (1,), (0,), (COUNT, 1), (1, COUNT), (COUNT, 3)])
 def test_bounds_of_other_shapes_are_refused(name: str, bound: str, shape: tuple[int, ...]) -> None:
     assert "shape" in refusal(name, bound, np.ones(shape))
 
@@ -179,9 +180,9 @@ def test_bounds_of_other_shapes_are_refused(name: str, bound: str, shape: tuple[
 # --- values ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("row", [0, -1])
-@pytest.mark.parametrize(
+@cases("value", [np.nan, np.inf, -np.inf])
+@cases("row", [0, -1])
+@cases(
     ("name", "argument"),
     [
         (name, argument)
@@ -197,8 +198,8 @@ def test_values_that_are_not_finite_are_refused(name: str, argument: str, row: i
     assert argument == "matrix" or f"in row {row % len(array)}" in message
 
 
-@pytest.mark.parametrize("value", [np.longdouble("1e4000"), np.longdouble("-1e4000")])
-@pytest.mark.parametrize(
+@cases("value", [np.longdouble("1e4000"), np.longdouble("-1e4000")])
+@cases(
     ("name", "argument"),
     [pair for pair in ARRAYS if pair[1] not in {"faces", "t_max"} and pair != ("Mesh.repaired", "normals")],
 )
@@ -213,8 +214,8 @@ def test_numbers_beyond_float64_are_refused_without_a_warning(name: str, argumen
     refusal(name, argument, array if array.ndim else value)
 
 
-@pytest.mark.parametrize("index", [-1, ROWS, 2**31, 2**63 - 1, -(2**63), np.uint64(2**64 - 1)])
-@pytest.mark.parametrize("corner", range(3))
+@cases("index", [-1, ROWS, 2**31, 2**63 - 1, -(2**63), np.uint64(2**64 - 1)])
+@cases("corner", range(3))
 def test_indices_out_of_range_are_refused_or_repaired(index: Any, corner: int) -> None:
     faces = BOX.faces.astype(np.uint64 if isinstance(index, np.uint64) else np.int64)
     faces[4, corner] = index
@@ -241,7 +242,7 @@ POINT_OPTIONS: dict[str, list[Any]] = {
 }
 
 
-@pytest.mark.parametrize(("name", "bad"), [(n, b) for n, values in POINT_OPTIONS.items() for b in values], ids=repr)
+@cases(("name", "bad"), [(n, b) for n, values in POINT_OPTIONS.items() for b in values])
 def test_options_of_questions_of_points(name: str, bad: Any) -> None:
     solid = Octree.from_mesh(BOX)
     asked = {"tolerance": [solid.winding_number], "boundary": [solid.contains]}
@@ -327,8 +328,8 @@ def same(got: Any, expected: Any) -> None:
         assert_same_hits(got, expected)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize(("name", "argument"), ARRAYS)
+@cases("layout", LAYOUTS)
+@cases(("name", "argument"), ARRAYS)
 def test_any_layout_gives_the_same(name: str, argument: str, layout: str) -> None:
     good = CALLS[name].good[argument]
     clean = np.full(COUNT, 0.125 if argument == "t_min" else 3.0) if argument in BOUNDS else np.asarray(good)
@@ -339,8 +340,8 @@ def test_any_layout_gives_the_same(name: str, argument: str, layout: str) -> Non
     assert np.array_equal(np.asarray(given), clean)  # the caller's array stays as it was
 
 
-@pytest.mark.parametrize("type_", TYPES)
-@pytest.mark.parametrize("accelerator", [OCTREE, BRUTE], ids=["octree", "brute"])
+@cases("type_", TYPES)
+@cases("accelerator", [OCTREE, BRUTE])
 def test_any_type_of_rays_gives_the_same(accelerator: Any, type_: str) -> None:
     origins, directions = INTEGER_RAYS
     directions = -directions if type_[-2] in "fi" else directions
@@ -352,7 +353,7 @@ def test_any_type_of_rays_gives_the_same(accelerator: Any, type_: str) -> None:
     assert accelerator.any_hit(*arrays, *bounds).tolist() == expected.hit.tolist()
 
 
-@pytest.mark.parametrize("type_", TYPES)
+@cases("type_", TYPES)
 def test_any_type_of_mesh_gives_the_same(type_: str) -> None:
     vertices, expected = box((0, 0, 0), (1, 2, 3)).vertices.astype(type_), box((0, 0, 0), (1, 2, 3))
     faces = expected.faces.astype(type_) if type_[-2] in "iu" else expected.faces
@@ -363,8 +364,8 @@ def test_any_type_of_mesh_gives_the_same(type_: str) -> None:
     same_mesh(expected.transformed(np.eye(4).astype(type_)), expected)
 
 
-@pytest.mark.parametrize("type_", ["f2", "f4", "f8", "i4", "u8", ">f8"])
-@pytest.mark.parametrize("built", [OCTREE, BRUTE, Octree([], []), BruteForce([], [])])
+@cases("type_", ["f2", "f4", "f8", "i4", "u8", ">f8"])
+@cases("built", [OCTREE, BRUTE, Octree([], []), BruteForce([], [])])
 def test_no_rays_give_no_hits(built: Any, type_: str) -> None:
     none = np.empty((0, 3), type_)
     for t_max in (np.inf, np.empty(0), []):
@@ -374,8 +375,8 @@ def test_no_rays_give_no_hits(built: Any, type_: str) -> None:
         assert built.any_hit(none, none, t_max=t_max).shape == (0,)
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize("vertices", [[], np.empty((0, 3)), VERTICES])
+@cases("accelerator", [Octree, BruteForce])
+@cases("vertices", [[], np.empty((0, 3)), VERTICES])
 def test_no_faces_are_missed_by_all(accelerator: Any, vertices: Any) -> None:
     built = accelerator(vertices, np.empty((0, 3), np.int64))
     hits = built.closest_hit(ORIGINS, DIRECTIONS)
@@ -388,8 +389,8 @@ def test_no_faces_are_missed_by_all(accelerator: Any, vertices: Any) -> None:
 # --- Hits, Mesh and their sizes -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("exponent", [-1000, -700, -200, -60, 0, 60, 200, 700, 1000])
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
+@cases("exponent", [-1000, -700, -200, -60, 0, 60, 200, 700, 1000])
+@cases("accelerator", [Octree, BruteForce])
 def test_a_hit_has_a_point_and_a_normal_at_any_size(accelerator: Any, exponent: int) -> None:
     vertices = np.ldexp([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], exponent)
     hits = accelerator(vertices, [[0, 1, 2]]).closest_hit(np.ldexp([[0.25, 0.25, 1.0]], exponent), [[0, 0, -1.0]])
@@ -398,8 +399,8 @@ def test_a_hit_has_a_point_and_a_normal_at_any_size(accelerator: Any, exponent: 
     assert hits.normals.tolist() == [[0, 0, 1]]
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-160, 1.0, 1e160, 1e300])
-@pytest.mark.parametrize("mirror", [1, -1])
+@cases("scale", [1e-300, 1e-160, 1.0, 1e160, 1e300])
+@cases("mirror", [1, -1])
 def test_maps_of_any_size_keep_outside_outside(scale: float, mirror: int) -> None:
     mesh = Mesh(BOX.vertices, BOX.faces, normals=BOX.vertices - 0.5)
     moved = mesh.transformed(np.diag([mirror * scale, scale, scale, 1.0]))
@@ -437,7 +438,7 @@ class TestWhatIsNoMesh:
                 call(BOX.vertices, BOX.faces, name=bad)
 
 
-@pytest.mark.parametrize("bad", [None, 3, "x", BOX, np.array(3)])
+@cases("bad", [None, 3, "x", BOX, np.array(3)])
 def test_concatenate_takes_meshes_only(bad: Any) -> None:
     with pytest.raises(MeshError, match=r"^meshes: expected an iterable of Mesh, got"):
         Mesh.concatenate(bad if bad is not BOX else [BOX, None])
@@ -446,7 +447,7 @@ def test_concatenate_takes_meshes_only(bad: Any) -> None:
 # --- files ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("bad", [None, 3, 1.5, [], {}, b"x.ply", np.ones(3), len], ids=repr)
+@cases("bad", [None, 3, 1.5, [], {}, b"x.ply", np.ones(3), len])
 def test_paths_are_strings_or_paths(bad: Any) -> None:
     image = renderer.render(PREPARED, resolution=(1, 1))
     for call in (load_mesh, load_scene, Octree.load, OCTREE.save, image.save):
@@ -454,9 +455,7 @@ def test_paths_are_strings_or_paths(bad: Any) -> None:
             call(bad)
 
 
-@pytest.mark.parametrize(
-    "bad", ["", ".", "\0", "a\0.ply", "no/such/folder/a.ply", "x" * 5000 + ".ply", "/", "\ud800.ply"]
-)
+@cases("bad", ["", ".", "\0", "a\0.ply", "no/such/folder/a.ply", "x" * 5000 + ".ply", "/", "\ud800.ply"])
 def test_paths_that_lead_nowhere(bad: str) -> None:
     with pytest.raises(MeshError):
         load_mesh(bad)
@@ -481,22 +480,22 @@ def test_colours_beyond_float32_are_refused_without_a_warning(tmp_path: Path) ->
             load_mesh(tmp_path / name)
 
 
-@pytest.mark.parametrize("separator", ["\x0b", "\x0c", "\x1c", "\x85", "\u2028", "\u2029"])
+@cases("separator", ["\x0b", "\x0c", "\x1c", "\x85", "\u2028", "\u2029"])
 def test_separators_within_a_comment_end_no_line(tmp_path: Path, separator: str) -> None:
     text = f"# a{separator}b\ng c{separator}d\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     (tmp_path / "a.obj").write_text(text, encoding="utf-8")
     assert load_mesh(tmp_path / "a.obj").faces.tolist() == [[0, 1, 2]]
 
 
-@pytest.mark.parametrize("bad", [None, 1, 0, "yes", [], np.True_], ids=repr)
+@cases("bad", [None, 1, 0, "yes", [], np.True_])
 def test_repair_of_files_is_true_or_false(bad: Any, tmp_path: Path) -> None:
     save_ply(BOX, tmp_path / "box.ply")
     with pytest.raises(MeshError, match=r"^repair: expected True or False, got"):
         load_mesh(tmp_path / "box.ply", repair=bad)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".npy"])
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@cases("suffix", [".png", ".npy"])
+@cases("bad", [np.nan, np.inf, -np.inf])
 def test_pictures_of_what_is_not_finite_are_saved_or_refused_without_a_warning(
     tmp_path: Path, suffix: str, bad: float
 ) -> None:
@@ -532,16 +531,14 @@ BAD_SETTINGS: dict[str, list[Any]] = {
 }
 
 
-@pytest.mark.parametrize(("name", "bad"), [(n, b) for n, values in BAD_SETTINGS.items() for b in values], ids=repr)
+@cases(("name", "bad"), [(n, b) for n, values in BAD_SETTINGS.items() for b in values])
 def test_settings_of_render(name: str, bad: Any) -> None:
     with pytest.raises(ValueError, match=name) as caught:
         render(SCENE, **{"resolution": (4, 4), name: bad})
     assert "ambiguous" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "bad", [None, "scene.toml", 3, {"camera": {}}, BOX, np.ones(3)], ids=lambda b: type(b).__name__
-)
+@cases("bad", [None, "scene.toml", 3, {"camera": {}}, BOX, np.ones(3)])
 def test_render_takes_scenes(bad: Any) -> None:
     with pytest.raises(ValueError, match=r"^scene: expected a Scene or a PreparedScene, got"):
         render(bad, resolution=(4, 4))
@@ -549,7 +546,7 @@ def test_render_takes_scenes(bad: Any) -> None:
         needs_of(bad)
 
 
-@pytest.mark.parametrize("bad", [-1, 1.5, "1", True, np.nan, [1]], ids=repr)
+@cases("bad", [-1, 1.5, "1", True, np.nan, [1]])
 def test_bounces_of_needs_of(bad: Any) -> None:
     with pytest.raises(ValueError, match=r"^max_depth: expected an integer >= 0 or None, got"):
         needs_of(SCENE, bad)
@@ -558,10 +555,9 @@ def test_bounces_of_needs_of(bad: Any) -> None:
 PREPARED = renderer.prepare(SCENE)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("name", "bad"),
     [("accelerator", "octree"), ("split", "sah"), ("needs", needs_of(SCENE)), ("camera", SCENE), ("samples", 3)],
-    ids=lambda value: str(value)[:12],
 )
 def test_what_a_prepared_scene_cannot_change_is_refused(name: str, bad: Any) -> None:
     with pytest.raises(ValueError, match=rf"^{name}: expected .*, got "):
@@ -593,10 +589,9 @@ CLASSES: list[tuple[type, dict[str, Any], dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("kind", "good", "field", "bad"),
     [(kind, good, field, bad) for kind, good, fields in CLASSES for field, bad in fields.items()],
-    ids=lambda value: getattr(value, "__name__", str(value)[:12]),
 )
 def test_each_class_of_a_scene_says_on_one_line_what_is_wrong(
     kind: type, good: dict[str, Any], field: str, bad: Any
@@ -616,7 +611,7 @@ def test_a_prepared_scene_has_a_class_and_the_package_a_version() -> None:
     assert renderer.srgb(np.array([0.0, 1.0, np.inf])).tolist() == [0, 255, 255]
 
 
-@pytest.mark.parametrize("bad", [{}, "x", None, [[1.0], [2.0, 3.0]], [1j]], ids=repr)
+@cases("bad", [{}, "x", None, [[1.0], [2.0, 3.0]], [1j]])
 def test_srgb_takes_numbers_only(bad: Any) -> None:
     with pytest.raises(ValueError, match=r"^linear: expected "):
         renderer.srgb(bad)
@@ -671,8 +666,8 @@ def replaced(table: Any, path: tuple[Any, ...], value: Any) -> Any:
     return [replaced(v, path[1:], value) if k == path[0] else v for k, v in enumerate(table)]
 
 
-@pytest.mark.parametrize("path", leaves(GOOD_SCENE), ids=lambda path: ".".join(map(str, path)))
-@pytest.mark.parametrize("bad", BAD_VALUES, ids=repr)
+@cases("path", leaves(GOOD_SCENE))
+@cases("bad", BAD_VALUES)
 def test_each_number_of_a_scene(path: tuple[Any, ...], bad: Any) -> None:
     with pytest.raises(ValueError) as caught:
         Scene.model_validate(replaced(GOOD_SCENE, path, bad))
