@@ -17,7 +17,7 @@ from renderer.inside.contains import contains
 from renderer.inside.winding import winding_number
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.system.threads import checked_threads
-from renderer.trace.batch import RayBatch, check_rays, moved_off
+from renderer.trace.batch import RayBatch, check_rays, offset_origins
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.error import add_errors
 from renderer.trace.hits import AllHits, Hits, Passage
@@ -166,7 +166,7 @@ class Queries:
         """
         mesh, tree = built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        hits = all_hits(tree, rays, mesh, (contacts, max_hits), shape, self.threads)
+        hits = all_hits(tree, rays, mesh, contacts, max_hits, shape, self.threads)
         if flag_argument("t_error", t_error):
             add_errors(hits, rays, hits.ray, tree.scale, self.threads)
         return hits
@@ -235,7 +235,7 @@ class Queries:
             expect(side is None, "side", "None without leaving", repr(side)[:40])
             return rays, shape
         left = check_leaving(leaving, side, shape, len(mesh.faces))
-        return moved_off(rays, left, mesh, tree.scale, self.threads), shape
+        return offset_origins(rays, left, mesh, tree.scale, self.threads), shape
 
     def contains(
         self,

@@ -15,9 +15,10 @@ from renderer.jit.decorators import kernel
 from renderer.numerics.simd import splat8, store
 from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import check_rays
+from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
-from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.trace.leaf import nearest_carefully, tree_pointers
 from renderer.trace.walk import blocks_of
 
 Boxes = NDArray[np.float64]
@@ -88,7 +89,7 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
             continue
         opened.append(Visit(level, box[:3] / scale, box[3:] / scale, child < 0))
         if child < 0:
-            best = _best_in_leaf(tree.words, child, ray, best)
+            best = _best_in_leaf(tree.descriptor, child, ray, best)
         else:
             waiting += _met_octants(tree, child, level, ray, best[0])
     return opened
@@ -146,6 +147,6 @@ def _limit(ray: Ray, t: float) -> float:
 def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, best: tuple[float, int]) -> tuple[float, np.int64]:
     """The better of ``best`` = (t, face) and the hits in a leaf."""
     seen, (first, count) = tree_pointers(words), blocks_of(leaf)
-    start = (best[0], np.int32(best[1]), 0.0, 0.0, 1.0)
-    t, face, _, _, _ = nearest_carefully(seen, first, count, ray, make_shear(ray), start)
-    return t, np.int64(face)
+    start = Best(best[0], np.int32(best[1]), 0.0, 0.0, 1.0)
+    found = nearest_carefully(seen, first, count, ray, make_shear(ray), start)
+    return found.t, np.int64(found.face)

@@ -27,9 +27,10 @@ from renderer.numerics.simd import (
     store,
 )
 from renderer.numerics.vec3 import three
+from renderer.trace.best import NO_FACE
 from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, tree_pointers
+from renderer.trace.leaf import tree_pointers
 from renderer.trace.point import Point
 from renderer.trace.rays import hit_pointers
 from renderer.trace.walk import blocks_of

@@ -79,12 +79,12 @@ def _computed(tree: Tree, threads: int) -> NDArray[np.float64]:
     rows, leaves = cache_aligned(count * MOMENT_WORDS, np.float64), _leaf_count(tree)
 
     def measure(begin: int, end: int) -> None:
-        _measure_octants(tree.words, rows, _room(tree, leaves), begin, end)
+        _measure_octants(tree.descriptor, rows, _room(tree, leaves), begin, end)
 
     for_chunks(measure, count, _NODES, threads)
     room = _room(tree, leaves)
     for end in range(count, 0, -_NODES):
-        _join_octants(tree.words, rows, room, max(0, end - _NODES), end)
+        _join_octants(tree.descriptor, rows, room, max(0, end - _NODES), end)
     return rows
 
 

@@ -34,7 +34,7 @@ def winding_number(
     moments, numbers = moments_of(tree, threads), np.empty(len(rows))
 
     def search(some: Floats, out: Floats, stack: NDArray[np.int64], begin: int, end: int) -> int:
-        return int(sum_windings(tree.words, moments, some, limit, out, stack, begin, end))
+        return int(sum_windings(tree.descriptor, moments, some, limit, out, stack, begin, end))
 
     _search_in_order(search, tree, mesh, rows, numbers, threads)
     return numbers.reshape(shape)
@@ -45,7 +45,7 @@ def exceeds_half(tree: Tree, mesh: Mesh, rows: NDArray[np.float64], threads: int
     moments, numbers = moments_of(tree, threads), np.empty(len(rows))
 
     def search(some: Floats, out: Floats, stack: NDArray[np.int64], begin: int, end: int) -> int:
-        return int(exceed_half(tree.words, moments, some, out, stack, begin, end))
+        return int(exceed_half(tree.descriptor, moments, some, out, stack, begin, end))
 
     _search_in_order(search, tree, mesh, rows, numbers, threads)
     return numbers > 0.5

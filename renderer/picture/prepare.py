@@ -110,7 +110,7 @@ class PreparedScene:
             tall, wide = film.radiance.shape[:2]
             tile = (x, y, min(x + TILE, wide), min(y + TILE, tall))
             memory = tile_memory(self.tree.depth, settings, _bundles_in_a_row(self.tree))
-            while not render_tile(self.tree.words, arrays, settings, rows, samples, film, tile, memory):
+            while not render_tile(self.tree.descriptor, arrays, settings, rows, samples, film, tile, memory):
                 yield
             cut[first] = memory.state[CUT]
 
@@ -199,7 +199,7 @@ def arrays_for(prepared: PreparedScene, camera: Camera, offset: OffsetRule, medi
         arrays = arrays._replace(media=media_around(prepared.scene, camera))
     if media == "normal":
         arrays = arrays._replace(media=arrays.media[:0])
-    if media == "normal" or not offset.bounded:
+    if media == "normal" or not offset.uses_error_bound:
         arrays = arrays._replace(touching=arrays.touching[:0])
     return arrays
 

@@ -28,7 +28,7 @@ from renderer.shade.whitted import (
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.spawn import put_no_start
-from renderer.trace.traverse import Memory, make_memory, make_scratch
+from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
 # The side in pixels of the squares whose rays become packets.
@@ -205,7 +205,7 @@ class TileMemory(NamedTuple):
     number of bundles that are traced per call.
     """
 
-    trace: Memory
+    trace: Scratch
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     hits: NDArray[np.bool_]
@@ -217,7 +217,7 @@ class TileMemory(NamedTuple):
 def tile_memory(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileMemory:
     """The memory that ``render_tile`` needs beside its film, for one tile and a tree of ``depth`` levels."""
     doubles, integers = work_lengths(settings)
-    trace, hits = make_memory(depth, SIZE), np.empty(SIZE, np.bool_)
+    trace, hits = new_scratch(depth, SIZE), np.empty(SIZE, np.bool_)
     return TileMemory(
         trace, cache_aligned(doubles, np.float64), cache_aligned(integers, np.int64), hits, np.empty(3 * SIZE),
         np.zeros(_STATE, np.int64), bundles,
@@ -248,7 +248,7 @@ def render_tile(words, scene, settings, camera, samples, film, tile, memory):
     """
     doubles, integers, hits = pointer(memory.doubles), pointer(memory.integers), pointer(memory.hits)
     state, total = pointer(memory.state), pointer(memory.total)
-    work = make_work(doubles, integers, hits, settings, make_scratch(memory.trace))
+    work = make_work(doubles, integers, hits, settings, scratch_pointers(memory.trace))
     tree, seen = tree_pointers(words), scene_pointers(scene)
     shooting = CameraMap(pointer(camera), pointer(samples), len(samples))
     if get(state, _BLOCK) == 0 and get(state, _BEGUN) == 0:

@@ -143,7 +143,7 @@ def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
                 rows, jumps = (part[begin:end] for part in way)
                 state, memory = (0, 0), make_sweep_memory(tree.depth)
                 while state[0] < len(rows):
-                    state = sweep(tree.words, arrays, places, sky, answers, rows, jumps, state, memory)
+                    state = sweep(tree.descriptor, arrays, places, sky, answers, rows, jumps, state, memory)
                     yield
 
             size = min(_MOST, max(_LEAST, len(order) // (16 * asked.threads)))

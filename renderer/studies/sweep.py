@@ -18,14 +18,14 @@ from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.parallel_rays import (
-    Parallel,
-    ParallelMemory,
-    make_parallel_memory,
+    ParallelPointers,
+    ParallelScratch,
+    new_parallel_scratch,
     parallel_pointers,
     trace_parallel,
 )
 from renderer.trace.rays import HitPointers, RayPointers, hit_pointers
-from renderer.trace.spawn import LEVEL, has_normal, leave_to_both_sides, put_no_start
+from renderer.trace.spawn import LEVEL, has_normal, offset_to_both_sides, put_no_start
 from renderer.trace.starts.anchor import anchor_of, rounded
 from renderer.trace.starts.cone import make_holders
 from renderer.trace.starts.fan import FAN_HEAD, OPEN, STOPPED, UNSURE, has_fan, size_of_fan, stop_of
@@ -46,7 +46,7 @@ from renderer.trace.starts.record import (
     start_at,
 )
 from renderer.trace.starts.search import take_side
-from renderer.trace.traverse import Memory, Scratch, make_memory, make_scratch, search_blocks, trace
+from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers, search_blocks, trace
 
 TILE = 256
 # A tile ends where the curve leaves the largest cell, but not before so many points: else its parts may be far apart,
@@ -128,8 +128,8 @@ class SweepMemory(NamedTuple):
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     hits: NDArray[np.float64]
-    trace: Memory
-    parallel: ParallelMemory
+    trace: Scratch
+    parallel: ParallelScratch
 
 
 class _Work(NamedTuple):
@@ -149,7 +149,7 @@ class _Work(NamedTuple):
     listed: Any
     found: HitPointers
     scratch: Scratch
-    parallel: Parallel
+    parallel: ParallelPointers
 
 
 def make_sweep_memory(depth: int) -> SweepMemory:
@@ -158,8 +158,8 @@ def make_sweep_memory(depth: int) -> SweepMemory:
         cache_aligned(_POINT_DOUBLES + (8 + ROW) * RAYS + 8, np.float64),
         cache_aligned(_POINT_INTEGERS + RAYS, np.int64),
         cache_aligned(RAYS // 8, np.float64),
-        make_memory(depth, RAYS),
-        make_parallel_memory(depth, TILE),
+        new_scratch(depth, RAYS),
+        new_parallel_scratch(depth, TILE),
     )
 
 
@@ -172,7 +172,7 @@ def _work_in(memory):
     put(zero, 0, 0.0)
     return _Work(
         doubles, integers, origins, directions, limits, starts, values, zero, at(integers, _POINT_INTEGERS),
-        hit_pointers(memory.hits, 0), make_scratch(memory.trace), parallel_pointers(memory.parallel),
+        hit_pointers(memory.hits, 0), scratch_pointers(memory.trace), parallel_pointers(memory.parallel),
     )  # fmt: skip
 
 
@@ -228,7 +228,7 @@ def _begin_on_face(tree, mesh, work, i, o, face, code, has_horizon):
     starts = StartPointers(start, 0, pointer(mesh[0]), pointer(mesh[1]))
     corners, slack = corners_of(starts.vertices, starts.faces, face, tree.scale), EDGE
     if has_normal(corners[0], corners[1], corners[2]):
-        normal, above, below, slack = leave_to_both_sides(corners, o, tree.scale)
+        normal, above, below, slack = offset_to_both_sides(corners, o, tree.scale)
         _put3(work.points, _FACING + 3 * i, normal)
         _put3(work.points, _ABOVE + 3 * i, above)
         _put3(work.points, _BELOW + 3 * i, below)

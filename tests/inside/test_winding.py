@@ -281,7 +281,7 @@ def search_all(words, rows, points, share, out, stack):
 
 def errors_and_bounds(mesh, points, share):
     tree, out = Octree.from_mesh(mesh).tree, np.empty((len(points), 2))
-    search_all(tree.words, moments_of(tree, 1), points, share, out, np.empty(stack_size(tree.depth), np.int64))
+    search_all(tree.descriptor, moments_of(tree, 1), points, share, out, np.empty(stack_size(tree.depth), np.int64))
     return np.abs(np.float64(out[:, 0] - reference(mesh, points))), out[:, 1]
 
 
@@ -317,7 +317,7 @@ def test_a_search_whose_bound_exceeds_the_tolerance_is_not_the_answer():
     points = around(mesh, np.random.default_rng(3), 300) * 3
     tree, out = Octree.from_mesh(mesh).tree, np.empty((len(points), 2))
     stack = np.empty(stack_size(tree.depth), np.int64)
-    search_all(tree.words, moments_of(tree, 1), points, _FIRST * tolerance, out, stack)
+    search_all(tree.descriptor, moments_of(tree, 1), points, _FIRST * tolerance, out, stack)
     good = out[:, 1] <= tolerance
     numbers = Octree.from_mesh(mesh).winding_number(points, tolerance)
     assert good.any() and (~good).any()

@@ -61,7 +61,7 @@ EQUIVALENT: dict[str, str] = {
     "np.maximum(-away.max(axis=1), away.min(axis=1))": "the larger of two numbers is the larger in either order",
     "renderer.trace.traverse._trace_on #0: rounds > _WORK -> (rounds) >= (_WORK)":
         "a call that ends earlier is called again: the same answers",
-    "renderer.trace.traverse.make_memory #0: 1 -> 2": "memory behind the last stack is never written nor read",
+    "renderer.trace.traverse.new_scratch #0: 1 -> 2": "memory behind the last stack is never written nor read",
     "renderer.jit.compiler.probe #0: True -> False": "a kernel answers alike whether what it calls is inlined",
     "renderer.trace.stream.resume #0: _prefetch_child(tree, child) -> pass": "a prefetch changes no answer",
     "renderer.shade.whitted._meet_surfaces #0: times(row3(bundle.weights, i), row3(scene.colors, 1)) -> "
