@@ -4,6 +4,7 @@ k_a I_a + sum over lights [k_d (N.L)+ + k_s (R.V)+^n] I_light, with N the geomet
 """
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,24 +35,30 @@ def face_colors(arrays: SceneArrays, eye: ArrayLike, threads: int | None = None)
     """
     at = checked_vector("eye", eye)
     seen = arrays._replace(materials=_with_stand_ins(arrays.materials))
-    colors = np.empty((len(arrays.faces), 3), np.uint8)
+    colors, table = np.empty((len(arrays.faces), 3), np.uint8), _code_table()
 
     def shade(begin: int, end: int) -> None:
-        shade_faces(seen, at, colors, _table(), begin, end)
+        shade_faces(seen, at, colors, table.steps, table.first, begin, end)
 
     for_chunks(shade, len(colors), _CHUNK, checked_threads(threads))
     return colors
 
 
-@cache
-def _table() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """The steps of sRGB: the least radiance of codes 1 to 255 and an infinity, (256,); and the code at the beginning of
-    each of PLACES equal parts of [0, 1], and at 1.
+class CodeTable(NamedTuple):
+    """The codes of sRGB as a table: a power for each value would take three times as long as all the rest here.
 
-    A power for each value, as in the formula of sRGB, would take three times as long as all the rest here.
+    steps  (256,) the least radiance of codes 1 to 255, and an infinity
+    first  (PLACES + 1,) the code at the beginning of each of PLACES equal parts of [0, 1], and at 1
     """
+
+    steps: NDArray[np.float64]
+    first: NDArray[np.int64]
+
+
+@cache
+def _code_table() -> CodeTable:
     first = srgb(np.arange(PLACES + 1) / PLACES).astype(np.int64)
-    return np.append(srgb_steps(), np.inf), first
+    return CodeTable(np.append(srgb_steps(), np.inf), first)
 
 
 def _with_stand_ins(materials: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -51,7 +51,7 @@ class Ray(NamedTuple):
     start: Floats
 
 
-class Met(NamedTuple):
+class SurfaceHit(NamedTuple):
     """What a ray met: t, the faces that are crossed together, the place where they are seen, the surface there, the
     normal that faces the ray, and the material's row with its columns; and where light passes, the change of media and
     those beyond.
@@ -94,14 +94,14 @@ class Steps:
         """The ray from the eye, in the media there."""
         return Ray("camera", 0, origin, normalized(direction), (1.0, 1.0, 1.0), self._media_at(origin), _NO_START)
 
-    def meet(self, ray: Ray) -> Met | None:
+    def meet(self, ray: Ray) -> SurfaceHit | None:
         """The nearest surface that the ray meets."""
         hits = self.closest(ray.origin, ray.direction, np.inf, ray.start)
         if not hits.hit[0]:
             return None
         return self.meet_at(ray, Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0])), float(hits.t[0]))
 
-    def meet_at(self, ray: Ray, spot: Spot, t: float) -> Met:
+    def meet_at(self, ray: Ray, spot: Spot, t: float) -> SurfaceHit:
         """What the ray meets at t, where it hits a face at barycentrics."""
         d, arrays, tree = ray.direction, self.arrays, self.prepared.tree
         stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
@@ -115,17 +115,17 @@ class Steps:
         n, columns = scale(surface.n_s, -1.0) if inside else surface.n_s, arrays.materials[row // MATERIAL_COLUMNS]
         place = place_at(Spot(*together.near), surface, d)
         left = tuple(beyond[: change.left].tolist())
-        return Met(t, together, place, surface, n, inside, row, columns, change, left)
+        return SurfaceHit(t, together, place, surface, n, inside, row, columns, change, left)
 
     def background(self, ray: Ray) -> Vector:
         """What the pixel receives of a ray that meets nothing."""
         return times(ray.weight, color_at(self.arrays.colors[1], 0))
 
-    def ambient(self, ray: Ray, met: Met) -> Vector:
+    def ambient(self, ray: Ray, met: SurfaceHit) -> Vector:
         """What the pixel receives of the ambient light on a surface."""
         return times(ray.weight, times(color_at(met.material, AMBIENT), color_at(self.arrays.colors[0], 0)))
 
-    def aims(self, ray: Ray, met: Met) -> list[Aim]:
+    def aims(self, ray: Ray, met: SurfaceHit) -> list[Aim]:
         """The shadow rays to the lights that the surface faces."""
         if met.material[KIND] not in (PHONG, LAMBERT):
             return []
@@ -141,7 +141,7 @@ class Steps:
             aims.append(Aim(light, o, way, float(t_max), end, radiance, start))
         return aims
 
-    def bounce(self, ray: Ray, met: Met) -> list[Ray]:
+    def bounce(self, ray: Ray, met: SurfaceHit) -> list[Ray]:
         """The rays that leave the surface: the reflected one, then the refracted one where light passes."""
         change, m, d = met.change, met.row, ray.direction
         through, passes, k_r, k_t = refract_from(self.arrays, m, d, met.n, change.n1, change.n2)
@@ -190,9 +190,10 @@ class Steps:
         self, kind: Kind, ray: Ray, surface: Surface, place: Place, direction: Vector, weight: Vector,
         media: tuple[int, ...],
     ) -> Ray:  # fmt: skip
-        w, (p, error, n_g, *_) = normalized(direction), surface
-        start = self._start(place, n_g, w, ray.direction)
-        return Ray(kind, ray.depth + 1, spawn_origin(p, error, n_g, w, self.offset), w, weight, media, start)
+        w = normalized(direction)
+        start = self._start(place, surface.n_g, w, ray.direction)
+        origin = spawn_origin(surface.p, surface.error, surface.n_g, w, self.offset)
+        return Ray(kind, ray.depth + 1, origin, w, weight, media, start)
 
 
 def steps_of(prepared: PreparedScene, offset: OffsetRule = BOUNDED, media: MediaRule = "stack") -> Steps:

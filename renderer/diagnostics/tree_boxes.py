@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import count_argument
 from renderer.jit.decorators import kernel
 from renderer.numerics.simd import splat8, store
 from renderer.octree import BruteForce, Octree
@@ -43,7 +43,7 @@ def boxes_at(octree: Octree | BruteForce, level: int) -> Boxes:
 
     Raises ``ValueError`` for a negative level.
     """
-    expect(is_count(level), "level", "an integer >= 0", repr(level))
+    count_argument("level", level)
     tree, scale = octree.tree, octree.tree.scale
     boxes = _root_box(tree)
     children = np.zeros(len(boxes), np.int64)
@@ -80,18 +80,18 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
     octree.any_hit(rays.origins, rays.directions)  # raises for rays out of bounds
     tree, scale = octree.tree, octree.tree.scale
     (ox, oy, oz), (dx, dy, dz) = (scale * rays.origins[0]).tolist(), rays.directions[0].tolist()
-    ray, best = Ray(ox, oy, oz, dx, dy, dz, 0.0), (scale * float(rays.t_max[0]), NO_FACE)
+    ray, t, face = Ray(ox, oy, oz, dx, dy, dz, 0.0), scale * float(rays.t_max[0]), NO_FACE
     opened: list[Visit] = []
-    waiting = [o for box in _root_box(tree) for o in _met_octants(_above(tree, box), 0, -1, ray, best[0])]
+    waiting = [o for box in _root_box(tree) for o in _met_octants(_above(tree, box), 0, -1, ray, t)]
     while waiting:
         distance, child, level, box = waiting.pop()
-        if distance > _limit(ray, best[0]):
+        if distance > _limit(ray, t):
             continue
         opened.append(Visit(level, box[:3] / scale, box[3:] / scale, child < 0))
         if child < 0:
-            best = _best_in_leaf(tree.descriptor, child, ray, best)
+            t, face = _best_in_leaf(tree.descriptor, child, ray, t, face)
         else:
-            waiting += _met_octants(tree, child, level, ray, best[0])
+            waiting += _met_octants(tree, child, level, ray, t)
     return opened
 
 
@@ -144,9 +144,9 @@ def _limit(ray: Ray, t: float) -> float:
 
 
 @kernel
-def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, best: tuple[float, int]) -> tuple[float, np.int64]:
-    """The better of ``best`` = (t, face) and the hits in a leaf."""
-    seen, (first, count) = tree_pointers(words), blocks_of(leaf)
-    start = Best(best[0], np.int32(best[1]), 0.0, 0.0, 1.0)
-    found = nearest_carefully(seen, first, count, ray, make_shear(ray), start)
-    return found.t, np.int64(found.face)
+def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, t: float, face: int) -> tuple[float, int]:
+    """t and face of the best hit so far and those in a leaf."""
+    tree, (first, count) = tree_pointers(words), blocks_of(leaf)
+    best = Best(t, np.int32(face), 0.0, 0.0, 1.0)
+    best = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
+    return best.t, int(best.face)

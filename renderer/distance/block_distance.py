@@ -1,8 +1,8 @@
 """Bounds of the distances of a point from the four faces of a block, in float64, four at a time.
 
-Any point of a face bounds its distance from above. From below, any direction does: no point of the face is nearer than
-the corner that is nearest along it. With the nearest point and its direction both bounds are the distance, but for
-rounding; where rounding misses that point they are wider, and still bounds.
+Any point of a face bounds its distance from above. Projecting the corners on any direction bounds it from below. With
+the nearest point and its direction both bounds are the distance, but for rounding. Where rounding misses that point
+they are wider, and still bounds.
 """
 
 import numpy as np

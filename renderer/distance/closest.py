@@ -1,4 +1,4 @@
-"""Closest points on a mesh: checks at the boundary, chunks on threads, and the answer."""
+"""Closest points on a mesh: checks at the boundary, chunks on threads, and the result."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.arguments.arrays import real_argument
 from renderer.arguments.points import check_points, farthest_of
-from renderer.distance.nearest import LISTED, UNTOLD_FACE, find_nearest
+from renderer.distance.nearest import LISTED, UNDECIDED_FACE, find_nearest
 from renderer.distance.rational import nearest_exactly
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
-from renderer.ordering.cells import ask_in_order
+from renderer.ordering.cells import search_in_order
 from renderer.trace.closest import rays_against_blocks
 from renderer.trace.hits import points_on
 from renderer.trace.layout import Tree
@@ -89,11 +89,11 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
             yield
 
     least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))
-    ask_in_order(find, given, mesh, None, least, threads)
+    search_in_order(find, given, mesh, None, least, threads)
     faces = out[3].view(np.int64)
-    untold = np.flatnonzero(faces == UNTOLD_FACE)
-    triangles = mesh.triangles if len(untold) else np.empty((0, 3, 3))
-    for row in untold:
+    undecided = np.flatnonzero(faces == UNDECIDED_FACE)
+    triangles = mesh.triangles if len(undecided) else np.empty((0, 3, 3))
+    for row in undecided:
         distance, u, v, face = nearest_exactly(given[row], triangles, tree.scale)
         hit = distance <= limits[row if len(limits) > 1 else 0]
         out[:3, row] = (distance, u, v) if hit else (np.inf, np.nan, np.nan)

@@ -28,11 +28,13 @@ from renderer.numerics.simd import larger, put
 # middle of two float64 a distance is taken as there.
 _CANCELLED, _LOST = 2.0**-40, 2.0**-90
 _TINIEST = 2.0**-1000
-# Where ``parts`` has a number behind the expansion: not 0 once a distance was asked whose products vanish or overflow.
-UNTOLD = PARTS
+# Where ``parts`` has a number behind the expansion: not 0 once products of a distance have vanished or overflowed.
+UNDECIDED_FLAG = PARTS
+# More than any distance in units of the reach.
+_BEYOND = 2.0**1000
 
 
-class _Seen(NamedTuple):
+class FaceView(NamedTuple):
     """A face seen from a point: corners less the point and sides, as pairs, and the factors that scaled them."""
 
     pa: Any
@@ -50,36 +52,40 @@ def distance_to_face(a, b, c, p, parts):
     """The distance of the point p from a face, and u and v of the face's nearest point.
 
     The distance errs by less than an ulp, or by 2^-90 of that of the farthest corner if that is more, and is 0 on the
-    face only; else ``parts``, memory for an expansion, has a number at UNTOLD that is not 0.
+    face only; else ``parts``, memory for an expansion, has a number at UNDECIDED_FLAG that is not 0.
     """
-    seen = _see(a, b, c, p)
-    normal = _normal(seen, a, b, c, parts)
-    wa = dot_pairs(seen.pb, cross_pairs(seen.bc, normal))[0]
-    wb = dot_pairs(seen.pc, cross_pairs(seen.ca, normal))[0]
-    wc = dot_pairs(seen.pa, cross_pairs(seen.ab, normal))[0]
+    view = _view_face(a, b, c, p)
+    normal = _normal(view, a, b, c, parts)
+    # Find on which side of each edge the point lies, as seen along the normal.
+    wa = dot_pairs(view.pb, cross_pairs(view.bc, normal))[0]
+    wb = dot_pairs(view.pc, cross_pairs(view.ca, normal))[0]
+    wc = dot_pairs(view.pa, cross_pairs(view.ab, normal))[0]
     limit = _LOST * _largest(normal)
-    on_a, on_b, on_c = limit * _largest(seen.bc), limit * _largest(seen.ca), limit * _largest(seen.ab)
+    on_a, on_b, on_c = limit * _largest(view.bc), limit * _largest(view.ca), limit * _largest(view.ab)
+    # Over the face, measure along the normal.
     # rule: over-face
     if wa > on_a and wb > on_b and wc > on_c:
-        height, total = _height(seen, normal, a, b, c, p, parts), wa + wb + wc
+        height, total = _height(view, normal, a, b, c, p, parts), wa + wb + wc
         distance = _rounded(quotient(height, length_pair(normal)))
-        return distance / seen.to_reach, wb / total, wc / total
-    distance, u, v = 2.0**1000, 0.0, 0.0
+        return distance / view.to_reach, wb / total, wc / total
+    # Elsewhere take the nearest of the edges beyond which the point lies.
+    distance, u, v = _BEYOND, 0.0, 0.0
     if wc <= on_c:
-        d, t = _distance_to_edge(a, b, p, seen, (seen.pa, seen.pb, seen.ab), parts)
+        d, t = _distance_to_edge(a, b, p, view.pa, view.pb, view.ab, view, parts)
         if d < distance:
             distance, u, v = d, t, 0.0
     if wa <= on_a:
-        d, t = _distance_to_edge(b, c, p, seen, (seen.pb, seen.pc, seen.bc), parts)
+        d, t = _distance_to_edge(b, c, p, view.pb, view.pc, view.bc, view, parts)
         if d < distance:
             distance, u, v = d, 1.0 - t, t
     if wb <= on_b:
-        d, t = _distance_to_edge(c, a, p, seen, (seen.pc, seen.pa, seen.ca), parts)
+        d, t = _distance_to_edge(c, a, p, view.pc, view.pa, view.ca, view, parts)
         if d < distance:
             distance, u, v = d, 0.0, 1.0 - t
+    # So near that rounding cannot tell, decide exactly whether the point lies on the face.
     if distance < 2.0 * _LOST:
         distance = _on_or_beside(a, b, c, p, distance, parts)
-    return distance / seen.to_reach, u, v
+    return distance / view.to_reach, u, v
 
 
 @kernel
@@ -90,18 +96,19 @@ def _on_or_beside(a, b, c, p, distance, parts):
     if on == 1:
         return 0.0
     if on == UNDECIDED or distance == 0.0:
-        put(parts, UNTOLD, 1.0)
+        put(parts, UNDECIDED_FLAG, 1.0)
     return distance
 
 
 @kernel
-def _see(a, b, c, p):
+def _view_face(a, b, c, p):
+    """The ``FaceView`` of a face from p."""
     reach, side = _TINIEST, _TINIEST
     for k in range(3):
         reach = larger(reach, larger(larger(abs(a[k] - p[k]), abs(b[k] - p[k])), abs(c[k] - p[k])))
         side = larger(side, larger(larger(abs(b[k] - a[k]), abs(c[k] - b[k])), abs(a[k] - c[k])))
     to_reach, to_side = 1.0 / power_below(reach), 1.0 / power_below(side)
-    return _Seen(
+    return FaceView(
         scaled_difference(a, p, to_reach), scaled_difference(b, p, to_reach), scaled_difference(c, p, to_reach),
         scaled_difference(b, a, to_side), scaled_difference(c, b, to_side), scaled_difference(a, c, to_side),
         to_reach, to_side,
@@ -120,11 +127,11 @@ def _scaled(pair, x, y):
 
 
 @kernel
-def _normal(seen, a, b, c, parts):
+def _normal(view, a, b, c, parts):
     """The vector product of a face's sides."""
-    normal = cross_pairs(seen.ca, seen.ab)
+    normal = cross_pairs(view.ca, view.ab)
     if _largest(normal) < _CANCELLED:
-        return _expanded(b, c, a, seen.to_side, seen.to_side, normal, parts)
+        return _expanded(b, c, a, view.to_side, view.to_side, normal, parts)
     return normal
 
 
@@ -138,38 +145,36 @@ def _expanded(a, b, p, first, second, otherwise, parts):
     z = expand_area((a[0], a[1]), (b[0], b[1]), (p[0], p[1]), parts)
     z_pair = pair_of(parts, z)
     if x == OUT_OF_RANGE or y == OUT_OF_RANGE or z == OUT_OF_RANGE:
-        put(parts, UNTOLD, 1.0)
+        put(parts, UNDECIDED_FLAG, 1.0)
         return otherwise
     return _scaled(x_pair, first, second), _scaled(y_pair, first, second), _scaled(z_pair, first, second)
 
 
 @kernel
-def _height(seen, normal, a, b, c, p, parts):
+def _height(view, normal, a, b, c, p, parts):
     """The distance of the point from the face's plane times the length of the normal."""
-    height = dot_pairs(seen.pa, normal)
+    height = dot_pairs(view.pa, normal)
     # rule: cancelled-height
     if abs(height[0]) < _CANCELLED * _largest(normal):
         count = expand_volume(a, b, c, p, parts)
         if count == OUT_OF_RANGE:
-            put(parts, UNTOLD, 1.0)
+            put(parts, UNDECIDED_FLAG, 1.0)
         else:
-            height = _scaled(_scaled(pair_of(parts, count), seen.to_side, seen.to_reach), seen.to_side, 1.0)
+            height = _scaled(_scaled(pair_of(parts, count), view.to_side, view.to_reach), view.to_side, 1.0)
     return height if height[0] >= 0.0 else (-height[0], -height[1])
 
 
 @kernel
-def _distance_to_edge(a, b, p, seen, edge, parts):
+def _distance_to_edge(a, b, p, pa, pb, ab, view, parts):
     """The distance of the point from the edge from a to b, in units of its reach, and the share of the way from a."""
-    pa, pb, ab = edge
     if _precedes(b, a):
-        d, t = _distance_to_ordered(b, a, p, seen, (pb, pa, negative(ab)), parts)
+        d, t = _distance_to_ordered(b, a, p, pb, pa, negative(ab), view, parts)
         return d, 1.0 - t
-    return _distance_to_ordered(a, b, p, seen, edge, parts)
+    return _distance_to_ordered(a, b, p, pa, pb, ab, view, parts)
 
 
 @kernel
-def _distance_to_ordered(a, b, p, seen, edge, parts):
-    pa, pb, ab = edge
+def _distance_to_ordered(a, b, p, pa, pb, ab, view, parts):
     behind, ahead = -dot_pairs(pa, ab)[0], dot_pairs(pb, ab)[0]
     # rule: nearest-corner
     if behind <= 0.0:
@@ -179,7 +184,7 @@ def _distance_to_ordered(a, b, p, seen, edge, parts):
     area = cross_pairs(pa, ab)
     # rule: cancelled-area
     if _largest(area) < _CANCELLED * _largest(pa):
-        area = _expanded(a, b, p, seen.to_reach, seen.to_side, area, parts)
+        area = _expanded(a, b, p, view.to_reach, view.to_side, area, parts)
     return _rounded(quotient(length_pair(area), length_pair(ab))), behind / (behind + ahead)
 
 
@@ -189,7 +194,7 @@ def _rounded(pair):
 
     So equal distances, which faces in one plane have, stay equal.
     """
-    head, tail = pair
+    head, tail = pair[0], pair[1]
     bits = np.int64(np.float64(head).view(np.int64))
     other = np.int64(bits + (1 if tail > 0.0 else -1)).view(np.float64)
     if tail != 0.0 and bits & 1 != 0 and abs(2.0 * abs(tail) - abs(other - head)) <= _LOST * head:

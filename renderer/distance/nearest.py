@@ -1,7 +1,7 @@
 """The face that is nearest to a point: a search through the tree, the nearest boxes first.
 
-The search keeps a bound of the distance and lists the faces that may be within it; only those are told apart by
-``distance_to_face``. So the answer is the least of those distances over all faces, whatever the tree and the order.
+The search keeps a bound of the distance and lists the faces that may be within it. ``distance_to_face`` measures only
+those. So the result is the least of those distances over all faces, whatever the tree and the order.
 """
 
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.distance.block_distance import bound_distances
-from renderer.distance.face_distance import UNTOLD, distance_to_face
+from renderer.distance.face_distance import UNDECIDED_FLAG, distance_to_face
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
     at,
@@ -29,18 +29,18 @@ from renderer.numerics.simd import (
 from renderer.numerics.vec3 import three
 from renderer.trace.best import NO_FACE
 from renderer.trace.edge_signs import corner
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.point import Point
 from renderer.trace.rays import hit_pointers
-from renderer.trace.walk import blocks_of
+from renderer.trace.walk import child_in, walk_nearest_first
 
-# In place of a face: float64 cannot tell.
-UNTOLD_FACE = -2
-# Faces that may be the nearest are told apart at once when so many are listed.
+# In place of a face: float64 cannot decide.
+UNDECIDED_FACE = -2
+# Faces that may be the nearest are measured together when so many are listed.
 LISTED = 64
-# The blocks that a call tests, some milliseconds, and how many of them one face costs that is told apart.
-WORK, _APART = 1 << 16, 16
+# The blocks that a call tests, some milliseconds, and how many of them the measure of one face costs.
+WORK, _MEASURE = 1 << 16, 16
 # No distance is larger: points keep to 2^126 and meshes to 2^60, in the tree's units.
 _FARTHEST = 2.0**130
 # More than squares and their sum lose, and what a bound's square needs above it.
@@ -49,13 +49,22 @@ _LESS, _MORE = 1.0 - 2.0**-48, 1.0 + 2.0**-48
 _VANISHED = 2.0**-1060
 
 
-class Search(NamedTuple):
-    """Memory of a search, as pointers.
+class Nearest(NamedTuple):
+    """The nearest face so far: its distance, its number (NO_FACE for none), and where on it the nearest point lies."""
+
+    distance: float
+    face: Any
+    u: float
+    v: float
+
+
+class Scratch(NamedTuple):
+    """Memory of a scratch, as pointers.
 
     children, near  the nodes and leaves that wait, and the squares of their boxes' distances
     places, least   the listed faces' places in the blocks, and the least distances that they may have
     squares         eight squares
-    work            the blocks tested so far, and, as more of them, the faces told apart
+    work            the blocks tested so far, and, as more of them, the faces measured
     parts           memory for an expansion
     """
 
@@ -68,10 +77,26 @@ class Search(NamedTuple):
     parts: Any
 
 
+class _Query(NamedTuple):
+    """A point, and the scratch of its search."""
+
+    point: Point
+    scratch: Scratch
+
+
+class _Found(NamedTuple):
+    """The nearest face so far, the number of faces that are listed, and a bound of the distance."""
+
+    best: Nearest
+    listed: int
+    limit: float
+
+
 @kernel
 def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
-    """Write distance, u, v and face (or UNTOLD_FACE) of ``points``, from row ``begin`` on, to ``out[:, rows]``, (4, m).
+    """Write distance, u, v and face (or UNDECIDED_FACE) of ``points``, from row ``begin`` on, to ``out[:, rows]``.
 
+    out        (4, m) float64
     limits     (m,) or (1,), the largest distance that counts
     integers   memory for ``walk.stack_size`` and LISTED int64; ``doubles``, for as many float64 and nine more
 
@@ -80,43 +105,42 @@ def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
     tree, parts, count = tree_pointers(words), local_doubles(), len(points)
     found, size = hit_pointers(out, out.shape[1]), len(integers) - LISTED
     children, near = pointer(integers), pointer(doubles)
-    search = Search(
+    scratch = Scratch(
         children, near, at(children, size), at(near, size), at(near, size + LISTED), at(near, size + LISTED + 8), parts
     )
-    put(search.work, 0, 0.0)
+    put(scratch.work, 0, 0.0)
     for i in range(begin, count):
         p, row = at(pointer(points), 3 * i), rows[i]
         limit = limits[row if len(limits) > 1 else 0]
         # rule: point-in-tree-units
         point = Point(0, 4, 8, tree.scale * get(p, 0), tree.scale * get(p, 1), tree.scale * get(p, 2))
-        put(parts, UNTOLD, 0.0)
-        distance, face, u, v = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), search)
-        distance /= tree.scale
+        put(parts, UNDECIDED_FLAG, 0.0)
+        near = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), scratch)
+        distance, face = near.distance / tree.scale, near.face
         # rule: reach-is-closed
         hit = face != NO_FACE and distance <= limit
         put(found.t, row, distance if hit else np.inf)
         # rule: lost-products
-        told = get(parts, UNTOLD) == 0.0 and _is_scaled(point, p, tree.scale)
-        put(found.face, row, np.int64((face if hit else -1) if told else UNTOLD_FACE))
-        put(found.u, row, u if hit else np.nan)
-        put(found.v, row, v if hit else np.nan)
-        if get(search.work, 0) > WORK:
+        is_known = get(parts, UNDECIDED_FLAG) == 0.0 and _is_scaled(point, p, tree.scale)
+        put(found.face, row, np.int64((face if hit else -1) if is_known else UNDECIDED_FACE))
+        put(found.u, row, near.u if hit else np.nan)
+        put(found.v, row, near.v if hit else np.nan)
+        if get(scratch.work, 0) > WORK:
             return i + 1
     return count
 
 
 @kernel
-def tell_faces(triangles, point, told):
-    """Write distance, u and v of each face (k, 3 corners, 3) seen from a point (3,), and 1 where they are told.
-
-    ``told`` has the shape (k, 4).
+def measure_faces(triangles, point, out):
+    """Write distance, u and v of each face (k, 3 corners, 3) seen from a point (3,), and 1 where they are known, to
+    ``out`` (k, 4).
     """
     parts, p = local_doubles(), three(pointer(point), 0)
     for i in range(len(triangles)):
-        put(parts, UNTOLD, 0.0)
+        put(parts, UNDECIDED_FLAG, 0.0)
         base = at(pointer(triangles), 9 * i)
-        told[i, 0], told[i, 1], told[i, 2] = distance_to_face(three(base, 0), three(base, 3), three(base, 6), p, parts)
-        told[i, 3] = 1.0 if get(parts, UNTOLD) == 0.0 else 0.0
+        out[i, 0], out[i, 1], out[i, 2] = distance_to_face(three(base, 0), three(base, 3), three(base, 6), p, parts)
+        out[i, 3] = 1.0 if get(parts, UNDECIDED_FLAG) == 0.0 else 0.0
 
 
 @inlined
@@ -126,28 +150,27 @@ def _is_scaled(point, p, scale):
 
 
 @kernel
-def _search(tree, point, limit, search):
-    """The nearest face within ``limit``: distance, face (NO_FACE for none), u and v."""
-    best, listed = (np.inf, np.int32(NO_FACE), 0.0, 0.0), np.int64(0)
-    if not tree.has_nodes:
-        best, listed, limit = _search_blocks(tree, 0, tree.count, point, search, best, listed, limit)
-        return _settle(tree, point, search, best, listed, limit)
-    top = 1
-    put(search.children, 0, 0)
-    put(search.near, 0, 0.0)
-    while top > 0:
-        top -= 1
-        if get(search.near, top) > _squared(limit):
-            continue
-        child = get(search.children, top)
-        if child < 0:
-            first, count = blocks_of(child)
-            best, listed, limit = _search_blocks(tree, first, count, point, search, best, listed, limit)
-            continue
-        base = child * NODE_WORDS
-        bits = _bound_boxes(tree.nodes, base, point, splat4(_squared(limit)), search.squares)
-        top = _push_nearest_last(tree.links, base + CHILDREN, bits, search, top)
-    return _settle(tree, point, search, best, listed, limit)
+def _search(tree, point, limit, scratch):
+    """The ``Nearest`` face within ``limit``."""
+    query, none = _Query(point, scratch), Nearest(np.inf, np.int32(NO_FACE), 0.0, 0.0)
+    put(scratch.near, 0, 0.0)
+    found = walk_nearest_first(
+        tree, scratch.children, query, _Found(none, np.int64(0), limit), _reaches, _enter, _list_faces
+    )
+    return _settle(tree, query, found)
+
+
+@inlined
+def _reaches(query, k, found):
+    return get(query.scratch.near, k) <= _squared(found.limit)
+
+
+@inlined
+def _enter(tree, query, node, found, top):
+    bits = _bound_boxes(
+        tree.nodes, node * NODE_WORDS, query.point, splat4(_squared(found.limit)), query.scratch.squares
+    )  # fmt: skip
+    return found, _push_nearest_last(tree, node, bits, query.scratch, top)
 
 
 @inlined
@@ -157,8 +180,8 @@ def _squared(limit):
 
 
 @inlined
-def _push_nearest_last(links, base, bits, search, top):
-    """Let the octants ``bits`` wait, the nearest on top; ``base`` is where the node's links begin.
+def _push_nearest_last(tree, node, bits, scratch, top):
+    """Let the octants ``bits`` of a node wait, the nearest on top.
 
     The others are in no order: most are out of reach once the nearest is searched, and sorting takes longer.
     """
@@ -168,17 +191,17 @@ def _push_nearest_last(links, base, bits, search, top):
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        square = get(search.squares, i)
-        put(search.near, top, square)
-        put(search.children, top, np.int64(get(links, base + i)))
+        square = get(scratch.squares, i)
+        put(scratch.near, top, square)
+        put(scratch.children, top, child_in(tree, node, i))
         nearest, least = (top, square) if square < least else (nearest, least)
         top += 1
     last = top - 1
-    square, child = get(search.near, nearest), get(search.children, nearest)
-    put(search.near, nearest, get(search.near, last))
-    put(search.children, nearest, get(search.children, last))
-    put(search.near, last, square)
-    put(search.children, last, child)
+    square, child = get(scratch.near, nearest), get(scratch.children, nearest)
+    put(scratch.near, nearest, get(scratch.near, last))
+    put(scratch.children, nearest, get(scratch.children, last))
+    put(scratch.near, last, square)
+    put(scratch.children, last, child)
     return top
 
 
@@ -206,38 +229,42 @@ def _gap(nodes, row, x):
 
 
 @kernel
-def _search_blocks(tree, first, count, point, search, best, listed, limit):
-    """List the faces of some blocks that may be within ``limit``, and lower that to what they bound."""
-    put(search.work, 0, get(search.work, 0) + count)
+def _list_faces(tree, query, first, count, found):
+    """List the faces of some blocks that may be within the limit, and lower that to what they bound; the search goes
+    on.
+    """
+    scratch, best, listed, limit = query.scratch, found.best, found.listed, found.limit
+    put(scratch.work, 0, get(scratch.work, 0) + count)
     for block in range(first, first + count):
-        bits, low, limit = bound_distances(tree, block * BLOCK_WORDS, point, limit)
+        bits, low, limit = bound_distances(tree, block * BLOCK_WORDS, query.point, limit)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            put(search.places, listed, block * BLOCK_FACES + i)
-            put(search.least, listed, extract(low, i))
+            put(scratch.places, listed, block * BLOCK_FACES + i)
+            put(scratch.least, listed, extract(low, i))
             listed += 1
             if listed == LISTED:
-                best = _settle(tree, point, search, best, listed, limit)
-                limit, listed = smaller(limit, best[0] * _MORE), np.int64(0)
-    return best, listed, limit
+                best = _settle(tree, query, _Found(best, listed, limit))
+                limit, listed = smaller(limit, best.distance * _MORE), np.int64(0)
+    return _Found(best, listed, limit), False
 
 
 @kernel
-def _settle(tree, point, search, best, listed, limit):
-    """The better of ``best`` and the listed faces that are still within the limit: least distance, then lowest face."""
-    distance, face, u, v = best
-    p = point.x, point.y, point.z
-    for k in range(listed):
-        if get(search.least, k) > limit:
+def _settle(tree, query, found):
+    """The better of the best face and the listed ones that are still within the limit: least distance, then lowest
+    face.
+    """
+    best, scratch, p = found.best, query.scratch, (query.point.x, query.point.y, query.point.z)
+    for k in range(found.listed):
+        if get(scratch.least, k) > found.limit:
             continue
-        place = get(search.places, k)
-        put(search.work, 0, get(search.work, 0) + _APART)
+        place = get(scratch.places, k)
+        put(scratch.work, 0, get(scratch.work, 0) + _MEASURE)
         base = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
         f = get(tree.faces, place)
-        d, du, dv = distance_to_face(corner(tree, base), corner(tree, base + 12), corner(tree, base + 24), p,
-                                     search.parts)  # fmt: skip
+        a, b, c = corner(tree, base), corner(tree, base + 12), corner(tree, base + 24)
+        d, u, v = distance_to_face(a, b, c, p, scratch.parts)
         # rule: equally-near
-        if d < distance or (d == distance and f < face):
-            distance, face, u, v = d, f, du, dv
-    return distance, face, u, v
+        if d < best.distance or (d == best.distance and f < best.face):
+            best = Nearest(d, f, u, v)
+    return best

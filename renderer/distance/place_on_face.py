@@ -21,7 +21,8 @@ from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
 
 # 32 roundings of float64, and 8 of float32.
 DOUBLE, SINGLE = 2.0**-48, 2.0**-21
-# A point is exactly on an edge where the product of the ways along it and to the point is less, of ways of about 1.
+# A point is exactly on an edge where the product of the vectors along it and to the point is less, of vectors of size
+# about 1.
 _EXACT = 2.0**-80
 
 
@@ -36,16 +37,17 @@ def anchor_all(vertices, faces, points, chosen, rough, codes, anchors):
     """
     for i in range(len(points)):
         if chosen[i] >= 0:
-            corners, o = corners_of(pointer(vertices), pointer(faces), chosen[i], 1.0), row3(pointer(points), i)
+            p0, p1, p2 = corners_of(pointer(vertices), pointer(faces), chosen[i], 1.0)
+            o = row3(pointer(points), i)
             largest = largest_component(o)
-            u, v = _weights_of(corners, o, DOUBLE * largest)
-            near = _measured(corners, u, v, o, DOUBLE * largest) <= DOUBLE * largest
+            u, v = _weights_of(p0, p1, p2, o, DOUBLE * largest)
+            near = _measured(p0, p1, p2, u, v, o, DOUBLE * largest) <= DOUBLE * largest
             if rough[i] and not near:
-                u, v = _weights_of(corners, o, SINGLE * largest)
+                u, v = _weights_of(p0, p1, p2, o, SINGLE * largest)
             code, anchor = np.int64(0), o
             if u == 1.0 or v == 1.0 or (u == 0.0 and v == 0.0):
-                anchor = corners[1] if u == 1.0 else (corners[2] if v == 1.0 else corners[0])
-            elif not (near and _is_exact(corners, u, v, o)):
+                anchor = p1 if u == 1.0 else (p2 if v == 1.0 else p0)
+            elif not (near and _is_exact(p0, p1, p2, u, v, o)):
                 code, anchor = np.int64(BARYCENTRIC), (u, v, 0.0)
             codes[i] = code
             for k in range(3):
@@ -53,19 +55,17 @@ def anchor_all(vertices, faces, points, chosen, rough, codes, anchors):
 
 
 @inlined
-def _measured(corners, u, v, o, enough):
+def _measured(p0, p1, p2, u, v, o, enough):
     """How far a point is from a face, along the axis where it is farthest: with twice the digits, if it is not as near
     as ``enough`` to the place of barycentrics u and v.
     """
-    p0, p1, p2 = corners
     distance = largest_component(sub(o, barycentric(p0, p1, p2, u, v)))
-    return distance if distance <= enough else far_from(anchor_of(Start(corners, o, 0, 0)), o)
+    return distance if distance <= enough else far_from(anchor_of(Start((p0, p1, p2), o, 0, 0)), o)
 
 
 @kernel
-def _is_exact(corners, u, v, o):
+def _is_exact(p0, p1, p2, u, v, o):
     """Whether a point with barycentrics u and v is inside a face, or exactly on the edge where these are."""
-    p0, p1, p2 = corners
     w = 1.0 - u - v
     if w == 0.0:
         return u > 0.0 and v > 0.0 and _is_between(p1, p2, o)
@@ -76,7 +76,7 @@ def _is_exact(corners, u, v, o):
 
 @inlined
 def _is_between(p, q, o):
-    """Whether a point is on the line of two others, told with twice the digits."""
+    """Whether a point is on the line of two others, with twice the digits."""
     unit = 1.0 / power_below(largest_component(sub(q, p)))
     across = cross_pairs(scaled_difference(q, p, unit), scaled_difference(o, p, unit))
     return largest_component(heads(across)) <= _EXACT
@@ -88,9 +88,10 @@ def measure_all(vertices, faces, points, chosen, enough, distances):
     more than ``enough`` (n,).
     """
     for i in range(len(points)):
-        corners, o = corners_of(pointer(vertices), pointer(faces), chosen[i], 1.0), row3(pointer(points), i)
-        u, v = _weights_of(corners, o, 0.0)
-        distances[i] = _measured(corners, u, v, o, enough[i])
+        p0, p1, p2 = corners_of(pointer(vertices), pointer(faces), chosen[i], 1.0)
+        o = row3(pointer(points), i)
+        u, v = _weights_of(p0, p1, p2, o, 0.0)
+        distances[i] = _measured(p0, p1, p2, u, v, o, enough[i])
 
 
 @inlined
@@ -99,15 +100,14 @@ def _over(a, size):
 
 
 @kernel
-def _weights_of(corners, o, room):
+def _weights_of(p0, p1, p2, o, room):
     """u and v of the point of a face that is nearest to o; nearer to an edge than ``room``, one on it."""
-    p0, p1, p2 = corners
-    sides = sub(p2, p1), sub(p0, p2), sub(p1, p0)
-    size = largest_of_three(sides[0], sides[1], sides[2])
+    s0, s1, s2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
+    size = largest_of_three(s0, s1, s2)
     if size == 0.0:
         return 0.0, 0.0
     # In units of the face, so that no product overflows or vanishes.
-    s0, s1, s2 = _over(sides[0], size), _over(sides[1], size), _over(sides[2], size)
+    s0, s1, s2 = _over(s0, size), _over(s1, size), _over(s2, size)
     w0, w1, w2, room = _over(sub(o, p0), size), _over(sub(o, p1), size), _over(sub(o, p2), size), room / size
     n = cross(s2, scale(s1, -1.0))
     area = length(n)
@@ -117,7 +117,7 @@ def _weights_of(corners, o, room):
     c = _beyond(dot(cross(s2, w0), n) / area, room * length(s2))
     if not a + b + c > 0.0:
         # A face without area is its longest side.
-        a, b, c = _along_longest((s0, s1, s2), (w0, w1, w2), room)
+        a, b, c = _along_longest(s0, s1, s2, w0, w1, w2, room)
     return _exact_shares(a, b, c)
 
 
@@ -143,9 +143,11 @@ def _exact_shares(a, b, c):
 
 
 @kernel
-def _along_longest(sides, ways, room):
-    """Weights of the nearest point of the longest side; within ``room`` of a corner those of the corner."""
-    (s0, s1, s2), (w0, w1, w2) = sides, ways
+def _along_longest(s0, s1, s2, w0, w1, w2, room):
+    """Weights of the nearest point of the longest side; within ``room`` of a corner those of the corner.
+
+    The side s0 is opposite to the first corner, from which w0 leads to the point; and so on.
+    """
     l0, l1, l2 = length(s0), length(s1), length(s2)
     d0, d1, d2 = length(w0), length(w1), length(w2)
     least = smaller(d0, smaller(d1, d2))

@@ -6,8 +6,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.distance.nearest import tell_faces
-from renderer.numerics.rational import Vector, dot, exact, less
+from renderer.distance.nearest import measure_faces
+from renderer.numerics.rational import Vector, corners_from, dot, less
 
 # What the few roundings of the bounds below may change.
 _MORE = 1.0 + 2.0**-48
@@ -20,23 +20,21 @@ def nearest_exactly(
 ) -> tuple[float, float, float, int]:
     """The distance of a point (3,) from triangles (F, 3 corners, 3), u, v and the face.
 
-    Faces that float64 can tell have the distances that a search gives them, with the tree's ``scale``, so that answers
+    Faces that float64 decides have the distances that a search gives them, with the tree's ``scale``, so that answers
     do not depend on what a search meets; the others have theirs rounded once. Of equal distances the lowest face wins.
     """
     faces, found = _candidates(point, triangles), list[tuple[float, int, float, float]]()
-    told = np.zeros((len(faces), 4))
+    measured = np.zeros((len(faces), 4))
     if (point * scale / scale == point).all():
-        tell_faces(triangles[faces] * scale, point * scale, told)
-    for face, (distance, u, v, sure) in zip(faces.tolist(), told.tolist(), strict=True):
-        answer = (distance / scale, u, v) if sure else _exactly(point, triangles[face])
-        found.append((answer[0], face, *answer[1:]))
+        measure_faces(triangles[faces] * scale, point * scale, measured)
+    for face, (distance, u, v, is_known) in zip(faces.tolist(), measured.tolist(), strict=True):
+        if is_known:
+            found.append((distance / scale, face, u, v))
+        else:
+            square, exact_u, exact_v = _nearest(*corners_from(point, triangles[face]))
+            found.append((_root(square), face, float(exact_u), float(exact_v)))
     distance, face, u, v = min(found)
     return distance, u, v, face
-
-
-def _exactly(point: NDArray[np.float64], triangle: NDArray[np.float64]) -> tuple[float, float, float]:
-    square, u, v = _nearest(exact(point), *(exact(corner) for corner in triangle))
-    return _root(square), float(u), float(v)
 
 
 def _candidates(point: NDArray[np.float64], triangles: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -47,25 +45,25 @@ def _candidates(point: NDArray[np.float64], triangles: NDArray[np.float64]) -> N
     return np.flatnonzero(gap <= corner * _MORE)
 
 
-def _nearest(p: Vector, a: Vector, b: Vector, c: Vector) -> tuple[Fraction, Fraction, Fraction]:
-    """The squared distance of p from a face, and u and v of the face's nearest point."""
-    d, ab, ac = less(p, a), less(b, a), less(c, a)
-    bb, bc, cc, x, y = dot(ab, ab), dot(ab, ac), dot(ac, ac), dot(d, ab), dot(d, ac)
+def _nearest(a: Vector, b: Vector, c: Vector) -> tuple[Fraction, Fraction, Fraction]:
+    """The squared distance of the origin from a face, and u and v of the face's nearest point."""
+    ab, ac = less(b, a), less(c, a)
+    bb, bc, cc, x, y = dot(ab, ab), dot(ab, ac), dot(ac, ac), -dot(a, ab), -dot(a, ac)
     area = bb * cc - bc * bc
     if area > 0:
         u, v = (cc * x - bc * y) / area, (bb * y - bc * x) / area
         if u >= 0 and v >= 0 and u + v <= 1:
-            return _square(d, ab, ac, u, v), u, v
+            return _square(a, ab, ac, u, v), u, v
     none, one = Fraction(0), Fraction(1)
     s, t = _share(x, bb), _share(y, cc)
-    r = _share(dot(less(p, b), less(c, b)), bb - 2 * bc + cc)
+    r = _share(-dot(b, less(c, b)), bb - 2 * bc + cc)
     places = ((s, none), (none, t), (one - r, r))
-    return min((_square(d, ab, ac, u, v), u, v) for u, v in places)
+    return min((_square(a, ab, ac, u, v), u, v) for u, v in places)
 
 
-def _square(d: Vector, ab: Vector, ac: Vector, u: Fraction, v: Fraction) -> Fraction:
-    """The square of d less u ab and v ac."""
-    return sum(((x - u * y - v * z) ** 2 for x, y, z in zip(d, ab, ac, strict=True)), Fraction(0))
+def _square(a: Vector, ab: Vector, ac: Vector, u: Fraction, v: Fraction) -> Fraction:
+    """The square of a + u ab + v ac."""
+    return sum(((x + u * y + v * z) ** 2 for x, y, z in zip(a, ab, ac, strict=True)), Fraction(0))
 
 
 def _share(part: Fraction, whole: Fraction) -> Fraction:

@@ -1,4 +1,4 @@
-"""Whether points see each other: segments without their ends, asked by the query for any hit."""
+"""Whether points see each other: whether segments without their ends hit anything."""
 
 from typing import NamedTuple
 
@@ -13,8 +13,8 @@ from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.layout import Tree
 
 Floats = NDArray[np.float64]
-# What is nearer to an end than this share of the largest coordinate of both is not looked at: ends that went through
-# more roundings than ``on_surface`` takes.
+# Hits within this share of the largest coordinate of both ends are ignored, unless the end's face is given: ends may
+# have gone through more roundings than ``on_surface`` takes.
 _BESIDE = 2.0**-40
 # The least room: an end at 0 is left out, too.
 _LEAST = float(np.finfo(np.float64).smallest_subnormal)

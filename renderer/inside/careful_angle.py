@@ -3,7 +3,7 @@
 With a corner a, A the angle there of the face as seen on a sphere, and (ab) and (ac) the angles at the point between
 the corners, half the solid angle is the angle of the complex number e^(iA) + cot((ab)/2) cot((ac)/2). Its size is
 cos((bc)/2) / (sin((ab)/2) sin((ac)/2)), at least cos((bc)/2): of the corner a where (bc) is the smallest of the three,
-which is at most a third of a turn, at least 1/2. So whatever is known to 2^-50 absolutely tells the angle to 2^-47:
+which is at most a third of a turn, at least 1/2. So whatever is known to 2^-50 absolutely gives the angle to 2^-47:
 float64 does, where e^(iA) has the directions of a x b and a x c to 2^-50, however short these are.
 Source: Todhunter, Spherical Trigonometry, 1886, the spherical excess from two sides and the angle between them.
 """
@@ -19,7 +19,7 @@ from renderer.numerics.predicates import UNDECIDED, balance, stretched, volume_s
 from renderer.numerics.simd import larger
 from renderer.numerics.vec3 import cross, dot, largest_component, length, scale, sub
 
-# The real part of a face's number, for directions of size one, above which float64 tells its angle: both parts err by
+# The real part of a face's number, for directions of size one, above which float64 gives its angle: both parts err by
 # 2^-49. Below it the largest angle between two corners is at least 108 degrees, and so the second at least 54.
 PLAIN = 2.0**-5
 # A vector product of pairs, at most 2 in each component, errs by 2^-98.
@@ -50,16 +50,15 @@ def careful_angle(a, b, c, p, parts):
     if rest > PLAIN:
         return math.atan2(dot(x, cross(y, z)), rest)
     if yz >= xy and yz >= zx:
-        return _angle_at((a, b, c, p), x, y, z, parts)
+        return _angle_at(a, b, c, p, x, y, z, parts)
     if zx >= xy:
-        return _angle_at((b, c, a, p), y, z, x, parts)
-    return _angle_at((c, a, b, p), z, x, y, parts)
+        return _angle_at(b, c, a, p, y, z, x, parts)
+    return _angle_at(c, a, b, p, z, x, y, parts)
 
 
 @kernel
-def _angle_at(corners, x, y, z, parts):
+def _angle_at(a, b, c, p, x, y, z, parts):
     """The angle by its corner between the two sides that are longest from the point; x, y, z: directions to corners."""
-    a, b, c, p = corners
     m, n = _normal(a, b, p, parts), _normal(a, c, p, parts)
     across = cross(m, n)
     sine, side = length(across), 1 if dot(across, x) > 0.0 else -1

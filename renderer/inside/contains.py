@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.arguments.arrays import flag_argument
 from renderer.arguments.points import check_points
 from renderer.errors import expect
-from renderer.inside.crossings import ON_FACE, UNTOLD, count_crossings
+from renderer.inside.crossings import ON_FACE, UNDECIDED_COUNT, count_crossings
 from renderer.inside.rational import crossings_of
 from renderer.inside.winding import exceeds_half
 from renderer.mesh.mesh import Mesh
-from renderer.ordering.cells import ask_in_order
+from renderer.ordering.cells import search_in_order
 from renderer.trace.layout import Tree
 from renderer.trace.walk import stack_size
 
@@ -37,7 +37,7 @@ def contains(
     counted = _counted(tree, mesh, rows, threads)
     on = counted == ON_FACE
     if winding:
-        # A point on a flat part of the surface has 1/2 exactly, which costs most to tell and is not asked for.
+        # A point on a flat part of the surface has 1/2 exactly, which costs most to decide and is not needed.
         inside = np.zeros(len(rows), np.bool_)
         inside[~on] = exceeds_half(tree, mesh, rows[~on], threads)
     else:
@@ -70,10 +70,10 @@ def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) 
             done = count_crossings(tree.descriptor, some, axis, middle, rows, counted, stack, done)
             yield
 
-    ask_in_order(count, points, mesh, axis, _LEAST, threads)
-    untold = np.flatnonzero(counted == UNTOLD)
-    triangles = mesh.triangles if len(untold) else np.empty((0, 3, 3))
-    for row in untold:
+    search_in_order(count, points, mesh, axis, _LEAST, threads)
+    undecided = np.flatnonzero(counted == UNDECIDED_COUNT)
+    triangles = mesh.triangles if len(undecided) else np.empty((0, 3, 3))
+    for row in undecided:
         winding, on = crossings_of(points[row], triangles, axis)
         counted[row] = ON_FACE if on else winding
     return counted

@@ -1,4 +1,4 @@
-"""Crossings of a ray from a point along an axis, counted exactly: the answer to what lies inside.
+"""Crossings of a ray from a point along an axis, counted exactly: they decide what lies inside.
 
 Each crossing counts 1 or -1, so their sum, the winding number, is odd where their number is.
 
@@ -8,6 +8,8 @@ of their rounding errors or by expansions, so the counts are those of real arith
 """
 
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.expansions import PARTS
@@ -30,10 +32,10 @@ from renderer.trace.edge_signs import coordinate
 from renderer.trace.intersect import load_corners, round_down, round_up
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.walk import blocks_of, push_children
+from renderer.trace.walk import walk
 
-# In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot tell.
-ON_FACE, UNTOLD = -(2**31), -(2**31) + 1
+# In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot decide.
+ON_FACE, UNDECIDED_COUNT = -(2**31), -(2**31) + 1
 _ROUNDOFF = 2.0**-53
 # The blocks that a call tests, some milliseconds, and how many of them one exact test costs.
 WORK, _EXACTLY = 1 << 16, 16.0
@@ -45,7 +47,7 @@ _VOLUME_ERROR = (7.0 + 56.0 * _ROUNDOFF) * _ROUNDOFF
 _AREA_LOSS, _VOLUME_LOSS = 2.0**-1070, 2.0**-930
 
 
-class Column(NamedTuple):
+class AxisRay(NamedTuple):
     """A point and the half-line from it along an axis: its axes turned so that z is that axis.
 
     row_x, row_y, row_z  where a block has the coordinates of each axis
@@ -62,9 +64,26 @@ class Column(NamedTuple):
     up: bool
 
 
+class _Query(NamedTuple):
+    """A ray, and memory for an expansion, behind which the blocks tested are counted."""
+
+    ray: AxisRay
+    parts: Any
+
+
+class _Crossings(NamedTuple):
+    """What a ray has crossed: the winding number so far; and 1 where its point lies on a face, UNDECIDED or more where
+    float64 cannot decide.
+    """
+
+    winding: int
+    on: int
+
+
 @kernel
 def count_crossings(words, points, axis, middle, rows, out, stack, begin):
-    """Winding numbers (or ON_FACE, or UNTOLD) for ``points`` (n, 3), from row ``begin`` on, to ``out[rows[i]]``, int32.
+    """Winding numbers (or ON_FACE, or UNDECIDED_COUNT) for ``points`` (n, 3), from row ``begin`` on, to
+    ``out[rows[i]]``, int32.
 
     The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
     ``stack`` is memory for ``walk.stack_size`` int64. Returns the row before which it ended: early after WORK, so
@@ -78,76 +97,69 @@ def count_crossings(words, points, axis, middle, rows, out, stack, begin):
     for i in range(begin, len(points)):
         row = at(pointer(points), 3 * i)
         x, y, z = scale * get(row, axis_x), scale * get(row, axis_y), scale * get(row, axis)
-        column = Column(4 * axis_x, 4 * axis_y, 4 * axis, x, y, z, z >= middle)
+        ray = AxisRay(4 * axis_x, 4 * axis_y, 4 * axis, x, y, z, z >= middle)
         if x / scale != get(row, axis_x) or y / scale != get(row, axis_y) or z / scale != get(row, axis):
             # The tree's units cannot hold it exactly.
-            winding, on = 0, UNDECIDED
-        elif tree.has_nodes:
-            winding, on = _search_nodes(tree, column, pointer(stack), parts)
+            winding, on = np.int64(0), np.int64(UNDECIDED)
         else:
-            winding, on = _cross_blocks(tree, 0, tree.count, column, parts, (0, 0))
-        out[rows[i]] = UNTOLD if on >= UNDECIDED else (ON_FACE if on else winding)
+            winding, on = _search(tree, _Query(ray, parts), pointer(stack))
+        out[rows[i]] = UNDECIDED_COUNT if on >= UNDECIDED else (ON_FACE if on else winding)
         if get(work, 0) > WORK:
             return i + 1
     return len(points)
 
 
 @kernel
-def _search_nodes(tree, column, stack, parts):
-    """Winding number and ``on`` of a column, through the nodes whose boxes it meets."""
-    found, top = (0, 0), 1
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, count = blocks_of(child)
-            found = _cross_blocks(tree, first, count, column, parts, found)
-            continue
-        top = push_children(tree, child, _meet_boxes(tree.nodes, child * NODE_WORDS, column), stack, top)
-    return found
+def _search(tree, query, stack):
+    """The ``_Crossings`` of a ray with all faces."""
+    return walk(tree, stack, query, _Crossings(np.int64(0), np.int64(0)), _enter, _cross_blocks)
 
 
 @inlined
-def _meet_boxes(nodes, base, column):
-    """The bits of the octants that a column meets; boxes are only ever too large."""
+def _enter(tree, query, node, found):
+    return found, _meet_boxes(tree.nodes, node * NODE_WORDS, query.ray)
+
+
+@inlined
+def _meet_boxes(nodes, base, ray):
+    """The bits of the octants that a ray meets; boxes are only ever too large."""
     # A node's rows, lower and upper, are four times as long as a block's.
-    x, y, z = base + 4 * column.row_x, base + 4 * column.row_y, base + 4 * column.row_z
-    meets = (load8(nodes, x) <= splat8(round_up(column.x))) & (load8(nodes, x + 8) >= splat8(round_down(column.x)))
-    meets = meets & (load8(nodes, y) <= splat8(round_up(column.y)))
-    meets = meets & (load8(nodes, y + 8) >= splat8(round_down(column.y)))
-    if column.up:
-        return movemask(meets & (load8(nodes, z + 8) >= splat8(round_down(column.z))))
-    return movemask(meets & (load8(nodes, z) <= splat8(round_up(column.z))))
+    x, y, z = base + 4 * ray.row_x, base + 4 * ray.row_y, base + 4 * ray.row_z
+    meets = (load8(nodes, x) <= splat8(round_up(ray.x))) & (load8(nodes, x + 8) >= splat8(round_down(ray.x)))
+    meets = meets & (load8(nodes, y) <= splat8(round_up(ray.y)))
+    meets = meets & (load8(nodes, y + 8) >= splat8(round_down(ray.y)))
+    if ray.up:
+        return movemask(meets & (load8(nodes, z + 8) >= splat8(round_down(ray.z))))
+    return movemask(meets & (load8(nodes, z) <= splat8(round_up(ray.z))))
 
 
 @kernel
-def _cross_blocks(tree, first, count, column, parts, found):
-    """Add the crossings with the faces of some blocks to ``found``."""
+def _cross_blocks(tree, query, first, count, found):
+    """Add the crossings with the faces of some blocks to ``found``; the search goes on."""
+    ray, parts, winding, on = query.ray, query.parts, found.winding, found.on
     put(parts, PARTS, get(parts, PARTS) + count)
-    winding, on = found
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
-        sure, unsure, turns = _cross_block(tree, base, column)
+        sure, unsure, turns = _cross_block(tree, base, ray)
         winding += 2 * count_bits(sure & turns) - count_bits(sure)
         while unsure != 0:
             i = lowest_bit(unsure)
             unsure &= unsure - 1
             if get(tree.faces, block * BLOCK_FACES + i) >= 0:
                 put(parts, PARTS, get(parts, PARTS) + _EXACTLY)
-                step, touches = _cross_exactly(tree, base + i, column, parts)
+                step, touches = _cross_exactly(tree, base + i, ray, parts)
                 winding, on = winding + step, on | touches
-    return winding, on
+    return _Crossings(winding, on), False
 
 
 @inlined
-def _cross_block(tree, base, column):
-    """Bits of four faces: those surely crossed, those that float64 cannot tell, and where the winding rises by one."""
-    x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, column)
-    x, y, z = splat4(column.x), splat4(column.y), splat4(column.z)
+def _cross_block(tree, base, ray):
+    """Bits of four faces: the surely crossed, those that float64 cannot decide, and where the winding rises by one."""
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, ray)
+    x, y, z = splat4(ray.x), splat4(ray.y), splat4(ray.z)
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = x0 - x, x1 - x, x2 - x, y0 - y, y1 - y, y2 - y, z0 - z, z1 - z, z2 - z
 
-    # On which side of each edge the column passes, as far as rounding tells.
+    # On which side of each edge the ray passes, as far as rounding decides.
     a, b, c, d, e, f = x1 * y2, y1 * x2, x2 * y0, y2 * x0, x0 * y1, y0 * x1
     e0, e1, e2 = a - b, c - d, e - f
     m0, m1, m2 = magnitude(a) + magnitude(b), magnitude(c) + magnitude(d), magnitude(e) + magnitude(f)
@@ -167,25 +179,25 @@ def _cross_block(tree, base, column):
     error = terms * splat4(_VOLUME_ERROR) + splat4(_VOLUME_LOSS)
     over = movemask((left & (volume > error)) | (right & (zero - volume > error)))
     under = movemask((left & (zero - volume > error)) | (right & (volume > error)))
-    sure, rising = (over, movemask(left)) if column.up else (under, movemask(right))
+    sure, rising = (over, movemask(left)) if ray.up else (under, movemask(right))
     return possible & sure, possible & ~(over | under), rising
 
 
 @inlined
-def _corner(tree, place, column):
+def _corner(tree, place, ray):
     """A corner (x, y, z) of a face, exactly."""
     return (
-        coordinate(tree, place + column.row_x),
-        coordinate(tree, place + column.row_y),
-        coordinate(tree, place + column.row_z),
+        coordinate(tree, place + ray.row_x),
+        coordinate(tree, place + ray.row_y),
+        coordinate(tree, place + ray.row_z),
     )
 
 
 @kernel
-def _cross_exactly(tree, place, column, parts):
+def _cross_exactly(tree, place, ray, parts):
     """The change of the winding number at one face, 0 where it is not crossed, and whether the point lies on it."""
-    a, b, c = _corner(tree, place, column), _corner(tree, place + 12, column), _corner(tree, place + 24, column)
-    p = column.x, column.y, column.z
+    a, b, c = _corner(tree, place, ray), _corner(tree, place + 12, ray), _corner(tree, place + 24, ray)
+    p = ray.x, ray.y, ray.z
     s0, s1, s2 = area_sign(b, c, p, parts), area_sign(c, a, p, parts), area_sign(a, b, p, parts)
     if s0 == UNDECIDED or s1 == UNDECIDED or s2 == UNDECIDED:
         return 0, UNDECIDED
@@ -207,9 +219,9 @@ def _cross_exactly(tree, place, column, parts):
     if s0 == 0 or s0 != s1 or s0 != s2:
         return 0, 0
     # Over the point where the volume has the sign of the area.
-    if (side == s0) != column.up:
+    if (side == s0) != ray.up:
         return 0, 0
-    return (s0 if column.up else -s0), 0
+    return (s0 if ray.up else -s0), 0
 
 
 @inlined

@@ -29,7 +29,7 @@ from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree, cache_aligned
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.walk import blocks_of, stack_size
+from renderer.trace.walk import blocks_of, child_in, stack_size
 
 # Nodes per chunk: some milliseconds, but for the first chunk, whose nodes hold all faces.
 _NODES = 256
@@ -43,7 +43,7 @@ _MORE = 1.0 + 2.0**-30
 _AREA_ERROR = 2.0**-48
 
 
-class Room(NamedTuple):
+class Scratch(NamedTuple):
     """Memory of one thread.
 
     total, other, work  (ORDER + 1, ORDER + 2) complex, series
@@ -79,12 +79,12 @@ def _computed(tree: Tree, threads: int) -> NDArray[np.float64]:
     rows, leaves = cache_aligned(count * MOMENT_WORDS, np.float64), _leaf_count(tree)
 
     def measure(begin: int, end: int) -> None:
-        _measure_octants(tree.descriptor, rows, _room(tree, leaves), begin, end)
+        _measure_octants(tree.descriptor, rows, _scratch(tree, leaves), begin, end)
 
     for_chunks(measure, count, _NODES, threads)
-    room = _room(tree, leaves)
+    scratch = _scratch(tree, leaves)
     for end in range(count, 0, -_NODES):
-        _join_octants(tree.descriptor, rows, room, max(0, end - _NODES), end)
+        _join_octants(tree.descriptor, rows, scratch, max(0, end - _NODES), end)
     return rows
 
 
@@ -94,20 +94,20 @@ def _leaf_count(tree: Tree) -> int:
     return int((links < 0).sum())
 
 
-def _room(tree: Tree, leaves: int) -> Room:
+def _scratch(tree: Tree, leaves: int) -> Scratch:
     total, other, work = np.zeros((3, ORDER + 1, ORDER + 2), np.complex128)
     stack = np.empty(stack_size(tree.depth), np.int64)
-    return Room(total, other, work, stack, np.empty(max(1, leaves), np.int64))
+    return Scratch(total, other, work, stack, np.empty(max(1, leaves), np.int64))
 
 
 @kernel
-def _measure_octants(words, rows, room, begin, end):
+def _measure_octants(words, rows, scratch, begin, end):
     """Write the centres, radii, sizes and spreads of the octants of some nodes, and the coefficients of leaves."""
     tree, rows = tree_pointers(words), pointer(rows)
     for node in range(begin, end):
         for place in range(8):
-            base, link = node * MOMENT_WORDS + place, np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + place))
-            room.total[:] = 0.0
+            base, link = node * MOMENT_WORDS + place, child_in(tree, node, place)
+            scratch.total[:] = 0.0
             if not _is_used(tree, node, place):
                 put(rows, base + 8 * X, _FAR)
                 put(rows, base + 8 * Y, _FAR)
@@ -115,47 +115,47 @@ def _measure_octants(words, rows, room, begin, end):
                 put(rows, base + 8 * RADIUS, 0.0)
                 put(rows, base + 8 * SIZE, 0.0)
                 put(rows, base + 8 * SPREAD, 0.0)
-                put_series(rows, base, room.total)
+                put_series(rows, base, scratch.total)
                 continue
-            count = _list_leaves(tree, link, room)
-            centre, radius = _measure(tree, room, count, rows, base)
+            count = _list_leaves(tree, link, scratch)
+            centre, radius = _measure(tree, scratch, count, rows, base)
             if link < 0:
-                _add_faces(tree, link, centre, radius, room)
-                put_series(rows, base, room.total)
+                _add_faces(tree, link, centre, radius, scratch)
+                put_series(rows, base, scratch.total)
 
 
 @inlined
 def _is_used(tree, node, place):
-    """Whether an octant is not empty, told by its box."""
+    """Whether an octant is not empty, by its box."""
     return get(tree.nodes, node * NODE_WORDS + place) <= get(tree.nodes, node * NODE_WORDS + place + 8)
 
 
 @kernel
-def _list_leaves(tree, link, room):
+def _list_leaves(tree, link, scratch):
     """List the leaves behind a link; returns their number."""
     top, count = 1, 0
-    room.stack[0] = link
+    scratch.stack[0] = link
     while top > 0:
         top -= 1
-        child = room.stack[top]
+        child = scratch.stack[top]
         if child < 0:
-            room.leaves[count] = child
+            scratch.leaves[count] = child
             count += 1
             continue
         for place in range(8):
             if _is_used(tree, child, place):
-                room.stack[top] = get(tree.links, child * NODE_WORDS + CHILDREN + place)
+                scratch.stack[top] = child_in(tree, child, place)
                 top += 1
     return count
 
 
 @kernel
-def _measure(tree, room, count, rows, base):
+def _measure(tree, scratch, count, rows, base):
     """Write what an octant's faces are like; returns their centre and radius."""
-    first, _ = blocks_of(room.leaves[0])
-    centre, size = _centre(tree, room, count, corner(tree, first * BLOCK_WORDS))
-    radius = larger(np.sqrt(_farthest(tree, room, count, centre)) * _MORE, _LEAST)
-    spread = _spread(tree, room, count, centre, 1.0 / (radius * radius))
+    first, _ = blocks_of(scratch.leaves[0])
+    centre, size = _centre(tree, scratch, count, corner(tree, first * BLOCK_WORDS))
+    radius = larger(np.sqrt(_farthest(tree, scratch, count, centre)) * _MORE, _LEAST)
+    spread = _spread(tree, scratch, count, centre, 1.0 / (radius * radius))
     put(rows, base + 8 * X, centre[0])
     put(rows, base + 8 * Y, centre[1])
     put(rows, base + 8 * Z, centre[2])
@@ -166,12 +166,12 @@ def _measure(tree, room, count, rows, base):
 
 
 @kernel
-def _centre(tree, room, count, near):
+def _centre(tree, scratch, count, near):
     """The mean of the faces by size, and their size; ``near`` is one of their corners."""
     zero = splat4(0.0)
     x, y, z, total = zero, zero, zero, zero
     for k in range(count):
-        first, blocks = blocks_of(room.leaves[k])
+        first, blocks = blocks_of(scratch.leaves[k])
         for block in range(first, first + blocks):
             a, b, c = _faces(tree, block, near)
             size, _ = _sizes(a, b, c)
@@ -183,11 +183,11 @@ def _centre(tree, room, count, near):
 
 
 @kernel
-def _farthest(tree, room, count, centre):
+def _farthest(tree, scratch, count, centre):
     """The largest squared distance of a corner from the centre."""
     most = splat4(0.0)
     for k in range(count):
-        first, blocks = blocks_of(room.leaves[k])
+        first, blocks = blocks_of(scratch.leaves[k])
         for block in range(first, first + blocks):
             for vertex in _faces(tree, block, centre):
                 square = _square(vertex)
@@ -196,7 +196,7 @@ def _farthest(tree, room, count, centre):
 
 
 @kernel
-def _spread(tree, room, count, centre, unit):
+def _spread(tree, scratch, count, centre, unit):
     """The integral over the faces of their distance from the centre to the power ORDER; ``unit`` times its square is 1
     at the radius.
 
@@ -204,7 +204,7 @@ def _spread(tree, room, count, centre, unit):
     """
     total = splat4(0.0)
     for k in range(count):
-        first, blocks = blocks_of(room.leaves[k])
+        first, blocks = blocks_of(scratch.leaves[k])
         for block in range(first, first + blocks):
             a, b, c = _faces(tree, block, centre)
             _, area = _sizes(a, b, c)
@@ -252,8 +252,8 @@ def _square(a):
 
 
 @kernel
-def _add_faces(tree, link, centre, radius, room):
-    """Add the series of a leaf's faces to ``room.total``."""
+def _add_faces(tree, link, centre, radius, scratch):
+    """Add the series of a leaf's faces to ``scratch.total``."""
     first, count = blocks_of(link)
     unit = 1.0 / radius
     for place in range(first * BLOCK_FACES, (first + count) * BLOCK_FACES):
@@ -264,8 +264,8 @@ def _add_faces(tree, link, centre, radius, room):
             area = (
                 0.5 * (d[1] * e[2] - d[2] * e[1]), 0.5 * (d[2] * e[0] - d[0] * e[2]), 0.5 * (d[0] * e[1] - d[1] * e[0])
             )  # fmt: skip
-            corners = _scaled(a, centre, unit), _scaled(b, centre, unit), _scaled(c, centre, unit)
-            add_face(room.total, corners, area, room.work)
+            a, b, c = _scaled(a, centre, unit), _scaled(b, centre, unit), _scaled(c, centre, unit)
+            add_face(scratch.total, a, b, c, area, scratch.work)
 
 
 @inlined
@@ -274,21 +274,21 @@ def _scaled(a, b, unit):
 
 
 @kernel
-def _join_octants(words, rows, room, begin, end):
+def _join_octants(words, rows, scratch, begin, end):
     """Write the coefficients of octants that are nodes themselves, last to first: a child comes after its parent."""
     tree, rows = tree_pointers(words), pointer(rows)
     for node in range(end - 1, begin - 1, -1):
         for place in range(8):
-            child = np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + place))
+            child = child_in(tree, node, place)
             if child < 0:
                 continue
             base = node * MOMENT_WORDS + place
             centre, radius = (get(rows, base), get(rows, base + 8), get(rows, base + 16)), get(rows, base + 8 * RADIUS)
-            room.total[:] = 0.0
+            scratch.total[:] = 0.0
             for k in range(8):
                 if _is_used(tree, child, k):
                     at = child * MOMENT_WORDS + k
-                    get_series(rows, at, get(rows, at + 8 * RADIUS) / radius, room.other)
+                    get_series(rows, at, get(rows, at + 8 * RADIUS) / radius, scratch.other)
                     shift = _scaled((get(rows, at), get(rows, at + 8), get(rows, at + 16)), centre, 1.0 / radius)
-                    add_shifted(room.total, room.other, shift, room.work)
-            put_series(rows, base, room.total)
+                    add_shifted(scratch.total, scratch.other, shift, scratch.work)
+            put_series(rows, base, scratch.total)

@@ -25,7 +25,7 @@ ORDER = 6
 X, Y, Z, RADIUS, SIZE, SPREAD, COEFFICIENTS = range(7)
 ROWS = COEFFICIENTS + ORDER * (ORDER + 2)
 MOMENT_WORDS = 8 * ROWS
-# Above this q no series is asked: 1 - q keeps its digits.
+# Above this q no series is evaluated: 1 - q keeps its digits.
 _NEAREST = 0.75
 # Rounding errors of a series as a share of size / R^2. A face's own numbers err by some 2^-48 of its size, and joining
 # them in up to 256 levels by as much a level.
@@ -72,15 +72,14 @@ def _see_four(rows, base, point, share):
     if bits == 0:
         return np.int64(15), zero, zero
     part = radius / square
-    value = q * _harmonics(rows, base, (x * part, y * part, z * part), q2)
+    value = q * _harmonics(rows, base, x * part, y * part, z * part, q2)
     bound = q2 * load4(rows, base + 8 * SIZE) * (remainder + splat4(ROUNDING))
     return 15 & ~bits, select(far, value, zero), select(far, bound, zero)
 
 
 @inlined
-def _harmonics(rows, base, u, square):
-    """The sum over orders and degrees of coefficients and solid harmonics at ``u``, whose square is given."""
-    x, y, z = u
+def _harmonics(rows, base, x, y, z, square):
+    """The sum over orders and degrees of coefficients and solid harmonics at (x, y, z), whose square is given."""
     total, _ = _degree(rows, base, 0, z, square)
     real, imaginary = x, y
     for m in range(1, ORDER + 1):
@@ -128,13 +127,12 @@ def _lifted(series, n, m, v):
 
 
 @kernel
-def add_face(series, corners, area, work):
-    """Add the series of a face with this area vector; ``corners`` are relative to the centre.
+def add_face(series, a, b, c, area, work):
+    """Add the series of a face with this area vector; its corners a, b and c are relative to the centre.
 
     The mean of a product (y . w)^k over the face is 2 k! / (k + 2)! times the sum of all products of degree k of the
     corners', which come corner by corner.
     """
-    a, b, c = corners
     work[:] = 0.0
     work[0, 0] = 1.0
     _multiply(work, a)
@@ -158,13 +156,17 @@ def _multiply(series, v):
 @kernel
 def add_shifted(series, other, shift, work):
     """Add a series whose centre lies at ``shift`` from that of ``series``: multiplied by exp(shift . w)."""
+    # Begin with the series as it is.
     for n in range(1, ORDER + 1):
         for m in range(n + 1):
             work[n, m] = other[n, m]
+    # Multiply by Horner's rule: exp(x) = 1 + x (1 + x/2 (1 + x/3 ...)), where x = shift . w lifts each order by one.
+    # Go from the highest order down, so that each is read before it changes.
     for k in range(ORDER - 1, 0, -1):
         for n in range(ORDER, 1, -1):
             for m in range(n + 1):
                 work[n, m] = other[n, m] + _lifted(work, n, m, shift) / k
+    # Add the product.
     for n in range(1, ORDER + 1):
         for m in range(n + 1):
             series[n, m] += work[n, m]

@@ -29,7 +29,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 # each, then six products of three. Its angle errs by the share of that in its size: by 2^-44 of a turn at most where
 # the square of its size is at least LEAST_SQUARE. Nearer than 2^-5 of its length to an edge it may be less.
 _LEAST_SQUARE = 2.0**-10
-# A volume above it has its true sign, which tells both sides of the face apart.
+# A volume above it has its true sign, which says on which side of the face the point is.
 _LEAST_VOLUME = 2.0**-46
 # The sum of three inverse distances, of corners from the point, below which no square has lost digits to underflow.
 _NEAREST = 2.0**450
@@ -55,10 +55,10 @@ def no_turn():
 def add_blocks(tree, first, count, point, total, parts):
     """``total`` and the angles of the faces of some blocks, seen from ``point``; ``parts`` is memory for an expansion.
 
-    A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products that tell a face
+    A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products that measure a face
     leave float64's range, for which it takes coordinates as unlike as 1 and 2^-300.
     """
-    real, imaginary, turns, apart = total
+    apart = total.apart
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
         rest, volume, sure = _see_block(tree, base, point)
@@ -68,9 +68,8 @@ def add_blocks(tree, first, count, point, total, parts):
             bits &= bits - 1
             if get(tree.faces, block * BLOCK_FACES + i) >= 0:
                 apart += _careful_angle(tree, base + i, point, parts)
-        rest, volume = select(sure, rest, splat4(1.0)), select(sure, volume, splat4(0.0))
-        real, imaginary, turns = _times(real, imaginary, turns, rest, volume)
-    return Turned(real, imaginary, turns, apart)
+        total = _times(total, select(sure, rest, splat4(1.0)), select(sure, volume, splat4(0.0)))
+    return Turned(total.real, total.imaginary, total.turns, apart)
 
 
 @kernel
@@ -109,16 +108,16 @@ def _direction(x, y, z):
 
 
 @inlined
-def _times(real, imaginary, turns, a, b):
-    """The product of numbers and a + b i, made of size one, and its turns; no a + b i lies on the negative axis."""
+def _times(total, a, b):
+    """``total`` times a + b i, its product made of size one; no a + b i lies on the negative axis."""
     zero, one = splat4(0.0), splat4(1.0)
-    x, y = real * a - imaginary * b, real * b + imaginary * a
+    x, y = total.real * a - total.imaginary * b, total.real * b + total.imaginary * a
     # Angles go from -pi, without it, to pi. Two of one sign pass pi where the sign of their sum is the other.
-    over = (imaginary >= zero) & (b >= zero) & (y < zero)
-    under = (imaginary < zero) & (b < zero) & (y >= zero)
-    turns = turns + select(over, one, zero) - select(under, one, zero)
+    over = (total.imaginary >= zero) & (b >= zero) & (y < zero)
+    under = (total.imaginary < zero) & (b < zero) & (y >= zero)
+    turns = total.turns + select(over, one, zero) - select(under, one, zero)
     share = one / (magnitude(x) + magnitude(y))
-    return x * share, y * share, turns
+    return Turned(x * share, y * share, turns, total.apart)
 
 
 @kernel

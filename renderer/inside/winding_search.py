@@ -1,19 +1,23 @@
 """Winding numbers by a search through the tree: series of octants that are far enough, and single faces near by."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from renderer.arguments.limits import FARTHEST
 from renderer.inside.multipoles import MOMENT_WORDS, ROUNDING, see_octants, sum_lanes
-from renderer.inside.solid_angle import add_blocks, no_turn, turns_of
+from renderer.inside.solid_angle import Turned, add_blocks, no_turn, turns_of
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, larger, local_doubles, pointer, put, smaller, splat4
+from renderer.numerics.simd import at, get, larger, local_doubles, pointer, smaller, splat4
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.point import Point
-from renderer.trace.walk import blocks_of, push_children
+from renderer.trace.walk import walk
 
 # The nodes and blocks that a call sums, beside those of one point: some milliseconds, so that Ctrl-C need not wait for
 # long.
 _WORK = 1 << 16
+# In place of a tolerance: only on which side of 1/2 the number lies.
+SIDE_OF_HALF = -1.0
 # The share with which a search for a tolerance begins: the bounds add up to about the tolerance around a closed mesh.
 _FIRST = 2.0
 # The next share aims at so much of the tolerance, and is at most half of the last.
@@ -23,56 +27,39 @@ _FIRST_SIDE, _NEXT_SIDE = 1.0, 2.0**-4
 
 
 @kernel
-def sum_windings(words, rows, points, tolerance, out, stack, begin, end):
-    """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``.
+def find_windings(words, rows, points, tolerance, out, stack, begin, end):
+    """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``;
+    for SIDE_OF_HALF numbers that are above 1/2 where they are, and else not.
 
-    They are NaN where float64's range does not hold what tells them, see ``add_blocks``. ``rows`` is what
+    They are NaN where float64's range does not hold what decides them, see ``add_blocks``. ``rows`` is what
     ``moments_of`` has for the tree, ``stack`` memory for ``walk.stack_size`` int64. Returns the row before which it
     ended: early after _WORK.
     """
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
-    work = np.int64(0)
+    work, first_share = np.int64(0), _FIRST_SIDE if tolerance < 0.0 else _FIRST * tolerance
     for i in range(begin, end):
         row = at(pointer(points), 3 * i)
         point = _point_at(tree, row)
-        number, bound, share = 0.0, np.inf, _FIRST * tolerance
+        number, bound, share = 0.5, np.inf, first_share
         if not _is_held(tree, row, point):
             number, bound = np.nan, 0.0
-        while bound > tolerance and share > ROUNDING and tree.has_nodes:
-            number, bound, steps = _search(tree, rows, point, share, stack, parts)
+        while _is_open(number, bound, tolerance) and share > ROUNDING and tree.has_nodes:
+            number, bound, steps = _search(tree, _Query(rows, point, share, parts), stack)
             work += steps
-            share *= smaller(_LESS, _AIM * tolerance / bound)
-        out[i] = number
-        if bound > tolerance:
-            out[i] = _all_faces(tree, point, parts)
+            share *= _NEXT_SIDE if tolerance < 0.0 else smaller(_LESS, _AIM * tolerance / bound)
+        if _is_open(number, bound, tolerance):
+            number = _all_faces(tree, point, parts)
             work += tree.count
+        out[i] = number
         if work > _WORK:
             return i + 1
     return end
 
 
-@kernel
-def exceed_half(words, rows, points, out, stack, begin, end):
-    """Write numbers above 1/2 where winding numbers are, and else others, to ``out`` (n,); all else as above."""
-    tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
-    work = np.int64(0)
-    for i in range(begin, end):
-        row = at(pointer(points), 3 * i)
-        point = _point_at(tree, row)
-        number, bound, share = 0.5, 0.0, _FIRST_SIDE
-        if not _is_held(tree, row, point):
-            number = np.nan
-        while abs(number - 0.5) <= bound and share > ROUNDING and tree.has_nodes:
-            number, bound, steps = _search(tree, rows, point, share, stack, parts)
-            work += steps
-            share *= _NEXT_SIDE
-        out[i] = number
-        if abs(number - 0.5) <= bound:
-            out[i] = _all_faces(tree, point, parts)
-            work += tree.count
-        if work > _WORK:
-            return i + 1
-    return end
+@inlined
+def _is_open(number, bound, tolerance):
+    """Whether a number with a bound of its error leaves the question open."""
+    return abs(number - 0.5) <= bound if tolerance < 0.0 else bound > tolerance
 
 
 @inlined
@@ -98,26 +85,47 @@ def _within(x):
     return larger(-FARTHEST, smaller(FARTHEST, x))
 
 
-@kernel
-def _search(tree, rows, point, share, stack, parts):
-    """The winding number and a bound of its error, where ``share`` says how near a series is asked; and the number of
-    nodes and blocks that it took.
+class _Query(NamedTuple):
+    """A point, and ``share``, which says how near to it a series is evaluated.
+
+    rows   pointer to what ``moments_of`` has for the tree
+    parts  memory for an expansion
     """
-    total, values, bounds, top, steps = no_turn(), splat4(0.0), splat4(0.0), 1, np.int64(0)
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, count = blocks_of(child)
-            total = add_blocks(tree, first, count, point, total, parts)
-            steps += count
-            continue
-        bits, value, bound = see_octants(rows, child * MOMENT_WORDS, point, share)
-        values, bounds = values + value, bounds + bound
-        top = push_children(tree, child, bits, stack, top)
-        steps += 1
-    return sum_lanes(values) + turns_of(total), sum_lanes(bounds), steps
+
+    rows: Any
+    point: Point
+    share: float
+    parts: Any
+
+
+class _Sums(NamedTuple):
+    """Sums so far: of the solid angles of single faces, of series and of the bounds of their errors, four lanes each;
+    and the number of nodes and blocks that they took.
+    """
+
+    angles: Turned
+    values: Any
+    bounds: Any
+    steps: int
+
+
+@kernel
+def _search(tree, query, stack):
+    """The winding number and a bound of its error, and the number of nodes and blocks that it took."""
+    sums = walk(tree, stack, query, _Sums(no_turn(), splat4(0.0), splat4(0.0), np.int64(0)), _add_series, _add_leaf)
+    return sum_lanes(sums.values) + turns_of(sums.angles), sum_lanes(sums.bounds), sums.steps
+
+
+@inlined
+def _add_series(tree, query, node, sums):
+    bits, value, bound = see_octants(query.rows, node * MOMENT_WORDS, query.point, query.share)
+    return _Sums(sums.angles, sums.values + value, sums.bounds + bound, sums.steps + 1), bits
+
+
+@inlined
+def _add_leaf(tree, query, first, count, sums):
+    angles = add_blocks(tree, first, count, query.point, sums.angles, query.parts)
+    return _Sums(angles, sums.values, sums.bounds, sums.steps + count), False
 
 
 @kernel

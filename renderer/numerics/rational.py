@@ -16,6 +16,13 @@ def exact(point: NDArray[np.float64]) -> Vector:
     return x, y, z
 
 
+def corners_from(point: NDArray[np.float64], triangle: NDArray[np.float64]) -> tuple[Vector, Vector, Vector]:
+    """The corners of a triangle (3 corners, 3) less a point (3,)."""
+    p = exact(point)
+    a, b, c = (less(exact(corner), p) for corner in triangle)
+    return a, b, c
+
+
 def less(a: Vector, b: Vector) -> Vector:
     """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
@@ -29,3 +36,8 @@ def dot(a: Vector, b: Vector) -> Any:
 def cross(a: Vector, b: Vector) -> Vector:
     """The vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def volume(a: Vector, b: Vector, c: Vector) -> Any:
+    """The triple product a . (b x c): 0 where the origin lies in the plane of the corners."""
+    return dot(a, cross(b, c))

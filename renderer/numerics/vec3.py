@@ -3,7 +3,7 @@
 import math
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import get, larger
+from renderer.numerics.simd import get, larger, put
 
 
 @kernel
@@ -98,6 +98,14 @@ def three(base, at):
 def row3(base, i):
     """Row i of a ``pointer`` to rows of three."""
     return three(base, 3 * i)
+
+
+@inlined
+def put3(base, at, a):
+    """Write three numbers to a ``pointer``, from ``at``."""
+    put(base, at, a[0])
+    put(base, at + 1, a[1])
+    put(base, at + 2, a[2])
 
 
 @kernel

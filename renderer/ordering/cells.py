@@ -1,6 +1,6 @@
-"""The order in which points are asked: those that are near each other together, as they read the same nodes.
+"""The order in which points are searched: those that are near each other together, as they read the same nodes.
 
-A grid of cells over the mesh, and a counting sort by cell. Answers do not depend on the order.
+A grid of cells over the mesh, and a counting sort by cell. Results do not depend on the order.
 """
 
 from __future__ import annotations
@@ -14,37 +14,38 @@ from renderer.jit.decorators import kernel
 from renderer.mesh.mesh import Mesh
 from renderer.system.threads import for_chunks
 
-Ask = Callable[[NDArray[np.int64], NDArray[np.float64]], Iterator[None]]
+Search = Callable[[NDArray[np.int64], NDArray[np.float64]], Iterator[None]]
 
 # Cells of the grid: some dozens of points in each, for as many points as are ordered together.
 _CELLS = 4096
 # So that Ctrl-C and other threads need not wait for long.
 _MOST = 1 << 17
-# Points that are asked at once, on the caller's thread: ordering them takes longer than it saves.
+# Points that are searched at once, on the caller's thread: ordering them takes longer than it saves.
 _FEW = 32
 
 
-def ask_in_order(
-    ask: Ask, points: NDArray[np.float64], mesh: Mesh, along: int | None, least: int, threads: int
+def search_in_order(
+    search: Search, points: NDArray[np.float64], mesh: Mesh, along: int | None, least: int, threads: int
 ) -> None:
-    """Call ``ask(rows, some)`` on threads until all points (n, 3) are asked: ``some`` are the points in these rows.
+    """Call ``search(rows, some)`` on threads until all points (n, 3) are done: ``some`` are the points in these rows.
 
     Each time it yields, Ctrl-C is heard. The points come in the order of a grid's cells, of a grid across the axis
     ``along`` if that is given; the fewest at a time are ``least``. A few stay as they are.
     """
     if len(points) <= _FEW:
-        for _ in ask(np.arange(len(points)), points):
+        for _ in search(np.arange(len(points)), points):
             pass
         return
-    grid = _make_grid(*mesh.bounds, along)
+    lower, upper = mesh.bounds
+    grid = _make_grid(lower, upper, along)
 
-    def ask_some(begin: int, end: int) -> Iterator[None]:
+    def search_some(begin: int, end: int) -> Iterator[None]:
         rows, some, starts = np.empty(end - begin, np.int64), np.empty((end - begin, 3)), np.empty(_CELLS + 1, np.int64)
         _order_points(points, grid, rows, some, starts, begin, end)
-        yield from ask(rows, some)
+        yield from search(rows, some)
 
     # The more are ordered together the better, but each thread gets some chunks.
-    for_chunks(ask_some, len(points), max(least, min(_MOST, len(points) // (4 * threads))), threads)
+    for_chunks(search_some, len(points), max(least, min(_MOST, len(points) // (4 * threads))), threads)
 
 
 def _make_grid(lower: NDArray[np.float64], upper: NDArray[np.float64], along: int | None) -> NDArray[np.float64]:

@@ -3,15 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.inside.rational import crossings_of, winding_of
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera
-from renderer.scene.needs import Needs, needs_of
+from renderer.scene.needs import Features, lit_materials, needs_of
 from renderer.scene.scene import Scene
 from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.shade.surface import MAX_MEDIA, SceneArrays
 
 
-def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
+def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays]:
     """The merged mesh of all instances in their order, and everything else that the kernel reads.
 
     Arrays that ``needs`` does not name are left empty; for None, those that the scene does not need; and ``touching``,
@@ -43,7 +44,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
     return mesh, arrays
 
 
-def repacked(arrays: SceneArrays, scene: Scene, needs: Needs) -> SceneArrays:
+def repacked(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
     """``arrays`` with the materials and lights of ``scene``, which has the meshes that they were packed of, and as many
     materials of the same names.
     """
@@ -51,18 +52,18 @@ def repacked(arrays: SceneArrays, scene: Scene, needs: Needs) -> SceneArrays:
     return arrays._replace(materials=_materials(scene, needs), lights=light_rows(scene, needs), media=media)
 
 
-def _materials(scene: Scene, needs: Needs) -> NDArray[np.float64]:
+def _materials(scene: Scene, needs: Features) -> NDArray[np.float64]:
     """The rows of the materials, of kinds that have all that ``needs`` names, whether the scene needs it or not."""
     rows = np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)
-    own, kinds = needs_of(scene), rows[:, KIND]
-    if needs.shadows and not own.shadows:
+    kinds, lit = rows[:, KIND], {material.kind for material in lit_materials(scene)}
+    if needs.shadows and lit <= {UNLIT}:
         kinds[kinds == UNLIT] = LAMBERT
-    if needs.specular and not own.specular:
+    if needs.specular and PHONG not in lit:
         kinds[kinds == LAMBERT] = PHONG
     return rows
 
 
-def light_rows(scene: Scene, needs: Needs) -> NDArray[np.float64]:
+def light_rows(scene: Scene, needs: Features) -> NDArray[np.float64]:
     """The rows of the lights that shine, and of as many others as ``needs`` asks for, in the scene's order."""
     if not needs.shadows:
         return np.zeros((0, LIGHT_COLUMNS))
@@ -79,9 +80,9 @@ def _material_rows(scene: Scene) -> dict[str, int]:
 
 def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
     """Materials of the closed, light-passing meshes around the camera's eye, outermost (by volume) first."""
-    rows, around = _material_rows(scene), []
+    rows, around = _material_rows(scene), list[tuple[float, int]]()
     for instance in scene.instances:
-        if scene.materials[instance.material].passes_light and _winding(instance.mesh, camera.eye) > 0.5:
+        if scene.materials[instance.material].passes_light and _is_inside(instance.mesh, np.array(camera.eye)):
             p0, p1, p2 = instance.mesh.triangles.transpose(1, 0, 2)
             volume = abs(np.einsum("nk,nk->", p0, np.cross(p1, p2)))
             around.append((volume, rows[instance.material]))
@@ -89,24 +90,16 @@ def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
     return np.array([row for _, row in sorted(around, reverse=True)][:MAX_MEDIA], np.int64)
 
 
-def _winding(mesh: Mesh, point: tuple[float, float, float]) -> float:
-    """The winding number of ``mesh`` around ``point``: the solid angle of its faces over 4 pi, 1 inside a closed mesh.
+def _is_inside(mesh: Mesh, point: NDArray[np.float64]) -> bool:
+    """Whether the winding number of ``mesh`` around ``point`` is above 1/2.
 
-    van Oosterom and Strackee, The Solid Angle of a Plane Triangle, IEEE Trans. Biomed. Eng. 30:2, 1983.
+    A point on the surface is outside: rays from there into the mesh enter it, and others leave what they were never in.
     """
     lower, upper = mesh.bounds
     if (np.less(point, lower) | np.greater(point, upper)).any():
-        return 0.0
-    with np.errstate(over="ignore", invalid="ignore"):  # meshes of such sizes are refused when the tree is built
-        a, b, c = (mesh.triangles - np.asarray(point)).transpose(1, 0, 2)
-        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-        dots = [np.einsum("nk,nk->n", v, w) for v, w in ((a, b), (b, c), (c, a))]
-        denominator = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
-        volume = np.einsum("nk,nk->n", a, np.cross(b, c))
-        if ((volume == 0.0) & (denominator <= 0.0)).any():
-            # On the surface: rays from there into the mesh enter it, and others leave what they were never in.
-            return 0.0
-        return float(2.0 * np.arctan2(volume, denominator).sum() / (4.0 * np.pi))
+        return False
+    _, on = crossings_of(point, mesh.triangles, 0)
+    return not on and winding_of(point, mesh.triangles) > 0.5
 
 
 def _normals(scene: Scene, count: int) -> NDArray[np.float64]:

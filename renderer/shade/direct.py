@@ -7,7 +7,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import at, get, put
-from renderer.numerics.vec3 import add, row3, three, times
+from renderer.numerics.vec3 import add, put3, row3, three, times
 from renderer.shade.bundle import SIZE
 from renderer.shade.lights import aim, see_light
 from renderer.shade.records import DIELECTRIC, KIND, MIRROR, UNLIT
@@ -35,14 +35,6 @@ def trace_rays(tree, rays, found, count, scratch, any_hit):
         trace(tree, rays, found, 0, count, scratch, any_hit)
     else:
         search_blocks(tree, rays, found, 0, count, scratch.holders, any_hit)
-
-
-@inlined
-def put3(base, first, a):
-    """Write three numbers."""
-    put(base, first, a[0])
-    put(base, first + 1, a[1])
-    put(base, first + 2, a[2])
 
 
 @inlined
@@ -120,35 +112,35 @@ def _add_light(scene, bundle, surface, i, towards, arriving):
 
 
 @inlined
-def _trace_shadows(tree, scene, bundle, lit, aimed, work):
+def _trace_shadows(tree, scene, bundle, lit, aimed, scratch):
     """Find which of the ``aimed`` shadow rays hit anything, and count all of them in their pixels."""
-    shadows = work.shadows
+    shadows = scratch.shadows
     starts = StartPointers(at(shadows, _START), ROW, scene.vertices, scene.faces)
     rays = RayPointers(
-        at(shadows, _ORIGIN), at(shadows, _DIRECTION), work.zero, at(shadows, _T_MAX), 3, 3, 0, 1, 1.0, starts
+        at(shadows, _ORIGIN), at(shadows, _DIRECTION), scratch.zero, at(shadows, _T_MAX), 3, 3, 0, 1, 1.0, starts
     )  # fmt: skip
-    trace_rays(tree, rays, work.found, aimed, work.trace, np.bool_(True))
+    trace_rays(tree, rays, scratch.found, aimed, scratch.trace, np.bool_(True))
     for k in range(aimed):
         pixel = get(bundle.pixels, get(lit, SIZE + k))
-        put(work.traced, pixel, get(work.traced, pixel) + 1)
+        put(scratch.traced, pixel, get(scratch.traced, pixel) + 1)
 
 
 @kernel
-def light_surfaces(tree, scene, bundle, surfaces, lit, settings, work):
+def light_surfaces(tree, scene, bundle, surfaces, lit, settings, scratch):
     """Direct light of the surfaces that a bundle met, into their LIGHT.
 
     ``lit`` holds the number of rays whose material shows direct light, then these rays, and room for as many again.
-    Shadow rays are counted in ``work.traced`` of their pixels; without ``settings.shadows`` there are none.
+    Shadow rays are counted in ``scratch.traced`` of their pixels; without ``settings.shadows`` there are none.
     """
     count, lit = get(lit, 0), at(lit, 1)
-    shadows = work.shadows
+    shadows = scratch.shadows
     for light in range(scene.light_count):
         aimed = _aim_all(scene, bundle, surfaces, lit, count, light, settings.offset, shadows)
         if settings.shadows:
-            _trace_shadows(tree, scene, bundle, lit, aimed, work)
+            _trace_shadows(tree, scene, bundle, lit, aimed, scratch)
         for k in range(aimed):
             i = get(lit, SIZE + k)
             # rule: shadows
-            if not (settings.shadows and get(work.found.hit, k)):
+            if not (settings.shadows and get(scratch.found.hit, k)):
                 towards, arriving = three(shadows, _TOWARDS + 3 * k), three(shadows, _ARRIVING + 3 * k)
                 _add_light(scene, bundle, at(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)

@@ -14,9 +14,8 @@ PLACES = 4096
 
 
 @inlined
-def _encoded(x, table):
-    """The sRGB code of x, found from the code at the beginning of its part of [0, 1]; see ``face_phong._table``."""
-    steps, first = table
+def _encoded(x, steps, first):
+    """The sRGB code of x, found from the code at the beginning of its part of [0, 1]; see ``face_phong.CodeTable``."""
     x = smaller(larger(x, 0.0), 1.0)
     code = get(first, np.int64(x * PLACES))
     while get(steps, code) <= x:
@@ -25,9 +24,9 @@ def _encoded(x, table):
 
 
 @kernel
-def shade_faces(arrays, eye, colors, table, begin, end):
-    """Colour the faces from ``begin`` to ``end``."""
-    seen, table = scene_pointers(arrays), (pointer(table[0]), pointer(table[1]))
+def shade_faces(arrays, eye, colors, steps, first, begin, end):
+    """Colour the faces from ``begin`` to ``end``; ``steps`` and ``first`` are those of ``face_phong.CodeTable``."""
+    seen, steps, first = scene_pointers(arrays), pointer(steps), pointer(first)
     for face in range(begin, end):
         a, b, c = row3(seen.faces, face)
         p0, p1, p2 = row3(seen.vertices, a), row3(seen.vertices, b), row3(seen.vertices, c)
@@ -40,4 +39,4 @@ def shade_faces(arrays, eye, colors, table, begin, end):
             if lamp.faces:
                 color = add(color, times(phong(seen, m, n, d, lamp.towards), lamp.arriving))
         for k in range(3):
-            colors[face, k] = _encoded(color[k], table)
+            colors[face, k] = _encoded(color[k], steps, first)

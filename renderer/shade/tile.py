@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import at, get, pointer, put, smaller
-from renderer.numerics.vec3 import add, normalized, row3, scale, three
+from renderer.numerics.vec3 import add, normalized, put3, row3, scale, three
 from renderer.shade.bundle import SIDE, SIZE, append, clear, count_of
-from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES, put3
+from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES
 from renderer.shade.surface import scene_pointers
 from renderer.shade.whitted import (
     Settings,
-    begin_work,
-    make_work,
+    begin_bundles,
+    bundle_scratch,
     meet,
     push_children,
+    scratch_lengths,
     slot,
     trace_bundle,
-    work_lengths,
 )
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
@@ -47,12 +47,21 @@ class Film(NamedTuple):
     rays: NDArray[np.int32]
 
 
+class Rectangle(NamedTuple):
+    """A rectangle of pixels: columns from x0 up to, but not, x1, rows from y0 to y1."""
+
+    x0: int
+    y0: int
+    x1: int
+    y1: int
+
+
 class CameraMap(NamedTuple):
     """Pointers to the rows of the camera's affine map and to the samples' places in a pixel, and their number."""
 
     rows: Any
     samples: Any
-    count: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
 
 
 @inlined
@@ -64,20 +73,20 @@ def _place(k):
 
 
 @inlined
-def _shoot(camera, scene, bundle, place, block):
-    """Fill a bundle with the camera rays of a block = (x0, y0, x1, y1), all through one ``place`` (x, y) in a pixel.
+def _shoot(camera, scene, bundle, across, down, block):
+    """Fill a bundle with the camera rays of a block, all through the same place in a pixel: ``across`` and ``down``
+    from its corner.
 
     Pixels count row by row, SIDE per row.
     """
-    x0, y0, x1, y1 = block
     clear(bundle, 0)
     put_no_start(bundle.starts)
     for k in range(SIZE):
         i, j = _place(k)
-        x, y = x0 + i, y0 + j
-        if x < x1 and y < y1:
+        x, y = block.x0 + i, block.y0 + j
+        if x < block.x1 and y < block.y1:
             # rule: place-in-pixel
-            px, py = x + place[0], y + place[1]
+            px, py = x + across, y + down
             rows = camera.rows
             o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))
             d = add(row3(rows, 3), add(scale(row3(rows, 4), px), scale(row3(rows, 5), py)))
@@ -85,13 +94,13 @@ def _shoot(camera, scene, bundle, place, block):
 
 
 @inlined
-def _write_first_hits(film, bundle, work, x0, y0):
-    """Write depth, face and shading normal of the camera rays that were just traced."""
+def _write_first_hits(film, bundle, scratch, block):
+    """Write depth, face and shading normal of the camera rays of a block that were just traced."""
     for i in range(count_of(bundle)):
-        pixel, surface = get(bundle.pixels, i), at(work.surfaces, i * SURFACE_DOUBLES)
-        x, y, face = x0 + pixel % SIDE, y0 + pixel // SIDE, get(work.found.face, i)
+        pixel, surface = get(bundle.pixels, i), at(scratch.surfaces, i * SURFACE_DOUBLES)
+        x, y, face = block.x0 + pixel % SIDE, block.y0 + pixel // SIDE, get(scratch.found.face, i)
         if len(film.depth) > 0:
-            film.depth[y, x] = get(work.found.t, i)
+            film.depth[y, x] = get(scratch.found.t, i)
         if len(film.face) > 0:
             film.face[y, x] = face
         if face >= 0 and len(film.normal) > 0:
@@ -108,14 +117,14 @@ def _has_centre(count):
 
 
 @kernel
-def _look(tree, scene, settings, camera, film, work, block):
+def _look(tree, scene, settings, camera, film, scratch, block):
     """Write the first hits of rays through the pixels' centres, none of which is a sample. Colours, counts of rays and
-    surfaces in ``work`` are overwritten.
+    surfaces in ``scratch`` are overwritten.
     """
-    bundle = slot(work, settings, 0)
-    _shoot(camera, scene, bundle, (0.5, 0.5), block)
-    meet(tree, scene, bundle, work)
-    _write_first_hits(film, bundle, work, block[0], block[1])
+    bundle = slot(scratch, settings, 0)
+    _shoot(camera, scene, bundle, 0.5, 0.5, block)
+    meet(tree, scene, bundle, scratch)
+    _write_first_hits(film, bundle, scratch, block)
 
 
 @inlined
@@ -124,26 +133,24 @@ def _shows_first_hits(film):
 
 
 @kernel
-def _end_sample(film, block, work, total):
+def _end_sample(film, block, scratch, total):
     """Add the colours and ray counts of a sample to the sums of its block."""
-    x0, y0, x1, y1 = block
-    for y in range(y0, y1):
-        for x in range(x0, x1):
-            pixel = (y - y0) * SIDE + x - x0
-            put3(total, 3 * pixel, add(row3(total, pixel), row3(work.color, pixel)))
+    for y in range(block.y0, block.y1):
+        for x in range(block.x0, block.x1):
+            pixel = (y - block.y0) * SIDE + x - block.x0
+            put3(total, 3 * pixel, add(row3(total, pixel), row3(scratch.color, pixel)))
             if len(film.rays) > 0:
-                film.rays[y, x] += get(work.traced, pixel)
+                film.rays[y, x] += get(scratch.traced, pixel)
 
 
 @kernel
-def _end_block(film, block, work, total, count):
+def _end_block(film, block, scratch, total, count):
     """Write the radiance of a block. Returns the number of its pixels that were cut by ``max_rays``."""
-    x0, y0, x1, y1 = block
     cut = 0
-    for y in range(y0, y1):
-        for x in range(x0, x1):
-            pixel = (y - y0) * SIDE + x - x0
-            cut += get(work.cut, pixel)
+    for y in range(block.y0, block.y1):
+        for x in range(block.x0, block.x1):
+            pixel = (y - block.y0) * SIDE + x - block.x0
+            cut += get(scratch.cut, pixel)
             # The largest float32 stands for anything brighter, as from a light within 1e-15 of a surface.
             for k in range(3):
                 film.radiance[y, x, k] = smaller(get(total, 3 * pixel + k) / count, _BRIGHTEST)
@@ -151,19 +158,18 @@ def _end_block(film, block, work, total, count):
 
 
 @inlined
-def _clear_block(work, total):
+def _clear_block(scratch, total):
     for k in range(SIZE):
-        put(work.cut, k, 0)
+        put(scratch.cut, k, 0)
         put3(total, 3 * k, (0.0, 0.0, 0.0))
 
 
 @inlined
 def _block_of(tile, k):
     """The k-th block of a tile, row by row; for k beyond the last, one below the tile."""
-    x0, y0, x1, y1 = tile
-    across = (x1 - x0 + SIDE - 1) // SIDE
-    x, y = x0 + k % across * SIDE, y0 + k // across * SIDE
-    return x, y, smaller(x + SIDE, x1), smaller(y + SIDE, y1)
+    across = (tile.x1 - tile.x0 + SIDE - 1) // SIDE
+    x, y = tile.x0 + k % across * SIDE, tile.y0 + k // across * SIDE
+    return Rectangle(x, y, smaller(x + SIDE, tile.x1), smaller(y + SIDE, tile.y1))
 
 
 # The progress of a tile, int64: its block, the number of the block's samples that were begun, the number of bundles
@@ -172,37 +178,37 @@ _BLOCK, _BEGUN, _WAITING, _FROM_CAMERA, CUT, _STATE = range(6)
 
 
 @kernel
-def _next_sample(tree, scene, settings, camera, film, tile, work, total, state):
+def _next_sample(tree, scene, settings, camera, film, tile, scratch, total, state):
     """End the sample under way and begin the next one, in the next block after the last sample of a block. Returns
     whether there is one.
     """
     block, begun = _block_of(tile, get(state, _BLOCK)), get(state, _BEGUN)
     if begun > 0:
-        _end_sample(film, block, work, total)
+        _end_sample(film, block, scratch, total)
     if begun == camera.count:
-        put(state, CUT, get(state, CUT) + _end_block(film, block, work, total, camera.count))
+        put(state, CUT, get(state, CUT) + _end_block(film, block, scratch, total, camera.count))
         put(state, _BLOCK, get(state, _BLOCK) + 1)
         block, begun = _block_of(tile, get(state, _BLOCK)), 0
-    if block[1] >= tile[3]:
+    if block.y0 >= tile.y1:
         return False
     if begun == 0:
-        _clear_block(work, total)
+        _clear_block(scratch, total)
         if _shows_first_hits(film) and not _has_centre(camera.count):
-            _look(tree, scene, settings, camera, film, work, block)
+            _look(tree, scene, settings, camera, film, scratch, block)
     for k in range(SIZE):
-        put(work.traced, k, 0)
-        put3(work.color, 3 * k, (0.0, 0.0, 0.0))
-    place = get(camera.samples, 2 * begun), get(camera.samples, 2 * begun + 1)
-    _shoot(camera, scene, slot(work, settings, 0), place, block)
+        put(scratch.traced, k, 0)
+        put3(scratch.color, 3 * k, (0.0, 0.0, 0.0))
+    across, down = get(camera.samples, 2 * begun), get(camera.samples, 2 * begun + 1)
+    _shoot(camera, scene, slot(scratch, settings, 0), across, down, block)
     put(state, _BEGUN, begun + 1)
     put(state, _WAITING, 1)
     put(state, _FROM_CAMERA, 1)
     return True
 
 
-class TileMemory(NamedTuple):
-    """Memory to render a tile: for tracing, for its ``Work``, for the sums of a block and for its progress; and the
-    number of bundles that are traced per call.
+class TileScratch(NamedTuple):
+    """Scratch to render a tile: for tracing, for its ``BundleScratch``, for the sums of a block and for its progress;
+    and the number of bundles that are traced per call.
     """
 
     trace: Scratch
@@ -214,49 +220,48 @@ class TileMemory(NamedTuple):
     bundles: int
 
 
-def tile_memory(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileMemory:
-    """The memory that ``render_tile`` needs beside its film, for one tile and a tree of ``depth`` levels."""
-    doubles, integers = work_lengths(settings)
+def tile_scratch(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileScratch:
+    """The scratch that ``render_tile`` needs beside its film, for one tile and a tree of ``depth`` levels."""
+    doubles, integers = scratch_lengths(settings)
     trace, hits = new_scratch(depth, SIZE), np.empty(SIZE, np.bool_)
-    return TileMemory(
+    return TileScratch(
         trace, cache_aligned(doubles, np.float64), cache_aligned(integers, np.int64), hits, np.empty(3 * SIZE),
         np.zeros(_STATE, np.int64), bundles,
     )  # fmt: skip
 
 
 @inlined
-def _trace_next(tree, scene, settings, camera, film, tile, work, state):
+def _trace_next(tree, scene, settings, camera, film, tile, scratch, state):
     """Trace the bundle that was spawned last, and spawn its bundles."""
     top = get(state, _WAITING) - 1
-    bundle = slot(work, settings, top)
-    trace_bundle(tree, scene, settings, bundle, work)
+    bundle = slot(scratch, settings, top)
+    trace_bundle(tree, scene, settings, bundle, scratch)
     if get(state, _FROM_CAMERA) != 0:
         put(state, _FROM_CAMERA, 0)
         if _has_centre(camera.count) and get(state, _BEGUN) == camera.count // 2 + 1:
-            block = _block_of(tile, get(state, _BLOCK))
-            _write_first_hits(film, bundle, work, block[0], block[1])
-    put(state, _WAITING, push_children(scene, settings, work, bundle, top))
+            _write_first_hits(film, bundle, scratch, _block_of(tile, get(state, _BLOCK)))
+    put(state, _WAITING, push_children(scene, settings, scratch, bundle, top))
 
 
 @kernel
-def render_tile(words, scene, settings, camera, samples, film, tile, memory):
-    """Fill the pixels of ``tile`` = (x0, y0, x1, y1); ``camera`` are the rows of the camera's affine map.
+def render_tile(words, scene, settings, camera, samples, film, tile, arrays):
+    """Fill the pixels of a ``Rectangle``, the tile; ``camera`` are the rows of the camera's affine map.
 
     ``words`` are the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
-    samples, their rays are added up from 0. Returns whether the tile is done. If not, ``memory.bundles``
-    bundles were traced, and the caller can react to Ctrl-C; called again with the same memory, it goes on.
+    samples, their rays are added up from 0. Returns whether the tile is done. If not, ``arrays.bundles`` bundles were
+    traced, and the caller can react to Ctrl-C; called again with the same ``arrays``, a ``TileScratch``, it goes on.
     """
-    doubles, integers, hits = pointer(memory.doubles), pointer(memory.integers), pointer(memory.hits)
-    state, total = pointer(memory.state), pointer(memory.total)
-    work = make_work(doubles, integers, hits, settings, scratch_pointers(memory.trace))
+    doubles, integers, hits = pointer(arrays.doubles), pointer(arrays.integers), pointer(arrays.hits)
+    state, total = pointer(arrays.state), pointer(arrays.total)
+    scratch = bundle_scratch(doubles, integers, hits, settings, scratch_pointers(arrays.trace))
     tree, seen = tree_pointers(words), scene_pointers(scene)
     shooting = CameraMap(pointer(camera), pointer(samples), len(samples))
     if get(state, _BLOCK) == 0 and get(state, _BEGUN) == 0:
-        begin_work(work, settings)
-    for _ in range(memory.bundles):
+        begin_bundles(scratch, settings)
+    for _ in range(arrays.bundles):
         if get(state, _WAITING) == 0 and not _next_sample(
-            tree, seen, settings, shooting, film, tile, work, total, state
+            tree, seen, settings, shooting, film, tile, scratch, total, state
         ):
             return True
-        _trace_next(tree, seen, settings, shooting, film, tile, work, state)
+        _trace_next(tree, seen, settings, shooting, film, tile, scratch, state)
     return False

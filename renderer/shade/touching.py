@@ -26,7 +26,7 @@ from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import octants_around, tree_pointers
 from renderer.trace.starts.level import CORNER_ERROR, plane_of
-from renderer.trace.walk import blocks_of, push_children
+from renderer.trace.walk import walk
 
 # The share of a face's coordinates by which its box grows.
 _ROOM = 2.0**-45
@@ -43,7 +43,7 @@ def mark_touching(words, arrays, begin, end, every, stack, touching):
     for slot in range(begin, end):
         face = get(tree.faces, slot)
         if face >= 0 and (every or lets_through(scene.materials, np.int64(get(scene.material, face)))):
-            _mark_touched(tree, slot, face, pointer(stack), touching)
+            _mark_touched(tree, slot, face, pointer(stack), pointer(touching))
 
 
 @inlined
@@ -90,36 +90,44 @@ def _box_of(flat):
     return (x0 - room, y0 - room, z0 - room), (x1 + room, y1 + room, z1 + room)
 
 
+class _Query(NamedTuple):
+    """A face whose company is looked for: its ``_Flat``, its number, the corners of its box grown by its room, and a
+    pointer to the marks.
+    """
+
+    flat: Any
+    face: int
+    low: tuple
+    high: tuple
+    touching: Any
+
+
 @kernel
 def _mark_touched(tree, slot, face, stack, touching):
     """Mark the face in a place and those that may coincide with it."""
-    flat, top = _flat_at(tree, slot), 1
-    if not tree.has_nodes:
-        _mark_touched_in(tree, 0, tree.count, flat, face, touching)
-        return
+    flat = _flat_at(tree, slot)
     low, high = _box_of(flat)
-    put(stack, 0, 0)
-    while top > 0:
-        top -= 1
-        child = get(stack, top)
-        if child < 0:
-            first, blocks = blocks_of(child)
-            _mark_touched_in(tree, first, blocks, flat, face, touching)
-            continue
-        top = push_children(tree, child, octants_around(tree, child, low, high), stack, top)
+    walk(tree, stack, _Query(flat, face, low, high, touching), np.int64(0), _enter, _mark_touched_in)
 
 
 @inlined
-def _mark_touched_in(tree, first, blocks, flat, face, touching):
-    """Mark a face and those of some blocks that may coincide with it."""
+def _enter(tree, query, node, found):
+    return found, octants_around(tree, node, query.low, query.high)
+
+
+@inlined
+def _mark_touched_in(tree, query, first, blocks, found):
+    """Mark the face and those of some blocks that may coincide with it; the search goes on."""
     for block in range(first, first + blocks):
-        bits = _level_bits(tree, block * BLOCK_WORDS, flat)
+        bits = _level_bits(tree, block * BLOCK_WORDS, query.flat)
         while bits != 0:
             slot = block * BLOCK_FACES + lowest_bit(bits)
             bits &= bits - 1
             other = get(tree.faces, slot)
-            if other >= 0 and other != face and _may_coincide(flat, _corners(tree, slot)):
-                touching[face], touching[other] = 1, 1
+            if other >= 0 and other != query.face and _may_coincide(query.flat, _corners(tree, slot)):
+                put(query.touching, query.face, np.uint8(1))
+                put(query.touching, other, np.uint8(1))
+    return found, False
 
 
 @inlined

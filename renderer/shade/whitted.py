@@ -12,7 +12,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import at, get, put
-from renderer.numerics.vec3 import add, dot, largest_component, normalized, row3, scale, three, times
+from renderer.numerics.vec3 import add, dot, largest_component, normalized, put3, row3, scale, three, times
 from renderer.shade.bundle import (
     BUNDLE_DOUBLES,
     BUNDLE_INTEGERS,
@@ -50,7 +50,6 @@ from renderer.shade.direct import (
     is_lit,
     light_surfaces,
     place_of,
-    put3,
     put_bounds,
     put_facet,
     put_place,
@@ -85,8 +84,8 @@ class Settings(NamedTuple):
     max_rays: int
 
 
-class Work(NamedTuple):
-    """Memory of one thread, as pointers.
+class BundleScratch(NamedTuple):
+    """Scratch of one thread, as pointers.
 
     The bundles and the order in which their places are used: first those that wait, then the free ones. For tracing,
     its scratch, its hits, and a zero and an infinity as bounds. For the bundle under way, its surfaces, its shadow
@@ -110,8 +109,8 @@ class Work(NamedTuple):
     cut: Any
 
 
-def work_lengths(settings: Settings) -> tuple[int, int]:
-    """Words of float64 and of int64 of the arrays behind a ``Work``, less those of ``trace``.
+def scratch_lengths(settings: Settings) -> tuple[int, int]:
+    """Words of float64 and of int64 of the arrays behind a ``BundleScratch``, less those of ``trace``.
 
     At most one bundle waits per level; one more is under way, and two places are free for those that it spawns.
     """
@@ -123,8 +122,11 @@ def work_lengths(settings: Settings) -> tuple[int, int]:
 
 
 @inlined
-def make_work(doubles, integers, hits, settings, scratch):
-    """A ``Work`` in memory of ``work_lengths``, SIZE bools and a scratch for tracing; ``begin_work`` comes first."""
+def bundle_scratch(doubles, integers, hits, settings, trace):
+    """A ``BundleScratch`` in arrays of ``scratch_lengths``, SIZE bools, and scratch for tracing.
+
+    ``begin_bundles`` comes first.
+    """
     slots = settings.max_depth + 4
     t = at(doubles, slots * BUNDLE_DOUBLES)
     u, v, zero = at(t, SIZE), at(t, 2 * SIZE), at(t, 3 * SIZE)
@@ -137,25 +139,25 @@ def make_work(doubles, integers, hits, settings, scratch):
     traced = at(beyond, SIZE * (settings.media + SPARE))
     side = at(traced, 2 * SIZE)
     found = HitPointers(t, face, u, v, side, side, hits)
-    return Work(
-        doubles, integers, order, scratch, found, zero, infinity, surfaces, shadows, lit, beyond,
+    return BundleScratch(
+        doubles, integers, order, trace, found, zero, infinity, surfaces, shadows, lit, beyond,
         at(shadows, SHADOW_DOUBLES), traced, at(traced, SIZE),
     )  # fmt: skip
 
 
 @inlined
-def begin_work(work, settings):
+def begin_bundles(scratch, settings):
     """Set the bounds of all rays, and the order of the places at the start."""
-    put(work.zero, 0, 0.0)
-    put(work.infinity, 0, np.inf)
+    put(scratch.zero, 0, 0.0)
+    put(scratch.infinity, 0, np.inf)
     for slot in range(settings.max_depth + 4):
-        put(work.order, slot, slot)
+        put(scratch.order, slot, slot)
 
 
 @inlined
-def slot(work, settings, k):
+def slot(scratch, settings, k):
     """The bundle in the k-th place of the order."""
-    return bundle_at(work.bundles, work.bundle_words, settings.media, get(work.order, k))
+    return bundle_at(scratch.bundles, scratch.bundle_words, settings.media, get(scratch.order, k))
 
 
 @inlined
@@ -165,27 +167,27 @@ def _goes_on(weight, min_weight):
 
 
 @inlined
-def _beyond(work, limit, i):
+def _beyond(scratch, limit, i):
     """The place for the media beyond the surface that ray ``i`` met."""
-    return at(work.beyond, i * (limit + SPARE))
+    return at(scratch.beyond, i * (limit + SPARE))
 
 
 @inlined
-def _put_change(scene, bundle, work, i, together, inside):
+def _put_change(scene, bundle, scratch, i, together, inside):
     """Write how the media of ray ``i`` change where it crosses the surface that it met."""
-    surface = at(work.surfaces, i * SURFACE_DOUBLES)
+    surface = at(scratch.surfaces, i * SURFACE_DOUBLES)
     media = Media(at(bundle.media, i * bundle.limit), get(bundle.media_counts, i), bundle.limit)
     m = np.int64(get(surface, MATERIAL))
-    change = cross(scene, together, m, inside, media, _beyond(work, bundle.limit, i), work.trace.holders)
+    change = cross(scene, together, m, inside, media, _beyond(scratch, bundle.limit, i), scratch.trace.holders)
     put3(surface, CHANGE, (change.n1, change.n2, float(change.left)))
     last = together.far
     put3(surface, LAST, (float(last.face), last.u, last.v))
 
 
 @inlined
-def _put_look(scene, bundle, work, i, together, look):
-    """Write what ray ``i`` sees where it meets some faces together, and its ambient light, to ``work``."""
-    surface, d = at(work.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
+def _put_look(scene, bundle, scratch, i, together, look):
+    """Write what ray ``i`` sees where it meets some faces together, and its ambient light, to ``scratch``."""
+    surface, d = at(scratch.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, look.n_s) > 0.0
     put3(surface, POINT, look.p)
@@ -196,48 +198,48 @@ def _put_look(scene, bundle, work, i, together, look):
     put(surface, INSIDE, 1.0 if inside else 0.0)
     put3(surface, LIGHT, times(three(scene.materials, look.material + AMBIENT), row3(scene.colors, 0)))
     if passes_light(scene.materials, look.material):
-        _put_change(scene, bundle, work, i, together, inside)
+        _put_change(scene, bundle, scratch, i, together, inside)
     return look.material
 
 
 @kernel
-def _meet_together(tree, scene, bundle, work, i, spot):
+def _meet_together(tree, scene, bundle, scratch, i, spot):
     """Write what ray ``i`` sees at a ``Spot`` where faces may coincide; returns its material."""
     d = row3(bundle.directions, i)
-    together = faces_together(tree, scene, spot, d, work.trace.packet_stack, work.trace.holders)
-    put(work.found.face, i, together.seen.face)
-    return _put_look(scene, bundle, work, i, together, look_together(scene, together, d))
+    together = faces_together(tree, scene, spot, d, scratch.trace.packet_stack, scratch.trace.holders)
+    put(scratch.found.face, i, together.seen.face)
+    return _put_look(scene, bundle, scratch, i, together, look_together(scene, together, d))
 
 
 @inlined
-def _meet_surface(tree, scene, bundle, work, i):
+def _meet_surface(tree, scene, bundle, scratch, i):
     """Write what ray ``i`` sees; returns its material."""
-    found = work.found
+    found = scratch.found
     spot = Spot(get(found.face, i), get(found.u, i), get(found.v, i))
     if may_coincide(scene, spot.face):
-        return _meet_together(tree, scene, bundle, work, i, spot)
+        return _meet_together(tree, scene, bundle, scratch, i, spot)
     look = look_at(scene, spot.face, spot.u, spot.v, row3(bundle.directions, i))
-    return _put_look(scene, bundle, work, i, Together(spot, spot, spot, 0), look)
+    return _put_look(scene, bundle, scratch, i, Together(spot, spot, spot, 0), look)
 
 
 @kernel
-def _meet_surfaces(tree, scene, bundle, work):
-    """Write the surfaces that rays met to ``work``, and list the lit rays; rays that met none add the background."""
+def _meet_surfaces(tree, scene, bundle, scratch):
+    """Write the surfaces that rays met to ``scratch``, and list the lit rays; rays that met none add the background."""
     lit = 0
     for i in range(count_of(bundle)):
         pixel = get(bundle.pixels, i)
-        put(work.traced, pixel, get(work.traced, pixel) + 1)
-        if get(work.found.face, i) < 0:
+        put(scratch.traced, pixel, get(scratch.traced, pixel) + 1)
+        if get(scratch.found.face, i) < 0:
             seen = times(row3(bundle.weights, i), row3(scene.colors, 1))
-            put3(work.color, 3 * pixel, add(row3(work.color, pixel), seen))
-        elif is_lit(scene.materials, _meet_surface(tree, scene, bundle, work, i)):
+            put3(scratch.color, 3 * pixel, add(row3(scratch.color, pixel), seen))
+        elif is_lit(scene.materials, _meet_surface(tree, scene, bundle, scratch, i)):
             lit += 1
-            put(work.lit, lit, i)
-    put(work.lit, 0, lit)
+            put(scratch.lit, lit, i)
+    put(scratch.lit, 0, lit)
     # In a loop of their own, as the processor overlaps more of short rounds.
     for i in range(count_of(bundle)):
-        if get(work.found.face, i) >= 0:
-            put_bounds(scene, at(work.surfaces, i * SURFACE_DOUBLES))
+        if get(scratch.found.face, i) >= 0:
+            put_bounds(scene, at(scratch.surfaces, i * SURFACE_DOUBLES))
 
 
 @inlined
@@ -316,84 +318,84 @@ def _spawn(leaving, pixel, d, w, weight, children, media, count, settings):
 
 
 @inlined
-def _may_leave(work, pixel, weight, settings):
+def _may_leave(scratch, pixel, weight, settings):
     """Whether a ray of this weight is spawned. That depends on its pixel alone, not on others of its bundle."""
     if not _goes_on(weight, settings.min_weight):
         return False
     # rule: ray-budget
-    if get(work.traced, pixel) >= settings.max_rays:
-        put(work.cut, pixel, 1)
+    if get(scratch.traced, pixel) >= settings.max_rays:
+        put(scratch.cut, pixel, 1)
         return False
     return True
 
 
 @kernel
-def _bounce(scene, bundle, settings, work, refracted, reflected):
+def _bounce(scene, bundle, settings, scratch, refracted, reflected):
     """Collect the refracted and the reflected rays that a bundle spawns."""
     materials = scene.materials
     for i in range(count_of(bundle)):
-        if get(work.found.face, i) < 0:
+        if get(scratch.found.face, i) < 0:
             continue
-        surface = at(work.surfaces, i * SURFACE_DOUBLES)
+        surface = at(scratch.surfaces, i * SURFACE_DOUBLES)
         m, weight, pixel = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i), get(bundle.pixels, i)
         d, n, k_r = row3(bundle.directions, i), three(surface, NORMAL), three(materials, m + REFLECTANCE)
         if passes_light(materials, m):
             n1, n2, left = three(surface, CHANGE)
             w, passes, k_r, k_t = _refract(scene, m, d, n, n1, n2)
-            if passes and _may_leave(work, pixel, times(weight, k_t), settings):
-                leaving, beyond = _exit_beyond(scene, surface, d), _beyond(work, bundle.limit, i)
+            if passes and _may_leave(scratch, pixel, times(weight, k_t), settings):
+                leaving, beyond = _exit_beyond(scene, surface, d), _beyond(scratch, bundle.limit, i)
                 _spawn(leaving, pixel, d, w, times(weight, k_t), refracted, beyond, np.int64(left), settings)
-        if _may_leave(work, pixel, times(weight, k_r), settings):
+        if _may_leave(scratch, pixel, times(weight, k_r), settings):
             media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
             w = reflect(d, n)
             _spawn(_exit_of(surface), pixel, d, w, times(weight, k_r), reflected, media, count, settings)
 
 
 @inlined
-def _collect_light(scene, bundle, work):
+def _collect_light(scene, bundle, scratch):
     """Add the ambient and direct light of a bundle's surfaces to the pixels."""
     for i in range(count_of(bundle)):
-        if get(work.found.face, i) < 0:
+        if get(scratch.found.face, i) < 0:
             continue
-        surface = at(work.surfaces, i * SURFACE_DOUBLES)
+        surface = at(scratch.surfaces, i * SURFACE_DOUBLES)
         kind = get(scene.materials, np.int64(get(surface, MATERIAL)) + KIND)
         if kind != MIRROR and kind != DIELECTRIC:
             pixel = get(bundle.pixels, i)
             own = times(row3(bundle.weights, i), three(surface, LIGHT))
-            put3(work.color, 3 * pixel, add(row3(work.color, pixel), own))
+            put3(scratch.color, 3 * pixel, add(row3(scratch.color, pixel), own))
 
 
 @inlined
-def meet(tree, scene, bundle, work):
-    """Trace the rays of a bundle and write the surfaces that they meet to ``work``, of which none is lit yet."""
+def meet(tree, scene, bundle, scratch):
+    """Trace the rays of a bundle and write the surfaces that they meet to ``scratch``, of which none is lit yet."""
     # Those of camera rays are all alike: they start on no surface.
     starts = StartPointers(bundle.starts, ROW if depth_of(bundle) > 0 else 0, scene.vertices, scene.faces)
-    rays = RayPointers(bundle.origins, bundle.directions, work.zero, work.infinity, 3, 3, 0, 0, 1.0, starts)
-    trace_rays(tree, rays, work.found, count_of(bundle), work.trace, np.bool_(False))
-    _meet_surfaces(tree, scene, bundle, work)
+    rays = RayPointers(bundle.origins, bundle.directions, scratch.zero, scratch.infinity, 3, 3, 0, 0, 1.0, starts)
+    trace_rays(tree, rays, scratch.found, count_of(bundle), scratch.trace, np.bool_(False))
+    _meet_surfaces(tree, scene, bundle, scratch)
 
 
 @kernel
-def trace_bundle(tree, scene, settings, bundle, work):
+def trace_bundle(tree, scene, settings, bundle, scratch):
     """Trace the rays of a bundle and light the surfaces that they meet; ``push_children`` spawns further rays."""
-    meet(tree, scene, bundle, work)
-    light_surfaces(tree, scene, bundle, work.surfaces, work.lit, settings, work)
-    _collect_light(scene, bundle, work)
+    meet(tree, scene, bundle, scratch)
+    light_surfaces(tree, scene, bundle, scratch.surfaces, scratch.lit, settings, scratch)
+    _collect_light(scene, bundle, scratch)
 
 
 @inlined
-def push_children(scene, settings, work, bundle, top):
+def push_children(scene, settings, scratch, bundle, top):
     """Spawn the rays of the bundle in place ``top`` into the two free places above it. Returns the new top.
 
     The bundle's own place is free then, and goes behind the others; an empty bundle does not wait.
     """
     if depth_of(bundle) >= settings.max_depth:
         return top
-    refracted, reflected = slot(work, settings, top + 1), slot(work, settings, top + 2)
+    refracted, reflected = slot(scratch, settings, top + 1), slot(scratch, settings, top + 2)
     clear(refracted, depth_of(bundle) + 1)
     clear(reflected, depth_of(bundle) + 1)
-    _bounce(scene, bundle, settings, work, refracted, reflected)
-    order, own = work.order, get(work.order, top)
+    _bounce(scene, bundle, settings, scratch, refracted, reflected)
+    order, own = scratch.order, get(scratch.order, top)
     first, second = get(order, top + 1), get(order, top + 2)
     if count_of(refracted) == 0:
         first, second = second, first

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.studies.directions import Pattern, check_count, cosine_hemisphere, fibonacci_sphere
-from renderer.studies.share import Asked, answer, check_asked, limits_of
+from renderer.studies.share import StudyRequest, check_request, evaluate, limits_of
 from renderer.studies.sweep import Sky
 
 Floats = NDArray[np.float64]
@@ -45,9 +45,9 @@ def ambient_occlusion(
     array([1. , 0.5])
     """
     expect(normals is not None, "normals", "vectors", "None")
-    asked = check_asked(octree, points, normals, leaving, threads, progress)
+    request = check_request(octree, points, normals, leaving, threads, progress)
     check_count("samples", samples)
-    return _open_share(octree, asked, cosine_hemisphere(samples), distance, turned=True)
+    return _open_share(octree, request, cosine_hemisphere(samples), distance, turned=True)
 
 
 def openness(
@@ -78,13 +78,13 @@ def openness(
     >>> openness(octree, [[0.5, 0.5, 0.5], [0.5, 0.5, 1.0001], [0.5, 0.5, 1000]], samples=100)
     array([0. , 0.5, 1. ])
     """
-    asked = check_asked(octree, points, None, leaving, threads, progress)
+    request = check_request(octree, points, None, leaving, threads, progress)
     check_count("samples", samples)
-    return _open_share(octree, asked, fibonacci_sphere(samples), distance, turned=False)
+    return _open_share(octree, request, fibonacci_sphere(samples), distance, turned=False)
 
 
-def _open_share(octree: Queries, asked: Asked, pattern: Pattern, distance: float, *, turned: bool) -> Floats:
+def _open_share(octree: Queries, request: StudyRequest, pattern: Pattern, distance: float, *, turned: bool) -> Floats:
     """The share of a pattern's directions that is open."""
-    ways = pattern.directions
-    sky = Sky(ways, np.ones(len(ways)), limits_of(distance, ways), turned, False)
-    return answer(octree, asked, sky, hidden=False, share=True)
+    directions = pattern.directions
+    sky = Sky(directions, np.ones(len(directions)), limits_of(distance, directions), turned, False)
+    return evaluate(octree, request, sky, hidden=False, share=True)

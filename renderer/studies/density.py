@@ -1,4 +1,4 @@
-"""Whether points lie about as densely as the faces around them, told from a sample of the faces."""
+"""Whether points lie about as densely as the faces around them, by a sample of the faces."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def are_dense(points: Floats, mesh: Mesh) -> bool:
     with np.errstate(divide="ignore", over="ignore"):
         cells = min(_CELLS, max(1, int((count / _IN_CELL) ** 0.5)))
         rate = cells / (upper - lower).max()
-        if not 0.0 < rate < np.inf:  # all in one place, or farther apart than float64 tells
+        if not 0.0 < rate < np.inf:  # all in one place, or farther apart than float64 holds
             return False
         taken = np.zeros((cells + 1,) * 3, bool)
         taken[tuple(((points - lower) * rate).astype(np.int64).T)] = True

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from renderer.jit.decorators import kernel
 from renderer.numerics.predicates import UNDECIDED, volume_sign
-from renderer.numerics.rational import cross, dot, exact, less
+from renderer.numerics.rational import corners_from, volume
 from renderer.numerics.simd import at, local_doubles, pointer
 from renderer.numerics.vec3 import row3
 
@@ -17,41 +17,35 @@ _SHARE, _LEAST, _FARTHEST = 2.0**-50, 2.0**-600, 2.0**200
 
 
 def are_edge_on(corners: Floats, eye: Floats) -> NDArray[np.bool_]:
-    """Whether an eye (3,) lies in the planes of faces with corners (n, 3, 3), (n,); no rounding tells.
+    """Whether an eye (3,) lies in the planes of faces with corners (n, 3, 3), (n,), exactly.
 
-    The volume of face and eye is 0 there. Float64 tells that it is not for almost all faces.
+    The volume of face and eye is 0 there. For almost all faces float64 decides that it is not.
     """
     sides = np.ones(len(corners), np.int64)
     rows = np.flatnonzero(~_are_apart(corners, eye))
     if len(rows):
-        some, told = np.ascontiguousarray(corners[rows]), np.empty(len(rows), np.int64)
-        _tell_sides(some, eye, told)
-        for row in np.flatnonzero(told == UNDECIDED):
-            told[row] = _is_beside(some[row], eye)
-        sides[rows] = told
+        some, signs = np.ascontiguousarray(corners[rows]), np.empty(len(rows), np.int64)
+        _write_signs(some, eye, signs)
+        for row in np.flatnonzero(signs == UNDECIDED):
+            signs[row] = volume(*corners_from(eye, some[row])) != 0
+        sides[rows] = signs
     return sides == 0
 
 
 def _are_apart(corners: Floats, eye: Floats) -> NDArray[np.bool_]:
-    """Whether float64 tells that the eye is beside a face's plane."""
-    with np.errstate(all="ignore"):  # what overflows or vanishes is not told
+    """Whether float64 decides that the eye is beside a face's plane."""
+    with np.errstate(all="ignore"):  # what overflows or vanishes is not decided
         a, b, c = np.moveaxis(corners - eye, 1, 0)
         x, y = b[:, [1, 2, 0]] * c[:, [2, 0, 1]], b[:, [2, 0, 1]] * c[:, [1, 2, 0]]
-        volume, terms = (a * (x - y)).sum(axis=1), (np.abs(a) * (np.abs(x) + np.abs(y))).sum(axis=1)
+        rounded, terms = (a * (x - y)).sum(axis=1), (np.abs(a) * (np.abs(x) + np.abs(y))).sum(axis=1)
     near = np.abs(corners - eye).max(axis=(1, 2), initial=0.0) <= _FARTHEST
-    return near & (terms >= _LEAST) & (np.abs(volume) > _SHARE * terms)
+    return near & (terms >= _LEAST) & (np.abs(rounded) > _SHARE * terms)
 
 
 @kernel
-def _tell_sides(corners, eye, sides):
-    """``volume_sign`` of faces and an eye to ``sides``."""
+def _write_signs(corners, eye, signs):
+    """Write ``volume_sign`` of faces and an eye to ``signs``."""
     parts, p = local_doubles(), row3(pointer(eye), 0)
     for i in range(len(corners)):
         face = at(pointer(corners), 9 * i)
-        sides[i] = volume_sign(row3(face, 0), row3(face, 1), row3(face, 2), p, parts)
-
-
-def _is_beside(face: Floats, eye: Floats) -> bool:
-    """Whether the eye is beside the plane of a face (3, 3), by rational numbers."""
-    a, b, c = (less(exact(corner), exact(eye)) for corner in face)
-    return bool(dot(a, cross(b, c)) != 0)
+        signs[i] = volume_sign(row3(face, 0), row3(face, 1), row3(face, 2), p, parts)

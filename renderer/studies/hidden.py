@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.arguments.arrays import flag_argument
 from renderer.errors import expect
 from renderer.queryable import Queries
-from renderer.studies.share import answer, answer_bits, check_asked, check_directions, check_weights, limits_of
+from renderer.studies.share import check_directions, check_request, check_weights, evaluate, evaluate_bits, limits_of
 from renderer.studies.sweep import Sky
 
 
@@ -27,8 +27,8 @@ def occlusion(
 ) -> NDArray[np.float64] | NDArray[np.uint8]:
     """The share of directions that is HIDDEN from each point, (...) float64 from 0 to 1; or one bit for each of them.
 
-    A direction d is hidden from a point where d . n <= 0, as float64 computes it of its unit normal n: it is at the
-    point's horizon or below. Else it is hidden where a ray this way hits anything, as ``octree.any_hit`` tells.
+    A direction d is hidden if it is at the point's horizon or below, d . n <= 0 as float64 computes it of the unit
+    normal n, or if a ray in direction d hits the mesh, see ``octree.any_hit``.
 
     points      (..., 3), finite
     normals     (..., 3) as points, or one (3,) for all; not zero, of any length; None: no point has a horizon
@@ -37,9 +37,9 @@ def occlusion(
     leaving     the face that each point lies on, (...) or one for all, -1 where that is not known; None: -1 for all. A
                 point is then on the surface where it is as near as 32 roundings of float64 of its largest coordinate;
                 or, if all its coordinates are numbers of float32, where each is as near as 8 of its own roundings to
-                float32. Rays start at the point of the face that is nearest: no epsilon
-                is needed. The normal says on which side of the faces there the point is: directions that lead through
-                them to another side are hidden. Without a normal the faces that hold the point hide nothing
+                float32. Rays start at the point of the face that is nearest: no epsilon is needed. The normal says on
+                which side of the faces there the point is: directions that lead through them to another side are
+                hidden. Without a normal the faces that hold the point hide nothing
     packed      True: (..., ceil(k / 8)) uint8 with a set bit for each hidden direction, in the order of
                 ``numpy.unpackbits(..., axis=-1, count=k)``. There are no weights then
     distance    how far the mesh hides, in scene units
@@ -62,12 +62,12 @@ def occlusion(
     >>> np.unpackbits(bits, axis=-1, count=4)
     array([[1, 1, 1, 0]], dtype=uint8)
     """
-    asked = check_asked(octree, points, normals, leaving, threads, progress)
-    ways = check_directions("directions", directions)
-    limits = limits_of(distance, ways)
+    request = check_request(octree, points, normals, leaving, threads, progress)
+    directions = check_directions("directions", directions)
+    limits = limits_of(distance, directions)
     if flag_argument("packed", packed):
         expect(weights is None, "weights", "None, as bits have none", "an array")
-        return answer_bits(octree, asked, Sky(ways, np.ones(len(ways)), limits, False, False))
-    values = check_weights("weights", weights, len(ways))
+        return evaluate_bits(octree, request, Sky(directions, np.ones(len(directions)), limits, False, False))
+    values = check_weights("weights", weights, len(directions))
     expect(bool(values.any()), "weights", "one that is not 0", "all 0")
-    return answer(octree, asked, Sky(ways, values, limits, False, False), hidden=True, share=True)
+    return evaluate(octree, request, Sky(directions, values, limits, False, False), hidden=True, share=True)

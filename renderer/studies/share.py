@@ -16,7 +16,7 @@ from renderer.errors import expect
 from renderer.ordering.morton import order_along_curve
 from renderer.queryable import Queries
 from renderer.studies.density import are_dense
-from renderer.studies.sweep import TILE, Answers, Places, Sky, make_sweep_memory, sweep
+from renderer.studies.sweep import TILE, Answers, Places, Sky, make_sweep_scratch, sweep
 from renderer.system.terminal import progress_bar
 from renderer.system.threads import checked_threads, for_chunks
 from renderer.trace.batch import check_faces
@@ -29,7 +29,7 @@ _BLOCK = 1 << 22
 _MOST, _LEAST = 64 * TILE, 16
 
 
-class Asked(NamedTuple):
+class StudyRequest(NamedTuple):
     """Where a study is made, and how: points (n, 3) with the leading dimensions that were given, and the threads."""
 
     places: Places
@@ -38,14 +38,14 @@ class Asked(NamedTuple):
     progress: bool
 
 
-def check_asked(
+def check_request(
     octree: Queries,
     points: ArrayLike,
     normals: ArrayLike | None,
     leaving: ArrayLike | None,
     threads: int | None,
     progress: bool,
-) -> Asked:
+) -> StudyRequest:
     """The arguments that all studies have, checked. Raises ``ValueError`` naming argument and row."""
     expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
     rows, shape = check_points("points", points, farthest_of(octree.tree.scale))
@@ -53,7 +53,7 @@ def check_asked(
     check_on(octree.mesh, "points", rows, faces)
     workers = octree.threads if threads is None else checked_threads(threads)
     places = Places(rows, _check_normals(normals, shape), faces, np.empty(0, np.int64), np.empty((0, 3)))
-    return Asked(places, shape, workers, flag_argument("progress", progress))
+    return StudyRequest(places, shape, workers, flag_argument("progress", progress))
 
 
 def _check_normals(normals: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
@@ -109,31 +109,30 @@ def limits_of(distance: float, directions: Floats) -> Floats:
     return float(given) / lengths_of(directions)
 
 
-def answer(octree: Queries, asked: Asked, sky: Sky, *, hidden: bool, share: bool) -> Floats:
+def evaluate(octree: Queries, request: StudyRequest, sky: Sky, *, hidden: bool, share: bool) -> Floats:
     """The sums over the hidden or open directions of each point, as they are or as shares of all; see ``Answers``."""
-    sums = np.empty(len(asked.places.points))
-    run(octree, asked, sky, Answers(sums, np.empty((0, 1), np.uint8), hidden, share))
-    return sums.reshape(asked.shape)
+    sums = np.empty(len(request.places.points))
+    run(octree, request, sky, Answers(sums, np.empty((0, 1), np.uint8), hidden, share))
+    return sums.reshape(request.shape)
 
 
-def answer_bits(octree: Queries, asked: Asked, sky: Sky) -> NDArray[np.uint8]:
+def evaluate_bits(octree: Queries, request: StudyRequest, sky: Sky) -> NDArray[np.uint8]:
     """A bit for each point and direction that is hidden from it."""
     width = -(-len(sky.directions) // 8)
-    bits = np.zeros((len(asked.places.points), width), np.uint8)
-    run(octree, asked, sky, Answers(np.empty(0), bits, True, False))
-    return bits.reshape(*asked.shape, width)
+    bits = np.zeros((len(request.places.points), width), np.uint8)
+    run(octree, request, sky, Answers(np.empty(0), bits, True, False))
+    return bits.reshape(*request.shape, width)
 
 
-def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
+def run(octree: Queries, request: StudyRequest, sky: Sky, answers: Answers) -> None:
     """Let all points look in all directions, and write to ``answers``: points in an order of our own, on threads."""
     mesh, tree = octree._built
-    count = len(asked.places.points)
-    arrays = mesh.vertices, mesh.faces
-    faces, codes, anchors = on_surface(tree, mesh, asked.places.points, asked.places.leaving, asked.threads)
-    places = asked.places._replace(leaving=faces, codes=codes, anchors=anchors)
-    with progress_bar(count, "point", asked.progress) as update:
+    count = len(request.places.points)
+    faces, codes, anchors = on_surface(tree, mesh, request.places.points, request.places.leaving, request.threads)
+    places = request.places._replace(leaving=faces, codes=codes, anchors=anchors)
+    with progress_bar(count, "point", request.progress) as update:
         for first in range(0, count, _BLOCK):
-            block = asked.places.points[first : first + _BLOCK]
+            block = request.places.points[first : first + _BLOCK]
             order, steps = order_along_curve(block)
             order = first + order
             # Else the way that a tile's rays share costs more than it saves: up to 58 % with a point for 30 faces.
@@ -141,10 +140,12 @@ def run(octree: Queries, asked: Asked, sky: Sky, answers: Answers) -> None:
 
             def look(begin: int, end: int, way: tuple[NDArray[np.int64], ...] = (order, steps)) -> Iterator[None]:
                 rows, jumps = (part[begin:end] for part in way)
-                state, memory = (0, 0), make_sweep_memory(tree.depth)
-                while state[0] < len(rows):
-                    state = sweep(tree.descriptor, arrays, places, sky, answers, rows, jumps, state, memory)
+                first, k, scratch = 0, 0, make_sweep_scratch(tree.depth)
+                while first < len(rows):
+                    first, k = sweep(
+                        tree.descriptor, mesh.vertices, mesh.faces, places, sky, answers, rows, jumps, first, k, scratch
+                    )  # fmt: skip
                     yield
 
-            size = min(_MOST, max(_LEAST, len(order) // (16 * asked.threads)))
-            for_chunks(look, len(order), size, asked.threads, update)
+            size = min(_MOST, max(_LEAST, len(order) // (16 * request.threads)))
+            for_chunks(look, len(order), size, request.threads, update)

@@ -7,14 +7,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import count_argument
+from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.studies.directions import MOST, Pattern, fibonacci_hemisphere, reinhart, tregenza, turned
 from renderer.studies.share import (
-    answer,
-    check_asked,
     check_directions,
+    check_request,
     check_weights,
+    evaluate,
     lengths_of,
     limits_of,
 )
@@ -71,14 +72,14 @@ def sky_view_factor(
     """
     _expect_definition(definition)
     pole = _pole(up)
-    asked = check_asked(octree, points, pole if normals is None else normals, leaving, threads, progress)
+    request = check_request(octree, points, pole if normals is None else normals, leaving, threads, progress)
     pattern = _patches(patches)
-    ways = turned(pattern.directions, pole)
+    directions = turned(pattern.directions, pole)
     # rule: cosine-of-patches
     cosine = definition == "cosine"
-    values = pattern.weights / lengths_of(ways) if cosine else pattern.weights
-    sky = Sky(ways, values, limits_of(distance, ways), False, cosine)
-    return answer(octree, asked, sky, hidden=False, share=True)
+    values = pattern.weights / lengths_of(directions) if cosine else pattern.weights
+    sky = Sky(directions, values, limits_of(distance, directions), False, cosine)
+    return evaluate(octree, request, sky, hidden=False, share=True)
 
 
 def sun_hours(
@@ -110,10 +111,11 @@ def sun_hours(
     >>> sun_hours(octree, [[2, 0, 0]], [0, 0, 1], suns, [3.0, 4.0, 3.5])
     array([7.5])
     """
-    asked = check_asked(octree, points, normals, leaving, threads, progress)
+    request = check_request(octree, points, normals, leaving, threads, progress)
     suns = check_directions("sun_directions", sun_directions)
     hours = check_weights("weights", weights, len(suns))
-    return answer(octree, asked, Sky(suns, hours, limits_of(distance, suns), False, False), hidden=False, share=False)
+    sky = Sky(suns, hours, limits_of(distance, suns), False, False)
+    return evaluate(octree, request, sky, hidden=False, share=False)
 
 
 def _expect_definition(definition: str) -> None:
@@ -131,16 +133,15 @@ def _pole(up: ArrayLike) -> Floats:
 def _patches(patches: int | Pattern) -> Pattern:
     """The patches of a sky about +z, by their number, or given, which are checked."""
     if isinstance(patches, Pattern):
-        ways = check_directions("patches", patches.directions)
-        below = ~(ways[:, 2] > 0.0)
+        directions = check_directions("patches", patches.directions)
+        below = ~(directions[:, 2] > 0.0)
         if below.any():
             row = int(below.argmax())
-            expect(False, "patches", "directions above the horizon, z > 0", f"{ways[row].tolist()} in row {row}")
-        weights = check_weights("patches", patches.weights, len(ways))
+            expect(False, "patches", "directions above the horizon, z > 0", f"{directions[row].tolist()} in row {row}")
+        weights = check_weights("patches", patches.weights, len(directions))
         expect(bool(weights.any()), "patches", "a weight that is not 0", "all 0")
-        return Pattern(ways, weights)
-    good = is_count(patches) and 1 <= patches <= MOST
-    expect(good, "patches", f"an integer from 1 to {MOST}, or a Pattern", repr(patches))
+        return Pattern(directions, weights)
+    patches = count_argument("patches", patches, 1, MOST, ", or a Pattern")
     if patches in (145, 577):
         return tregenza() if patches == 145 else reinhart(2)
-    return fibonacci_hemisphere(int(patches))
+    return fibonacci_hemisphere(patches)

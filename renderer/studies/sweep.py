@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import at, get, pointer, put, smaller
-from renderer.numerics.vec3 import add, cross, dot, largest_component, normalized, row3, scale, three
+from renderer.numerics.vec3 import add, cross, dot, largest_component, normalized, put3, row3, scale, three
 from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
@@ -122,8 +122,8 @@ class Answers(NamedTuple):
     share: bool
 
 
-class SweepMemory(NamedTuple):
-    """The memory of one thread: its tile's points, its rays, what they hit, and what tracing needs."""
+class SweepScratch(NamedTuple):
+    """The scratch of one thread: its tile's points, its rays, what they hit, and what tracing needs."""
 
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
@@ -132,10 +132,10 @@ class SweepMemory(NamedTuple):
     parallel: ParallelScratch
 
 
-class _Work(NamedTuple):
-    """Pointers into a ``SweepMemory``: the tile's points; origins, directions, t_max and starts of rays; the points
-    with directions that are listed, (direction * TILE + point) * 2, and 1 more for those that have a ray; and their
-    values.
+class _SweepPointers(NamedTuple):
+    """Pointers into a ``SweepScratch`` and to the mesh: the tile's points; origins, directions, t_max and starts of
+    rays; the points with directions that are listed, (direction * TILE + point) * 2, and 1 more for those that have a
+    ray; and their values.
     """
 
     points: Any
@@ -147,14 +147,16 @@ class _Work(NamedTuple):
     values: Any
     zero: Any
     listed: Any
+    vertices: Any
+    faces: Any
     found: HitPointers
-    scratch: Scratch
+    trace: Scratch
     parallel: ParallelPointers
 
 
-def make_sweep_memory(depth: int) -> SweepMemory:
-    """Memory for tiles against a tree of ``depth`` levels."""
-    return SweepMemory(
+def make_sweep_scratch(depth: int) -> SweepScratch:
+    """Scratch for tiles against a tree of ``depth`` levels."""
+    return SweepScratch(
         cache_aligned(_POINT_DOUBLES + (8 + ROW) * RAYS + 8, np.float64),
         cache_aligned(_POINT_INTEGERS + RAYS, np.int64),
         cache_aligned(RAYS // 8, np.float64),
@@ -164,23 +166,18 @@ def make_sweep_memory(depth: int) -> SweepMemory:
 
 
 @inlined
-def _work_in(memory):
-    doubles, integers = pointer(memory.doubles), pointer(memory.integers)
+def _scratch_pointers(arrays, vertices, faces):
+    """The ``_SweepPointers`` of a ``SweepScratch`` and a mesh."""
+    doubles, integers = pointer(arrays.doubles), pointer(arrays.integers)
     origins = at(doubles, _POINT_DOUBLES)
     directions, limits, values = at(origins, 3 * RAYS), at(origins, 6 * RAYS), at(origins, 7 * RAYS)
     starts, zero = at(origins, 8 * RAYS), at(origins, (8 + ROW) * RAYS)
     put(zero, 0, 0.0)
-    return _Work(
+    return _SweepPointers(
         doubles, integers, origins, directions, limits, starts, values, zero, at(integers, _POINT_INTEGERS),
-        hit_pointers(memory.hits, 0), scratch_pointers(memory.trace), parallel_pointers(memory.parallel),
+        pointer(vertices), pointer(faces),
+        hit_pointers(arrays.hits, 0), scratch_pointers(arrays.trace), parallel_pointers(arrays.parallel),
     )  # fmt: skip
-
-
-@inlined
-def _put3(base, first, a):
-    put(base, first, a[0])
-    put(base, first + 1, a[1])
-    put(base, first + 2, a[2])
 
 
 @inlined
@@ -196,84 +193,84 @@ def _frame_of(normal):
 
 
 @kernel
-def _begin_tile(tree, mesh, places, rows, begin, count, work):
+def _begin_tile(tree, places, rows, begin, count, scratch):
     """Read ``count`` points, those in ``rows`` from ``begin`` on, and prepare where their rays start."""
     points, normals, leaving = pointer(places.points), pointer(places.normals), pointer(places.leaving)
     step = np.int64(len(places.normals) > 1)
-    put(work.numbers, _LEFT, _TRIES)
-    put(work.numbers, _TABLES, 0)
+    put(scratch.numbers, _LEFT, _TRIES)
+    put(scratch.numbers, _TABLES, 0)
     for i in range(count):
         row = rows[begin + i]
-        face, o, start = get(leaving, row), row3(points, row), at(work.points, _START + ROW * i)
-        put(work.numbers, _ROW + i, row)
-        put(work.numbers, _HIDER + i, 0)
-        _put3(work.points, _ABOVE + 3 * i, o)
+        face, o, start = get(leaving, row), row3(points, row), at(scratch.points, _START + ROW * i)
+        put(scratch.numbers, _ROW + i, row)
+        put(scratch.numbers, _HIDER + i, 0)
+        put3(scratch.points, _ABOVE + 3 * i, o)
         put_no_start(start)
         if len(places.normals) > 0:
             first, second, third = _frame_of(row3(normals, row * step))
-            _put3(work.points, _FRAME + 9 * i, first)
-            _put3(work.points, _FRAME + 9 * i + 3, second)
-            _put3(work.points, _FRAME + 9 * i + 6, third)
+            put3(scratch.points, _FRAME + 9 * i, first)
+            put3(scratch.points, _FRAME + 9 * i + 3, second)
+            put3(scratch.points, _FRAME + 9 * i + 6, third)
         if face >= 0:
-            _put3(start, ANCHOR, row3(pointer(places.anchors), row))
-            _begin_on_face(tree, mesh, work, i, o, face, places.codes[row], len(places.normals) > 0)
-        put(work.points, _SUM + i, 0.0)
-        put(work.points, _WHOLE + i, 0.0)
+            put3(start, ANCHOR, row3(pointer(places.anchors), row))
+            _begin_on_face(tree, scratch, i, o, face, places.codes[row], len(places.normals) > 0)
+        put(scratch.points, _SUM + i, 0.0)
+        put(scratch.points, _WHOLE + i, 0.0)
 
 
 @kernel
-def _begin_on_face(tree, mesh, work, i, o, face, code, has_horizon):
+def _begin_on_face(tree, scratch, i, o, face, code, has_horizon):
     """Prepare where the rays of a tile's ``i``-th point start, which lies on a face; its normal says on which side."""
-    start, n = at(work.points, _START + ROW * i), three(work.points, _FRAME + 9 * i + 6)
-    starts = StartPointers(start, 0, pointer(mesh[0]), pointer(mesh[1]))
+    start, n = at(scratch.points, _START + ROW * i), three(scratch.points, _FRAME + 9 * i + 6)
+    starts = StartPointers(start, 0, scratch.vertices, scratch.faces)
     corners, slack = corners_of(starts.vertices, starts.faces, face, tree.scale), EDGE
     if has_normal(corners[0], corners[1], corners[2]):
         normal, above, below, slack = offset_to_both_sides(corners, o, tree.scale)
-        _put3(work.points, _FACING + 3 * i, normal)
-        _put3(work.points, _ABOVE + 3 * i, above)
-        _put3(work.points, _BELOW + 3 * i, below)
+        put3(scratch.points, _FACING + 3 * i, normal)
+        put3(scratch.points, _ABOVE + 3 * i, above)
+        put3(scratch.points, _BELOW + 3 * i, below)
         if has_horizon and slack != EDGE and dot(normal, n) != 0.0:
             code |= KNOWN | BACK | (ABOVE if dot(normal, n) > 0.0 else 0)
-    _put3(start, WAY, n)
+    put3(start, WAY, n)
     put(start, FACE, np.float64(face))
     put(start, SLACK, slack)
     put(start, CODE, np.float64(code))
     if slack == EDGE:
-        _begin_on_edge(tree, starts, work, i, n, has_horizon)
+        _begin_on_edge(tree, starts, scratch, i, n, has_horizon)
 
 
 @kernel
-def _begin_on_edge(tree, starts, work, i, n, has_horizon):
+def _begin_on_edge(tree, starts, scratch, i, n, has_horizon):
     """``_begin_on_face`` for a point on or near an edge."""
-    begin = get(work.numbers, _TABLES)
+    begin = get(scratch.numbers, _TABLES)
     anchor = anchor_of(start_at(starts, 0, tree.scale))
-    put(work.numbers, _CORNER + i, np.int64(anchor.zeros & (anchor.zeros - 1) != 0))
-    _put3(work.points, _ABOVE + 3 * i, scale(rounded(anchor), 1.0 / tree.scale))
-    put(work.numbers, _TABLE + i, -1)
+    put(scratch.numbers, _CORNER + i, np.int64(anchor.zeros & (anchor.zeros - 1) != 0))
+    put3(scratch.points, _ABOVE + 3 * i, scale(rounded(anchor), 1.0 / tree.scale))
+    put(scratch.numbers, _TABLE + i, -1)
     if has_horizon and _FANS - begin >= _LEAST_FAN:
-        stack, holders, table = work.scratch.packet_stack, work.scratch.holders, at(work.points, _FAN + begin)
+        stack, holders, table = scratch.trace.packet_stack, scratch.trace.holders, at(scratch.points, _FAN + begin)
         take_side(tree, starts, n, stack, holders, table, _FANS - begin)
         if has_fan(table):
-            put(work.numbers, _TABLE + i, begin)
-            put(work.numbers, _TABLES, begin + size_of_fan(table))
+            put(scratch.numbers, _TABLE + i, begin)
+            put(scratch.numbers, _TABLES, begin + size_of_fan(table))
 
 
 @kernel
-def _start_ray(work, i, d, ray):
+def _start_ray(scratch, i, d, ray):
     """Write the origin and the start of a ray from point ``i`` in direction d. Returns whether nothing stops it yet."""
-    own, row = at(work.points, _START + ROW * i), at(work.starts, ROW * ray)
+    own, row = at(scratch.points, _START + ROW * i), at(scratch.starts, ROW * ray)
     for k in range(ROW):
         put(row, k, get(own, k))
-    _put3(work.origins, 3 * ray, three(work.points, _ABOVE + 3 * i))
+    put3(scratch.origins, 3 * ray, three(scratch.points, _ABOVE + 3 * i))
     if get(own, FACE) < 0.0:
         return True
     if get(own, SLACK) == EDGE:
-        return _start_on_edge(work, i, d, row)
-    slope, code = dot(three(work.points, _FACING + 3 * i), d), np.int64(get(own, CODE))
+        return _start_on_edge(scratch, i, d, row)
+    slope, code = dot(three(scratch.points, _FACING + 3 * i), d), np.int64(get(own, CODE))
     # rule: side-of-study-ray
     above = slope >= 0.0
     if not above:
-        _put3(work.origins, 3 * ray, three(work.points, _BELOW + 3 * i))
+        put3(scratch.origins, 3 * ray, three(scratch.points, _BELOW + 3 * i))
     if abs(slope) <= LEVEL * largest_component(d):
         put(row, SLACK, EDGE)
         return True
@@ -281,99 +278,99 @@ def _start_ray(work, i, d, ray):
 
 
 @kernel
-def _start_on_edge(work, i, d, row):
+def _start_on_edge(scratch, i, d, row):
     """``_start_ray`` for a point on or near an edge, whose start is written."""
-    begin, stop = get(work.numbers, _TABLE + i), OPEN
+    begin, stop = get(scratch.numbers, _TABLE + i), OPEN
     if np.int64(get(row, CODE)) & KNOWN != 0:
         stop = UNSURE
         if begin >= 0:
-            stop = stop_of(at(work.points, _FAN + begin), d, make_holders(work.scratch.holders))
+            stop = stop_of(at(scratch.points, _FAN + begin), d, make_holders(scratch.trace.holders))
     if stop == OPEN:
         # Nothing is left to be decided at the start.
         put(row, CODE, np.float64(np.int64(get(row, CODE)) & BARYCENTRIC))
-        if get(work.numbers, _CORNER + i) != 0:
+        if get(scratch.numbers, _CORNER + i) != 0:
             put(row, SLACK, CORNER)
     return stop != STOPPED
 
 
 @kernel
-def _aim(places, sky, work, begun, count):
-    """List a tile's ``count`` points with one direction more; ``begun`` are that, and the entries and rays so far.
+def _aim(places, sky, scratch, k, count, listed, rays):
+    """List a tile's ``count`` points with direction ``k``, after the entries and rays that are listed already.
 
     Returns the entries and rays with them. What is below the horizon of a point, or behind its face, has no ray.
     """
-    k, listed, rays = begun
     given, weight, limit = row3(pointer(sky.directions), k), sky.values[k], sky.limits[k]
     has_horizon = len(places.normals) > 0
     for i in range(count):
         d, height, value = given, 1.0, weight
         if sky.turned:
-            frame = at(work.points, _FRAME + 9 * i)
+            frame = at(scratch.points, _FRAME + 9 * i)
             across = add(scale(row3(frame, 0), given[0]), scale(row3(frame, 1), given[1]))
             d, height = add(across, scale(row3(frame, 2), given[2])), given[2]
         elif has_horizon:
-            height = dot(three(work.points, _FRAME + 9 * i + 6), given)
+            height = dot(three(scratch.points, _FRAME + 9 * i + 6), given)
         if sky.cosine:
             # rule: cosine-weight
             value *= abs(height)
-        put(work.points, _WHOLE + i, get(work.points, _WHOLE + i) + value)
+        put(scratch.points, _WHOLE + i, get(scratch.points, _WHOLE + i) + value)
         # rule: open-above-horizon
-        seen = height > 0.0 and _start_ray(work, i, d, rays)
+        seen = height > 0.0 and _start_ray(scratch, i, d, rays)
         if seen:
-            _put3(work.directions, 3 * rays, d)
-            put(work.limits, rays, limit)
+            put3(scratch.directions, 3 * rays, d)
+            put(scratch.limits, rays, limit)
             if rays < TILE:
-                put(work.parallel.hiders, rays, get(work.numbers, _HIDER + i))
-        put(work.values, listed, value)
-        put(work.listed, listed, (k * TILE + i) * 2 + np.int64(seen))
+                put(scratch.parallel.hiders, rays, get(scratch.numbers, _HIDER + i))
+        put(scratch.values, listed, value)
+        put(scratch.listed, listed, (k * TILE + i) * 2 + np.int64(seen))
         listed += 1
         rays += np.int64(seen)
     return listed, rays
 
 
 @kernel
-def _take_down(answers, work, listed):
+def _take_down(answers, scratch, listed):
     """Take down what the listed points see, once their rays are traced: for each point in the order of directions."""
     ray = np.int64(0)
     for entry in range(listed):
-        code, hides = get(work.listed, entry), True
+        code, hides = get(scratch.listed, entry), True
         if code & 1 != 0:
-            hides = get(work.found.hit, ray)
+            hides = get(scratch.found.hit, ray)
             if ray < TILE:
-                put(work.numbers, _HIDER + (code >> 1) % TILE, get(work.parallel.hiders, ray))
+                put(scratch.numbers, _HIDER + (code >> 1) % TILE, get(scratch.parallel.hiders, ray))
             ray += 1
         k, i = (code >> 1) // TILE, (code >> 1) % TILE
         if hides == answers.hidden:
-            put(work.points, _SUM + i, get(work.points, _SUM + i) + get(work.values, entry))
+            put(scratch.points, _SUM + i, get(scratch.points, _SUM + i) + get(scratch.values, entry))
         if hides and len(answers.bits) > 0:
-            row = get(work.numbers, _ROW + i)
+            row = get(scratch.numbers, _ROW + i)
             answers.bits[row, k >> 3] |= np.uint8(0x80 >> (k & 7))
 
 
 @kernel
-def _end_tile(answers, work, count):
+def _end_tile(answers, scratch, count):
     """Write the sums of a tile's points."""
     if len(answers.sums) == 0:
         return
     for i in range(count):
-        total, whole = get(work.points, _SUM + i), get(work.points, _WHOLE + i)
+        total, whole = get(scratch.points, _SUM + i), get(scratch.points, _WHOLE + i)
         # Nothing counts where all directions lie in the horizon of a point that weighs them by the cosine.
-        answers.sums[get(work.numbers, _ROW + i)] = total / whole if answers.share and whole > 0.0 else total
+        answers.sums[get(scratch.numbers, _ROW + i)] = total / whole if answers.share and whole > 0.0 else total
 
 
 @inlined
-def _trace(tree, mesh, work, rays, together):
+def _trace(tree, scratch, rays, together):
     """Find which rays hit anything; ``together`` says that they are those of one direction."""
-    starts = StartPointers(work.starts, ROW, pointer(mesh[0]), pointer(mesh[1]))
-    batch = RayPointers(work.origins, work.directions, work.zero, work.limits, 3, 3, 0, 1, tree.scale, starts)
+    starts = StartPointers(scratch.starts, ROW, scratch.vertices, scratch.faces)
+    origins, directions, zero, limits = scratch.origins, scratch.directions, scratch.zero, scratch.limits
+    batch = RayPointers(origins, directions, zero, limits, 3, 3, 0, 1, tree.scale, starts)
     if together and rays > 0:
-        if trace_parallel(tree, batch, work.found, rays, work.scratch, work.parallel):
+        if trace_parallel(tree, batch, scratch.found, rays, scratch.trace, scratch.parallel):
             return
-        put(work.numbers, _LEFT, get(work.numbers, _LEFT) - 1)
+        put(scratch.numbers, _LEFT, get(scratch.numbers, _LEFT) - 1)
     if tree.has_nodes:
-        trace(tree, batch, work.found, 0, rays, work.scratch, np.bool_(True))
+        trace(tree, batch, scratch.found, 0, rays, scratch.trace, np.bool_(True))
     else:
-        search_blocks(tree, batch, work.found, 0, rays, work.scratch.holders, np.bool_(True))
+        search_blocks(tree, batch, scratch.found, 0, rays, scratch.trace.holders, np.bool_(True))
 
 
 @kernel
@@ -390,31 +387,32 @@ def _tile_from(rows, steps, begin):
 
 
 @kernel
-def sweep(words, mesh, places, sky, answers, rows, steps, state, memory):
+def sweep(words, vertices, faces, places, sky, answers, rows, steps, begin, k, arrays):
     """Let the points in ``rows``, one tile after the other, look in all directions; some rays more with each call.
 
-    ``words`` are the tree's, ``mesh`` its vertices and faces. ``steps`` are those of the curve to the rows, none
-    where the points are too far apart for their rays to be traced together.
-    ``state`` is (0, 0) in the first call, and later what the
-    last one returned, with the same memory: the begin of the tile under way, and its next direction. All is done at
-    (len(rows), 0).
+    words      those of the tree, over ``vertices`` and ``faces``
+    steps      those of the curve to the rows; none where the points are too far apart for their rays to be traced
+               together
+    begin, k   where the tile under way begins, and its next direction: 0, 0 in the first call, and later what the last
+               one returned, with the same ``arrays``, a ``SweepScratch``
+
+    All is done at (len(rows), 0).
     """
-    tree, work = tree_pointers(words), _work_in(memory)
-    begin, k = state
+    tree, scratch = tree_pointers(words), _scratch_pointers(arrays, vertices, faces)
     count = _tile_from(rows, steps, begin)
     if k == 0:
-        _begin_tile(tree, mesh, places, rows, begin, count, work)
+        _begin_tile(tree, places, rows, begin, count, scratch)
     traced, parallel = np.int64(0), len(steps) > 0 and tree.has_nodes and not sky.turned and count >= _TOGETHER
     while k < len(sky.values) and traced < RAYS_A_CALL:
-        together = parallel and get(work.numbers, _LEFT) > 0
+        together = parallel and get(scratch.numbers, _LEFT) > 0
         listed, rays, most = np.int64(0), np.int64(0), count if together else np.int64(RAYS)
         while k < len(sky.values) and listed + count <= most:
-            listed, rays = _aim(places, sky, work, (k, listed, rays), count)
+            listed, rays = _aim(places, sky, scratch, k, count, listed, rays)
             k += 1
-        _trace(tree, mesh, work, rays, together)
-        _take_down(answers, work, listed)
+        _trace(tree, scratch, rays, together)
+        _take_down(answers, scratch, listed)
         traced += listed
     if k < len(sky.values):
         return begin, k
-    _end_tile(answers, work, count)
+    _end_tile(answers, scratch, count)
     return begin + count, np.int64(0)

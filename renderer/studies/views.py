@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arguments.arrays import flag_argument, real_array
+from renderer.arguments.counts import count_argument
 from renderer.arguments.points import check_points, farthest_of
 from renderer.distance.on_surface import on_surface
-from renderer.errors import expect, is_count
+from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
 from renderer.queryable import Queries
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
@@ -76,7 +77,7 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
     the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
     only what looks to the eye. An eye on the surface is not hidden by the faces that hold it; see ``octree.visible``,
     which this calls. A face without area is not seen, and neither is one whose plane the eye lies in,
-    which no rounding tells. Raises ``ValueError`` naming the argument.
+    exactly. Raises ``ValueError`` naming the argument.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
@@ -87,14 +88,14 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
     """
     _expect_octree(octree)
     place = _one_place("eye", eye, octree)
-    expect(is_count(cuts) and 1 <= cuts <= _MOST_CUTS, "cuts", f"an integer from 1 to {_MOST_CUTS}", repr(cuts))
+    cuts = count_argument("cuts", cuts, 1, _MOST_CUTS)
     mesh = octree.mesh
     seen = np.zeros(len(mesh.faces), np.bool_)
     with progress_bar(len(seen), "face", flag_argument("progress", progress)) as update:
         for begin in range(0, len(seen), _ROWS):
             corners = mesh.vertices[mesh.faces[begin : begin + _ROWS]]
             left = begin + np.flatnonzero(face_normals(corners).any(axis=1) & ~are_edge_on(corners, place))
-            for u, v in _centroids(int(cuts)):
+            for u, v in _centroids(cuts):
                 points = points_on(mesh, left, np.full(len(left), u), np.full(len(left), v))
                 # rule: faces-in-view
                 reached = octree.visible(points, place, leaving=left)
@@ -123,10 +124,8 @@ def depth_map(octree: Queries, camera: Camera, width: int, height: int, *, progr
     array([[inf,  2., inf]])
     """
     _expect_octree(octree)
-    for argument, value in (("width", width), ("height", height)):
-        expect(is_count(value) and 1 <= value <= 1 << 16, argument, "an integer from 1 to 65536", repr(value))
+    width, height = count_argument("width", width, 1, 1 << 16), count_argument("height", height, 1, 1 << 16)
     expect(callable(getattr(camera, "rows", None)), "camera", "a camera", type(camera).__name__)
-    width, height = int(width), int(height)
     rows, depth = _rows_of(camera, width, height), np.empty((height, width))
     lines, x = max(1, _ROWS // width), np.arange(width)[:, None] + 0.5
     with progress_bar(height, "line", flag_argument("progress", progress)) as update:
@@ -173,13 +172,13 @@ def scan(
     """
     _expect_octree(octree)
     place = _one_place("origin", origin, octree)
-    ways = _ways(pattern)
-    reach = limits_of(distance, ways)
+    directions = _directions(pattern)
+    reach = limits_of(distance, directions)
     towards = None if normal is None else _one_direction("normal", normal)
     parts: list[Scan] = []
-    with progress_bar(len(ways), "ray", flag_argument("progress", progress)) as update:
-        for begin in range(0, len(ways), _ROWS):
-            some = ways[begin : begin + _ROWS]
+    with progress_bar(len(directions), "ray", flag_argument("progress", progress)) as update:
+        for begin in range(0, len(directions), _ROWS):
+            some = directions[begin : begin + _ROWS]
             hits = _first_hits(octree, place, some, reach[begin : begin + _ROWS], towards)
             rays = np.flatnonzero(hits.hit)
             away = hits.t[rays] * lengths_of(some[rays])
@@ -189,16 +188,16 @@ def scan(
     return Scan(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _first_hits(octree: Queries, place: Floats, ways: Floats, reach: Floats, normal: Floats | None) -> Hits:
+def _first_hits(octree: Queries, place: Floats, directions: Floats, reach: Floats, normal: Floats | None) -> Hits:
     """The first hits of rays from one place, which may lie on the surface."""
     mesh, tree = octree._built
-    rays, _ = check_rays(place, ways, 0.0, reach)
+    rays, _ = check_rays(place, directions, 0.0, reach)
     face, code, anchor = (part[0] for part in on_surface(tree, mesh, place[None], np.full(1, -1), octree.threads))
     if face >= 0:
         # rule: outer-side-of-scanner
         outer = face_normals(mesh.vertices[mesh.faces[face : face + 1]])[0] if normal is None else normal
         row = _row_on_side(octree, face, code, anchor, outer)
-        count, (face, code) = len(ways), row[[FACE, CODE]].astype(np.int64)
+        count, (face, code) = len(directions), row[[FACE, CODE]].astype(np.int64)
         leaving = Leaving(np.full(count, face), np.full(1, code), np.tile(row[ANCHOR : ANCHOR + 3], (count, 1)))
         rays = offset_origins(rays, leaving, mesh, tree.scale, octree.threads)
         rays.starts[HEAD:].view(np.float64).reshape(count, ROW)[:, WAY:] = outer
@@ -247,7 +246,7 @@ def _rows_of(camera: Camera, width: int, height: int) -> Floats:
     return rows.astype(np.float64)
 
 
-def _ways(pattern: Pattern | ArrayLike | int) -> Floats:
+def _directions(pattern: Pattern | ArrayLike | int) -> Floats:
     if isinstance(pattern, Pattern):
         return check_directions("pattern", pattern.directions)
     if isinstance(pattern, Integral):  # of NumPy, too

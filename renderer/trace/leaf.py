@@ -48,15 +48,15 @@ class TreePointers(NamedTuple):
     wide_blocks: Any
     wide: Any
     faces: Any
-    count: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
     has_nodes: bool
     scale: float
 
 
 @inlined
-def tree_pointers(words):
-    """The pointers in ``Tree.words``, whose tree the caller must keep alive."""
-    at = pointer(words)
+def tree_pointers(descriptor):
+    """The pointers in ``Tree.descriptor``, whose tree the caller must keep alive."""
+    at = pointer(descriptor)
     nodes, blocks = get(at, NODES), get(at, BLOCKS)
     return TreePointers(
         float32_pointer(nodes),

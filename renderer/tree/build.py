@@ -15,9 +15,9 @@ from renderer.trace.layout import BLOCK_FACES, NODE_WORDS, Tree, cache_aligned
 from renderer.tree.blocks import fill_blocks
 from renderer.tree.bounds import BOX, Faces, face_boxes, fit
 from renderer.tree.collapse import collapse
-from renderer.tree.emit import emit_nodes, emit_room, moved_link, place_subtree
+from renderer.tree.emit import emit_nodes, emit_scratch, moved_link, place_subtree
 from renderer.tree.hierarchy import MIDPOINT, SAH, Hierarchy, Rule, add_part, first_parts, new_hierarchy
-from renderer.tree.subtree import Workspace, build_subtree, cut_once, new_room, new_workspace
+from renderer.tree.subtree import SubtreeScratch, build_subtree, cut_once, new_cut_scratch, new_subtree_scratch
 
 SPLITS = {"midpoint": MIDPOINT, "sah": SAH}
 
@@ -104,7 +104,7 @@ def _cut_each(
             piece = new_hierarchy(_PARTS)
             add_part(piece, 0, *top.ranges[part].tolist())
             piece.boxes[:BOX] = top.boxes[part * BOX : (part + 1) * BOX]
-            count, level = cut_once(order, piece, rule, levels[part], new_room())
+            count, level = cut_once(order, piece, rule, levels[part], new_cut_scratch())
             cut[part] = first_parts(piece, count), level
 
     for_chunks(work, len(parts), 1, threads)
@@ -130,22 +130,22 @@ def _build_subtrees(order: Faces, rule: Rule, top: Hierarchy, levels: list[int],
     """The subtree of each whole part, by the part's number in ascending order."""
     parts = np.flatnonzero(top.halves < 0).tolist()
     built: dict[int, _Subtree] = {}
-    idle: list[Workspace] = []
+    idle: list[SubtreeScratch] = []
     largest = int((top.ranges[parts, 1] - top.ranges[parts, 0]).max())
 
     def work(begin: int, end: int) -> None:
-        space = idle.pop() if idle else new_workspace(largest)
+        scratch = idle.pop() if idle else new_subtree_scratch(largest)
         for part in parts[begin:end]:
-            found = build_subtree(order, rule, *top.ranges[part].tolist(), levels[part], space)
+            found = build_subtree(order, rule, *top.ranges[part].tolist(), levels[part], scratch)
             link, cost, nodes, blocks, depth = found
             built[part] = _Subtree(
-                space.nodes[: nodes * NODE_WORDS].copy(),
-                space.block_faces[: blocks * BLOCK_FACES].copy(),
+                scratch.nodes[: nodes * NODE_WORDS].copy(),
+                scratch.block_faces[: blocks * BLOCK_FACES].copy(),
                 link,
                 cost,
                 depth,
             )
-        idle.append(space)
+        idle.append(scratch)
 
     for_chunks(work, len(parts), 1, threads)
     return {part: built[part] for part in parts}
@@ -171,8 +171,8 @@ def _join(
     links = nodes.view(np.int32)
 
     def place(begin: int, end: int) -> None:
-        for built, start in zip(parts[begin:end], starts[begin:end], strict=True):
-            place_subtree(built.nodes.view(np.int32), built.block_faces, start, links, block_faces)
+        for built, (node, block) in zip(parts[begin:end], starts[begin:end], strict=True):
+            place_subtree(built.nodes.view(np.int32), built.block_faces, node, block, links, block_faces)
 
     for_chunks(place, len(parts), 1, threads)
     return nodes, block_faces, depth
@@ -187,5 +187,5 @@ def _emit_top(
         ends[part] = moved_link.py_func(built.link, *start), built.depth
     nodes = np.empty(len(top.halves) * NODE_WORDS, np.float32)
     none = np.empty(0, np.int32)
-    used, _, depth = emit_nodes(top, none, ends, nodes, nodes.view(np.int32), none, emit_room())
+    used, _, depth = emit_nodes(top, none, ends, nodes, nodes.view(np.int32), none, emit_scratch())
     return nodes[: used * NODE_WORDS], depth

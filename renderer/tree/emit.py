@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.jit.decorators import kernel
+from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import larger
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, LEAF_BITS, NODE_WORDS, UNUSED
 from renderer.tree.bounds import BOX, FACE
@@ -15,29 +15,28 @@ from renderer.tree.bounds import BOX, FACE
 WAITING = 8 * 256
 
 
-class EmitRoom(NamedTuple):
+class EmitScratch(NamedTuple):
     """Scratch of ``emit_nodes``: parts that wait to become nodes, and those that share a node's places."""
 
     waiting: NDArray[np.int32]
     shares: NDArray[np.int32]
 
 
-def emit_room() -> EmitRoom:
+def emit_scratch() -> EmitScratch:
     """Scratch for one thread."""
-    return EmitRoom(np.empty((WAITING, 3), np.int32), np.empty((9, 2), np.int32))
+    return EmitScratch(np.empty((WAITING, 3), np.int32), np.empty((9, 2), np.int32))
 
 
 @kernel
-def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
+def emit_nodes(tree, numbers, ends, nodes, links, block_faces, scratch):
     """Write the nodes below part 0, which becomes node 0, depth first. Returns (nodes, blocks, levels of nodes).
 
     ``ends`` (n, 2) int32 holds the link and the levels below it for each whole part; when it is empty, whole parts and
     those that ``collapse`` chose are written as leaves. ``nodes`` and ``links`` are the same memory.
     """
     # Begin with part 0, which has no parent.
-    waiting, shares = room
-    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 1, -1
-    top, used, blocks, depth = 1, np.int64(0), np.int64(0), np.int64(0)
+    waiting, shares = scratch.waiting, scratch.shares
+    top, used, blocks, depth = _wait(waiting, 0, 0, 1, -1), np.int64(0), np.int64(0), np.int64(0)
     while top > 0:
         # Make the node and hang it below its parent.
         top -= 1
@@ -48,23 +47,15 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
         if parent >= 0:
             links[parent] = used
         used += 1
-        # Find its children: share out its eight places between halves, until each part takes one place.
+        # Write its children: nodes that wait, subtrees that are built already, and leaves.
         place, shared = 0, _first_shares(tree, part, shares)
         while shared > 0:
-            shared -= 1
-            child, share = np.int64(shares[shared, 0]), shares[shared, 1]
-            while share > 1 and tree.choices[8 * child + share - 1] == 0:
-                share -= 1
-            if share > 1:
-                shared = _share_out(tree, child, tree.choices[8 * child + share - 1], share, shares, shared)
-                continue
-            # Write the child: a node that waits, a subtree that is built already, or a leaf.
+            child, shared = _next_child(tree, shares, shared)
             _set_bounds(nodes, base, place, tree.boxes, child * BOX)
             link = base + CHILDREN + place
             place += 1
             if tree.choices[8 * child] > 0:
-                waiting[top, 0], waiting[top, 1], waiting[top, 2] = child, level + 1, link
-                top += 1
+                top = _wait(waiting, top, child, level + 1, link)
             elif len(ends) > 0:
                 links[link] = ends[child, 0]
                 depth = larger(depth, level + ends[child, 1])
@@ -72,6 +63,28 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, room):
                 links[link] = leaf_link(blocks, tree.ranges[child, 1] - tree.ranges[child, 0])
                 blocks = emit_leaf(tree, child, numbers, block_faces, blocks)
     return used, blocks, depth
+
+
+@inlined
+def _wait(waiting, top, part, level, link):
+    """Let a part wait to become the node of a level that ``link`` leads to; returns the new top."""
+    waiting[top, 0], waiting[top, 1], waiting[top, 2] = part, level, link
+    return top + 1
+
+
+@kernel
+def _next_child(tree, shares, shared):
+    """The part that takes the next place, and the number of shares that are left: the uppermost of ``shared`` shares
+    is shared out until one part takes one place.
+    """
+    while True:
+        shared -= 1
+        child, share = np.int64(shares[shared, 0]), shares[shared, 1]
+        while share > 1 and tree.choices[8 * child + share - 1] == 0:
+            share -= 1
+        if share <= 1:
+            return child, shared
+        shared = _share_out(tree, child, tree.choices[8 * child + share - 1], share, shares, shared)
 
 
 @kernel
@@ -136,9 +149,8 @@ def moved_link(link, node, block):
 
 
 @kernel
-def place_subtree(words, block_faces, start, links, all_block_faces):
-    """Copy a subtree's nodes, as int32, and the faces of its blocks to their ``start`` = (node, block) in the whole."""
-    node, block = start
+def place_subtree(words, block_faces, node, block, links, all_block_faces):
+    """Copy a subtree's nodes, as int32, and the faces of its blocks to the whole: from ``node`` and ``block`` on."""
     base = node * NODE_WORDS
     for i in range(len(words)):
         links[base + i] = words[i]

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.trace.intersect import ROOM
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree
+from renderer.trace.walk import blocks_of
 
 
 def faults(tree: Tree, mesh: Mesh) -> list[str]:
@@ -46,7 +47,7 @@ def faults(tree: Tree, mesh: Mesh) -> list[str]:
             if child >= 0:
                 pending.append((child, level + 1, low, high))
             else:
-                found += _leaf_faults(tree, mesh, ~child, (low, high), blocks_reached, where)
+                found += _leaf_faults(tree, mesh, child, (low, high), blocks_reached, where)
     found += [f"node {i}: reached {n} times" for i, n in enumerate(reached) if n != 1]
     found += [f"block {i}: reached {n} times" for i, n in enumerate(blocks_reached) if n != 1]
     return found
@@ -60,12 +61,12 @@ def _octant(tree: Tree, node: int, place: int) -> tuple[NDArray[np.float32], NDA
 def _leaf_faults(
     tree: Tree,
     mesh: Mesh,
-    code: int,
+    leaf: int,
     box: tuple[NDArray[np.float32], NDArray[np.float32]],
     blocks_reached: NDArray[np.int64],
     where: str,
 ) -> list[str]:
-    first, count = code >> LEAF_BITS, (code & (MAX_LEAF_BLOCKS - 1)) + 1
+    first, count = blocks_of.py_func(leaf)
     if first + count > len(blocks_reached):
         return [f"{where}: leaf of blocks {first} to {first + count - 1} of {len(blocks_reached)}"]
     blocks_reached[first : first + count] += 1
@@ -112,10 +113,9 @@ def check_safe(tree: Tree, face_count: int) -> None:
     expect(once, "block_faces", f"each of {face_count} faces once", f"{len(used)} places with other faces")
     links = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
     expect((len(links) > 0) == (face_count > 0), "nodes", "some where there are faces, else none", len(links))
-    codes = ~links[links < 0]
-    ends = (codes >> LEAF_BITS) + (codes & (MAX_LEAF_BLOCKS - 1))
-    beyond = int(ends.max(initial=-1))
-    expect(beyond < blocks, "nodes", f"leaves within {blocks} blocks", f"one up to block {beyond}")
+    first, count = blocks_of.py_func(links[links < 0])
+    last = int((first + count - 1).max(initial=-1))
+    expect(last < blocks, "nodes", f"leaves within {blocks} blocks", f"one up to block {last}")
     _check_levels(links, tree.depth)
 
 

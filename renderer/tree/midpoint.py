@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import larger, load8, smaller, store
-from renderer.tree.bounds import BOX, double_centre, empty_box, united
+from renderer.tree.bounds import BOX, double_centre, empty_box, fit, united
 from renderer.tree.hierarchy import add_part
 
 
-class OctantRoom(NamedTuple):
+class OctantScratch(NamedTuple):
     """Scratch of ``cut_octants``: the start of each octant's faces, the octants' boxes, and parts to be cut."""
 
     starts: NDArray[np.int64]
@@ -19,12 +19,12 @@ class OctantRoom(NamedTuple):
     waiting: NDArray[np.int64]
 
 
-def octant_room() -> OctantRoom:
-    return OctantRoom(np.empty(9, np.int64), np.empty(8 * BOX, np.float32), np.empty((8, 3), np.int64))
+def octant_scratch() -> OctantScratch:
+    return OctantScratch(np.empty(9, np.int64), np.empty(8 * BOX, np.float32), np.empty((8, 3), np.int64))
 
 
 @kernel
-def cut_octants(faces, tree, part, whole, count, room):
+def cut_octants(faces, tree, part, whole, count, scratch):
     """Cut a part into octants about the middle of its box. Returns the number of parts, which was ``count`` before.
 
     The part is cut in two along the longest axis first, and halves of at most ``whole`` faces are not cut further.
@@ -34,40 +34,48 @@ def cut_octants(faces, tree, part, whole, count, room):
     # Sort the faces by octant.
     begin, end = tree.ranges[part]
     axes, middle = _box_middle(tree.boxes, part * BOX)
-    if _sort_octants(faces, begin, end, axes, middle, room):
+    if _sort_octants(faces, begin, end, axes, middle, scratch):
         middle = _centres_middle(faces.boxes, begin, end, axes)
-        if _sort_octants(faces, begin, end, axes, middle, room):
+        if _sort_octants(faces, begin, end, axes, middle, scratch):
             return count
-    # Cut in two, from all eight octants down: a waiting entry is a part, its first octant and its number of octants.
-    waiting, starts = room.waiting, room.starts
+    # Cut in two, from all eight octants down. A waiting entry is a part, its first octant and its number of octants.
+    waiting, starts = scratch.waiting, scratch.starts
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = part, 0, 8
     top = 1
     while top > 0:
         top -= 1
         cut, first, width = waiting[top]
-        # Pass over empty halves.
-        half = width
-        while half == width and width > 1:
-            half = width // 2
-            if starts[first + half] == starts[first]:
-                first, width = first + half, half
-            elif starts[first + half] == starts[first + width]:
-                width = half
-        if half == width:
+        # Leave a part whole whose faces lie in one octant.
+        first, width = _without_empty_halves(starts, first, width)
+        if width == 1:
             continue
-        # Cut the part in two.
+        # Cut the others in two, and let large halves wait.
+        half = width // 2
         tree.halves[cut] = count
         for at in range(first, first + width, half):
             add_part(tree, count, begin + starts[at], begin + starts[at + half])
-            box = empty_box()
-            for k in range(at, at + half):
-                box = united(box, load8(room.boxes, k * BOX))
-            store(tree.boxes, count * BOX, box)
+            fit(scratch.boxes, at, at + half, tree.boxes, count * BOX)
             if half > 1 and starts[at + half] - starts[at] > whole:
                 waiting[top, 0], waiting[top, 1], waiting[top, 2] = count, at, half
                 top += 1
             count += 1
     return count
+
+
+@kernel
+def _without_empty_halves(starts, first, width):
+    """Of ``width`` octants from ``first`` on those that are left when empty halves are passed over: the first, and how
+    many.
+    """
+    while width > 1:
+        half = width // 2
+        if starts[first + half] == starts[first]:
+            first, width = first + half, half
+        elif starts[first + half] == starts[first + width]:
+            width = half
+        else:
+            break
+    return first, width
 
 
 @inlined
@@ -121,17 +129,20 @@ def _octant(boxes, base, axes, middle):
 
 
 @kernel
-def _sort_octants(faces, begin, end, axes, middle, room):
-    """Stable counting sort by octant, which fills ``room``. Returns whether all are in one octant; none moves then."""
-    boxes, spare, starts = faces.boxes, faces.spare, room.starts
+def _sort_octants(faces, begin, end, axes, middle, scratch):
+    """Sort faces by octant, stably by counting, and fill ``scratch``.
+
+    Returns whether all are in one octant; then none moves.
+    """
+    boxes, spare, starts = faces.boxes, faces.spare, scratch.starts
     for k in range(9):
         starts[k] = 0
     for k in range(8):
-        store(room.boxes, k * BOX, empty_box())
+        store(scratch.boxes, k * BOX, empty_box())
     for i in range(begin, end):
         k = _octant(boxes, i * BOX, axes, middle)
         starts[k + 1] += 1
-        store(room.boxes, k * BOX, united(load8(room.boxes, k * BOX), load8(boxes, i * BOX)))
+        store(scratch.boxes, k * BOX, united(load8(scratch.boxes, k * BOX), load8(boxes, i * BOX)))
     for k in range(8):
         if starts[k + 1] == end - begin:
             return True

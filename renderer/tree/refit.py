@@ -10,13 +10,12 @@ from renderer.trace.intersect import face_range
 from renderer.trace.layout import (
     BLOCK_FACES,
     CHILDREN,
-    LEAF_BITS,
-    MAX_LEAF_BLOCKS,
     NODE_WORDS,
     Tree,
     cache_aligned,
     locked,
 )
+from renderer.trace.walk import blocks_of
 from renderer.tree.blocks import fill_blocks
 
 # Nodes per chunk when leaves are fitted: some tenths of a millisecond.
@@ -25,25 +24,23 @@ _NODES = 1 << 10
 
 @kernel
 def _fit_leaves(vertices, faces, block_faces, nodes, links, begin, end):
-    """Set the boxes of all leaves of the nodes ``begin:end``; empty octants, told by their boxes, stay empty."""
+    """Set the boxes of all leaves of the nodes ``begin:end``; empty octants, by their boxes, stay empty."""
     for node in range(begin, end):
         for place in range(8):
             at = node * NODE_WORDS + place
-            code = ~links[at + CHILDREN]
-            if code >= 0 and nodes[at] <= nodes[at + 8]:
-                first = (code >> LEAF_BITS) * BLOCK_FACES
-                last = first + ((code & (MAX_LEAF_BLOCKS - 1)) + 1) * BLOCK_FACES
-                _fit_leaf(vertices, faces, block_faces, (first, last), nodes, at)
+            link = links[at + CHILDREN]
+            if link < 0 and nodes[at] <= nodes[at + 8]:
+                first, count = blocks_of(link)
+                begin_face, end_face = first * BLOCK_FACES, (first + count) * BLOCK_FACES
+                _fit_leaf(vertices, faces, block_faces, begin_face, end_face, nodes, at)
 
 
 @kernel
-def _fit_leaf(vertices, faces, block_faces, leaf, nodes, at):
-    """Set the box whose words are ``at``, ``at + 8``, ... to the union of those of the faces in the places ``leaf`` =
-    (first, last).
-    """
+def _fit_leaf(vertices, faces, block_faces, first, last, nodes, at):
+    """Set the box whose words are ``at``, ``at + 8``, ... to the union of those of the faces in ``first:last``."""
     for axis in range(3):
         low, high = np.float32(np.inf), np.float32(-np.inf)
-        for i in range(leaf[0], leaf[1]):
+        for i in range(first, last):
             face = block_faces[i]
             if face >= 0:
                 a, b, c = faces[face]

@@ -4,7 +4,7 @@ Version 1. Numbers are little-endian. The header and each array begin on a multi
 do, so that a map of the file can be traced as it stands.
 
     bytes 0-7     89 4F 43 54 52 45 45 0A: no text, and damaged by what takes it for one
-    bytes 8-11    uint32 0x01020304, from which another order of bytes is told
+    bytes 8-11    uint32 0x01020304, which shows the order of bytes
     bytes 12-15   uint32, the version
     bytes 16-19   uint32, the bytes of the header's text with the spaces that fill it up
     bytes 20-23   uint32, the CRC-32 (as zlib has it) of bytes 0-19 and the text
@@ -32,7 +32,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import is_count
+from renderer.errors import expect
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.system.files import as_path, write_atomically
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, NODE_WORDS, Tree, cache_aligned, locked
@@ -142,7 +143,7 @@ def _path(path: str | os.PathLike[str]) -> Path:
 
 def _arrays(stored: Stored) -> Arrays:
     """The arrays to be written, by their names in the file."""
-    mesh, tree, repairs = stored
+    mesh, tree, repairs = stored.mesh, stored.tree, stored.repairs
     arrays = {name: getattr(mesh, name) for name in _OF_MESH if getattr(mesh, name) is not None}
     arrays |= {"nodes": tree.nodes, "blocks": tree.blocks, "block_faces": tree.faces}
     return arrays | ({name: getattr(repairs, name) for name in _OF_REPAIRS} if repairs is not None else {})
@@ -163,8 +164,8 @@ def _head_of(stored: Stored, arrays: Arrays) -> bytes:
         memory, (_, row) = _bytes_of(array), _KINDS[name]
         crc = zlib.crc32(_zeros_after(memory), zlib.crc32(memory))
         listed.append({"name": name, "dtype": array.dtype.str, "rows": array.size // math.prod(row), "crc32": crc})
-    told = {"depth": int(stored.tree.depth), "scale": float(stored.tree.scale), "name": stored.mesh.name}
-    text = json.dumps({**told, "arrays": listed}).encode("ascii")
+    described = {"depth": int(stored.tree.depth), "scale": float(stored.tree.scale), "name": stored.mesh.name}
+    text = json.dumps({**described, "arrays": listed}).encode("ascii")
     before = _START.size + _CRC.size
     text = text.ljust(_filled(before + len(text)) - before)
     start = _START.pack(_MAGIC, _ORDER, VERSION, len(text))
@@ -205,14 +206,14 @@ def _parsed(text: bytes, begin: int) -> tuple[_Header, int]:
     A text that ``_head_of`` wrote passes; the checks are for others, whose checksum is right.
     """
     try:
-        told = json.loads(text)
+        described = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"header: expected JSON, got {error}") from None
     keys = ["depth", "scale", "name", "arrays"]
-    expect(isinstance(told, dict) and sorted(told) == sorted(keys), "header", f"the keys {keys}", _shown(told))
-    depth, scale, name, listed = (told[key] for key in keys)
-    good = is_count(depth) and depth <= _MAX_LEVELS
-    expect(good, "depth", f"an integer from 0 to {_MAX_LEVELS}", _shown(depth))
+    good = isinstance(described, dict) and sorted(described) == sorted(keys)
+    expect(good, "header", f"the keys {keys}", _shown(described))
+    depth, scale, name, listed = (described[key] for key in keys)
+    expect(is_count(depth, 0, _MAX_LEVELS), "depth", f"an integer from 0 to {_MAX_LEVELS}", _shown(depth))
     good = isinstance(scale, float) and math.frexp(scale)[0] == 0.5
     expect(good, "scale", "a power of two", _shown(scale))
     expect(isinstance(name, str), "name", "a string", _shown(name))
@@ -236,7 +237,7 @@ def _section(entry: Any, begin: int) -> tuple[str, _Section]:
     expect(isinstance(name, str) and name in _KINDS, "arrays", f"names among {sorted(_KINDS)}", _shown(name))
     dtypes, row = _KINDS[name]
     expect(dtype in dtypes, name, f"the type {' or '.join(dtypes)}", _shown(dtype))
-    good = is_count(rows) and rows < 2**32 and is_count(crc) and crc < 2**32
+    good = is_count(rows, 0, 2**32 - 1) and is_count(crc, 0, 2**32 - 1)
     expect(good, name, "rows and crc32 from 0 to 2^32 - 1", f"{_shown(rows)} and {_shown(crc)}")
     return name, _Section(np.dtype(dtype), (rows, *row), begin, crc)
 

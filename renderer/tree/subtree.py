@@ -9,10 +9,10 @@ from renderer.jit.decorators import kernel
 from renderer.trace.layout import BLOCK_FACES, NODE_WORDS
 from renderer.tree.bounds import BOX, fit
 from renderer.tree.collapse import collapse, leaf_cost
-from renderer.tree.emit import EmitRoom, emit_leaf, emit_nodes, emit_room, leaf_link
+from renderer.tree.emit import EmitScratch, emit_leaf, emit_nodes, emit_scratch, leaf_link
 from renderer.tree.hierarchy import SAH, Hierarchy, add_part, new_hierarchy, whole_size
-from renderer.tree.midpoint import OctantRoom, cut_octants, octant_room
-from renderer.tree.sah import BinRoom, bin_room, cut_sah
+from renderer.tree.midpoint import OctantScratch, cut_octants, octant_scratch
+from renderer.tree.sah import BinScratch, bin_scratch, cut_sah
 
 # Parts of at most so many faces are cut by the surface area heuristic, under the midpoint rule too. Most of their
 # octants would be empty, and only 72 % of the blocks' places used. With the heuristic it is 86 %, which saves a sixth
@@ -20,49 +20,49 @@ from renderer.tree.sah import BinRoom, bin_room, cut_sah
 _FEW = 32
 
 
-class Room(NamedTuple):
+class CutScratch(NamedTuple):
     """Scratch for one subtree: that of both split rules, and that of ``emit_nodes``, which ``_cut_all`` uses too."""
 
-    octants: OctantRoom
-    bins: BinRoom
-    emit: EmitRoom
+    octants: OctantScratch
+    bins: BinScratch
+    emit: EmitScratch
 
 
-class Workspace(NamedTuple):
+class SubtreeScratch(NamedTuple):
     """Memory in which one subtree at a time is built."""
 
     tree: Hierarchy
-    room: Room
+    cut: CutScratch
     nodes: NDArray[np.float32]
     links: NDArray[np.int32]
     block_faces: NDArray[np.int32]
     no_ends: NDArray[np.int32]
 
 
-def new_room() -> Room:
+def new_cut_scratch() -> CutScratch:
     """Scratch for one thread."""
-    return Room(octant_room(), bin_room(), emit_room())
+    return CutScratch(octant_scratch(), bin_scratch(), emit_scratch())
 
 
-def new_workspace(faces: int) -> Workspace:
+def new_subtree_scratch(faces: int) -> SubtreeScratch:
     """Memory for subtrees of up to ``faces`` faces, most of which a subtree leaves untouched."""
     nodes = np.empty(max(1, faces) * NODE_WORDS, np.float32)
     tree = new_hierarchy(max(1, 2 * faces - 1))
     block_faces, no_ends = np.empty(faces * BLOCK_FACES, np.int32), np.empty((0, 2), np.int32)
-    return Workspace(tree, new_room(), nodes, nodes.view(np.int32), block_faces, no_ends)
+    return SubtreeScratch(tree, new_cut_scratch(), nodes, nodes.view(np.int32), block_faces, no_ends)
 
 
 @kernel
-def cut_part(faces, tree, part, rule, level, count, room):
+def cut_part(faces, tree, part, rule, level, count, scratch):
     """Cut a part by the rule, or in half where the rule cannot or has cut ``max_depth`` levels. Returns the number of
     parts, which was ``count`` before, and the level of the new ones. A level is one cut in two; octants are three.
     """
     after, below = count, level + 1
     if level < 3 * rule.max_depth:
         if rule.split == SAH or tree.ranges[part, 1] - tree.ranges[part, 0] <= _FEW:
-            after = cut_sah(faces, tree, part, count, room.bins)
+            after = cut_sah(faces, tree, part, count, scratch.bins)
         else:
-            after, below = cut_octants(faces, tree, part, whole_size(rule), count, room.octants), level + 3
+            after, below = cut_octants(faces, tree, part, whole_size(rule), count, scratch.octants), level + 3
     if after == count:
         after, below = _cut_in_half(faces, tree, part, count), level + 1
     return after, below
@@ -82,9 +82,9 @@ def _cut_in_half(faces, tree, part, count):
 
 
 @kernel
-def _cut_all(faces, tree, rule, level, room):
+def _cut_all(faces, tree, rule, level, scratch):
     """Cut part 0 until every part is whole; returns the number of parts."""
-    waiting, whole = room.emit.waiting, whole_size(rule)
+    waiting, whole = scratch.emit.waiting, whole_size(rule)
     waiting[0, 0], waiting[0, 1] = 0, level
     # Counters are int64 from the start, or Numba would compile the callees twice: for the literal and for the number.
     top, count = 1, np.int64(1)
@@ -94,7 +94,7 @@ def _cut_all(faces, tree, rule, level, room):
         if tree.ranges[part, 1] - tree.ranges[part, 0] <= whole:
             continue
         before = count
-        count, level = cut_part(faces, tree, part, rule, level, count, room)
+        count, level = cut_part(faces, tree, part, rule, level, count, scratch)
         for new in range(before, count):
             if tree.halves[new] < 0:
                 waiting[top, 0], waiting[top, 1] = new, level
@@ -103,22 +103,22 @@ def _cut_all(faces, tree, rule, level, room):
 
 
 @kernel
-def cut_once(faces, tree, rule, level, room):
+def cut_once(faces, tree, rule, level, scratch):
     """Cut part 0, the only one, once. Returns the same as ``cut_part``."""
-    return cut_part(faces, tree, np.int64(0), rule, level, np.int64(1), room)
+    return cut_part(faces, tree, np.int64(0), rule, level, np.int64(1), scratch)
 
 
 @kernel
-def build_subtree(faces, rule, begin, end, level, space):
-    """Build over the faces ``begin:end``, which were cut off by ``level`` cuts, into ``space``.
+def build_subtree(faces, rule, begin, end, level, scratch):
+    """Build over the faces ``begin:end``, which were cut off by ``level`` cuts, into ``scratch``.
 
     Returns (link, cost, nodes, blocks, levels of nodes), the link counted from the subtree's own first node and block.
     A subtree of one leaf has no node, unless it is the whole tree, which always begins with a node.
     """
-    tree, room, block_faces = space.tree, space.room, space.block_faces
+    tree, block_faces = scratch.tree, scratch.block_faces
     add_part(tree, 0, begin, end)
     fit(faces.boxes, begin, end, tree.boxes, 0)
-    count = _cut_all(faces, tree, rule, level, room)
+    count = _cut_all(faces, tree, rule, level, scratch.cut)
     for part in range(count):
         if tree.halves[part] < 0:
             tree.costs[8 * part] = leaf_cost(tree, part)
@@ -126,6 +126,6 @@ def build_subtree(faces, rule, begin, end, level, space):
     if tree.choices[0] == 0 and level > 0:
         blocks = emit_leaf(tree, np.int64(0), faces.numbers, block_faces, np.int64(0))
         return leaf_link(0, end - begin), tree.costs[0], 0, blocks, 0
-    numbers, nodes, links = faces.numbers, space.nodes, space.links
-    used, blocks, depth = emit_nodes(tree, numbers, space.no_ends, nodes, links, block_faces, room.emit)
+    numbers, nodes, links = faces.numbers, scratch.nodes, scratch.links
+    used, blocks, depth = emit_nodes(tree, numbers, scratch.no_ends, nodes, links, block_faces, scratch.cut.emit)
     return 0, tree.costs[0], used, blocks, depth

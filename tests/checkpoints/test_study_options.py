@@ -13,11 +13,11 @@ from PIL import Image as Pillow
 from plyfile import PlyData
 
 from renderer import Mesh, Octree, load_mesh, load_scene, render
-from renderer.checkpoints.study_points import on_grid
 from renderer.cli.main import main
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
 from renderer.studies import face_points, sky_view_factor, sun_hours
+from renderer.studies.points import on_grid
 from renderer.system.threads import available_threads
 from validation.benchmark.measures.meshes import named
 

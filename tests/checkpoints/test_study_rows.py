@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from twins import CORNERS, MESH, NORMALS, meetings
 
 from renderer import Mesh, Octree, Phong, Scene, SceneObject, render
-from renderer.checkpoints.study_points import of_file, on_faces, on_grid, on_vertices, suns_of
-from renderer.cli.study_drawing import draw, write_ply
-from renderer.cli.study_view import from_above
 from renderer.diagnostics.false_color import VIRIDIS
+from renderer.diagnostics.mesh_values import draw, write_ply
+from renderer.scene.overview import from_above
+from renderer.studies.points import of_file, on_faces, on_grid, on_vertices, suns_of
 
 Floats = NDArray[np.float64]
 

@@ -12,11 +12,11 @@ from scenery import scenery
 
 from renderer import Phong, Scene, SceneObject, load_mesh, load_scene, render
 from renderer.cli.main import main
-from renderer.cli.study_drawing import legend
-from renderer.cli.study_view import from_above
 from renderer.diagnostics.false_color import shades_of
+from renderer.diagnostics.mesh_values import legend
 from renderer.mesh.load import save_ply
 from renderer.scene.camera import Camera
+from renderer.scene.overview import from_above
 
 GREY = [128, 128, 128]
 CAMERA = {"eye": [3.0, -4.0, 5.0], "target": [0.0, 0.0, 0.5], "up": [0.0, 0.0, 1.0], "fov": 50.0}

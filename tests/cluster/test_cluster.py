@@ -17,8 +17,8 @@ from watched import Watched
 
 from renderer import Mesh, Octree, cluster
 from renderer.checkpoints.study import Study, run
-from renderer.checkpoints.study_points import on_faces
 from renderer.cluster import any_hit, closest_hit, connected, run_on
+from renderer.studies.points import on_faces
 from renderer.system.threads import checked_threads
 from validation.benchmark.measures.meshes import named
 
@@ -35,7 +35,7 @@ def octree() -> Octree:
 
 def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Octree, tmp_path: Path) -> None:
     points, study = on_faces(octree).points, Study("sky", {"patches": 145})
-    expected = study.answer(octree, points)
+    expected = study.evaluate(octree, points)
     here = run(octree, study, points, tmp_path / "here").joined()
     assert here.tobytes() == expected.tobytes()
     there = run_on(client, octree, study, points, str(tmp_path / "there"), size=SIZE)
@@ -62,7 +62,7 @@ def test_a_worker_that_is_killed_changes_no_bit(octree: Octree, tmp_path: Path) 
         parts = run_on(client, octree, study, points, folder, size=SIZE)
         killer.join(timeout=60)
     assert killed == pids[:1]
-    assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
+    assert parts.joined().tobytes() == study.evaluate(octree, points).tobytes()
 
 
 def test_parts_of_a_scheduler_that_is_gone_are_not_computed_again(octree: Octree, tmp_path: Path) -> None:
@@ -80,7 +80,7 @@ def test_parts_of_a_scheduler_that_is_gone_are_not_computed_again(octree: Octree
     with connected(workers=1) as client:
         parts = run_on(client, octree, study, points, folder, size=SIZE)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
+    assert parts.joined().tobytes() == study.evaluate(octree, points).tobytes()
 
 
 def test_hits_of_dask_arrays_stay_lazy_and_keep_chunks(client: Any, octree: Octree) -> None:

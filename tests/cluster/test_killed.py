@@ -18,10 +18,10 @@ from watched import Watched
 
 from renderer import Octree, Scene, load_scene, render
 from renderer.checkpoints.study import Study
-from renderer.checkpoints.study_points import on_faces
 from renderer.cli.main import main
 from renderer.cluster import connected, render_on, run_on
 from renderer.mesh.load import save_ply
+from renderer.studies.points import on_faces
 from validation.benchmark.measures.meshes import named
 
 pytestmark = pytest.mark.judges(
@@ -182,7 +182,7 @@ def test_a_scheduler_that_is_killed_is_told_and_another_goes_on_from_the_manifes
         wait_for(lambda: bool(client.nthreads()))
         parts = run_on(client, octree, study, points, folder, size=32)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept and parts.plan.parts > len(kept)
-    assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
+    assert parts.joined().tobytes() == study.evaluate(octree, points).tobytes()
 
 
 def is_there(group: int) -> bool:

@@ -9,7 +9,7 @@ from meshes import make_mesh
 from renderer import BruteForce, Mesh, Octree
 from renderer.distance import closest
 from renderer.distance.face_distance import _rounded
-from renderer.distance.nearest import LISTED, tell_faces
+from renderer.distance.nearest import LISTED, measure_faces
 from renderer.distance.rational import nearest_exactly
 from renderer.inside import contains as inside
 from renderer.mesh.shapes import box, icosphere, torus
@@ -264,7 +264,7 @@ def test_coordinates_of_all_sizes_are_told_apart_exactly(vertices, point):
 
 def test_every_face_of_some_that_float64_can_tell_is_told():
     triangles, told = icosphere(0).triangles, np.zeros((20, 4))
-    tell_faces(triangles, np.array([3.0, 2.0, 1.0]), told)
+    measure_faces(triangles, np.array([3.0, 2.0, 1.0]), told)
     assert (told[:, 3] == 1.0).all() and (told[:, 0] > 1.0).all()
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import renderer
-from renderer.cli.main import _choose_processor, main
+from renderer.cli.compiling import choose_processor
+from renderer.cli.main import main
 from renderer.picture.render import render
 from renderer.precompile import compile_ahead
 from renderer.scene.scene import load_scene
@@ -325,7 +326,7 @@ def test_a_level_is_what_numba_will_compile_for(monkeypatch: pytest.MonkeyPatch,
     monkeypatch.delitem(sys.modules, "numba", raising=False)
     for variable in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"):
         monkeypatch.setenv(variable, "another")
-    _choose_processor(level, tmp_path)
+    choose_processor(level, tmp_path)
     assert (os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"]) == (name, "")
 
 

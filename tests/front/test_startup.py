@@ -29,7 +29,6 @@ HEAVY = {
     "numpy",
     "pydantic",
     "trimesh",
-    "plyfile",
     "PIL",
     "tqdm",
     "scipy.linalg",
@@ -105,10 +104,11 @@ def test_the_public_names_are_there_whatever_was_imported_first():
     script = (
         "import renderer, renderer.scene.scene\nfrom renderer.picture.render import prepare\nfrom renderer import *"
     )
-    tell = "print(callable(render), *[f'{n}:{getattr(renderer, n).__module__}' for n in renderer._HOMES])"
+    tell = """\
+public = {name: getattr(renderer, name) for name in renderer.__all__ if name != "__version__"}
+print(callable(render), *[f"{name}:{found.__module__}" for name, found in public.items()])"""
     is_callable, *names = output(f"{script}\n{tell}").split()
     assert is_callable == "True" and "render:renderer.picture.render" in names and "Mesh:renderer.mesh.mesh" in names
-    assert {*renderer._HOMES, "__version__"} == set(renderer.__all__)
 
 
 def test_the_public_names_are_listed_and_others_are_errors():
@@ -236,7 +236,7 @@ def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatc
     log = logging.getLogger("renderer.jit")
     monkeypatch.setattr(log, "level", logging.CRITICAL)
     before = logging.CRITICAL, list(log.handlers)
-    monkeypatch.setattr("renderer.cli.main._render", lambda _options: log.warning("renderer: compiling %s", "it"))
+    monkeypatch.setattr("renderer.cli.render._render", lambda _options: log.warning("renderer: compiling %s", "it"))
     assert main(["render", "any.toml", *(["--quiet"] if quiet else [])]) == 0
     assert capsys.readouterr() == ("", "" if quiet else "octree-render: compiling it\n")
     assert (log.level, log.handlers) == before
@@ -265,12 +265,12 @@ def test_kernels_for_a_level_have_the_bits_of_native_ones_and_leave_nothing_to_c
     program = """
 import sys
 from renderer.cli import main as cli
-choose = cli._choose_processor
+choose = cli.choose_processor
 def choose_and_ask_less(*options):
     choose(*options)  # before Numba is imported
     from renderer.precompile import PARTS
     PARTS["queries"] = [p for p in PARTS["queries"] if p.name in ("build", "refit", "a few rays", "many rays")]
-cli._choose_processor = choose_and_ask_less
+cli.choose_processor = choose_and_ask_less
 sys.exit(cli.main(sys.argv[1:]))
 """
     command = [sys.executable, "-P", "-c", program, "compile", "--queries", "--level", level, "-o", str(folder)]

@@ -12,7 +12,7 @@ from meshes import KINDS, make_mesh
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.inside.moments import moments_of
-from renderer.inside.winding_search import _FIRST, _point_at, _search
+from renderer.inside.winding_search import _FIRST, _point_at, _Query, _search
 from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
 from renderer.numerics.simd import at, local_doubles, pointer
@@ -276,7 +276,7 @@ def search_all(words, rows, points, share, out, stack):
     tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
     for i in range(len(points)):
         point = _point_at(tree, at(pointer(points), 3 * i))
-        out[i, 0], out[i, 1], _ = _search(tree, rows, point, share, stack, parts)
+        out[i, 0], out[i, 1], _ = _search(tree, _Query(rows, point, share, parts), stack)
 
 
 def errors_and_bounds(mesh, points, share):

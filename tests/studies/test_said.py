@@ -24,7 +24,7 @@ from renderer.studies import (
     sun_hours,
     visible_faces,
 )
-from renderer.studies.share import check_asked
+from renderer.studies.share import check_request
 
 pytestmark = pytest.mark.judges(
     "studies.FacePoints", "studies.Pattern", "studies.Scan", "studies.ambient_occlusion", "studies.cosine_hemisphere",
@@ -163,7 +163,7 @@ def test_a_bar_is_drawn_on_a_terminal_and_nowhere_else(study: str, monkeypatch: 
 def test_threads_are_those_of_the_octree_unless_others_are_asked_for() -> None:
     octree = Octree.from_mesh(torus(), threads=3)
     for threads, used in ((None, 3), (1, 1), (7, 7)):
-        assert check_asked(octree, POINTS, None, None, threads, False).threads == used
+        assert check_request(octree, POINTS, None, None, threads, False).threads == used
 
 
 def test_nothing_of_the_size_of_points_times_directions_is_made() -> None:

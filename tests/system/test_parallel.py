@@ -333,23 +333,6 @@ def test_no_helper_is_left_at_work_whatever_a_signal_raises(monkeypatch, error):
     assert len(slept) > 2 and not at_work
 
 
-DAEMON = """
-import threading
-from renderer.system.threads import for_chunks
-begun = threading.Barrier(3)
-def work(begin, end):
-    begun.wait()
-    while True:
-        yield
-threading.Thread(target=for_chunks, args=(work, 2, 1, 2), daemon=True).start()
-begun.wait()
-"""
-
-
-def test_a_daemons_helpers_do_not_outlive_the_main_thread():
-    subprocess.run([sys.executable, "-P", "-c", DAEMON], check=True, timeout=60)
-
-
 DAEMON_LIVES_ON = """
 import threading, time
 import numpy as np

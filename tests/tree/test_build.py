@@ -19,7 +19,7 @@ from renderer.tree.build import SPLITS, build_parts, build_tree
 from renderer.tree.collapse import BLOCK_COST, NODE_COST, collapse
 from renderer.tree.hierarchy import Rule, add_part, first_parts, new_hierarchy
 from renderer.tree.invariants import faults
-from renderer.tree.subtree import cut_once, new_room
+from renderer.tree.subtree import cut_once, new_cut_scratch
 
 pytestmark = pytest.mark.judges("Octree")
 
@@ -85,7 +85,7 @@ def cut_of(mesh, split):
     tree = new_hierarchy(15)
     add_part(tree, 0, 0, count)
     tree.boxes[:BOX] = boxes.reshape(-1, BOX).min(axis=0)
-    parts, _ = cut_once(order, tree, Rule(SPLITS[split], 4, 32), 0, new_room())
+    parts, _ = cut_once(order, tree, Rule(SPLITS[split], 4, 32), 0, new_cut_scratch())
     return order.numbers.reshape(-1, BOX)[:, FACE], own, first_parts(tree, parts)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.checkpoints.study import Study
-from renderer.checkpoints.study_points import of_file, on_grid
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.octree import Octree
@@ -27,6 +26,7 @@ from renderer.studies import (
     tregenza,
     visible_faces,
 )
+from renderer.studies.points import of_file, on_grid
 from validation.oracle.exact import closest_hits
 from validation.oracle.starts import Surface
 from validation.studies.bodies import FAR, bodies, street, terrain, touching, town
@@ -235,7 +235,7 @@ def places_of_a_grid() -> Asked:
             path = Path(folder) / "points.npy"
             np.save(path, np.concatenate([grid_points.points, grid_points.normals], axis=1))
             read = of_file(octree, path).points
-        found.append(study.answer(octree, read) == study.answer(octree, grid_points))
+        found.append(study.evaluate(octree, read) == study.evaluate(octree, grid_points))
     return _count(np.concatenate(found))
 
 

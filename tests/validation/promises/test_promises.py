@@ -212,14 +212,14 @@ def one_block_twice(boxes: Any, links: Any, faces: Any) -> None:
 )
 def test_a_tree_that_is_altered_is_found(change: Any, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
     octree = Octree(np.random.default_rng(5).normal(size=(900, 3)), np.arange(900).reshape(-1, 3))
-    octree._built = octree.mesh, altered(octree.tree, change)
+    octree.tree = altered(octree.tree, change)
     monkeypatch.setattr(trees, "_octrees", lambda rng: [octree])
     assert expected in broken("trees")
 
 
 def test_a_depth_overstated_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     octree = Octree(np.random.default_rng(5).normal(size=(900, 3)), np.arange(900).reshape(-1, 3))
-    octree._built = octree.mesh, replace(octree.tree, depth=octree.tree.depth + 1)
+    octree.tree = replace(octree.tree, depth=octree.tree.depth + 1)
     monkeypatch.setattr(trees, "_octrees", lambda rng: [octree])
     assert broken("trees") == {"the depth"}
 

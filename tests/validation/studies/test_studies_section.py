@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from renderer import Octree
-from renderer.checkpoints.study import Points
-from renderer.checkpoints.study_points import Chosen
+from renderer.studies.points import Chosen, Points
 from validation.job import Job
 from validation.report import page, studies_figures
 from validation.studies import bits, bodies, corners, forms, holds, section

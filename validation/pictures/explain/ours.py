@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.diagnostics.ray_step import Aim, Met, Ray, Steps
+from renderer.diagnostics.ray_step import Aim, Ray, Steps, SurfaceHit
 from renderer.shade.records import DIELECTRIC, KIND, TRANSMITTANCE
 from renderer.trace.batch import check_rays
 from renderer.trace.closest import closest_hits
@@ -73,10 +73,10 @@ class Ours:
                 node.children[child.kind] = self._follow(child._replace(weight=_WHOLE), np.array(child.weight))
         return node
 
-    def _children(self, ray: Ray, met: Met) -> list[Ray]:
+    def _children(self, ray: Ray, met: SurfaceHit) -> list[Ray]:
         return [child for child in self.steps.bounce(ray, met) if max(child.weight) > 0.0]
 
-    def _spawn(self, node: Node, ray: Ray, met: Met | None) -> Node:
+    def _spawn(self, node: Node, ray: Ray, met: SurfaceHit | None) -> Node:
         made = self._made(ray, node.share, met)
         if met is not None:
             for aim in self.steps.aims(ray, met):
@@ -85,7 +85,7 @@ class Ours:
                 made.children = {child.kind: _node(child) for child in self._children(ray, met)}
         return made
 
-    def _made(self, ray: Ray, share: Vector, met: Met | None) -> Node:
+    def _made(self, ray: Ray, share: Vector, met: SurfaceHit | None) -> Node:
         node = _node(ray, share)
         if met is None:
             node.own = np.array(self.steps.background(ray))

@@ -1,4 +1,4 @@
-"""The points of a study that a command line names: a file's, a grid's, those of faces or of vertices."""
+"""The points of a study: of faces, of vertices, of a grid or of a file; and directions to the sun of a file."""
 
 from __future__ import annotations
 
@@ -12,22 +12,49 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.checkpoints.study import Points
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from renderer.ordering.morton import order_along_curve
 from renderer.studies.places import face_points
 
 Floats = NDArray[np.float64]
 # What NumPy raises for files that it cannot read: a header is parsed as Python, and PK begins an archive.
 _BROKEN = (ValueError, EOFError, TypeError, OverflowError, SyntaxError, TokenError, BadZipFile)
+# Points that are put in order together: 32 bytes each while it is done, and a second of sorting.
+_TOGETHER = 1 << 22
 # More would not fit into memory with their normals and results: 7 numbers of 8 bytes each.
 _MOST = 1 << 28
 
 
 @dataclass(frozen=True, eq=False)
+class Points:
+    """The points of a study: ``points`` and ``normals`` (n, 3) float64, and ``leaving`` (n,) int64, -1 for a face that
+    is not known.
+    """
+
+    points: Floats
+    normals: Floats
+    leaving: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def part(self, rows: slice | NDArray[np.int64]) -> Points:
+        """Those of some rows."""
+        return Points(self.points[rows], self.normals[rows], self.leaving[rows])
+
+    def order(self) -> NDArray[np.int64]:
+        """The rows (n,) in which those that follow each other lie together, along a curve that fills space."""
+        rows = np.empty(len(self), np.int64)
+        for first in range(0, len(self), _TOGETHER):
+            rows[first : first + _TOGETHER] = first + order_along_curve(self.points[first : first + _TOGETHER])[0]
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
 class Chosen:
-    """Points, and what their answers become.
+    """Points, and functions that spread their answers over the mesh.
 
     of_faces : from the answers (n,) to one a face (F,), NaN where a face has none; None where points are on no faces.
     of_vertices : to one a vertex (V,), NaN where it has none; None likewise.

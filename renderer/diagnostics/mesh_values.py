@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,8 @@ from numpy.typing import NDArray
 from renderer.diagnostics.false_color import shades_of
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
+from renderer.mesh.ply import by_name, format_columns
+from renderer.picture.encoding import write_pixels
 from renderer.picture.image import Image, write_array
 from renderer.system.files import write_atomically
 
@@ -44,27 +45,11 @@ def write_ply(path: Path, vertices: Floats, faces: NDArray[np.int32] | None, val
 
     faces : None for a cloud of points.
     """
-    from plyfile import PlyData, PlyElement
-
-    colored = [("value", "f8"), ("red", "u1"), ("green", "u1"), ("blue", "u1")]
     colors = colors_of(values, scale_of(values))
-    points = np.empty(len(vertices), [(axis, "f8") for axis in "xyz"] + ([] if of_faces else colored))
-    for k, axis in enumerate("xyz"):
-        points[axis] = vertices[:, k]
-    cells = np.empty(0 if faces is None else len(faces), [("vertex_indices", "i4", (3,))] + colored * of_faces)
-    if faces is not None:
-        cells["vertex_indices"] = faces
-    _color(cells if of_faces else points, values, colors)
-    elements = [PlyElement.describe(points, "vertex")]
-    if faces is not None:
-        elements.append(PlyElement.describe(cells, "face"))
-    write_atomically(path, lambda file: PlyData(elements, byte_order="<").write(file))
-
-
-def _color(rows: NDArray[np.void], values: Floats, colors: Bytes) -> None:
-    rows["value"] = values
-    for k, name in enumerate(("red", "green", "blue")):
-        rows[name] = colors[:, k]
+    valued = {"value": values, **by_name(("red", "green", "blue"), colors)}
+    points = by_name(("x", "y", "z"), vertices)
+    content = format_columns(points, faces, valued) if of_faces else format_columns(points | valued, faces)
+    write_atomically(path, lambda file: file.write(content))
 
 
 def draw(image: Image, mesh: Mesh, values: Floats, title: str) -> Bytes:
@@ -112,9 +97,4 @@ def write_npy(path: Path, values: Floats) -> None:
 
 def write_png(path: Path, picture: Bytes) -> None:
     """Write (h, w, 3) sRGB."""
-    from PIL import Image as Pillow
-
-    def write(file: BinaryIO) -> None:
-        Pillow.fromarray(picture).save(file, "png")
-
-    write_atomically(path, write)
+    write_atomically(path, lambda file: write_pixels(file, picture))
