@@ -144,9 +144,9 @@ def _limit(ray: Ray, t: float) -> float:
 
 
 @kernel
-def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, t: float, face: int) -> tuple[float, int]:
+def _best_in_leaf(descriptor: NDArray[np.int64], leaf: int, ray: Ray, t: float, face: int) -> tuple[float, int]:
     """t and face of the best hit so far and those in a leaf."""
-    tree, (first, count) = tree_pointers(words), blocks_of(leaf)
+    tree, (first, count) = tree_pointers(descriptor), blocks_of(leaf)
     best = Best(t, np.int32(face), 0.0, 0.0, 1.0)
     best = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
     return best.t, int(best.face)

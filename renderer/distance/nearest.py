@@ -93,7 +93,7 @@ class _Found(NamedTuple):
 
 
 @kernel
-def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
+def find_nearest(descriptor, points, rows, limits, out, integers, doubles, begin):
     """Write distance, u, v and face (or UNDECIDED_FACE) of ``points``, from row ``begin`` on, to ``out[:, rows]``.
 
     out        (4, m) float64
@@ -102,7 +102,7 @@ def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
 
     Returns the row before which it ended: early after WORK, so that Ctrl-C need not wait for long.
     """
-    tree, parts, count = tree_pointers(words), local_doubles(), len(points)
+    tree, parts, count = tree_pointers(descriptor), local_doubles(), len(points)
     found, size = hit_pointers(out, out.shape[1]), len(integers) - LISTED
     children, near = pointer(integers), pointer(doubles)
     scratch = Scratch(

@@ -101,9 +101,9 @@ def _scratch(tree: Tree, leaves: int) -> Scratch:
 
 
 @kernel
-def _measure_octants(words, rows, scratch, begin, end):
+def _measure_octants(descriptor, rows, scratch, begin, end):
     """Write the centres, radii, sizes and spreads of the octants of some nodes, and the coefficients of leaves."""
-    tree, rows = tree_pointers(words), pointer(rows)
+    tree, rows = tree_pointers(descriptor), pointer(rows)
     for node in range(begin, end):
         for place in range(8):
             base, link = node * MOMENT_WORDS + place, child_in(tree, node, place)
@@ -274,9 +274,9 @@ def _scaled(a, b, unit):
 
 
 @kernel
-def _join_octants(words, rows, scratch, begin, end):
+def _join_octants(descriptor, rows, scratch, begin, end):
     """Write the coefficients of octants that are nodes themselves, last to first: a child comes after its parent."""
-    tree, rows = tree_pointers(words), pointer(rows)
+    tree, rows = tree_pointers(descriptor), pointer(rows)
     for node in range(end - 1, begin - 1, -1):
         for place in range(8):
             child = child_in(tree, node, place)

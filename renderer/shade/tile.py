@@ -244,17 +244,17 @@ def _trace_next(tree, scene, settings, camera, film, tile, scratch, state):
 
 
 @kernel
-def render_tile(words, scene, settings, camera, samples, film, tile, arrays):
+def render_tile(descriptor, scene, settings, camera, samples, film, tile, arrays):
     """Fill the pixels of a ``Rectangle``, the tile; ``camera`` are the rows of the camera's affine map.
 
-    ``words`` are the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
+    ``descriptor`` is the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
     samples, their rays are added up from 0. Returns whether the tile is done. If not, ``arrays.bundles`` bundles were
     traced, and the caller can react to Ctrl-C; called again with the same ``arrays``, a ``TileScratch``, it goes on.
     """
     doubles, integers, hits = pointer(arrays.doubles), pointer(arrays.integers), pointer(arrays.hits)
     state, total = pointer(arrays.state), pointer(arrays.total)
     scratch = bundle_scratch(doubles, integers, hits, settings, scratch_pointers(arrays.trace))
-    tree, seen = tree_pointers(words), scene_pointers(scene)
+    tree, seen = tree_pointers(descriptor), scene_pointers(scene)
     shooting = CameraMap(pointer(camera), pointer(samples), len(samples))
     if get(state, _BLOCK) == 0 and get(state, _BEGUN) == 0:
         begin_bundles(scratch, settings)

@@ -46,7 +46,7 @@ from renderer.trace.starts.record import (
     start_at,
 )
 from renderer.trace.starts.search import take_side
-from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers, search_blocks, trace
+from renderer.trace.traverse import Scratch, ScratchPointers, new_scratch, scratch_pointers, search_blocks, trace
 
 TILE = 256
 # A tile ends where the curve leaves the largest cell, but not before so many points: else its parts may be far apart,
@@ -150,7 +150,7 @@ class _SweepPointers(NamedTuple):
     vertices: Any
     faces: Any
     found: HitPointers
-    trace: Scratch
+    trace: ScratchPointers
     parallel: ParallelPointers
 
 
@@ -387,10 +387,10 @@ def _tile_from(rows, steps, begin):
 
 
 @kernel
-def sweep(words, vertices, faces, places, sky, answers, rows, steps, begin, k, arrays):
+def sweep(descriptor, vertices, faces, places, sky, answers, rows, steps, begin, k, arrays):
     """Let the points in ``rows``, one tile after the other, look in all directions; some rays more with each call.
 
-    words      those of the tree, over ``vertices`` and ``faces``
+    descriptor      those of the tree, over ``vertices`` and ``faces``
     steps      those of the curve to the rows; none where the points are too far apart for their rays to be traced
                together
     begin, k   where the tile under way begins, and its next direction: 0, 0 in the first call, and later what the last
@@ -398,7 +398,7 @@ def sweep(words, vertices, faces, places, sky, answers, rows, steps, begin, k, a
 
     All is done at (len(rows), 0).
     """
-    tree, scratch = tree_pointers(words), _scratch_pointers(arrays, vertices, faces)
+    tree, scratch = tree_pointers(descriptor), _scratch_pointers(arrays, vertices, faces)
     count = _tile_from(rows, steps, begin)
     if k == 0:
         _begin_tile(tree, places, rows, begin, count, scratch)

@@ -58,15 +58,17 @@ BUDGET = 48
 class Beam(NamedTuple):
     """The bounds of sixteen rays that share their dominant axis w and the sign along it.
 
-        u                                   . most_u
-        |                          .  '  .
-        |        high_u   .   '   .            A box is met where its u, beside that of the origins, is within the
-        |    near +----+     .                 slopes times the distance along w at which it is entered or left.
-        |         |    | far                   The same holds for v.
-        |         +----+     '   .
-        |        low_u    '   .      '  .
-        |                         '  .      ' least_u
-        +-----------------------------------------> w, times ``sign``
+        u                                     .  '
+        |                               .  '         high_u + most_u t
+        |    high_u  +------+     .  '
+        |            |      |  '    +-----+
+        |            |      |       | box |          t: how far along w, from near_origin for where a box is
+        |     low_u  +------+  .    +-----+             entered, from far_origin for where it is left
+        |                         '  .
+        |           far    near         '  .         low_u + least_u t
+        +------------------------------------------> w, in the direction of ``sign``
+
+    A box is met where it is within these lines somewhere from its entry to its exit, and so along v.
 
     Rows of a node, then ranges of float32: near and far origins along w, origins along u and v, slopes along u and v;
     the sign, and the least distance that counts.

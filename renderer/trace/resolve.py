@@ -301,13 +301,17 @@ def _beyond(inward, corner, d, low, high):
 
 @kernel
 def _weights(face, normal, t):
-    """The weights of the second corner and the apex at t, from its place along the longest side and above it.
+    """The weights of the second corner and the apex at t: of the point x where the ray is then.
 
-                apex            ``foot`` is where the apex stands above the longest side, as a share of it;
-               . |  .           ``along`` where the point does. The apex's weight is the point's height as a share
-            .  x |    .         of the apex's. It errs most, of thin faces, so it keeps to what the face has above
-         .   : : |      .       ``along``: less than along / foot, and than (1 - along) / (1 - foot).
-    first ---------------- second
+                      apex
+                     . |  .
+                  . x  |     .
+               .    |  |        .
+            first--------------second
+                 along foot             both as shares of the longest side
+
+    The apex's weight is the height of x as a share of the apex's. It errs most, of thin faces, so it keeps to what the
+    face has above ``along``.
     """
     side, other = heads(face.along), heads(face.other)
     point = scale(sub(scale(face.direction, t), heads(face.first)), face.ratio)

@@ -75,12 +75,12 @@ def count_from_start(tree, rays, i, best):
 
 
 @kernel
-def trace_few(words, rays, out, holders):
+def trace_few(descriptor, rays, out, holders):
     """Closest hits of a few rays, one by one, into the rows t, u, v, face and side of ``out``.
 
     Bounds and return value are those of ``trace_chunk``. The tree has at most FEW_DEPTH levels.
     """
-    tree, count = tree_pointers(words), out.shape[1]
+    tree, count = tree_pointers(descriptor), out.shape[1]
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
     bad = first_bad_ray(source, 0, count)
     if bad >= 0:

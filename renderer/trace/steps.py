@@ -66,7 +66,7 @@ def count_steps(tree: Tree, rays: RayBatch, shape: tuple[int, ...], threads: int
 
 
 @kernel
-def _count_chunk(words, rays, counts, stack, near, begin, end):
+def _count_chunk(descriptor, rays, counts, stack, near, begin, end):
     """Write nodes and triangles of the rays begin:end to ``counts`` (2, n).
 
     stack  memory for ``walk.stack_size`` int64
@@ -74,7 +74,7 @@ def _count_chunk(words, rays, counts, stack, near, begin, end):
 
     Returns the ray before which it ended, early after _WORK; and the row of a ray out of range, or -1.
     """
-    tree, source = tree_pointers(words), ray_pointers(rays, tree_pointers(words).scale)
+    tree, source = tree_pointers(descriptor), ray_pointers(rays, tree_pointers(descriptor).scale)
     bad, work = first_bad_ray(source, begin, end), np.int64(0)
     if bad < 0 and tree.has_nodes:
         waiting = _Waiting(pointer(stack), pointer(near), at(pointer(near), len(stack)))

@@ -271,9 +271,9 @@ def test_far_away_it_is_0_at_any_coordinates():
 
 
 @kernel
-def search_all(words, rows, points, share, out, stack):
+def search_all(descriptor, rows, points, share, out, stack):
     """The winding number and its bound of each point, in the rows of ``out`` (n, 2)."""
-    tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
+    tree, rows, stack, parts = tree_pointers(descriptor), pointer(rows), pointer(stack), local_doubles()
     for i in range(len(points)):
         point = _point_at(tree, at(pointer(points), 3 * i))
         out[i, 0], out[i, 1], _ = _search(tree, _Query(rows, point, share, parts), stack)

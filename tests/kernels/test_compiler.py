@@ -208,8 +208,8 @@ from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
 from renderer.trace.traverse import new_scratch, scratch_pointers, trace
 
 @njit(error_model="numpy")
-def mine(words, rays, out, memory):
-    tree = tree_pointers(words)
+def mine(descriptor, rays, out, memory):
+    tree = tree_pointers(descriptor)
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
     trace(tree, source, found, 0, len(rays[1]), scratch_pointers(memory), False)
 

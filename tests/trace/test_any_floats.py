@@ -40,9 +40,9 @@ GUARD = 0x7EADBEEF
 
 
 @kernel
-def unchecked(words, rays, out, any_hit, memory, by_blocks):
+def unchecked(descriptor, rays, out, any_hit, memory, by_blocks):
     """``trace_chunk`` without its check of the rays."""
-    tree = tree_pointers(words)
+    tree = tree_pointers(descriptor)
     count = len(rays[1])
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
     if by_blocks:

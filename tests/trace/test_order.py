@@ -185,11 +185,11 @@ def within_own_box(tree, at, ray, t):
 
 
 @kernel
-def judged(words, origins, directions, out):
+def judged(descriptor, origins, directions, out):
     """Of ray i at face i: 0 for a miss, 1 for a hit, 2 where t is uncertain, 3 where the determinant is; then t, t
     resolved, and 1 where t, or that of an uncertain hit resolved, is within the face's own box.
     """
-    tree = tree_pointers(words)
+    tree = tree_pointers(descriptor)
     for i in range(len(origins)):
         o, d = origins[i], directions[i]
         ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0, 0.0, -1.0)

@@ -318,7 +318,7 @@ def take_side(tree, starts, n, stack, memory, table, room):
 
 
 @kernel
-def side_taken(words, vertices, faces, row, n, stack, memory):
+def side_taken(descriptor, vertices, faces, row, n, stack, memory):
     """For Python: ``take_side`` of the start in a row of ``starts.record``."""
     starts = StartPointers(pointer(row), 0, pointer(vertices), pointer(faces))
-    take_side(tree_pointers(words), starts, n, pointer(stack), pointer(memory), local_doubles(), 0)
+    take_side(tree_pointers(descriptor), starts, n, pointer(stack), pointer(memory), local_doubles(), 0)
