@@ -147,5 +147,5 @@ def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, t: float, face:
     """t and face of the best hit so far and those in a leaf."""
     tree, (first, count) = tree_pointers(words), blocks_of(leaf)
     best = (t, np.int32(face), 0.0, 0.0, 1.0)
-    t, face, _, _, _ = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
-    return t, np.int64(face)
+    t, found, _, _, _ = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
+    return t, found

@@ -80,7 +80,7 @@ def _material_rows(scene: Scene) -> dict[str, int]:
 
 def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
     """Materials of the closed, light-passing meshes around the camera's eye, outermost (by volume) first."""
-    rows, around = _material_rows(scene), []
+    rows, around = _material_rows(scene), list[tuple[float, int]]()
     for instance in scene.instances:
         if scene.materials[instance.material].passes_light and _is_inside(instance.mesh, np.array(camera.eye)):
             p0, p1, p2 = instance.mesh.triangles.transpose(1, 0, 2)
