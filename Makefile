@@ -1,4 +1,4 @@
-# make validate | test | lint | bench | docs | clean. The first one used sets up .venv; later ones find it there.
+# make help lists the targets. The first one used sets up .venv; later ones find it there.
 
 PYTHON ?= python3
 BIN    := .venv/bin
@@ -14,12 +14,13 @@ TRIMESH ?=
 FOREIGN := c cc cpp cxx c++ cu h hh hpp hxx pyx pxd pxi rs
 
 .DEFAULT_GOAL := help
-.PHONY: help validate test machines lint bench conformance docs clean
+.PHONY: help validate test test-slow machines lint bench conformance docs clean
 
 help:
 	@echo "make validate   prove hits and pictures against the references; writes reports/index.html"
 	@echo "                QUICK=1 for the short run, ARGS='--only hits' for a part"
-	@echo "make test       run the tests; ARGS='-k octree' for some"
+	@echo "make test       run the tests that a change needs; ARGS=tests/trace for some"
+	@echo "make test-slow  run the others: documents, packages, and the viewer's page in a browser"
 	@echo "make machines   run the tests on a busy, a small, a large and a foreign machine, half an hour"
 	@echo "make lint       check style, types, import order and the absence of other languages"
 	@echo "make bench      measure speed beside other systems; writes reports/benchmark.html"
@@ -31,8 +32,15 @@ help:
 validate: $(STAMP)
 	$(BIN)/python -m validation $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)
 
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
+# Rooms of tests that take as long as all the others, and that few changes touch.
+SLOW   := tests/documents tests/packaging tests/page
+
 test: $(STAMP)
-	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal $(ARGS)
+	$(PYTEST) $(SLOW:%=--ignore=%) $(ARGS)
+
+test-slow: $(STAMP)
+	$(PYTEST) $(SLOW) $(ARGS)
 
 machines: $(STAMP)
 	$(BIN)/python tests/machines.py $(ARGS)
@@ -60,7 +68,7 @@ lint: $(STAMP)
 clean:
 	rm -rf .venv build dist docs/examples sg_execution_times.rst *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
 	find renderer validation tests scenes -name __pycache__ -prune -exec rm -rf {} +
-	find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name baseline.json ! -name 'mutants*.json' -exec rm -rf {} +
+	find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name baseline.json -exec rm -rf {} +
 
 $(STAMP): pyproject.toml requirements.lock
 	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found; install Python 3.11 or newer, or set PYTHON=..." >&2; exit 1; }

@@ -3,8 +3,6 @@
 All of them are ``ValueError``s, so a caller can catch them as one; the command line turns each into one line.
 """
 
-from numbers import Integral
-
 
 class MeshError(ValueError):
     """A mesh file or mesh arrays that cannot be used; names the file or argument and the fault.
@@ -37,8 +35,3 @@ def expect(condition: bool, argument: str, expected: str, got: object) -> None:
 def extra_hint(name: str) -> str:
     """The command that installs what an optional part needs; there is no package on an index yet."""
     return f"in a checkout of octree-renderer: pip install '.[{name}]'; with a wheel: pip install 'FILE.whl[{name}]'"
-
-
-def is_count(value: object) -> bool:
-    """Whether it is an integer >= 0, of Python or NumPy, and not True or False."""
-    return isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= 0

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arguments.arrays import flag_argument
+from renderer.arguments.counts import count_argument
 from renderer.errors import MeshError, expect
 from renderer.mesh.mesh import Mesh, Repairs
-from renderer.queryable import Queries
+from renderer.queryable import Built, Queries
 from renderer.system.threads import checked_threads
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
 from renderer.tree.build import SPLITS, build_blocks, build_tree
@@ -92,7 +93,7 @@ class _Accelerator(Queries):
         scaled, scale = _scaled(moved)
         refitted = refit_tree(tree, scaled, moved.faces, scale, self.threads)
         _check_sides(moved, scaled, refitted)
-        self._built = (moved, refitted)
+        self._built = Built(moved, refitted)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} over {len(self.mesh.faces):,} faces, depth {self.tree.depth}>"
@@ -225,15 +226,16 @@ class Octree(_Accelerator):
         stored = load_octree(path, flag_argument("mmap", mmap))
         octree = cls.__new__(cls)
         _Accelerator.__init__(octree, stored.mesh, stored.tree, threads)
+        # rule: repairs-of-file
         octree.repairs = stored.repairs
         return octree
 
     def _build(self, mesh: Mesh, split: str, leaf_size: int, max_depth: int, threads: int | None) -> None:
         expect(isinstance(split, str) and split in SPLITS, "split", f"one of {sorted(SPLITS)}", repr(split))
-        _expect_range("leaf_size", leaf_size, MAX_LEAF_SIZE)
-        _expect_range("max_depth", max_depth, MAX_DEPTH)
+        leaf_size = count_argument("leaf_size", leaf_size, 1, MAX_LEAF_SIZE)
+        max_depth = count_argument("max_depth", max_depth, 1, MAX_DEPTH)
         vertices, scale = _scaled(mesh)
-        rule = Rule(SPLITS[split], int(leaf_size), int(max_depth))
+        rule = Rule(SPLITS[split], leaf_size, max_depth)
         tree = build_tree(vertices, mesh.faces, rule, scale, checked_threads(threads))
         _check_sides(mesh, vertices, tree)
         super().__init__(mesh, tree, threads)
@@ -287,11 +289,6 @@ def _checked_mesh(mesh: Mesh) -> Mesh:
     hint = ", whose arrays Octree(mesh.vertices, mesh.faces) takes" if arrays else ""
     expect(isinstance(mesh, Mesh), "mesh", "a renderer.Mesh", f"{type(mesh).__module__}.{type(mesh).__name__}{hint}")
     return replace(mesh) if mesh.vertices.flags.writeable or mesh.faces.flags.writeable else mesh
-
-
-def _expect_range(argument: str, value: object, largest: int) -> None:
-    good = isinstance(value, int | np.integer) and not isinstance(value, bool) and 1 <= value <= largest
-    expect(bool(good), argument, f"an integer from 1 to {largest}", repr(value))
 
 
 def _all_blocks(mesh: Mesh, threads: int) -> Tree:

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.errors import expect
 
 if TYPE_CHECKING:
-    from renderer.distance.closest import ClosestPoints
     from renderer.octree import Octree
-    from renderer.trace.hits import AllHits, Hits
+    from renderer.results.closest_points import ClosestPoints
+    from renderer.results.hits import AllHits, Hits
 
 if not hasattr(pyvista, "register_dataset_accessor"):
     raise ImportError(

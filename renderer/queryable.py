@@ -2,28 +2,37 @@
 
 from __future__ import annotations  # so that help() shows ArrayLike by its name
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.all_hits.all_hits import all_hits, count_hits
 from renderer.arguments.arrays import flag_argument
-from renderer.distance.closest import ClosestPoints, closest_point
+from renderer.distance.closest import closest_point
 from renderer.distance.signed import signed_distance
 from renderer.distance.visible import visible
 from renderer.errors import expect
 from renderer.inside.contains import contains
 from renderer.inside.winding import winding_number
 from renderer.mesh.mesh import Mesh, Repairs
+from renderer.results.closest_points import ClosestPoints
+from renderer.results.hits import AllHits, Hits, Passage
+from renderer.results.steps import Steps
 from renderer.system.threads import checked_threads
 from renderer.trace.batch import RayBatch, check_rays, moved_off
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.error import add_errors
-from renderer.trace.hits import AllHits, Hits, Passage
 from renderer.trace.layout import Tree
 from renderer.trace.leaving import check_leaving
-from renderer.trace.steps import Steps, count_steps
+from renderer.trace.steps import count_steps
+
+
+class Built(NamedTuple):
+    """A mesh and the tree over it, which a refit replaces together."""
+
+    mesh: Mesh
+    tree: Tree
 
 
 class Queries:
@@ -35,7 +44,7 @@ class Queries:
 
     def __init__(self, mesh: Mesh, tree: Tree, threads: int | None) -> None:
         # One reference, so that a refit on another thread changes both at once.
-        self._built = (mesh, tree)
+        self._built = Built(mesh, tree)
         self.repairs: Repairs | None = None
         self.threads = checked_threads(threads)
 
@@ -50,16 +59,16 @@ class Queries:
         >>> octree.mesh.faces[hit.face]
         array([4, 5, 7], dtype=int32)
         """
-        return self._built[0]
+        return self._built.mesh
 
     @property
     def tree(self) -> Tree:
         """The arrays that rays are traced against."""
-        return self._built[1]
+        return self._built.tree
 
     @tree.setter
     def tree(self, tree: Tree) -> None:
-        self._built = (self.mesh, tree)
+        self._built = Built(self.mesh, tree)
 
     def closest_hit(
         self,
@@ -99,11 +108,11 @@ class Queries:
         >>> octree.closest_hit(hits.points[:1], [[0, 0, -1]], leaving=hits.face[:1]).hit
         array([False])
         """
-        mesh, tree = built = self._built
+        built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        hits = closest_hits(tree, rays, mesh, self.threads)
+        hits = closest_hits(built.tree, rays, built.mesh, self.threads)
         if flag_argument("t_error", t_error):
-            add_errors(hits, rays, None, tree.scale, self.threads)
+            add_errors(hits, rays, None, built.tree.scale, self.threads)
         return hits.shaped(shape)
 
     def any_hit(
@@ -127,7 +136,7 @@ class Queries:
         """
         built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        return any_hits(built[1], rays, self.threads).reshape(shape)
+        return any_hits(built.tree, rays, self.threads).reshape(shape)
 
     def all_hits(
         self,
@@ -164,11 +173,11 @@ class Queries:
         >>> octree.all_hits([[0.5, 0.5, 3]], [[0, 0, -1]], contacts=False).t
         array([2., 2., 3., 3.])
         """
-        mesh, tree = built = self._built
+        built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        hits = all_hits(tree, rays, mesh, (contacts, max_hits), shape, self.threads)
+        hits = all_hits(built.tree, rays, built.mesh, (contacts, max_hits), shape, self.threads)
         if flag_argument("t_error", t_error):
-            add_errors(hits, rays, hits.ray, tree.scale, self.threads)
+            add_errors(hits, rays, hits.ray, built.tree.scale, self.threads)
         return hits
 
     def count_hits(
@@ -191,7 +200,7 @@ class Queries:
         """
         built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        return count_hits(built[1], rays, contacts, self.threads).reshape(shape)
+        return count_hits(built.tree, rays, contacts, self.threads).reshape(shape)
 
     def count_steps(
         self,
@@ -216,11 +225,11 @@ class Queries:
         """
         built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        return count_steps(built[1], rays, shape, self.threads)
+        return count_steps(built.tree, rays, shape, self.threads)
 
     def _rays(
         self,
-        built: tuple[Mesh, Tree],
+        built: Built,
         origins: ArrayLike,
         directions: ArrayLike,
         t_min: ArrayLike,
@@ -229,13 +238,12 @@ class Queries:
         side: ArrayLike | None,
     ) -> tuple[RayBatch, tuple[int, ...]]:
         """The arguments of a query, checked, and moved off the faces that the rays leave; and their dimensions."""
-        mesh, tree = built
         rays, shape = check_rays(origins, directions, t_min, t_max)
         if leaving is None:
             expect(side is None, "side", "None without leaving", repr(side)[:40])
             return rays, shape
-        left = check_leaving(leaving, side, shape, len(mesh.faces))
-        return moved_off(rays, left, mesh, tree.scale, self.threads), shape
+        left = check_leaving(leaving, side, shape, len(built.mesh.faces))
+        return moved_off(rays, left, built.mesh, built.tree.scale, self.threads), shape
 
     def contains(
         self,
@@ -276,7 +284,7 @@ class Queries:
         return contains(tree, mesh, points, boundary, rule, winding, self.threads)
 
     def winding_number(self, points: ArrayLike, tolerance: float = 1e-3) -> NDArray[np.float64]:
-        """How often the surface winds around each point, (...,) float64: the sum of its solid angles over 4 pi.
+        """The number of times that the surface winds around each point, (...,) float64: its solid angles over 4 pi.
 
         points     (..., 3), finite
         tolerance  the largest error, from 0, which sums over all faces. Looser is faster

@@ -1,6 +1,7 @@
 """Settings that all tests share."""
 
 import signal
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -28,3 +29,13 @@ def mitsuba() -> ModuleType:
     mitsuba.set_variant("scalar_rgb")
     drjit.set_thread_count(max(2, drjit.thread_count()))
     return mitsuba
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the meshes of the scene whose fields are varied."""
+    from varied import write_meshes
+
+    folder = tmp_path_factory.mktemp("varied")
+    write_meshes(folder)
+    return folder

@@ -12,7 +12,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.octree import BruteForce, Octree
-from renderer.trace.hits import Hits
+from renderer.results.hits import Hits
 
 Floats = NDArray[np.float64]
 Arrays = tuple[Floats, NDArray[np.int32]]

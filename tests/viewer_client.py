@@ -1,5 +1,6 @@
 """The viewer's server as its tests use it: scenes, and a client that says and hears what a page would."""
 
+import io
 import json
 import math
 import struct
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image as Pillow
 from viewer_page import MODELS, SCENE
 from websockets.sync.client import connect
 
@@ -138,3 +140,18 @@ def wait_for(happened: Any, seconds: float) -> None:
     while not happened():
         assert time.monotonic() < end
         time.sleep(0.01)
+
+
+def decoded(file: bytes) -> Any:
+    """The pixels of a picture's file."""
+    return np.asarray(Pillow.open(io.BytesIO(file)).convert("RGB"))
+
+
+def frames(file: bytes) -> list[Any]:
+    """The pixels of each picture of a GIF or a WebP."""
+    opened = Pillow.open(io.BytesIO(file))
+    seen: list[Any] = []
+    for i in range(opened.n_frames):
+        opened.seek(i)
+        seen.append(np.asarray(opened.convert("RGB")))
+    return seen

@@ -40,7 +40,7 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
     """Exit with code 2 where arguments are missing or contradict each other."""
     check_output(parser, options)
     kinds = {kind for kind in ("scene", "mesh") if getattr(options, kind)}
-    modes = {"--defects": options.defects, "--mutants": options.mutants, "--write-baseline": options.write_baseline}
+    modes = {"--defects": options.defects, "--write-baseline": options.write_baseline}
     given = [mode for mode, value in modes.items() if value]
     if given:
         alone = given[0]
@@ -48,10 +48,8 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
         others += ["--only"] * (options.only != NAMES) + ["--random"] * (options.random is not None) + given[1:]
         others += ["--quick"] * (options.quick and not options.defects)
         if others:
-            fitting = {"--defects": "--output and --quick", "--mutants": "--output, --of and --seed"}
-            parser.error(f"{alone} goes with {fitting.get(alone, '--output')} alone, got {others[0]} too")
-    if not options.mutants and (options.of, options.seed) != ("renderer", 1):
-        parser.error("--of and --seed are those of --mutants N, got no --mutants")
+            fitting = "--output and --quick" if options.defects else "--output"
+            parser.error(f"{alone} goes with {fitting} alone, got {others[0]} too")
     chosen, left_out = choose(options.only, kinds)
     if not chosen:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
@@ -79,8 +77,6 @@ def _run(options: argparse.Namespace, command: str) -> int:
     )
     if options.defects:
         return _defects_verdict(suite.run_defects(request), request)
-    if options.mutants:
-        return _mutants_verdict(suite.run_mutants(request, options.of, options.mutants, options.seed), request)
     return _verdict(suite.run(request), request)
 
 
@@ -100,33 +96,14 @@ def _verdict(metrics: Mapping[str, Any], request: "Request") -> int:
 
 def _defects_verdict(gates: Sequence["Gate"], request: "Request") -> int:
     """As ``_verdict``, for the gates of a run of the seeded defects."""
+    from validation import suite
+
     _print_failures([gate.record() for gate in gates])
-    held = sum(gate.passed for gate in gates)
-    state = "PASS" if gates and held == len(gates) else "FAIL"
-    stored = request.output / "defects.json"
-    print(f"validation: {state}, {held} of {len(gates)} gates on seeded defects; see {stored}")
+    state = "PASS" if gates and all(gate.passed for gate in gates) else "FAIL"
+    stored = suite.stored_defects(request.output) or {"caught": 0, "defects": []}
+    count = f"{stored['caught']} of {len(stored['defects'])} seeded defects caught"
+    print(f"validation: {state}, {count}; see {request.output / 'defects.json'}")
     return int(state == "FAIL")
-
-
-def _mutants_verdict(found: Mapping[str, Any], request: "Request") -> int:
-    """Print the mutants that nothing noticed and a line of counts; returns the exit code: 1 where one of them has no
-    reason to be left."""
-    survivors = 0
-    for kind in (kind for kind in ("kernels", "python") if found[kind]["mutants"]):
-        counts = found[kind]
-        real = counts["mutants"] - counts["equivalent"]
-        for row in counts["survivors"]:
-            survivors += row["reason"] is None
-            print(f"SURVIVED {row['file']}:{row['line']}: {row['key']}: {row['reason'] or 'no reason is known'}")
-        print(
-            f"validation: mutants in {kind}: {counts['killed']} of {real} noticed, {counts['by_gates']} by a gate; "
-            f"{counts['equivalent']} change no answer; {counts['hung']} hung, {counts['crashed']} crashed"
-        )
-    if found["outdated"]:
-        anew = f"a run of {found['asked']} judges them anew"
-        print(f"validation: {found['outdated']} verdicts are older than the sources; {anew}")
-    print(f"validation: see {request.output}")
-    return int(survivors > 0)
 
 
 def _print_failures(gates: Sequence[Mapping[str, Any]]) -> None:

@@ -2,7 +2,7 @@
 
 Exit codes:
   0    every gate holds
-  1    a gate fails, nothing was judged, or nothing notices a mutant that has no reason to be left
+  1    a gate fails, or nothing was judged
   2    a bad argument, a bad file (scene, mesh, thresholds, baseline, a record), a missing reference, or a process
        that was ended from outside
   130  Ctrl-C; the report that was there before is untouched
@@ -42,23 +42,8 @@ def make_parser() -> argparse.ArgumentParser:
         help="draw the scenes and meshes of the section random from this seed; default: 1",
     )  # fmt: skip
     parser.add_argument("--defects", action="store_true", help="only inject the seeded defects, about half an hour")
-    parser.add_argument(
-        "--mutants", type=_count, metavar="N",
-        help="only put N small faults into the source, one at a time, and see what notices each: hours; "
-        "what an earlier run judged is not judged again",
-    )  # fmt: skip
-    parser.add_argument(
-        "--of", choices=("renderer", "judges"), default="renderer", help="what the mutants break; default: renderer"
-    )
-    parser.add_argument("--seed", type=_seed, default=1, metavar="S", help="by which mutants are chosen; default: 1")
     parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
     return parser
-
-
-def _count(text: str) -> int:
-    if not (text.isdecimal() and int(text)):
-        raise argparse.ArgumentTypeError(f"expected a positive integer, got {text!r}")
-    return int(text)
 
 
 def _seed(text: str) -> int:

@@ -61,7 +61,7 @@ def run(request: Request) -> dict[str, Any]:
 
     _make_folder(request.output)
     # Read once more for the report: they may grow meanwhile.
-    stored_defects(request.output), stored_mutants(request.output)
+    stored_defects(request.output)
 
     # Run the sections, with pictures in a temporary folder.
     with TemporaryDirectory(dir=request.output, prefix=".run-") as folder, Workers(_processes()) as workers:
@@ -131,13 +131,12 @@ def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, 
 
 
 def _outcome(records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], output: Path) -> dict[str, Any]:
-    """What follows from records and gates, and what earlier runs stored about defects and mutants."""
-    defects, mutants = stored_defects(output), stored_mutants(output)
+    """What follows from records and gates, and what an earlier run stored about defects."""
+    defects = stored_defects(output)
     rows = summary.matrix(records, gates)
     found = {"gates": gates, "verdict": summary.verdict(gates), "matrix": rows}
     found["facts"] = summary.facts(rows, gates, defects)
-    found |= {} if defects is None else {"defects": defects}
-    return found | ({"mutants": mutants} if mutants else {})
+    return found | ({} if defects is None else {"defects": defects})
 
 
 def write(metrics: dict[str, Any], output: Path, pictures: Path) -> None:
@@ -190,18 +189,19 @@ def _make_folder(output: Path) -> None:
 def run_defects(request: Request) -> list[Gate]:
     """Inject the seeded defects, store the results as ``defects.json`` and return the gates.
 
-    A report in the same folder is drawn again with these results.
+    A run that was interrupted goes on where it was. A report in the same folder is drawn again with these results.
     """
     from validation.defects import run as defects
-    from validation.defects.list import DEFECTS
+    from validation.defects.answers import Known
 
     began, started = time.perf_counter(), datetime.now(UTC)
     sources = environment.sources_sha256()
-    chosen = [d for d in DEFECTS if not (request.quick and d.kernel)]
     _check_folder(request.output)
     _make_folder(request.output)
+    known = Known(request.output / "defects-so-far.json", sources)
+    chosen = defects.chosen(request.quick)
     with steps(len(chosen) + 1) as step:
-        record, gates = defects.run(request.quick, step)
+        record, gates = defects.run(chosen, step, known=known)
     record |= {
         "sources": sources,
         "quick": request.quick,
@@ -211,23 +211,9 @@ def run_defects(request: Request) -> list[Gate]:
     }
     text = json.dumps(record, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     _write(request.output / "defects.json", text.encode())
+    known.forget()
     _draw_again(request.output)
     return gates
-
-
-def run_mutants(request: Request, target: str, count: int, seed: int) -> dict[str, Any]:
-    """Judge mutants of a target, go on from the stored record, and return the counts, see ``record.summary``.
-
-    A report in the same folder is drawn again with these results.
-    """
-    from validation.mutants import run as mutants
-
-    _check_folder(request.output)
-    _make_folder(request.output)
-    with steps() as step:
-        found = mutants.run(target, count, seed, request.output, step)
-    _draw_again(request.output)
-    return found
 
 
 def _draw_again(output: Path) -> None:
@@ -238,16 +224,6 @@ def _draw_again(output: Path) -> None:
         return
     records = {row["section"]: metrics[row["section"]] for row in metrics["matrix"]}
     write(metrics | _outcome(records, metrics["gates"], output), output, output / "pictures")
-
-
-def stored_mutants(output: Path) -> dict[str, Any]:
-    """What the last runs of mutants found, by target; a target that was never broken is missing."""
-    from validation.mutants.record import summary as mutants_of
-    from validation.mutants.targets import TARGETS, record_of
-
-    root = Path(__file__).resolve().parents[1]
-    found = {target: mutants_of(record_of(target, output), root) for target in TARGETS}
-    return {target: one for target, one in found.items() if one is not None}
 
 
 def stored_defects(output: Path) -> dict[str, Any] | None:

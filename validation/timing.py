@@ -29,7 +29,7 @@ def median_seconds(calls: Mapping[str, Callable[[], float]], runs: int, unseen: 
 
 
 def ratio(theirs: Sequence[float], ours: Sequence[float]) -> float:
-    """How many times faster ours is: the median of the rounds' ratios, not the ratio of the medians."""
+    """The factor by which ours is faster: the median of the rounds' ratios, not the ratio of the medians."""
     return statistics.median(t / o for t, o in zip(theirs, ours, strict=True))
 
 

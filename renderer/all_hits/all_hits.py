@@ -20,12 +20,12 @@ from renderer.all_hits.gather import (
     gather_chunk,
 )
 from renderer.arguments.arrays import flag_argument
-from renderer.errors import expect
+from renderer.arguments.counts import count_argument
 from renderer.mesh.mesh import Mesh
+from renderer.results.hits import AllHits
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.closest import rays_against_blocks
-from renderer.trace.hits import AllHits
 from renderer.trace.layout import Tree
 from renderer.trace.traverse import make_memory
 
@@ -70,9 +70,7 @@ def count_hits(tree: Tree, rays: RayBatch, contacts: bool, threads: int) -> NDAr
 def _most(max_hits: int | None) -> int:
     if max_hits is None:
         return _ANY_NUMBER
-    good = isinstance(max_hits, int | np.integer) and not isinstance(max_hits, bool) and max_hits >= 1
-    expect(bool(good), "max_hits", "an integer >= 1 or None", repr(max_hits))
-    return min(int(max_hits), _ANY_NUMBER)
+    return min(count_argument("max_hits", max_hits, 1, alternative=" or None"), _ANY_NUMBER)
 
 
 def _gathered(tree: Tree, rays: RayBatch, choice: Choice, threads: int) -> tuple[NDArray[np.int64], list[_Part]]:

@@ -14,8 +14,8 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -24,16 +24,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.system.files import write_atomically
+from renderer.system.terminal import progress_bar
 
 _MANIFEST = "manifest.json"
 _DIGEST_BYTES = 32
+# The number and the values of a part.
+Computed = Generator[tuple[int, NDArray[Any]], None, None]
 # Of a result that is written at once, where its rows are not in the order of the parts.
 _MOST_BYTES = 1 << 26
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run computes, in parts.
+    """The result of a run, in parts, and all that it depends on.
 
     rows       of the result, one a point of a study, or a row of pixels
     size       rows of a part; the last may have fewer
@@ -50,12 +53,17 @@ class Plan:
 
     @property
     def parts(self) -> int:
-        """How many there are; one without rows where the result has none."""
+        """The number of parts; one without rows where the result has none."""
         return max(1, -(-self.rows // self.size))
 
     def span(self, part: int) -> tuple[int, int]:
         """The places of a part: begin and end."""
         return part * self.size, min(self.rows, (part + 1) * self.size)
+
+    def length(self, part: int) -> int:
+        """The number of rows of a part."""
+        begin, end = self.span(part)
+        return end - begin
 
     def shape(self, rows: int) -> tuple[int, ...]:
         """The shape of so many rows."""
@@ -91,6 +99,21 @@ class Parts:
         """The parts that are still to be computed."""
         return [part for part in range(self.plan.parts) if self._read(part) is None]
 
+    def complete(self, compute: Callable[[list[int]], Computed], unit: str, progress: bool) -> None:
+        """Compute the parts that are missing, and write each as it comes: those written stay, whatever ends the rest.
+
+        compute   makes a generator of the numbers and values of the parts that it is given, in any order
+        unit      the name of a row, for a bar of the rows that are done where ``progress`` and a terminal shows it
+        """
+        missing = self.missing()
+        with progress_bar(self.plan.rows, unit, progress) as update, closing(compute(missing)) as computed:
+            if update is not None:
+                update(self.plan.rows - sum(map(self.plan.length, missing)))
+            for part, values in computed:
+                self.write(part, values)
+                if update is not None:
+                    update(self.plan.length(part))
+
     def rows(self, part: int) -> slice | NDArray[np.int64]:
         """The rows of the result that a part has."""
         here = slice(*self.plan.span(part))
@@ -98,15 +121,13 @@ class Parts:
 
     def write(self, part: int, values: NDArray[Any]) -> None:
         """Keep a part; of the shape and type of the plan."""
-        begin, end = self.plan.span(part)
-        assert values.shape == self.plan.shape(end - begin) and values.dtype == self.plan.dtype
+        assert values.shape == self.plan.shape(self.plan.length(part)) and values.dtype == self.plan.dtype
         content = np.ascontiguousarray(values).tobytes()
         write_atomically(self._path(part), lambda file: file.write(content + self._digest(part, content)))
 
     def read(self, part: int) -> NDArray[Any]:
         """The values of a part. Raises ``OSError`` where it is absent."""
-        begin, end = self.plan.span(part)
-        return np.frombuffer(self._whole(part), self.plan.dtype).reshape(self.plan.shape(end - begin))
+        return np.frombuffer(self._whole(part), self.plan.dtype).reshape(self.plan.shape(self.plan.length(part)))
 
     def join(self, path: Path) -> None:
         """Write the result as ``.npy``, some of it at a time. Raises ``OSError`` where a part is absent."""
@@ -120,7 +141,7 @@ class Parts:
         return values
 
     def count(self, value: float) -> int:
-        """How many values of all parts are this one."""
+        """The number of values, in all parts, that are this one."""
         return sum(int(np.count_nonzero(self.read(part) == value)) for part in range(self.plan.parts))
 
     def remove(self) -> None:
@@ -160,9 +181,8 @@ class Parts:
             content = self._path(part).read_bytes()
         except FileNotFoundError:
             return None
-        begin, end = self.plan.span(part)
         values, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
-        size = (end - begin) * max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
+        size = self.plan.length(part) * max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
         return values if len(values) == size and self._digest(part, values) == digest else None
 
     def _digest(self, part: int, values: bytes) -> bytes:

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.counts import count_argument
 from renderer.checkpoints.parts import Parts, Plan, digest_of
-from renderer.errors import expect
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import pack
 from renderer.picture.prepare import PreparedScene
 from renderer.picture.render import View
-from renderer.scene.needs import Needs
+from renderer.scene.needs import Features
 from renderer.scene.scene import Scene
 from renderer.system.files import check_writable
 
@@ -31,7 +30,7 @@ _CUT = "cut"
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What is rendered: a view of a scene, which is named by its digest, see ``digest_of_scene``."""
+    """The view of a scene that is rendered; the scene is named by its digest, see ``digest_of_scene``."""
 
     view: View
     scene: str
@@ -121,12 +120,10 @@ def band_of(view: View) -> int:
 
 def checked_band(band: object) -> int:
     """``band``, a number of rows. Raises ``ValueError`` for what is none."""
-    good = isinstance(band, Integral) and not isinstance(band, bool) and int(band) >= 1
-    expect(good, "band", "an integer >= 1 or None", repr(band))
-    return int(band)  # type: ignore[call-overload]
+    return count_argument("band", band, 1, alternative=" or None")
 
 
-def digest_of_scene(scene: Scene, needs: Needs) -> str:
+def digest_of_scene(scene: Scene, needs: Features) -> str:
     """A digest of all that pictures of a scene show, whatever their cameras and settings are."""
     mesh, arrays = pack(scene, needs)
     # The media are those around the scene's own camera, which is the view's; around any they depend on how the mesh is

@@ -1,4 +1,4 @@
-"""A study as a record that can be stored, sent and repeated: what is asked, of which points, part by part."""
+"""A study as a record that can be stored, sent and repeated, and its run, part by part."""
 
 from __future__ import annotations
 
@@ -11,52 +11,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.checkpoints.parts import Parts, Plan, digest_of
+from renderer.checkpoints.parts import Computed, Parts, Plan, digest_of
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.ordering.morton import order_along_curve
 from renderer.studies.ambient import ambient_occlusion
+from renderer.studies.points import Points
 from renderer.studies.share import check_request
 from renderer.studies.sky import sky_view_factor, sun_hours
 from renderer.system.files import check_writable
-from renderer.system.terminal import progress_bar
 
 Floats = NDArray[np.float64]
 # Points of a part: with 145 directions some seconds of work on one thread, which is what a kill loses at most.
 PART = 1 << 15
-# Points that are put in order together: 32 bytes each while it is done, and a second of sorting.
-_TOGETHER = 1 << 22
-
-
-@dataclass(frozen=True, eq=False)
-class Points:
-    """The points of a study: ``points`` and ``normals`` (n, 3) float64, and ``leaving`` (n,) int64, -1 for a face that
-    is not known.
-    """
-
-    points: Floats
-    normals: Floats
-    leaving: NDArray[np.int64]
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-    def part(self, rows: slice | NDArray[np.int64]) -> Points:
-        """Those of some rows."""
-        return Points(self.points[rows], self.normals[rows], self.leaving[rows])
-
-    def order(self) -> NDArray[np.int64]:
-        """The rows (n,) in which those that follow each other lie together, along a curve that fills space."""
-        rows = np.empty(len(self), np.int64)
-        for first in range(0, len(self), _TOGETHER):
-            rows[first : first + _TOGETHER] = first + order_along_curve(self.points[first : first + _TOGETHER])[0]
-        return rows
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What is asked of each point.
+    """A question to each of many points.
 
     kind        "sky": sky view factor; "sun": hours of sun; "ao": ambient occlusion
     options     the keyword arguments of the kind's function, other than points, threads and progress
@@ -68,8 +40,8 @@ class Study:
     def __post_init__(self) -> None:
         expect(self.kind in KINDS, "kind", f"one of {list(KINDS)}", repr(self.kind))
 
-    def answer(self, octree: Octree, points: Points, threads: int | None = None) -> Floats:
-        """The answers (n,) for points; each is the same whatever other points are asked with it."""
+    def evaluate(self, octree: Octree, points: Points, threads: int | None = None) -> Floats:
+        """The answers (n,) for points; each is the same whatever other points are evaluated with it."""
         return KINDS[self.kind](
             octree, points.points, points.normals, leaving=points.leaving, threads=threads, **self.options
         )
@@ -98,7 +70,7 @@ KINDS: dict[str, Callable[..., Floats]] = {"sky": sky_view_factor, "sun": sun_ho
 
 
 def folder_of(output: Path) -> Path:
-    """Where the parts of a result are while it is under way."""
+    """The folder of the parts of a result that is under way."""
     return output.with_name(f"{output.name}.parts")
 
 
@@ -111,7 +83,7 @@ def parts_of(octree: Octree, study: Study, points: Points, folder: Path, size: i
     # Here, as an error of a part would name its own row.
     check_request(octree, points.points, points.normals, points.leaving, None, False)
     # Of no point, so that options that the kind refuses leave no folder, which would stand in the way of right ones.
-    study.answer(octree, points.part(slice(0)))
+    study.evaluate(octree, points.part(slice(0)))
     order = points.order()
     plan = study.plan(octree.mesh, points, order, *(() if size is None else (size,)))
     return Parts(folder, plan, order)
@@ -124,13 +96,10 @@ def run(octree: Octree, study: Study, points: Points, folder: Path, *, progress:
     """
     check_writable(folder.with_name(f"{folder.name}.try"))
     parts = parts_of(octree, study, points, folder)
-    missing = parts.missing()
-    with progress_bar(len(points), "point", progress) as update:
-        if update is not None:
-            update(len(points) - sum(end - begin for begin, end in map(parts.plan.span, missing)))
+
+    def compute(missing: list[int]) -> Computed:
         for part in missing:
-            some = points.part(parts.rows(part))
-            parts.write(part, study.answer(octree, some))
-            if update is not None:
-                update(len(some))
+            yield part, study.evaluate(octree, points.part(parts.rows(part)))
+
+    parts.complete(compute, "point", progress)
     return parts

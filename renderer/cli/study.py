@@ -1,11 +1,11 @@
 """``octree-render study``: arguments in, a study's result as an array, a coloured mesh, or a picture."""
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
 from renderer.cli.cluster import add_cluster, on_cluster
+from renderer.cli.main.render import resolution
 from renderer.errors import expect
 from renderer.system.terminal import say
 
@@ -19,8 +19,8 @@ _POINTS = ".npy, (n, 3), or (n, 6) with normals; on the surface or not"
 _GRID = "points as seen from above (z up), so far apart, on what they see first"
 
 
-def add_study(commands: Any, resolution: Callable[[str], tuple[int, int]]) -> None:
-    """Add the command to a parser's ``commands``; ``resolution`` reads WxH."""
+def add_study(commands: Any) -> None:
+    """Add the command to a parser's ``commands``."""
     study = commands.add_parser(
         "study",
         help="what points of a mesh see: the sky, the sun, their surroundings",
@@ -80,7 +80,7 @@ def _study(options: argparse.Namespace) -> None:
 
 
 def _said(options: argparse.Namespace, parts: Any, seconds: float) -> str:
-    """What was made, and the number of points that see nothing, so that this is not silent."""
+    """The line about the result, with the number of points that see nothing, so that this is not silent."""
     outputs = ", ".join(map(str, options.output))
     blind = 0 if options.kind == "sun" else parts.count(0.0)
     told = f"; {blind:,} see nothing: they face down, are hidden all around or lie inside a body" if blind else ""
@@ -101,7 +101,7 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
 
 
 def _check_output(options: argparse.Namespace) -> None:
-    """What can be told of the outputs before any work."""
+    """Refuse outputs that cannot be written, before any work."""
     from renderer.system.files import are_apart, check_writable
 
     on_mesh = options.grid is None and options.points is None
@@ -120,8 +120,8 @@ def _check_output(options: argparse.Namespace) -> None:
 
 
 def _check_options(options: argparse.Namespace) -> None:
-    """What can be told of the other options before any work."""
-    from renderer.cli.study_drawing import FINER
+    """Refuse other options that do not fit together, before any work."""
+    from renderer.diagnostics.mesh_values import FINER
     from renderer.scene.scene import MOST_PIXELS
 
     for kind, names in _OWN.items():
@@ -136,7 +136,7 @@ def _check_options(options: argparse.Namespace) -> None:
 
 def _options_of(options: argparse.Namespace) -> dict[str, Any]:
     """The keyword arguments of the study."""
-    from renderer.checkpoints.study_points import suns_of
+    from renderer.studies.points import suns_of
 
     of: dict[str, Any] = {"distance": options.distance}
     if options.kind == "sun":
@@ -151,7 +151,7 @@ def _camera(options: argparse.Namespace) -> Any:
 
 
 def _chosen(octree: Any, options: argparse.Namespace) -> Any:
-    from renderer.checkpoints import study_points as chosen
+    from renderer.studies import points as chosen
 
     if options.points is not None:
         return chosen.of_file(octree, options.points)
@@ -162,7 +162,7 @@ def _chosen(octree: Any, options: argparse.Namespace) -> Any:
 
 def _write(output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, camera: Any) -> None:
     """Write a result that is more than the answers of the points."""
-    from renderer.cli import study_drawing as drawing
+    from renderer.diagnostics import mesh_values as drawing
 
     suffix = output.suffix.lower()
     if chosen.of_faces is None and chosen.of_vertices is None:
@@ -182,10 +182,10 @@ def _write(output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, an
 
 def _picture(mesh: Any, camera: Any, options: argparse.Namespace) -> Any:
     """The faces and normals that a camera sees; without one, from the south-west and above."""
-    from renderer.cli.study_drawing import FINER
-    from renderer.cli.study_view import from_above
+    from renderer.diagnostics.mesh_values import FINER
     from renderer.picture.render import render
     from renderer.scene.material import Phong
+    from renderer.scene.overview import from_above
     from renderer.scene.scene import Scene, SceneObject
 
     thing = SceneObject(mesh=mesh, material="grey", normals="flat")

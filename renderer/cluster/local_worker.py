@@ -1,4 +1,4 @@
-"""How worker processes of a local cluster begin: they leave Ctrl-C, which a terminal sends to all, to who began them.
+"""The start of a worker process of a local cluster: Ctrl-C, which a terminal sends to all, is left to its parent.
 
 Dask imports this module in each of them, and calls ``dask_setup``.
 """

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from renderer.checkpoints.parts import remove_parts
 from renderer.checkpoints.pictures import Picture, PictureRun, checked_band, digest_of_scene
-from renderer.cluster.tasks import Task, results
+from renderer.cluster.tasks import Results, Task, results
 from renderer.cluster.workers import SentScene, render_rows
 from renderer.errors import expect
 from renderer.picture.image import PLANES, check_picture_path
@@ -58,17 +58,12 @@ def render_on(
     """
     sent, picture = _Sender(options).picture(scene, camera)
     run = PictureRun(as_path("folder", folder), picture, band)
-    missing = run.parts.missing()
-    with (
-        progress_bar(run.parts.plan.parts, "part", progress) as update,
-        closing(results(client, render_rows, _tasks(None, sent, run, missing))) as found,
-    ):
-        if update is not None:
-            update(run.parts.plan.parts - len(missing))
-        for (_, part), rows in found:
-            run.parts.write(part, rows)
-            if update is not None:
-                update(1)
+
+    def compute(missing: list[int]) -> Results:
+        tasks = (Task(part, sent, (picture, *run.parts.plan.span(part))) for part in missing)
+        return results(client, render_rows, tasks)
+
+    run.parts.complete(compute, "row", progress)
     return run
 
 
@@ -121,7 +116,7 @@ def frames_on(
 
 
 class _Sender:
-    """What workers are to be sent for pictures with the same options."""
+    """The scenes as workers are sent them, for pictures with the same options."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         settings = dict(options)
@@ -150,11 +145,6 @@ class _Sender:
 def _same_but_for_camera(scene: Scene, other: Scene) -> bool:
     shown = ("materials", "lights", "ambient", "background")
     return scene.instances is other.instances and all(getattr(scene, n) == getattr(other, n) for n in shown)
-
-
-def _tasks(number: int | None, sent: SentScene, run: PictureRun, missing: Iterable[int]) -> Iterator[Task]:
-    for part in missing:
-        yield Task((number, part), sent, (run.picture, *run.parts.plan.span(part)))
 
 
 class _Frames:
@@ -191,7 +181,8 @@ class _Frames:
             self._under_way[number] = run, set(missing)
             if not missing:
                 self._end(number)
-            yield from _tasks(number, sent, run, missing)
+            for part in missing:
+                yield Task((number, part), sent, (picture, *run.parts.plan.span(part)))
         self.expect_scenes(count)
 
     def write(self, number: int, part: int, rows: Any) -> None:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from contextlib import closing
-from numbers import Integral
 from pathlib import Path
 from typing import Any, Literal
 
+from renderer.arguments.counts import count_argument
 from renderer.checkpoints.parts import Parts, digest_of
-from renderer.checkpoints.study import PART, Points, Study, parts_of
-from renderer.cluster.tasks import Task, results
-from renderer.cluster.workers import SentMesh, answer_part
+from renderer.checkpoints.study import PART, Study, parts_of
+from renderer.cluster.tasks import Results, Task, results
+from renderer.cluster.workers import SentMesh, evaluate_part
 from renderer.errors import expect
 from renderer.octree import Octree
 from renderer.picture.render import check_tree
+from renderer.studies.points import Points
 from renderer.system.files import as_path
-from renderer.system.terminal import progress_bar
 
 
 def run_on(
@@ -31,7 +30,7 @@ def run_on(
 ) -> Parts:
     """``renderer.checkpoints.study.run`` on the workers of ``client``, a ``distributed.Client``.
 
-    points  where, as ``renderer.checkpoints.study_points`` makes them
+    points  where, as ``renderer.studies.points`` makes them
     folder  for the parts, a new one or that of a run that was killed; the caller removes it
     size    points of a part at least. It changes no bit
     split   the tree that workers build, as ``Octree.from_mesh`` takes it. It changes no bit
@@ -47,7 +46,7 @@ def run_on(
     >>> from tempfile import TemporaryDirectory
     >>> from renderer import Octree
     >>> from renderer.cluster import connected, run_on
-    >>> from renderer.checkpoints.study_points import on_faces
+    >>> from renderer.studies.points import on_faces
     >>> from renderer.checkpoints.study import Study
     >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> with connected(workers=1) as client, TemporaryDirectory() as folder:
@@ -57,20 +56,13 @@ def run_on(
     folder = _checked(octree, study, points, folder, size, split)
     mesh = octree.mesh
     parts = parts_of(octree, study, points, folder, size)
-    missing = parts.missing()
     sent = SentMesh(digest_of(mesh.vertices, mesh.faces), mesh.vertices, mesh.faces, split)
-    tasks = (Task(part, sent, (study, points.part(parts.rows(part)))) for part in missing)
-    with (
-        progress_bar(len(points), "point", progress) as update,
-        closing(results(client, answer_part, tasks)) as answers,
-    ):
-        if update is not None:
-            update(len(points) - sum(end - begin for begin, end in map(parts.plan.span, missing)))
-        for part, values in answers:
-            parts.write(part, values)
-            if update is not None:
-                begin, end = parts.plan.span(part)
-                update(end - begin)
+
+    def compute(missing: list[int]) -> Results:
+        tasks = (Task(part, sent, (study, points.part(parts.rows(part)))) for part in missing)
+        return results(client, evaluate_part, tasks)
+
+    parts.complete(compute, "point", progress)
     return parts
 
 
@@ -79,7 +71,6 @@ def _checked(octree: object, study: object, points: object, folder: object, size
     expect(isinstance(octree, Octree), "octree", "an Octree", type(octree).__name__)
     expect(isinstance(study, Study), "study", "a Study", type(study).__name__)
     expect(isinstance(points, Points), "points", "Points", type(points).__name__)
-    good = isinstance(size, Integral) and not isinstance(size, bool) and int(size) >= 1
-    expect(good, "size", "an integer >= 1", repr(size))
+    count_argument("size", size, 1)
     check_tree("octree", split)
     return as_path("folder", folder)

@@ -82,7 +82,7 @@ class _Crew:
         self._threads, self._looked = threads, time.monotonic()
 
     def room(self) -> int:
-        """How many more tasks may be under way."""
+        """The number of tasks that may begin now."""
         return max(0, _AHEAD * self._threads - len(self.under_way))
 
     def submit(self, task: Task) -> None:

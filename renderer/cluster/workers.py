@@ -1,4 +1,4 @@
-"""What a worker keeps: the meshes and scenes that it was sent, with their trees, which it builds once each."""
+"""The meshes and scenes that a worker was sent and keeps, with their trees, which it builds once each."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from renderer.checkpoints.pictures import Picture
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.picture.prepare import PreparedScene, prepare_scene
-from renderer.scene.needs import Needs
+from renderer.scene.needs import Features
 from renderer.scene.scene import Scene
 
 # The trees of a worker, by the digests of what they are over; the latest ones, because a worker serves many runs.
@@ -53,7 +53,7 @@ class SentScene(NamedTuple):
 
     digest: str
     scene: Scene
-    needs: Needs
+    needs: Features
     accelerator: str
     split: Literal["midpoint", "sah"]
 
@@ -76,9 +76,9 @@ def _kept(key: str, make: Callable[[], Any]) -> Any:
         return _TREES[key]
 
 
-def answer_part(mesh: SentMesh, study: Any, points: Any) -> NDArray[np.float64]:
+def evaluate_part(mesh: SentMesh, study: Any, points: Any) -> NDArray[np.float64]:
     """The answers to a study's part; a task."""
-    answers: NDArray[np.float64] = study.answer(mesh.octree(), points, threads=1)
+    answers: NDArray[np.float64] = study.evaluate(mesh.octree(), points, threads=1)
     return answers
 
 

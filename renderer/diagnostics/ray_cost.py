@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from renderer.picture.prepare import PreparedScene
+from renderer.results.steps import Steps
 from renderer.scene.camera import Camera
-from renderer.trace.steps import Steps
 
 # Rays of a call: of so many their arrays take a few megabytes, and Ctrl-C waits some 10 ms.
 _RAYS = 1 << 16

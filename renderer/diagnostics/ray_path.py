@@ -10,8 +10,9 @@ from typing import Literal
 
 from numpy.typing import ArrayLike
 
+from renderer.arguments.counts import count_argument
 from renderer.diagnostics.ray_step import Aim, Ray, Steps, SurfaceHit, Vector, color_at, steps_of
-from renderer.errors import expect, is_count
+from renderer.errors import expect
 from renderer.numerics.vec3 import add
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import checked_vector
@@ -66,7 +67,7 @@ def ray_path(
     colour. Without ``shadows`` the radiance of a ray that met a surface includes the direct light there. Raises
     ``ValueError`` naming the argument.
     """
-    expect(is_count(max_depth), "max_depth", "an integer >= 0", repr(max_depth))
+    count_argument("max_depth", max_depth)
     o, d = checked_vector("origin", origin), checked_vector("direction", direction)
     expect(any(d), "direction", "a vector of non-zero length", repr(direction))
     bounces = max_depth if prepared.needs.reflection or prepared.needs.refraction else 0

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from renderer.numerics.vec3 import add, dot, normalized, scale, times
 from renderer.picture.pack import media_around
 from renderer.picture.prepare import MediaRule, PreparedScene, arrays_for, media_limit
+from renderer.results.hits import Hits
 from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at, surface_together_of, together_of
 from renderer.shade.lights import aim_from
 from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG
@@ -20,7 +21,6 @@ from renderer.shade.surface import SceneArrays, Surface, phong_of, surface_of
 from renderer.shade.whitted import passes_light_of, refract_from
 from renderer.trace.batch import check_rays, make_starts
 from renderer.trace.closest import closest_hits
-from renderer.trace.hits import Hits
 from renderer.trace.spawn import BOUNDED, OffsetRule, Place, spawn_origin, start_row
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.level import Spot

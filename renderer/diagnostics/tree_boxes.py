@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import count_argument
 from renderer.jit.decorators import kernel
 from renderer.numerics.simd import splat8, store
 from renderer.octree import BruteForce, Octree
@@ -42,7 +42,7 @@ def boxes_at(octree: Octree | BruteForce, level: int) -> Boxes:
 
     Raises ``ValueError`` for a negative level.
     """
-    expect(is_count(level), "level", "an integer >= 0", repr(level))
+    count_argument("level", level)
     tree, scale = octree.tree, octree.tree.scale
     boxes = _root_box(tree)
     children = np.zeros(len(boxes), np.int64)
@@ -147,5 +147,5 @@ def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, t: float, face:
     """t and face of the best hit so far and those in a leaf."""
     tree, (first, count) = tree_pointers(words), blocks_of(leaf)
     best = (t, np.int32(face), 0.0, 0.0, 1.0)
-    t, found, _, _, _ = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
-    return t, found
+    t, face, _, _, _ = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
+    return t, int(face)

@@ -11,7 +11,7 @@ from renderer.distance.closest import closest_point
 from renderer.distance.place_on_face import DOUBLE, SINGLE, anchor_all, measure_all
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
-from renderer.trace.hits import points_on
+from renderer.results.hits import points_on
 from renderer.trace.layout import Tree
 from renderer.trace.spawn import FARTHEST_START
 from renderer.trace.starts.record import BARYCENTRIC

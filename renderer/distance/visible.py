@@ -86,6 +86,7 @@ def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) ->
     room = np.maximum(room / np.abs(directions).max(axis=1, initial=0.0), _LEAST)
     # Where the ends leave no room between them, t_min is above t_max, and nothing hides.
     t_min = np.where(start.places.faces < 0, room, 0.0)
+    # rule: room-before-end
     rays = RayBatch(
         start.points, directions, t_min, np.where(stop.places.faces < 0, np.maximum(reach - room, 0.0), reach)
     )

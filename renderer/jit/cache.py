@@ -17,7 +17,6 @@ from functools import cache
 from logging import getLogger
 from pathlib import Path
 from stat import S_ISREG
-from types import CodeType, ModuleType
 from typing import Any
 
 import llvmlite  # type: ignore[import-untyped]
@@ -59,7 +58,7 @@ class KernelStore:
         ours = is_ours(self._source)
         self._home = PACKAGE if ours else self._source.parent
         module = function.__module__ if ours else self._source.stem
-        self._name = f"{module}.{function.__qualname__}".replace("<", "").replace(">", "")
+        self._name = f"{module}.{function.__qualname__}"
 
     @property
     def cache_path(self) -> str | None:
@@ -69,19 +68,11 @@ class KernelStore:
 
     @lazy
     def _digest(self) -> str | None:
-        """The digest of all that the kernel's code depends on; None where that is not known.
+        """The digest of all that the kernel's code depends on: the text of files. None where that is not known.
 
-        For files of this package their text is enough. Elsewhere one name may stand for many functions, so the
-        function's code and the values that it finds around it count too.
+        A function within another stands for many, which no text tells apart.
         """
-        digest = source_digest(self._source)
-        if digest is None or is_ours(self._source):
-            return digest
-        try:
-            return digest + _fingerprint(self._function)
-        except Exception as error:  # whatever pickling may raise
-            _warn_once("unknown", f"{self._name} is not kept: {type(error).__name__}: {error}")
-            return None
+        return None if "<locals>" in self._function.__qualname__ else source_digest(self._source)
 
     def is_stored(self) -> bool:
         """Whether a file of these sources is there for any types of arguments, so that a later run need not compile.
@@ -190,24 +181,6 @@ def runnable_levels() -> tuple[str, ...]:
 def stored_in(folder: Path) -> int:
     """The number of kernels in a folder."""
     return len(_names(folder))
-
-
-def _fingerprint(function: Any) -> str:
-    """A digest of a function's code, enclosed values and the values of globals that it names.
-
-    It differs between functions of one name.
-    """
-    code = function.__code__
-    enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
-    named = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
-    values = {name: value for name, value in named.items() if not (callable(value) or isinstance(value, ModuleType))}
-    return hashlib.sha256(dumps((_shape(code), enclosed, values))).hexdigest()
-
-
-def _shape(code: CodeType) -> tuple[object, ...]:
-    """A function's code without what an edit elsewhere in its file changes."""
-    constants = tuple(_shape(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts)
-    return code.co_code, constants, code.co_names, code.co_varnames, code.co_freevars
 
 
 @cache

@@ -2,7 +2,7 @@
 
 A kernel is called by Python and by other kernels alike. It allocates nothing and raises nothing; the caller keeps its
 arrays alive. A kernel may stand in another package too: its machine code then follows the edits of its own file and of
-all files of this package, but not those of other files that it imports.
+all files of this package, but not those of other files that it imports. One within a function is never kept.
 """
 
 from collections.abc import Callable

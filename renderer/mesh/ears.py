@@ -80,7 +80,7 @@ def cut_ears(outline, flat, links, triangles):
     cut, at, missed = 0, 1, 0
     while cut < count - 2:
         a, c = before[at], after[at]
-        if _turn(outline, a, at, c) > flat and not _any_inside(outline, flat, blockers, blocking, (a, at, c)):
+        if _turn(outline, a, at, c) > flat and not _any_inside(outline, flat, blockers, blocking, a, at, c):
             triangles[cut, 0], triangles[cut, 1], triangles[cut, 2] = a, at, c
             cut += 1
             after[a], before[c] = c, a
@@ -107,9 +107,8 @@ def _still_blocking(outline, flat, links, blocking, changed):
 
 
 @inlined
-def _any_inside(outline, flat, blockers, blocking, corners):
+def _any_inside(outline, flat, blockers, blocking, a, b, c):
     """Whether any of the blockers lies in the triangle or on its edges."""
-    a, b, c = corners
     for i in range(blocking):
         k = blockers[i]
         if (

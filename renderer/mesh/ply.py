@@ -23,6 +23,7 @@ _TYPES = {
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "float": "f4", "double": "f8", "float32": "f4", "float64": "f8",
 }  # fmt: skip
+_KEYWORDS = {"f4": "float", "f8": "double", "u1": "uchar"}  # of what is written
 _ByteOrder = Literal["<", ">", "="]
 _ASCII: _ByteOrder = "="  # its numbers are turned into native doubles
 _BYTE_ORDERS: dict[str, _ByteOrder] = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": _ASCII}
@@ -101,27 +102,52 @@ def format_ply(mesh: Mesh) -> bytes:
 
     Normals and texture coordinates are doubles; colours are floats.
     """
-    position = "f4" if mesh.is_float32 else "f8"
-    fields: list[tuple[str, str, NDArray[Any]]] = [
-        (axis, position, mesh.vertices[:, k]) for k, axis in enumerate("xyz")
-    ]
-    for names, type_, array in (
-        (("nx", "ny", "nz"), "f8", mesh.normals),
-        (("red", "green", "blue"), "f4", mesh.colors),
-        (("s", "t"), "f8", mesh.texcoords),
+    columns = by_name(("x", "y", "z"), mesh.vertices.astype(np.float32) if mesh.is_float32 else mesh.vertices)
+    for names, array in (
+        (("nx", "ny", "nz"), mesh.normals),
+        (("red", "green", "blue"), mesh.colors),
+        (("s", "t"), mesh.texcoords),
     ):
         if array is not None:
-            fields += [(field, type_, array[:, k]) for k, field in enumerate(names)]
-    vertices = np.empty(len(mesh.vertices), [(field, "<" + type_) for field, type_, _ in fields])
-    for field, _, column in fields:
-        vertices[field] = column
-    faces = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3)])
-    faces["count"], faces["corners"] = 3, mesh.faces
-    keywords = {"f4": "float", "f8": "double"}
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
-    header += [f"property {keywords[type_]} {field}" for field, type_, _ in fields]
-    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
-    return "\n".join(header).encode("ascii") + vertices.tobytes() + faces.tobytes()
+            columns |= by_name(names, array)
+    return format_columns(columns, mesh.faces)
+
+
+def by_name(names: tuple[str, ...], array: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """The columns of an array (n, len(names)) by their names."""
+    return dict(zip(names, array.T, strict=True))
+
+
+def format_columns(
+    vertex: dict[str, NDArray[Any]],
+    faces: NDArray[np.int32] | None = None,
+    face: dict[str, NDArray[Any]] | None = None,
+) -> bytes:
+    """Binary little-endian PLY of columns (n,) of float32, float64 or uint8, by the names of their properties.
+
+    vertex : the vertices' columns. faces : (F, 3), or None for a file without faces. face : further columns of these.
+    """
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertex['x'])}", *_declared(vertex)]
+    body = _packed(vertex)
+    if faces is not None:
+        own = face or {}
+        header += [f"element face {len(faces)}", "property list uchar int vertex_indices", *_declared(own)]
+        body += _packed({"count": np.full(len(faces), 3, np.uint8), "corners": faces, **own})
+    return "\n".join([*header, "end_header", ""]).encode("ascii") + body
+
+
+def _declared(columns: dict[str, NDArray[Any]]) -> list[str]:
+    """The header's lines about single values."""
+    return [f"property {_KEYWORDS[column.dtype.str[1:]]} {name}" for name, column in columns.items()]
+
+
+def _packed(columns: dict[str, NDArray[Any]]) -> bytes:
+    """The columns' values, row by row."""
+    fields = [(name, column.dtype.newbyteorder("<"), column.shape[1:]) for name, column in columns.items()]
+    rows = np.empty(len(next(iter(columns.values()))), fields)
+    for name, column in columns.items():
+        rows[name] = column
+    return rows.tobytes()
 
 
 # --- header -------------------------------------------------------------------------------------------------

@@ -36,7 +36,8 @@ def search_in_order(
         for _ in search(np.arange(len(points)), points):
             pass
         return
-    grid = _make_grid(*mesh.bounds, along)
+    lower, upper = mesh.bounds
+    grid = _make_grid(lower, upper, along)
 
     def search_some(begin: int, end: int) -> Iterator[None]:
         rows, some, starts = np.empty(end - begin, np.int64), np.empty((end - begin, 3)), np.empty(_CELLS + 1, np.int64)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.arguments.arrays import real_argument
 from renderer.errors import expect
+from renderer.picture.encoding import write_pixels
 from renderer.picture.exr import check_exr, exr_bytes
 from renderer.system.files import as_path, check_writable, write_atomically
 
@@ -194,12 +195,10 @@ class Image:
         return buffer.getvalue()
 
     def _write_png(self, file: BinaryIO) -> None:
-        from PIL import Image as Pillow  # not needed to trace rays, and slow to import
-
         for begin in range(0, len(self.radiance), _ROWS):
             rows = self.radiance[begin : begin + _ROWS]
             expect(not np.isnan(rows).any(), "radiance", "numbers that have a colour", "nan")
-        Pillow.fromarray(self.srgb).save(file, "png")
+        write_pixels(file, self.srgb)
 
 
 def check_picture_path(path: str | Path) -> None:

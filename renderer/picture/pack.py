@@ -6,13 +6,13 @@ from numpy.typing import NDArray
 from renderer.inside.rational import crossings_of, winding_of
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera
-from renderer.scene.needs import Needs, needs_of
+from renderer.scene.needs import Features, lit_materials, needs_of
 from renderer.scene.scene import Scene
 from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.shade.surface import MAX_MEDIA, SceneArrays
 
 
-def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
+def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays]:
     """The merged mesh of all instances in their order, and everything else that the kernel reads.
 
     Arrays that ``needs`` does not name are left empty; for None, those that the scene does not need; and ``touching``,
@@ -44,7 +44,7 @@ def pack(scene: Scene, needs: Needs | None = None) -> tuple[Mesh, SceneArrays]:
     return mesh, arrays
 
 
-def repacked(arrays: SceneArrays, scene: Scene, needs: Needs) -> SceneArrays:
+def repacked(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
     """``arrays`` with the materials and lights of ``scene``, which has the meshes that they were packed of, and as many
     materials of the same names.
     """
@@ -52,18 +52,18 @@ def repacked(arrays: SceneArrays, scene: Scene, needs: Needs) -> SceneArrays:
     return arrays._replace(materials=_materials(scene, needs), lights=light_rows(scene, needs), media=media)
 
 
-def _materials(scene: Scene, needs: Needs) -> NDArray[np.float64]:
+def _materials(scene: Scene, needs: Features) -> NDArray[np.float64]:
     """The rows of the materials, of kinds that have all that ``needs`` names, whether the scene needs it or not."""
     rows = np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)
-    own, kinds = needs_of(scene), rows[:, KIND]
-    if needs.shadows and not own.shadows:
+    kinds, lit = rows[:, KIND], {material.kind for material in lit_materials(scene)}
+    if needs.shadows and lit <= {UNLIT}:
         kinds[kinds == UNLIT] = LAMBERT
-    if needs.specular and not own.specular:
+    if needs.specular and PHONG not in lit:
         kinds[kinds == LAMBERT] = PHONG
     return rows
 
 
-def light_rows(scene: Scene, needs: Needs) -> NDArray[np.float64]:
+def light_rows(scene: Scene, needs: Features) -> NDArray[np.float64]:
     """The rows of the lights that shine, and of as many others as ``needs`` asks for, in the scene's order."""
     if not needs.shadows:
         return np.zeros((0, LIGHT_COLUMNS))

@@ -16,7 +16,7 @@ from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import media_around, pack
 from renderer.picture.touching import find_touching, touching_faces
 from renderer.scene.camera import Camera, sample_offsets
-from renderer.scene.needs import Needs
+from renderer.scene.needs import Features
 from renderer.scene.scene import RenderSettings, Scene
 from renderer.shade.bundle import SIZE
 from renderer.shade.surface import MAX_MEDIA, SceneArrays
@@ -58,7 +58,7 @@ class PreparedScene:
     scene: Scene
     mesh: Mesh
     octree: Octree | BruteForce
-    needs: Needs
+    needs: Features
     arrays: SceneArrays
     tree: Tree
     build_seconds: float
@@ -103,7 +103,7 @@ class PreparedScene:
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
         settings = kernel_settings_of(self.needs, chosen, offset, media)
         arrays = arrays_for(self, camera, offset, media)
-        across, cut = -(-width // TILE), np.zeros(tiles((width, end_row - first_row)), np.int64)
+        across, cut = -(-width // TILE), np.zeros(tiles(width, end_row - first_row), np.int64)
 
         def render_in(film: Film, first: int) -> Iterator[None]:
             x, y = first % across * TILE, first_row + first // across * TILE
@@ -125,7 +125,7 @@ class PreparedScene:
 
 def prepare_scene(
     scene: Scene,
-    needs: Needs,
+    needs: Features,
     accelerator: str = "auto",
     split: Literal["midpoint", "sah"] = "midpoint",
     threads: int | None = None,
@@ -144,20 +144,19 @@ def _bundles_in_a_row(tree: Tree) -> int:
     return 256 if tree.has_nodes else max(1, rays_against_blocks(tree) // SIZE)
 
 
-def _restored(scene: Scene, octree: Octree | BruteForce, needs: Needs, build_seconds: float) -> PreparedScene:
+def _restored(scene: Scene, octree: Octree | BruteForce, needs: Features, build_seconds: float) -> PreparedScene:
     (_, arrays), tree = pack(scene, needs), tree_for(octree, needs)
     arrays = find_touching(tree, arrays, needs, checked_threads(None))
     return PreparedScene(scene, octree.mesh, octree, needs, arrays, tree, build_seconds)
 
 
-def tiles(resolution: tuple[int, int]) -> int:
-    """The number of tiles of a picture of (width, height)."""
-    width, height = resolution
+def tiles(width: int, height: int) -> int:
+    """The number of tiles of a picture."""
     return -(-width // TILE) * -(-height // TILE)
 
 
 def build_octree(
-    mesh: Mesh, accelerator: str, split: Literal["midpoint", "sah"], needs: Needs, threads: int | None = None
+    mesh: Mesh, accelerator: str, split: Literal["midpoint", "sah"], needs: Features, threads: int | None = None
 ) -> Octree | BruteForce:
     """A tree, or the blocks alone where ``accelerator`` is "brute" or no tree is needed.
 
@@ -169,7 +168,7 @@ def build_octree(
     return built
 
 
-def tree_for(octree: Octree | BruteForce, needs: Needs) -> Tree:
+def tree_for(octree: Octree | BruteForce, needs: Features) -> Tree:
     """The tree that the kernel traces rays against."""
     return _widened(octree.tree) if needs.float64_vertices else octree.tree
 
@@ -182,7 +181,7 @@ def _widened(tree: Tree) -> Tree:
 
 
 def kernel_settings_of(
-    needs: Needs, chosen: RenderSettings, offset: OffsetRule, media: MediaRule = "stack"
+    needs: Features, chosen: RenderSettings, offset: OffsetRule, media: MediaRule = "stack"
 ) -> Settings:
     """The kernel's settings: no bounces where nothing bounces, and no media where nothing refracts."""
     bounces = chosen.max_depth if needs.reflection or needs.refraction else 0
@@ -204,7 +203,7 @@ def arrays_for(prepared: PreparedScene, camera: Camera, offset: OffsetRule, medi
     return arrays
 
 
-def media_limit(needs: Needs, media: MediaRule) -> int:
+def media_limit(needs: Features, media: MediaRule) -> int:
     """The most media that a ray remembers. One that remembers none is inside where it looks along the normal."""
     return MAX_MEDIA if needs.refraction and media == "stack" else 0
 

@@ -9,7 +9,7 @@ from renderer.errors import expect
 from renderer.picture.image import PLANES, CutWarning, Image
 from renderer.picture.prepare import MediaRule, PreparedScene, prepare_scene, tiles
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
-from renderer.scene.needs import Needs, checked_needs
+from renderer.scene.needs import Features, checked_needs
 from renderer.scene.scene import RenderSettings, Scene, checked_settings
 from renderer.system.terminal import progress_bar
 from renderer.system.threads import checked_threads
@@ -23,7 +23,7 @@ def render(
     camera: Camera | None = None,
     accelerator: Literal["auto", "octree", "brute"] = "auto",
     split: Literal["midpoint", "sah"] = "midpoint",
-    needs: Needs | None = None,
+    needs: Features | None = None,
     offset: Literal["bounded", "mitsuba"] | float = "bounded",
     media: MediaRule = "stack",
     planes: Collection[str] = PLANES,
@@ -71,7 +71,7 @@ def render(
         prepared = scene
     else:
         prepared = _prepared(scene, view.chosen.max_depth, accelerator, split, needs, threads)
-    with progress_bar(tiles(view.chosen.resolution), "tile", progress) as update:
+    with progress_bar(tiles(*view.chosen.resolution), "tile", progress) as update:
         image = prepared.picture(view.camera, view.chosen, view.offset, threads, update, view.planes, media=view.media)
     if image.cut:
         warnings.warn(image.cut_message(view.chosen.max_rays), CutWarning, stacklevel=2)
@@ -83,7 +83,7 @@ def prepare(
     *,
     accelerator: Literal["auto", "octree", "brute"] = "auto",
     split: Literal["midpoint", "sah"] = "midpoint",
-    needs: Needs | None = None,
+    needs: Features | None = None,
     threads: int | None = None,
 ) -> PreparedScene:
     """Compute once what all pictures of ``scene`` share, its tree above all: for animations and several cameras.
@@ -106,8 +106,8 @@ def prepare(
 
 
 class View(NamedTuple):
-    """What a picture shows of its scene: a camera, settings, the rules of offsets and media, and the planes that are
-    kept, all checked.
+    """The view that a picture shows of its scene: a camera, settings, the rules of offsets and media, and the planes
+    that are kept, all checked.
     """
 
     camera: Camera
@@ -152,7 +152,7 @@ def _prepared(
     max_depth: int,
     accelerator: str,
     split: Literal["midpoint", "sah"],
-    needs: Needs | None,
+    needs: Features | None,
     threads: int,
 ) -> PreparedScene:
     check_tree(accelerator, split)

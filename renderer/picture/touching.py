@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.scene.needs import Needs
+from renderer.scene.needs import Features
 from renderer.shade.surface import SceneArrays
 from renderer.shade.touching import mark_touching
 from renderer.system.threads import for_chunks
@@ -13,7 +13,7 @@ from renderer.trace.walk import stack_size
 _CHUNK = 4096
 
 
-def find_touching(tree: Tree, arrays: SceneArrays, needs: Needs, threads: int) -> SceneArrays:
+def find_touching(tree: Tree, arrays: SceneArrays, needs: Features, threads: int) -> SceneArrays:
     """``arrays`` with ``touching``."""
     return arrays._replace(touching=touching_faces(tree, arrays, threads)) if needs.refraction else arrays
 

@@ -18,13 +18,13 @@ FiniteVector = tuple[_Number, _Number, _Number]
 Keys = tuple[int | str, ...]
 
 
-def _grey(value: object) -> object:
-    """Let one number stand for an equal red, green and blue."""
+def thrice(value: object) -> object:
+    """Let one number stand for three that are equal: red, green and blue, or x, y and z."""
     return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
 _Channel = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=True)]
-Color = Annotated[tuple[_Channel, _Channel, _Channel], BeforeValidator(_grey)]
+Color = Annotated[tuple[_Channel, _Channel, _Channel], BeforeValidator(thrice)]
 
 
 class Fields(BaseModel):

@@ -1,4 +1,4 @@
-"""The needs of a picture, read off its scene; features that it does not need are left out and cost nothing.
+"""The features that a picture needs, read off its scene; others are left out and cost nothing.
 
 Left out are rays (reflected, refracted, shadow), memory (vertex normals, the media of a ray, lights that are dark) and
 building (the tree over a handful of triangles). Kernel code is not: a kernel compiled without bounces, highlights and
@@ -10,7 +10,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import count_argument
+from renderer.errors import expect
 from renderer.scene.material import Phong
 from renderer.scene.scene import Instance, Scene
 
@@ -21,7 +22,7 @@ FEW_FACES = 24
 
 
 @dataclass(frozen=True)
-class Needs:
+class Features:
     """The features that a picture needs; ``dataclasses.replace`` switches more on, which changes no bit of it.
 
     reflection        reflected rays
@@ -53,8 +54,12 @@ class Needs:
     octree: bool
 
 
+# The public name.
+Needs = Features
+
+
 class Finding(NamedTuple):
-    """One feature of ``Needs``: its name, its value, and the reason."""
+    """One feature of ``Features``: its name, its value, and the reason."""
 
     feature: str
     value: bool | int
@@ -63,12 +68,12 @@ class Finding(NamedTuple):
 
 def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
     """The features that a picture of ``scene`` with ``max_depth`` bounces (the scene's own by default) needs, each with
-    its reason, in the order of the fields of ``Needs``.
+    its reason, in the order of the fields of ``Features``.
 
     Only the materials of faces count: one that no face has is not needed.
     """
     depth = scene.render.max_depth if max_depth is None else max_depth
-    present = [i for i in scene.instances if len(i.mesh.faces)]
+    present = _present(scene)
     used = {i.material: scene.materials[i.material] for i in present}
     phong = {name: m for name, m in used.items() if isinstance(m, Phong)}
     # rule: shining-lights
@@ -87,8 +92,8 @@ def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
     )
 
 
-def needs_of(scene: Scene, max_depth: int | None = None) -> Needs:
-    """The ``Needs`` of a picture of ``scene`` with ``max_depth`` bounces, by default the scene's own.
+def needs_of(scene: Scene, max_depth: int | None = None) -> Features:
+    """The ``Features`` of a picture of ``scene`` with ``max_depth`` bounces, by default the scene's own.
 
     Raises ``ValueError`` naming the argument.
 
@@ -98,25 +103,42 @@ def needs_of(scene: Scene, max_depth: int | None = None) -> Needs:
     False
     """
     expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
-    expect(max_depth is None or is_count(max_depth), "max_depth", "an integer >= 0 or None", repr(max_depth))
-    return Needs(**{f.feature: f.value for f in examine(scene, max_depth)})  # type: ignore[arg-type]
+    if max_depth is not None:
+        count_argument("max_depth", max_depth, alternative=" or None")
+    return features_of(examine(scene, max_depth))
 
 
-def checked_needs(needs: Needs | None, scene: Scene, max_depth: int) -> Needs:
+def features_of(findings: tuple[Finding, ...]) -> Features:
+    """The features that ``examine`` found."""
+    return Features(**{f.feature: f.value for f in findings})  # type: ignore[arg-type]
+
+
+def checked_needs(needs: Features | None, scene: Scene, max_depth: int) -> Features:
     """``needs`` if it has all that the picture needs, or what it needs for None. Raises ``ValueError`` otherwise."""
     findings = examine(scene, max_depth)
     if needs is None:
-        return needs_of(scene, max_depth)
-    expect(isinstance(needs, Needs), "needs", "a Needs or None", type(needs).__name__)
+        return features_of(findings)
+    expect(isinstance(needs, Features), "needs", "a Needs or None", type(needs).__name__)
     for finding, (name, given) in zip(findings, asdict(needs).items(), strict=True):
         if name == "lights":
-            least, most = finding.value, len(scene.lights)
-            good = isinstance(given, int) and not isinstance(given, bool) and least <= given <= most
-            expect(good, "needs.lights", f"an integer from {least} to {most}", repr(given))
+            count_argument("needs.lights", given, int(finding.value), len(scene.lights))
         else:
             expect(isinstance(given, bool), f"needs.{name}", "True or False", repr(given))
             expect(given or not finding.value, f"needs.{name}", f"True ({finding.reason})", "False")
     return needs
+
+
+def lit_materials(scene: Scene) -> list[Phong]:
+    """The Phong materials of faces, none where no light shines."""
+    if not any(any(light.row()[4:]) for light in scene.lights):
+        return []
+    used = (scene.materials[i.material] for i in _present(scene))
+    return [material for material in used if isinstance(material, Phong)]
+
+
+def _present(scene: Scene) -> list[Instance]:
+    """The instances that have faces."""
+    return [i for i in scene.instances if len(i.mesh.faces)]
 
 
 def _bounce(feature: str, does: str, depth: int, names: Iterable[str]) -> Finding:
@@ -152,4 +174,4 @@ def _precision(present: list[Instance]) -> Finding:
     return Finding("float64_vertices", count > 0, reason)
 
 
-__all__ = ["FEW_FACES", "Finding", "Needs", "checked_needs", "examine", "needs_of"]
+__all__ = ["FEW_FACES", "Features", "Finding", "checked_needs", "examine", "needs_of"]

@@ -19,7 +19,7 @@ from renderer.lazy import lazy
 from renderer.mesh.load import MESH_SUFFIXES, load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
-from renderer.scene.fields import Color, Fields, FiniteVector, Keys, first_fault, shown
+from renderer.scene.fields import Color, Fields, FiniteVector, Keys, first_fault, shown, thrice
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.showcase import showcase_text
@@ -51,10 +51,6 @@ def _path_or_mesh(value: Any) -> Any:
     if not isinstance(value, str | os.PathLike | Mesh):
         raise ValueError(f"expected a path or a Mesh, got {shown(value)}")
     return value
-
-
-def _uniform(value: Any) -> Any:
-    return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
 # The most that a count can hold, for ``max_rays``.
@@ -121,7 +117,7 @@ class SceneObject(Fields):
     mesh: Annotated[Path | Mesh, BeforeValidator(_path_or_mesh)]
     material: str
     normals: Literal["flat", "smooth"] = "flat"
-    scale: Annotated[FiniteVector, BeforeValidator(_uniform)] = (1.0, 1.0, 1.0)
+    scale: Annotated[FiniteVector, BeforeValidator(thrice)] = (1.0, 1.0, 1.0)
     rotate: FiniteVector = (0.0, 0.0, 0.0)
     translate: FiniteVector = (0.0, 0.0, 0.0)
 
@@ -288,7 +284,7 @@ def _scene_path(path: object) -> Path:
 
 
 def _table(path: Path) -> dict[str, Any]:
-    """What a scene file holds."""
+    """The content of a scene file."""
     try:
         return tomllib.loads(read_whole(path).decode("utf-8-sig"))
     except OSError as error:

@@ -32,7 +32,7 @@ class Together(NamedTuple):
     seen: Spot
     near: Spot
     far: Spot
-    count: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
 
 
 class Media(NamedTuple):
@@ -41,7 +41,7 @@ class Media(NamedTuple):
     """
 
     rows: Any
-    count: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
     limit: int
 
 

@@ -61,7 +61,7 @@ class CameraMap(NamedTuple):
 
     rows: Any
     samples: Any
-    count: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
 
 
 @inlined

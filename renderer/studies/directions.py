@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import count_argument
 
 Floats = NDArray[np.float64]
 
@@ -70,8 +70,7 @@ def reinhart(subdivision: int = 2) -> Pattern:
     >>> [len(reinhart(m).weights) for m in (1, 2, 4)]
     [145, 577, 2305]
     """
-    expect(is_count(subdivision) and 1 <= subdivision <= 64, "subdivision", "an integer from 1 to 64", subdivision)
-    subdivision = int(subdivision)
+    subdivision = count_argument("subdivision", subdivision, 1, 64)
     counts = np.repeat(_TREGENZA, subdivision) * subdivision
     step = np.pi / 2.0 / (len(counts) + 0.5)
     below = np.sin(step * np.arange(len(counts) + 1))
@@ -147,8 +146,7 @@ def turned(directions: Floats, pole: Floats) -> Floats:
 
 def check_count(argument: str, count: Any) -> int:
     """``count``, a number of directions. Raises ``ValueError`` that names the argument for what is none."""
-    expect(is_count(count) and 1 <= count <= MOST, argument, f"an integer from 1 to {MOST}", repr(count))
-    return int(count)
+    return count_argument(argument, count, 1, MOST)
 
 
 def _spiral(height: Floats) -> Floats:

@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import count_argument
+from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.studies.directions import MOST, Pattern, fibonacci_hemisphere, reinhart, tregenza, turned
 from renderer.studies.share import (
@@ -140,8 +141,7 @@ def _patches(patches: int | Pattern) -> Pattern:
         weights = check_weights("patches", patches.weights, len(directions))
         expect(bool(weights.any()), "patches", "a weight that is not 0", "all 0")
         return Pattern(directions, weights)
-    good = is_count(patches) and 1 <= patches <= MOST
-    expect(good, "patches", f"an integer from 1 to {MOST}, or a Pattern", repr(patches))
+    patches = count_argument("patches", patches, 1, MOST, ", or a Pattern")
     if patches in (145, 577):
         return tregenza() if patches == 145 else reinhart(2)
-    return fibonacci_hemisphere(int(patches))
+    return fibonacci_hemisphere(patches)

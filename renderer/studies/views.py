@@ -10,18 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.arguments.arrays import flag_argument, real_array
+from renderer.arguments.counts import count_argument
 from renderer.arguments.points import check_points, farthest_of
 from renderer.distance.on_surface import on_surface
-from renderer.errors import expect, is_count
+from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
 from renderer.queryable import Queries
+from renderer.results.hits import Hits, points_on
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
 from renderer.studies.edge_on import are_edge_on
 from renderer.studies.share import check_directions, lengths_of, limits_of
 from renderer.system.terminal import progress_bar
 from renderer.trace.batch import Leaving, check_rays, moved_off
 from renderer.trace.closest import closest_hits
-from renderer.trace.hits import Hits, points_on
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import ANCHOR, CODE, FACE, HEAD, ROW, WAY
 from renderer.trace.starts.search import side_taken
@@ -87,14 +88,14 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
     """
     _expect_octree(octree)
     place = _one_place("eye", eye, octree)
-    expect(is_count(cuts) and 1 <= cuts <= _MOST_CUTS, "cuts", f"an integer from 1 to {_MOST_CUTS}", repr(cuts))
+    cuts = count_argument("cuts", cuts, 1, _MOST_CUTS)
     mesh = octree.mesh
     seen = np.zeros(len(mesh.faces), np.bool_)
     with progress_bar(len(seen), "face", flag_argument("progress", progress)) as update:
         for begin in range(0, len(seen), _ROWS):
             corners = mesh.vertices[mesh.faces[begin : begin + _ROWS]]
             left = begin + np.flatnonzero(face_normals(corners).any(axis=1) & ~are_edge_on(corners, place))
-            for u, v in _centroids(int(cuts)):
+            for u, v in _centroids(cuts):
                 points = points_on(mesh, left, np.full(len(left), u), np.full(len(left), v))
                 # rule: faces-in-view
                 reached = octree.visible(points, place, leaving=left)
@@ -123,10 +124,8 @@ def depth_map(octree: Queries, camera: Camera, width: int, height: int, *, progr
     array([[inf,  2., inf]])
     """
     _expect_octree(octree)
-    for argument, value in (("width", width), ("height", height)):
-        expect(is_count(value) and 1 <= value <= 1 << 16, argument, "an integer from 1 to 65536", repr(value))
+    width, height = count_argument("width", width, 1, 1 << 16), count_argument("height", height, 1, 1 << 16)
     expect(callable(getattr(camera, "rows", None)), "camera", "a camera", type(camera).__name__)
-    width, height = int(width), int(height)
     rows, depth = _rows_of(camera, width, height), np.empty((height, width))
     lines, x = max(1, _ROWS // width), np.arange(width)[:, None] + 0.5
     with progress_bar(height, "line", flag_argument("progress", progress)) as update:

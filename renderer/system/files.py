@@ -42,7 +42,7 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], o
     Temporary files that killed processes left of the same file are removed.
     """
     with _temporary_beside(path) as (temporary, target):
-        if _is_special(target):
+        if is_special(target):
             with open(target, "wb") as file:
                 write(file)
             return
@@ -73,7 +73,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
             target.lstat()  # a name too long, which some versions of Python take for no folder
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
-        if not _is_special(target):
+        if not is_special(target):
             temporary.touch(exist_ok=False)
             temporary.unlink(missing_ok=True)  # who finds it left may have been faster
 
@@ -141,13 +141,13 @@ def _remove_unlocked(path: Path) -> None:
 
 
 def _beginning(target: Path) -> str:
-    """How the names of temporary files of ``target`` begin: a name has at most 255 bytes, a character up to four."""
+    """The beginning of temporary files' names: a name has at most 255 bytes, a character up to four."""
     return f".{target.name[:60]}."
 
 
-def _is_special(target: Path) -> bool:
-    """Whether it exists and is neither a file nor a folder; a folder is an error in any case."""
-    return target.exists() and not (target.is_file() or target.is_dir())
+def is_special(path: Path) -> bool:
+    """Whether it is a pipe, which may have no writer, or a device, which may have no end."""
+    return path.exists() and not (path.is_file() or path.is_dir())
 
 
 @contextmanager

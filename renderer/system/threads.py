@@ -7,12 +7,10 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from concurrent.futures import thread as pools
 from functools import cache
-from numbers import Integral
-from threading import Lock, current_thread
+from threading import Lock
 
-from renderer.errors import expect
+from renderer.arguments.counts import count_argument
 
 # The pool's threads: at least so many, and so many per processor. More would not change results.
 _LEAST_POOL, _PER_PROCESSOR = 16, 4
@@ -29,11 +27,7 @@ def available_threads() -> int:
 
 def checked_threads(threads: int | None) -> int:
     """``threads``, or all available processors for None."""
-    if threads is None:
-        return available_threads()
-    good = isinstance(threads, Integral) and not isinstance(threads, bool) and threads >= 1
-    expect(good, "threads", "an integer >= 1 or None", repr(threads))
-    return int(threads)
+    return available_threads() if threads is None else count_argument("threads", threads, 1, alternative=" or None")
 
 
 @cache
@@ -61,93 +55,87 @@ def for_chunks(
     one yields, by one thread at a time. On an exception, Ctrl-C included, no further chunk starts, the running ones end
     or stop, and it is raised here. ``work`` must not call ``for_chunks``: it might wait for itself.
     """
-    begins = iter(range(0, count, size))
-    taking, shared = Lock(), _Shared()
-
-    def tell(items: int) -> None:
-        if finished is not None:
-            with taking:
-                finished(items)
-
-    def take_chunks(helps: bool = False) -> None:
-        while not (shared.stopped or (helps and shared.is_left())):
-            with taking:
-                begin = next(begins, None)
-            if begin is None:
-                return
-            end = min(begin + size, count)
-            try:
-                for _ in work(begin, end) or ():
-                    if shared.stopped:
-                        return
-                    if helps and shared.is_left():
-                        raise RuntimeError("the interpreter ends while a daemon's work is under way")
-                    tell(0)
-                tell(end - begin)
-            except BaseException:
-                shared.stopped = True
-                raise
-
-    def help_out() -> None:
-        with taking:
-            if shared.stopped:
-                return
-            shared.helpers.append(None)
-        try:
-            take_chunks(helps=True)
-        finally:
-            shared.helpers.pop()
-
-    running: list[Future[None]] = []
+    chunks, running = _Chunks(work, count, size, finished), list[Future[None]]()
     try:
         # The caller's own thread takes chunks too, so the work starts without waiting for another to wake up.
-        _start(help_out, min(threads, -(-count // size)) - 1, running)
-        take_chunks()
+        _start(chunks.help, min(threads, -(-count // size)) - 1, running)
+        chunks.take()
         for future in running:
             # A helper that has not begun, because other calls keep the pool busy, has nothing left to take.
             if not future.cancel():
                 future.result()
     finally:
-        _stop_helpers(shared, taking)
+        chunks.stop()
 
 
-class _Shared:
-    """The state that the threads of one call share: whether all shall stop, and an entry for each helper at work.
+class _Chunks:
+    """The chunks of one call, which several threads take; by plain flags, as no signal can lose these."""
 
-    A daemon's helpers leave it when the interpreter ends, which waits for all threads of pools. A chunk that they had
-    begun is an error then; a daemon that lives on, beside other threads, works alone.
-    """
+    def __init__(
+        self,
+        work: Callable[[int, int], Iterator[None] | None],
+        count: int,
+        size: int,
+        finished: Callable[[int], object] | None,
+    ) -> None:
+        self._work, self._count, self._size, self._finished = work, count, size, finished
+        self._begins = iter(range(0, count, size))
+        self._lock = Lock()
+        self._stopped = False
+        self._helpers: list[None] = []  # an entry for each at work
 
-    def __init__(self) -> None:
-        self.stopped = False
-        self.helpers: list[None] = []
-        self._daemon = current_thread().daemon
+    def take(self) -> None:
+        """Work on chunks until none is left or all shall stop."""
+        while not self._stopped:
+            with self._lock:
+                begin = next(self._begins, None)
+            if begin is None:
+                return
+            end = min(begin + self._size, self._count)
+            try:
+                for _ in self._work(begin, end) or ():
+                    if self._stopped:
+                        return
+                    self._tell(0)
+                self._tell(end - begin)
+            except BaseException:
+                self._stopped = True
+                raise
 
-    def is_left(self) -> bool:
-        """Whether helpers leave a daemon alone."""
-        # The flag by which pools refuse new work then. It is private: without it Ctrl-C waits for a daemon's helpers.
-        return self._daemon and getattr(pools, "_shutdown", False)
-
-
-def _stop_helpers(shared: _Shared, taking: Lock) -> None:
-    """Return when no helper is at work any more, whatever signals raise here: they write to memory of the caller's.
-
-    By plain flags: interrupted at the wrong moment, an ``Event`` keeps its lock for good, and a future just submitted
-    is lost.
-    """
-    interrupted: BaseException | None = None
-    while True:
+    def help(self) -> None:
+        """``take`` on a thread that ``stop`` waits for."""
+        with self._lock:
+            if self._stopped:
+                return
+            self._helpers.append(None)
         try:
-            shared.stopped = True
-            with taking:
-                pass  # a helper that begins from here on sees it
-            while shared.helpers:
-                time.sleep(_MOMENT)
-            break
-        except BaseException as error:  # of Ctrl-C, a time limit, or another handler's
-            interrupted = error
-    if interrupted is not None:
-        raise interrupted
+            self.take()
+        finally:
+            self._helpers.pop()
+
+    def stop(self) -> None:
+        """Return when no helper is at work any more, whatever signals raise here: they write to the caller's memory.
+
+        Interrupted at the wrong moment, an ``Event`` keeps its lock for good, and a future just submitted is lost.
+        """
+        interrupted: BaseException | None = None
+        while True:
+            try:
+                self._stopped = True
+                with self._lock:
+                    pass  # a helper that begins from here on sees it
+                while self._helpers:
+                    time.sleep(_MOMENT)
+                break
+            except BaseException as error:  # of Ctrl-C, a time limit, or another handler's
+                interrupted = error
+        if interrupted is not None:
+            raise interrupted
+
+    def _tell(self, items: int) -> None:
+        if self._finished is not None:
+            with self._lock:
+                self._finished(items)
 
 
 def _start(work: Callable[[], None], count: int, running: list[Future[None]]) -> None:

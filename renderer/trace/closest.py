@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
+from renderer.results.hits import Hits
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, NO_STARTS, RayBatch, reject
-from renderer.trace.hits import Hits
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HIT_ROWS

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.results.hits import AllHits, Hits
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch
 from renderer.trace.error_bounds import bound_errors
-from renderer.trace.hits import AllHits, Hits
 
 
 def add_errors(

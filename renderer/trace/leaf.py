@@ -47,7 +47,7 @@ class TreePointers(NamedTuple):
     wide_blocks: Any
     wide: Any
     faces: Any
-    count: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
     has_nodes: bool
     scale: float
 

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer.arguments.arrays import real_argument
 from renderer.errors import expect
+from renderer.results.hits import Hits, Passage
 from renderer.trace.batch import Leaving, check_faces
-from renderer.trace.hits import Hits, Passage
 from renderer.trace.starts.record import ABOVE, BARYCENTRIC, KNOWN, THROUGH
 
 

@@ -1,14 +1,13 @@
 """The steps of the search for a ray's closest hit, counted: what heat maps of a tree's quality are made of."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import at, get, lowest_bit, pointer, put, store
+from renderer.results.steps import Steps
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.intersect import box_limit
@@ -22,24 +21,6 @@ _WORD = 0xFFFFFFFF
 # The nodes and triangles that a call tests, beside those of one ray: some milliseconds, so that Ctrl-C need not wait
 # for long.
 _WORK = 1 << 18
-
-
-@dataclass(eq=False, slots=True)
-class Steps:
-    """Steps of the search for each ray's closest hit, of a ray that travels alone and goes to the nearest boxes first.
-
-    nodes      (...) int64, the nodes entered, whose eight boxes are tested at once
-    triangles  (...) int64, the triangles tested
-
-    >>> from renderer import Octree
-    >>> from renderer.mesh.shapes import box
-    >>> steps = Octree.from_mesh(box()).count_steps([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
-    >>> steps.nodes, steps.triangles
-    (array([1, 1]), array([4, 0]))
-    """
-
-    nodes: NDArray[np.int64]
-    triangles: NDArray[np.int64]
 
 
 def count_steps(tree: Tree, rays: RayBatch, shape: tuple[int, ...], threads: int) -> Steps:

@@ -19,7 +19,7 @@ class Bins(NamedTuple):
 
     low: tuple
     scale: tuple
-    count: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
 
 
 class BinScratch(NamedTuple):

@@ -32,7 +32,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.errors import expect, is_count
+from renderer.arguments.counts import is_count
+from renderer.errors import expect
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.system.files import as_path, write_atomically
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, NODE_WORDS, Tree, cache_aligned, locked
@@ -212,8 +213,7 @@ def _parsed(text: bytes, begin: int) -> tuple[_Header, int]:
     good = isinstance(described, dict) and sorted(described) == sorted(keys)
     expect(good, "header", f"the keys {keys}", _shown(described))
     depth, scale, name, listed = (described[key] for key in keys)
-    good = is_count(depth) and depth <= _MAX_LEVELS
-    expect(good, "depth", f"an integer from 0 to {_MAX_LEVELS}", _shown(depth))
+    expect(is_count(depth, 0, _MAX_LEVELS), "depth", f"an integer from 0 to {_MAX_LEVELS}", _shown(depth))
     good = isinstance(scale, float) and math.frexp(scale)[0] == 0.5
     expect(good, "scale", "a power of two", _shown(scale))
     expect(isinstance(name, str), "name", "a string", _shown(name))
@@ -237,7 +237,7 @@ def _section(entry: Any, begin: int) -> tuple[str, _Section]:
     expect(isinstance(name, str) and name in _KINDS, "arrays", f"names among {sorted(_KINDS)}", _shown(name))
     dtypes, row = _KINDS[name]
     expect(dtype in dtypes, name, f"the type {' or '.join(dtypes)}", _shown(dtype))
-    good = is_count(rows) and rows < 2**32 and is_count(crc) and crc < 2**32
+    good = is_count(rows, 0, 2**32 - 1) and is_count(crc, 0, 2**32 - 1)
     expect(good, name, "rows and crc32 from 0 to 2^32 - 1", f"{_shown(rows)} and {_shown(crc)}")
     return name, _Section(np.dtype(dtype), (rows, *row), begin, crc)
 

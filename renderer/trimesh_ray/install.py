@@ -3,6 +3,7 @@
 import copyreg
 import importlib
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import RLock
@@ -14,9 +15,9 @@ from renderer.trimesh_ray import distances, intersector
 # What stood in a module or in ``sys.modules`` before, by the module's name and the attribute's; None for nothing.
 _before: dict[tuple[str, str], Any] = {}
 _MODULES = "sys.modules"
-# Who wants it: of ``install()`` and of each block under way, whether proximity too. The first may be absent.
-_installed: list[bool] = []
-_blocks: list[list[bool]] = []
+# What is wanted, rays alone (False) or proximity too (True): by ``install()``, and by how many blocks under way.
+_installed: set[bool] = set()
+_blocks: Counter[bool] = Counter()
 _changing = RLock()
 
 
@@ -30,7 +31,7 @@ def install(proximity: bool = False) -> None:
     what they name, and a mesh made with ``use_embree=False`` has trimesh's own intersector.
     """
     with _changing:
-        _installed[:] = [proximity or any(_installed)]
+        _installed.add(bool(proximity))
         _apply()
 
 
@@ -44,25 +45,23 @@ def uninstall() -> None:
 @contextmanager
 def installed(proximity: bool = False) -> Iterator[None]:
     """``install()`` for a block; blocks may overlap, on several threads too."""
-    block = [proximity]
     with _changing:
-        _blocks.append(block)
+        _blocks[bool(proximity)] += 1
         _apply()
     try:
         yield
     finally:
         with _changing:
-            # By identity: others may be equal.
-            _blocks[:] = [other for other in _blocks if other is not block]
+            _blocks[bool(proximity)] -= 1
             _apply()
 
 
 def _apply() -> None:
     """Put in place, or give back, what is wanted now."""
-    wanted = [*_installed, *(block[0] for block in _blocks)]
+    wanted = _installed | {*_blocks.elements()}
     names = [("trimesh.ray", "ray_pyembree"), ("trimesh.ray", "has_embree"), (_MODULES, "trimesh.ray.ray_pyembree")]
     ours = dict(zip(names, (intersector, True, intersector), strict=True)) if wanted else {}
-    if any(wanted):
+    if True in wanted:
         for name in ("closest_point", "signed_distance"):
             ours["trimesh.proximity", name] = getattr(distances, name)
     for key in [key for key in _before if key not in ours]:

@@ -129,7 +129,7 @@ def _computed(
 
 
 def _shares(size: tuple[int, int], finished: Callable[[float], object]) -> Callable[[int], object]:
-    number = tiles(size)
+    number = tiles(*size)
     return lambda done: finished(done / number)
 
 
@@ -142,9 +142,10 @@ def _for_others(shown: ShownScene, settings: ViewSettings) -> Scene:
 
 
 def heat_map(comparison: Comparison) -> tuple[NDArray[np.uint8], Limits]:
-    """Where the pictures differ, (h, w, 3) uint8, and the differences at the ends of its scale, which is logarithmic:
-    a difference of one unit in the last place is to be seen beside a missing shadow. Pixels that are the same to the
-    bit are dark grey; where all are, the limits are (0, 0).
+    """The differences of the pictures as colours, (h, w, 3) uint8, and the ends of their scale.
+
+    The scale is logarithmic: a difference of one unit in the last place is to be seen beside a missing shadow. Pixels
+    that are the same to the bit are dark grey; where all are, the ends are (0, 0).
     """
     difference = comparison.difference
     colors = np.full((*difference.shape, 3), _SAME, np.uint8)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
+from renderer.picture.encoding import encoded
 from renderer.scene.camera import unit
 from renderer.viewer.passes import Pass, colored, passes_of
 from renderer.viewer.protocol import FILE, CameraMessage, Rows, Still, Turntable, packed
@@ -39,11 +40,7 @@ def still(shown: ShownScene, asked: Still, finished: Callable[[float], object]) 
 
     ``finished(rays)`` is called with camera rays that are traced, of ``work(asked)`` in all; what it raises ends it.
     """
-    from PIL import Image as Pillow  # not needed before a file is made
-
-    buffer = io.BytesIO()
-    Pillow.fromarray(_pixels(shown, _view(asked, asked.m), finished)).save(buffer, "png")
-    return buffer.getvalue()
+    return encoded(_pixels(shown, _view(asked, asked.m), finished))
 
 
 def turntable(shown: ShownScene, asked: Turntable, finished: Callable[[float], object]) -> bytes:

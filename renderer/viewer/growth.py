@@ -1,4 +1,4 @@
-"""How much the picture of a camera at rest still changes."""
+"""The change that is left in the picture of a camera at rest."""
 
 from typing import Any
 

@@ -1,6 +1,5 @@
 """The pictures that answer one view: small ones at once, the full one when it is done, finer ones while it rests."""
 
-import io
 import struct
 import time
 from collections.abc import Callable
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from renderer.diagnostics.face_phong import face_colors
 from renderer.diagnostics.false_color import Limits, false_color, limits_of, scale_colors, shades_of
 from renderer.diagnostics.ray_cost import camera_steps
+from renderer.picture.encoding import encoded
 from renderer.picture.image import Image, srgb
 from renderer.picture.prepare import TILE, tiles
 from renderer.trace.spawn import BOUNDED
@@ -182,8 +182,10 @@ def _colored(shown: ShownScene, view: CameraMessage, *_: object) -> _Payload:
 def _traced(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]) -> _Payload:
     """A picture, or a band of one."""
     aov, (rgb, limits, rays) = view.settings.aov, colored(shown, view, wanted, finished)
-    kind, payload = (JPEG, _jpeg(rgb)) if view.settings.pixels == "jpeg" else (RGBA, _rgba(rgb))
-    return _Payload(kind, payload, rays, _legend(aov, limits) if aov in _SCALED else None, rgb)
+    legend = _legend(aov, limits) if aov in _SCALED else None
+    if view.settings.pixels == "jpeg":
+        return _Payload(JPEG, encoded(rgb, "jpeg", quality=_JPEG_QUALITY), rays, legend, rgb)
+    return _Payload(RGBA, _rgba(rgb), rays, legend, rgb)
 
 
 def colored(
@@ -203,7 +205,7 @@ def _proven(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Call
     """Both pictures of a comparison, and their heat map."""
     comparison = compared(shown, view, wanted.size, finished)
     heat, limits = heat_map(comparison)
-    files = [_png(rgb) for rgb in (*map(srgb, comparison.pictures), heat)]
+    files = [encoded(rgb, compress_level=_PNG_EFFORT) for rgb in (*map(srgb, comparison.pictures), heat)]
     told = _legend("difference", limits) | comparison.described() | {"type": "proof"}
     payload = b"".join(chain(*((struct.pack("<I", len(file)), file) for file in files)))
     return _Payload(PROOF, payload, told=told, comparison=comparison)
@@ -216,14 +218,14 @@ _PAYLOADS: dict[Mode, Callable[[ShownScene, CameraMessage, Pass, Callable[[float
 
 
 def _legend(aov: str, limits: Limits) -> dict[str, Any]:
-    """What is told of a scale of colours: its ends, and the colours at even steps between them."""
+    """The legend of a scale of colours: its ends, and the colours at even steps between them."""
     return {"type": "legend", "aov": aov, "low": limits[0], "high": limits[1], "colors": scale_colors(aov).tolist()}
 
 
 def _steps(
     shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object]
 ) -> tuple[NDArray[np.uint8], Limits, float]:
-    """What the camera rays test, as colours, the ends of their scale, and rays per second."""
+    """The steps of the camera rays as colours, the ends of their scale, and rays per second."""
     began = time.perf_counter()
     prepared = shown.brute if view.mode == "brute" else shown.prepared
     camera = camera_of(view.m, view.fovy, height=view.height)
@@ -242,7 +244,7 @@ def picture(
     camera = camera_of(view.m, view.fovy, height=view.height)
     planes = ("rays", *_PLANES[view.settings.aov])
     first, end = wanted.band or (0, wanted.size[1])
-    number = tiles((wanted.size[0], end - first))
+    number = tiles(wanted.size[0], end - first)
     return prepared.picture(
         camera, settings, BOUNDED, shown.threads, lambda done: finished(done / number), planes, wanted.band
     )
@@ -256,19 +258,3 @@ def _rgba(rgb: NDArray[np.uint8]) -> bytes:
     opaque = np.full((*rgb.shape[:2], 4), 255, np.uint8)
     opaque[..., :3] = rgb
     return opaque.tobytes()
-
-
-def _jpeg(rgb: NDArray[np.uint8]) -> bytes:
-    from PIL import Image as Pillow  # not needed where a page asks for "rgba"
-
-    buffer = io.BytesIO()
-    Pillow.fromarray(rgb).save(buffer, "jpeg", quality=_JPEG_QUALITY)
-    return buffer.getvalue()
-
-
-def _png(rgb: NDArray[np.uint8]) -> bytes:
-    from PIL import Image as Pillow
-
-    buffer = io.BytesIO()
-    Pillow.fromarray(rgb).save(buffer, "png", compress_level=_PNG_EFFORT)
-    return buffer.getvalue()

@@ -62,7 +62,7 @@ def description(shown: ShownScene) -> dict[str, Any]:
 
 
 class Payload(NamedTuple):
-    """What a client gets: its size in bytes, and the pieces that are sent as fast as the client reads."""
+    """Data for a client: its size in bytes, and the pieces that are sent as fast as the client reads."""
 
     size: int
     pieces: Iterator[bytes]

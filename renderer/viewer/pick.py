@@ -9,9 +9,9 @@ from renderer.diagnostics.ray_path import Segment, ray_path
 from renderer.diagnostics.ray_step import Vector
 from renderer.diagnostics.tree_boxes import Visit, visited
 from renderer.picture.prepare import PreparedScene
+from renderer.results.hits import Hits
 from renderer.shade.records import MATERIAL_COLUMNS
 from renderer.shade.surface import surface_of
-from renderer.trace.hits import Hits
 from renderer.viewer.compare import Comparison
 from renderer.viewer.protocol import Pick
 from renderer.viewer.shown import ShownScene, varied

@@ -68,7 +68,7 @@ class _Sized(_Message):
 
 
 class Edits(_Message):
-    """What the page has in place of the file's: materials by their names, and all lights or null for the file's."""
+    """The page's changes of the file: materials by their names, and all lights or null for the file's."""
 
     materials: Annotated[dict[str, AnyMaterial], Field(max_length=MAX_EDITS)] = {}
     lights: Annotated[tuple[AnyLight, ...], Field(max_length=MAX_EDITS)] | None = None

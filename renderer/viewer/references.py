@@ -57,7 +57,7 @@ def reference_picture(
 
 
 def _heard(other: "subprocess.Popen[bytes]", asked: bytes) -> Iterator[object]:
-    """What the other process tells once it is ``asked``, until it ends; and 0.0 where it tells nothing for a while."""
+    """The messages of the other process, once it is ``asked``, until it ends; 0.0 where none comes for a while."""
     assert other.stdin is not None and other.stdout is not None
     heard: SimpleQueue[Any] = SimpleQueue()
     # It waits for the pipe on a thread, since only the other process ends such a wait.

@@ -14,10 +14,11 @@ from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene,
 from renderer.precompile import touch_viewing
 from renderer.scene.camera import unit
 from renderer.scene.hide import object_names, without
-from renderer.scene.needs import Needs, needs_of
+from renderer.scene.needs import Features, needs_of
 from renderer.scene.scene import RenderSettings, Scene, load_scene, mesh_files
 from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
+from renderer.system.files import is_special
 from renderer.system.threads import available_threads
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer.protocol import Edits, ViewSettings
@@ -27,7 +28,7 @@ _CAMERA_BYTES = 16384
 
 
 class _Mark(NamedTuple):
-    """What tells a file from one that was edited since: nanoseconds of its last change, bytes, and its number."""
+    """The mark by which a file that was edited since is told: nanoseconds of its last change, bytes, and its number."""
 
     changed: int
     size: int
@@ -72,7 +73,7 @@ class ShownScene:
         """
         if self.path is None:
             return []
-        beside = {path.name for path in self.path.parent.glob("*.toml") if not (_is_special(path) or _is_camera(path))}
+        beside = {path.name for path in self.path.parent.glob("*.toml") if not (is_special(path) or _is_camera(path))}
         return sorted(name for name in beside | {self.path.name} if name.encode(errors="replace").decode() == name)
 
     @property
@@ -111,11 +112,6 @@ def _mark(path: Path) -> _Mark | None:
     return _Mark(found.st_mtime_ns, found.st_size, found.st_ino)
 
 
-def _is_special(path: Path) -> bool:
-    """Whether it is a pipe, which may have no writer, or a device, which may have no end."""
-    return path.exists() and not (path.is_file() or path.is_dir())
-
-
 def _is_camera(path: Path) -> bool:
     """Whether a file holds what the viewer saves and nothing else: a scene has materials."""
     try:
@@ -144,14 +140,14 @@ def prepare_shown(scene: Scene, path: Path | None = None) -> ShownScene:
     return ShownScene(scene, path, prepared, threads)
 
 
-def _needs(scene: Scene) -> Needs:
+def _needs(scene: Scene) -> Features:
     """The needs of the scene's pictures with at least one bounce, because a panel may ask for more than the file does;
     they are the same for any number above.
     """
     return needs_of(scene, max_depth=max(1, scene.render.max_depth))
 
 
-def _lit(arrays: SceneArrays, scene: Scene, needs: Needs) -> SceneArrays:
+def _lit(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
     """``arrays`` with the scene's lights. None are packed for a scene of mirrors and glass alone, which needs none; but
     its face colours need them.
     """

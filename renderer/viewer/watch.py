@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 
 class Watch:
-    """What is known of the files of scenes on show."""
+    """The files of scenes on show, as they were seen last."""
 
     def __init__(self) -> None:
         self._seen: Mapping[ShownScene, Marks] = {}

@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import meshes, options, rays_at
@@ -13,8 +14,8 @@ from renderer.all_hits import all_hits as module
 from renderer.all_hits.candidates import LISTED
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.octree import BruteForce, Octree
+from validation.meshes import loose
 from validation.oracle.contacts import contacts, hits
-from validation.stability.cases.judgement import both, soup_of
 
 pytestmark = pytest.mark.judges(
     "AllHits", "AllHits.counts", "AllHits.normals", "AllHits.ray", "BruteForce.all_hits", "BruteForce.count_hits",
@@ -38,14 +39,14 @@ def flattened(mesh):
 
 SOLIDS = {
     "box": box((-2, -2, -2), (2, 2, 2)),
-    "nested": both(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -1), (1, 1, 1))),
-    "touching": both(box((-2, -2, -2), (0, 2, 2)), box((0, -2, -2), (2, 2, 2))),
-    "doubled": both(box((-2, -2, -2), (2, 2, 2)), box((-2, -2, -2), (2, 2, 2))),
-    "thin": flattened(both(box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -2), (2, 2, 3)))),
+    "nested": Mesh.concatenate([box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -1), (1, 1, 1))]),
+    "touching": Mesh.concatenate([box((-2, -2, -2), (0, 2, 2)), box((0, -2, -2), (2, 2, 2))]),
+    "doubled": Mesh.concatenate([box((-2, -2, -2), (2, 2, 2)), box((-2, -2, -2), (2, 2, 2))]),
+    "thin": flattened(Mesh.concatenate([box((-2, -2, -2), (2, 2, 2)), box((-1, -1, -2), (2, 2, 3))])),
     "star": rounded(icosphere(1), 4),
     "ring": rounded(torus(around=6, across=4), 3),
     "grid": rounded(grid(6, 6), 6),
-    "soup": soup_of(rounded(icosphere(1), 3)),
+    "soup": loose(rounded(icosphere(1), 3).triangles),
     "slivers": Mesh(
         [[0, 0, 0], [4, 0, 0], [2, 0, 0], [2, 3, 0], [2, -3, 1], [1, 1, 1], [1, 1, 1]],
         [[0, 1, 3], [0, 2, 1], [0, 4, 2], [2, 4, 1], [5, 6, 5], [5, 3, 6]],
@@ -113,10 +114,10 @@ def test_laws(mesh, chosen, seed):
     assert_laws(Octree(*mesh, **chosen), BruteForce(*mesh, threads=1), (origins, directions, *bounds))
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-6, 1.0, 1e6, 1e150])
+@cases("scale", [1e-300, 1e-6, 1.0, 1e6, 1e150])
 def test_laws_at_any_size(scale):
     rng = np.random.default_rng(1)
-    for mesh in (icosphere(2), soup_of(torus(around=12, across=8))):
+    for mesh in (icosphere(2), loose(torus(around=12, across=8).triangles)):
         mesh = Mesh(mesh.vertices * scale, mesh.faces)
         corners = mesh.triangles[rng.integers(0, len(mesh.faces), 600)]
         share = rng.choice([0.0, 0.3, 0.5, 1.0], (600, 1))
@@ -132,7 +133,7 @@ def test_rays_through_a_closed_mesh_pass_it_an_even_number_of_times():
     share = rng.choice([0.0, 0.25, 0.5, 1.0, rng.random()], (20_000, 1))
     targets = 0.9 * (corners[:, 0] * share + corners[:, 1] * (1 - share))
     origins = 3.0 * targets / np.linalg.norm(targets, axis=1)[:, None]
-    for mesh in (ball, soup_of(ball)):
+    for mesh in (ball, loose(ball.triangles)):
         assert (Octree.from_mesh(mesh).count_hits(origins, -origins) == 2).all()
 
 
@@ -213,7 +214,7 @@ def test_faces_are_left():
     ) == [1]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("options", "told"),
     [
         ({"max_hits": 0}, "max_hits: expected an integer >= 1 or None, got 0"),
@@ -258,7 +259,7 @@ def test_many_callers_while_one_refits():
     assert not wrong
 
 
-@pytest.mark.parametrize("count", [LISTED - 1, LISTED, LISTED + 1, LISTED + 2])
+@cases("count", [LISTED - 1, LISTED, LISTED + 1, LISTED + 2])
 def test_a_ray_may_meet_as_many_blocks_as_are_listed_and_one_more(count):
     layers = np.tile([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], (count, 1))
     layers[:, 2] = np.repeat(np.arange(count), 3)

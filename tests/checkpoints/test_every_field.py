@@ -13,11 +13,11 @@ from scenery import scenery
 
 from renderer import Mesh, Octree
 from renderer.checkpoints.parts import Parts
-from renderer.checkpoints.study import KINDS, Points, Study, run
-from renderer.checkpoints.study_points import on_faces
+from renderer.checkpoints.study import KINDS, Study, run
 from renderer.cluster import run_on
 from renderer.cluster import studies as on_cluster
 from renderer.studies import tregenza
+from renderer.studies.points import Points, on_faces
 
 # What a run has of its own, and no option of a study.
 OF_POINTS = {"octree", "points", "normals", "leaving", "threads", "progress"}

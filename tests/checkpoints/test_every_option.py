@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomlkit
+from cases import cases
 from scenery import scenery
 
 from renderer import Mesh, Octree, load_mesh
@@ -130,8 +131,8 @@ def test_every_option_has_a_case() -> None:
     "octree-render study --faces", "octree-render study --patches", "octree-render study --samples",
     "octree-render study kind",
 )  # fmt: skip
-@pytest.mark.parametrize("where", [[], ["--cluster"]], ids=["here", "cluster"])
-@pytest.mark.parametrize("name", [*FUNCTIONS, *KINDS])
+@cases("where", [[], ["--cluster"]])
+@cases("name", [*FUNCTIONS, *KINDS])
 def test_the_answers_are_those_of_the_function_with_the_options_argument(
     folder: Path, tmp_path: Path, name: str, where: list[str]
 ) -> None:

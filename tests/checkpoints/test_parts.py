@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.checkpoints import parts as module
 from renderer.checkpoints.parts import Parts, Plan, digest_of
@@ -41,8 +42,16 @@ def test_a_run_goes_on_where_it_was_killed_and_joins_the_parts_in_order(tmp_path
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("spoil", [lambda b: b[:-1], lambda b: b"", lambda b: bytes([b[0] ^ 1]) + b[1:],
-                                   lambda b: b[:-1] + bytes([b[-1] ^ 1]), lambda b: b + b"0"])  # fmt: skip
+@cases(
+    "spoil",
+    [
+        lambda b: b[:-1],
+        lambda b: b"",
+        lambda b: bytes([b[0] ^ 1]) + b[1:],
+        lambda b: b[:-1] + bytes([b[-1] ^ 1]),
+        lambda b: b + b"0",
+    ],
+)
 def test_a_part_that_a_disk_has_spoilt_is_done_again(tmp_path: Path, spoil: object) -> None:
     parts = Parts(tmp_path / "parts", PLAN)
     _write(parts, 1)
@@ -55,13 +64,15 @@ def test_every_field_of_a_plan_has_another_value() -> None:
     assert OTHERS.keys() == {field.name for field in fields(Plan)}
 
 
-@pytest.mark.parametrize(
+@cases(
     "other, said",
-    [*((replace(PLAN, **{name: OTHERS[name]}), name) for name in OTHERS if name != "made_of"),
-     (replace(PLAN, made_of={"kind": "sun", "options": {"patches": 145}}), "kind"),
-     (replace(PLAN, made_of={"kind": "sky", "options": {"patches": 577}}), "options"),
-     (replace(PLAN, made_of=OTHERS["made_of"]), "mesh")],
-)  # fmt: skip
+    [
+        *((replace(PLAN, **{name: OTHERS[name]}), name) for name in OTHERS if name != "made_of"),
+        (replace(PLAN, made_of={"kind": "sun", "options": {"patches": 145}}), "kind"),
+        (replace(PLAN, made_of={"kind": "sky", "options": {"patches": 577}}), "options"),
+        (replace(PLAN, made_of=OTHERS["made_of"]), "mesh"),
+    ],
+)
 def test_parts_of_another_study_are_refused_and_kept(tmp_path: Path, other: Plan, said: str) -> None:
     _write(Parts(tmp_path / "parts", PLAN), 0)
     with pytest.raises(ValueError, match=f"whose {said} differ; remove the folder"):
@@ -69,7 +80,7 @@ def test_parts_of_another_study_are_refused_and_kept(tmp_path: Path, other: Plan
     assert Parts(tmp_path / "parts", PLAN).missing() == [1, 2]
 
 
-@pytest.mark.parametrize("other", [PLAN, *(replace(PLAN, **{name: value}) for name, value in OTHERS.items())])
+@cases("other", [PLAN, *(replace(PLAN, **{name: value}) for name, value in OTHERS.items())])
 def test_parts_that_a_removal_cut_short_left_are_those_of_their_run_alone(tmp_path: Path, other: Plan) -> None:
     """Its manifest went first: a run of another plan took its parts for its own, and its result was wrong."""
     _write(Parts(tmp_path / "parts", PLAN), 0)
@@ -83,7 +94,7 @@ def test_a_part_is_none_under_another_number(tmp_path: Path) -> None:
     assert Parts(tmp_path / "parts", PLAN).missing() == [0, 1, 2]
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{", "\x00"])
+@cases("text", ["", "[]", "{", "\x00"])
 def test_a_manifest_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(ValueError, match="expected the manifest of a run"):
@@ -110,8 +121,8 @@ def test_digests_tell_shapes_types_and_bytes_apart() -> None:
     assert digest_of(np.arange(6).reshape(2, 3).T) == digest_of(np.ascontiguousarray(np.arange(6).reshape(2, 3).T))
 
 
-@pytest.mark.parametrize("width", [0, 3])
-@pytest.mark.parametrize("most", [1, 30, 1 << 20])
+@cases("width", [0, 3])
+@cases("most", [1, 30, 1 << 20])
 def test_rows_go_where_an_order_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int, most: int) -> None:
     """Whatever bytes are written at once: less than a row, some rows, all."""
     monkeypatch.setattr(module, "_MOST_BYTES", most)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import (
     Dielectric,
@@ -52,7 +53,7 @@ def assert_same(image: Image, expected: Image) -> None:
     assert image.cut == expected.cut
 
 
-@pytest.mark.parametrize("band, planes", [(1, PLANES), (5, ("depth", "rays")), (8, ()), (36, PLANES), (99, PLANES)])
+@cases("band, planes", [(1, PLANES), (5, ("depth", "rays")), (8, ()), (36, PLANES), (99, PLANES)])
 def test_bands_of_rows_make_the_picture_of_all(
     ready: PreparedScene, tmp_path: Path, band: int, planes: tuple[str, ...]
 ) -> None:
@@ -110,7 +111,7 @@ def test_one_body_in_another_is_no_body_of_both() -> None:
     assert len({digest_of_scene(scene, needs_of(scene)) for scene in scenes}) == 2
 
 
-@pytest.mark.parametrize(
+@cases(
     "resolution, samples, rows",
     [((512, 512), 1, 512), ((640, 480), 16, 24), ((16384, 16384), 1, 16), ((16384, 16384), 64, 8), ((9, 3), 1, 3)],
 )
@@ -120,7 +121,7 @@ def test_bands_have_a_quarter_of_a_million_camera_rays(
     assert band_of(picture_of(glass, resolution=resolution, samples=samples).view) == rows
 
 
-@pytest.mark.parametrize("band", [0, -8, 2.5, "8", True, float("nan")])
+@cases("band", [0, -8, 2.5, "8", True, float("nan")])
 def test_a_band_that_is_no_number_of_rows_is_refused(glass: Scene, tmp_path: Path, band: Any) -> None:
     with pytest.raises(ValueError, match="band: expected an integer >= 1 or None"):
         PictureRun(tmp_path / "parts", picture_of(glass), band)

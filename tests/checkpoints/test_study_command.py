@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 from PIL import Image as Pillow
 from plyfile import PlyData
 
@@ -104,24 +105,26 @@ def test_a_coloured_mesh_and_a_picture_with_a_legend(city: Path, tmp_path: Path)
     assert (picture[:150] != 255).any(axis=2).mean() > 0.2
 
 
-@pytest.mark.parametrize(
+@cases(
     "arguments, said",
-    [(["sky", "-o", "a.txt"], "--output: expected one of .npy, .ply, .png"),
-     (["sky", "--grid", "1", "-o", "a.png"], "--output: expected .npy or .ply for points"),
-     (["sky", "--grid", "0", "-o", "a.npy"], "--grid: expected a number > 0"),
-     (["sky", "--grid", "nan", "-o", "a.npy"], "--grid: expected a number > 0"),
-     (["sky", "--grid", "1e-9", "-o", "a.npy"], "--grid: expected a spacing with at most"),
-     (["sun", "-o", "a.npy"], "--suns: expected a file for the kind sun"),
-     (["sky", "--suns", "none.txt", "-o", "a.npy"], "--suns: expected none, as it is the kind sun's"),
-     (["ao", "--patches", "577", "-o", "a.npy"], "--patches: expected none, as it is the kind sky's"),
-     (["ao", "--definition", "cosine", "-o", "a.npy"], "--definition: expected none, as it is the kind sky's"),
-     (["sky", "--samples", "9", "-o", "a.npy"], "--samples: expected none, as it is the kind ao's"),
-     (["sky", "--patches", "0", "-o", "a.npy"], "patches: expected"),
-     (["sky", "--distance", "-1", "-o", "a.npy"], "distance: expected"),
-     (["sky", "--points", "none.npy", "-o", "a.npy"], "none.npy"),
-     (["sky", "--camera", "s.toml", "-o", "a.npy"], "--camera: expected a .png"),
-     (["sky", "-o", "none/a.npy"], "none/a.npy")],
-)  # fmt: skip
+    [
+        (["sky", "-o", "a.txt"], "--output: expected one of .npy, .ply, .png"),
+        (["sky", "--grid", "1", "-o", "a.png"], "--output: expected .npy or .ply for points"),
+        (["sky", "--grid", "0", "-o", "a.npy"], "--grid: expected a number > 0"),
+        (["sky", "--grid", "nan", "-o", "a.npy"], "--grid: expected a number > 0"),
+        (["sky", "--grid", "1e-9", "-o", "a.npy"], "--grid: expected a spacing with at most"),
+        (["sun", "-o", "a.npy"], "--suns: expected a file for the kind sun"),
+        (["sky", "--suns", "none.txt", "-o", "a.npy"], "--suns: expected none, as it is the kind sun's"),
+        (["ao", "--patches", "577", "-o", "a.npy"], "--patches: expected none, as it is the kind sky's"),
+        (["ao", "--definition", "cosine", "-o", "a.npy"], "--definition: expected none, as it is the kind sky's"),
+        (["sky", "--samples", "9", "-o", "a.npy"], "--samples: expected none, as it is the kind ao's"),
+        (["sky", "--patches", "0", "-o", "a.npy"], "patches: expected"),
+        (["sky", "--distance", "-1", "-o", "a.npy"], "distance: expected"),
+        (["sky", "--points", "none.npy", "-o", "a.npy"], "none.npy"),
+        (["sky", "--camera", "s.toml", "-o", "a.npy"], "--camera: expected a .png"),
+        (["sky", "-o", "none/a.npy"], "none/a.npy"),
+    ],
+)
 def test_bad_arguments_are_told_on_one_line(
     city: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
     arguments: list[str], said: str,

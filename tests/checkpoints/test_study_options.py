@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from PIL import Image as Pillow
 from plyfile import PlyData
 
 from renderer import Mesh, Octree, load_mesh, load_scene, render
-from renderer.checkpoints.study_points import on_grid
 from renderer.cli.main import main
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
 from renderer.studies import face_points, sky_view_factor, sun_hours
+from renderer.studies.points import on_grid
 from renderer.system.threads import available_threads
 from validation.benchmark.measures.meshes import named
 
@@ -173,17 +174,26 @@ def test_points_that_see_nothing_are_counted(tmp_path: Path, capsys: pytest.Capt
     assert "see nothing" not in "".join(capsys.readouterr())
 
 
-@pytest.mark.parametrize(
+@cases(
     "arguments",
-    [["sky", "m.ply"], ["stars", "m.ply", "-o", "a.npy"], ["sky", "-o", "a.npy"], [],
-     ["sky", "m.ply", "-o", "a.npy", "--faces", "--vertices"], ["sky", "m.ply", "-o", "a.npy", "--grid", "x"],
-     ["sky", "m.ply", "-o", "a.npy", "--grid", "1", "--points", "p.npy"],
-     ["sky", "m.ply", "-o", "a.npy", "--faces", "--grid", "1"],
-     ["sky", "m.ply", "-o", "a.npy", "--vertices", "--points", "p.npy"],
-     ["sky", "m.ply", "-o", "a.npy", "--patches", "x"], ["sky", "m.ply", "-o", "a.npy", "--definition", "x"],
-     ["ao", "m.ply", "-o", "a.npy", "--samples", "x"], ["sky", "m.ply", "-o", "a.npy", "--distance", "x"],
-     ["sky", "m.ply", "-o", "a.png", "--resolution", "x"], ["sky", "m.ply", "-o", "a.npy", "--threads", "x"]],
-)  # fmt: skip
+    [
+        ["sky", "m.ply"],
+        ["stars", "m.ply", "-o", "a.npy"],
+        ["sky", "-o", "a.npy"],
+        [],
+        ["sky", "m.ply", "-o", "a.npy", "--faces", "--vertices"],
+        ["sky", "m.ply", "-o", "a.npy", "--grid", "x"],
+        ["sky", "m.ply", "-o", "a.npy", "--grid", "1", "--points", "p.npy"],
+        ["sky", "m.ply", "-o", "a.npy", "--faces", "--grid", "1"],
+        ["sky", "m.ply", "-o", "a.npy", "--vertices", "--points", "p.npy"],
+        ["sky", "m.ply", "-o", "a.npy", "--patches", "x"],
+        ["sky", "m.ply", "-o", "a.npy", "--definition", "x"],
+        ["ao", "m.ply", "-o", "a.npy", "--samples", "x"],
+        ["sky", "m.ply", "-o", "a.npy", "--distance", "x"],
+        ["sky", "m.ply", "-o", "a.png", "--resolution", "x"],
+        ["sky", "m.ply", "-o", "a.npy", "--threads", "x"],
+    ],
+)
 def test_arguments_that_make_no_sense_are_usage_errors(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -220,7 +230,7 @@ def test_a_file_that_cannot_be_read_is_told_with_its_option(
         assert capsys.readouterr().err == said
 
 
-@pytest.mark.parametrize(
+@cases(
     "wrong",
     [
         ["--distance", "-1"],
@@ -248,7 +258,7 @@ def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wro
     assert main(command) == 0
 
 
-@pytest.mark.parametrize(
+@cases(
     ("kind", "wrong"),
     [("sky", ["--patches", "0"]), ("sky", ["--samples", "4"]), ("sun", ["--suns", "{file}"]), ("sun", [])],
 )
@@ -268,7 +278,7 @@ def test_the_smallest_picture_and_the_widest(city: Path, tmp_path: Path, size: s
         assert picture.width == int(size.partition("x")[0])
 
 
-@pytest.mark.parametrize(
+@cases(
     ("spacing", "got"), [(1e-300, "4e+300"), (1e300, "none"), (float(np.finfo(np.float64).max), "none"), (9.0, "none")]
 )
 def test_a_grid_over_a_wall_and_one_without_end(
@@ -299,7 +309,7 @@ def test_one_of_several_outputs_may_be_a_picture_by_a_camera(city: Path, tmp_pat
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npy", "b.PNG"]
 
 
-@pytest.mark.parametrize("read", ["mesh", "--points", "--suns", "--camera"])
+@cases("read", ["mesh", "--points", "--suns", "--camera"])
 def test_no_output_is_a_file_that_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str], read: str) -> None:
     """A table of suns and a scene were written over where a link led there."""
     given = {name: tmp_path / f"{name.strip('-')}.ply" for name in ("mesh", "--points", "--suns", "--camera")}

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from renderer import Octree
-from renderer.checkpoints.study import Points, Study, parts_of, run
-from renderer.checkpoints.study_points import on_faces
+from renderer.checkpoints.study import Study, parts_of, run
+from renderer.studies.points import Points, on_faces
 from validation.benchmark.measures.meshes import named
 
 STUDY = Study("sky", {})
@@ -34,7 +34,7 @@ def test_points_of_a_part_lie_together_and_answers_stay_in_the_callers_order(
 ) -> None:
     monkeypatch.setattr(Study.plan, "__defaults__", (64,))
     parts = run(octree, STUDY, points, tmp_path / "parts")
-    assert parts.joined().tobytes() == STUDY.answer(octree, points).tobytes()
+    assert parts.joined().tobytes() == STUDY.evaluate(octree, points).tobytes()
     rows = [parts.rows(part) for part in range(parts.plan.parts)]
     assert sorted(np.concatenate(rows)) == list(range(len(points)))
     # 64 of 2,000 points have a thirtieth of the city, if they lie together; else nearly all of it.

@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 from numpy.typing import NDArray
 from twins import CORNERS, MESH, NORMALS, meetings
 
 from renderer import Mesh, Octree, Phong, Scene, SceneObject, render
-from renderer.checkpoints.study_points import of_file, on_faces, on_grid, on_vertices, suns_of
-from renderer.cli.study_drawing import draw, write_ply
-from renderer.cli.study_view import from_above
 from renderer.diagnostics.false_color import VIRIDIS
+from renderer.diagnostics.mesh_values import draw, write_ply
+from renderer.scene.overview import from_above
+from renderer.studies.points import of_file, on_faces, on_grid, on_vertices, suns_of
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +81,7 @@ def test_a_grid_stands_on_the_upper_side_of_a_sheet_that_is_turned_down() -> Non
     )
 
 
-@pytest.mark.parametrize("kind", ["<f8", ">f4", "<i2", "Fortran"])
+@cases("kind", ["<f8", ">f4", "<i2", "Fortran"])
 def test_points_of_a_file_are_read_in_their_rows(tmp_path: Path, kind: str) -> None:
     rows = np.array([[1, 2, 3, 0, 0, -2], [4, 5, 6, 1, 0, 0], [7, 8, 9, 0, 3, 4]])
     written = np.asfortranarray(rows.astype("<f8")) if kind == "Fortran" else rows.astype(kind)

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer import Mesh, PerspectiveCamera
-from renderer.cli.study_view import from_above
 from renderer.mesh.shapes import box
+from renderer.scene.overview import from_above
 
 FAR = [(0.0, 0.0, 0.0), (691_000.0, 5_335_000.0, 519.0)]
 

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 import tomlkit
 import trimesh
+from cases import cases
 from PIL import Image as Pillow
 from scenery import scenery
 
 from renderer import Phong, Scene, SceneObject, load_mesh, load_scene, render
 from renderer.cli.main import main
-from renderer.cli.study_drawing import legend
-from renderer.cli.study_view import from_above
 from renderer.diagnostics.false_color import shades_of
+from renderer.diagnostics.mesh_values import legend
 from renderer.mesh.load import save_ply
 from renderer.scene.camera import Camera
+from renderer.scene.overview import from_above
 
 GREY = [128, 128, 128]
 CAMERA = {"eye": [3.0, -4.0, 5.0], "target": [0.0, 0.0, 0.5], "up": [0.0, 0.0, 1.0], "fov": 50.0}
@@ -44,11 +45,16 @@ def colors_of(values: Any) -> Any:
     return colors
 
 
-@pytest.mark.parametrize(
+@cases(
     ("where", "element"),
-    [([], "face"), (["--faces"], "face"), (["--vertices"], "vertex"), (["--points", "{}/points.npy"], "vertex"),
-     (["--grid", "0.7"], "vertex")],
-)  # fmt: skip
+    [
+        ([], "face"),
+        (["--faces"], "face"),
+        (["--vertices"], "vertex"),
+        (["--points", "{}/points.npy"], "vertex"),
+        (["--grid", "0.7"], "vertex"),
+    ],
+)
 def test_trimesh_reads_values_and_colours_of_a_ply(
     folder: Path, tmp_path: Path, where: list[str], element: str
 ) -> None:
@@ -75,9 +81,9 @@ def test_trimesh_reads_values_and_colours_of_a_ply(
         assert np.array_equal(read.vertices, np.load(folder / "points.npy"))
 
 
-@pytest.mark.parametrize("where", ["--faces", "--vertices"])
-@pytest.mark.parametrize("camera", [None, "{}/scene.toml"])
-@pytest.mark.parametrize("size", [(48, 36), (30, 40)])
+@cases("where", ["--faces", "--vertices"])
+@cases("camera", [None, "{}/scene.toml"])
+@cases("size", [(48, 36), (30, 40)])
 def test_a_picture_has_the_values_colours_where_its_camera_sees_them(
     folder: Path, tmp_path: Path, where: str, camera: str | None, size: tuple[int, int]
 ) -> None:

@@ -13,12 +13,13 @@ from typing import Any
 import dask.array as da
 import numpy as np
 import pytest
+from cases import cases
 from watched import Watched
 
 from renderer import Mesh, Octree, cluster
 from renderer.checkpoints.study import Study, run
-from renderer.checkpoints.study_points import on_faces
 from renderer.cluster import any_hit, closest_hit, connected, run_on
+from renderer.studies.points import on_faces
 from renderer.system.threads import checked_threads
 from validation.benchmark.measures.meshes import named
 
@@ -35,7 +36,7 @@ def octree() -> Octree:
 
 def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Octree, tmp_path: Path) -> None:
     points, study = on_faces(octree).points, Study("sky", {"patches": 145})
-    expected = study.answer(octree, points)
+    expected = study.evaluate(octree, points)
     here = run(octree, study, points, tmp_path / "here").joined()
     assert here.tobytes() == expected.tobytes()
     there = run_on(client, octree, study, points, str(tmp_path / "there"), size=SIZE)
@@ -62,7 +63,7 @@ def test_a_worker_that_is_killed_changes_no_bit(octree: Octree, tmp_path: Path) 
         parts = run_on(client, octree, study, points, folder, size=SIZE)
         killer.join(timeout=60)
     assert killed == pids[:1]
-    assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
+    assert parts.joined().tobytes() == study.evaluate(octree, points).tobytes()
 
 
 def test_parts_of_a_scheduler_that_is_gone_are_not_computed_again(octree: Octree, tmp_path: Path) -> None:
@@ -80,7 +81,7 @@ def test_parts_of_a_scheduler_that_is_gone_are_not_computed_again(octree: Octree
     with connected(workers=1) as client:
         parts = run_on(client, octree, study, points, folder, size=SIZE)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
+    assert parts.joined().tobytes() == study.evaluate(octree, points).tobytes()
 
 
 def test_hits_of_dask_arrays_stay_lazy_and_keep_chunks(client: Any, octree: Octree) -> None:
@@ -142,7 +143,7 @@ def test_a_local_cluster_has_a_worker_of_one_thread_for_each_processor() -> None
     assert client.status == "closed"
 
 
-@pytest.mark.parametrize("address", ["nonsense", "", "x://y:1", "tcp://127.0.0.1", 3])
+@cases("address", ["nonsense", "", "x://y:1", "tcp://127.0.0.1", 3])
 def test_what_is_no_address_is_told_at_once(address: Any) -> None:
     said = "address: expected a scheduler's, such as 'tcp://host:8786', got "
     with pytest.raises(ValueError, match=said), connected(address):
@@ -155,13 +156,18 @@ def test_without_the_extra_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPa
         pass
 
 
-@pytest.mark.parametrize(
+@cases(
     "bad, said",
-    [({"client": None}, "client: expected a distributed.Client, got NoneType"), ({"size": 0}, "size: expected an int"),
-     ({"split": "x"}, "split: expected one of"), ({"study": "sky"}, "study: expected a Study, got str"),
-     ({"points": np.zeros((1, 3))}, "points: expected Points, got ndarray"),
-     ({"folder": 3}, "folder: expected a string"), ({"octree": 1}, "octree: expected an Octree")],
-)  # fmt: skip
+    [
+        ({"client": None}, "client: expected a distributed.Client, got NoneType"),
+        ({"size": 0}, "size: expected an int"),
+        ({"split": "x"}, "split: expected one of"),
+        ({"study": "sky"}, "study: expected a Study, got str"),
+        ({"points": np.zeros((1, 3))}, "points: expected Points, got ndarray"),
+        ({"folder": 3}, "folder: expected a string"),
+        ({"octree": 1}, "octree: expected an Octree"),
+    ],
+)
 def test_bad_arguments_of_a_study_are_named(
     client: Any, octree: Octree, tmp_path: Path, bad: dict[str, Any], said: str
 ) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 
 from renderer.cli.main import main
 from renderer.mesh.load import save_ply
@@ -50,13 +51,16 @@ def test_a_study_at_an_address_has_the_bytes_of_this_machine(client: Any, tmp_pa
     assert (tmp_path / "here.npy").read_bytes() == (tmp_path / "there.npy").read_bytes()
 
 
-@pytest.mark.parametrize(
+@cases(
     "more, said",
-    [(["--cluster", "tcp://127.0.0.1:9"], "127.0.0.1:9"), (["--cluster", "x://y"], "x"),
-     (["--cluster", "tcp://127.0.0.1:9", "--threads", "2"], "--threads: expected none, as the cluster has its own"),
-     (["--cluster", "--threads", "0"], "threads: expected an integer >= 1"),
-     (["--cluster", "--samples", "3", "--threads", "1"], "samples: expected a square number")],
-)  # fmt: skip
+    [
+        (["--cluster", "tcp://127.0.0.1:9"], "127.0.0.1:9"),
+        (["--cluster", "x://y"], "x"),
+        (["--cluster", "tcp://127.0.0.1:9", "--threads", "2"], "--threads: expected none, as the cluster has its own"),
+        (["--cluster", "--threads", "0"], "threads: expected an integer >= 1"),
+        (["--cluster", "--samples", "3", "--threads", "1"], "samples: expected a square number"),
+    ],
+)
 def test_what_is_wrong_is_told_on_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], more: list[str], said: str
 ) -> None:

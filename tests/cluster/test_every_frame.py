@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from varied import OTHERS, VARIATIONS, Variation, picture, scene_of, write_meshes
+from cases import cases
+from varied import OTHERS, VARIATIONS, Variation, picture, scene_of
 
 from renderer import PerspectiveCamera, RenderSettings, Scene, prepare, render
 from renderer.cluster import frames_on, pictures, render_on, workers
@@ -30,13 +31,6 @@ ARGUMENTS: dict[str, Any] = {
     **SETTINGS,
 }
 BITLESS = {"accelerator": "brute", "split": "sah", "progress": True}
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("frames")
-    write_meshes(folder)
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +132,7 @@ def test_a_worker_gives_other_pictures_of_a_scene_that_it_has(
         assert found.radiance.tobytes() == picture(base, **given).radiance.tobytes()
 
 
-@pytest.mark.parametrize("other", [other for other in VARIATIONS if other.keys[0] in ("camera", "render")], ids=str)
+@cases("other", [other for other in VARIATIONS if other.keys[0] in ("camera", "render")])
 def test_a_prepared_scene_takes_the_picture_of_another_camera_or_setting(
     bases: dict[str, Scene], folder: Path, other: Variation
 ) -> None:

@@ -18,10 +18,10 @@ from watched import Watched
 
 from renderer import Octree, Scene, load_scene, render
 from renderer.checkpoints.study import Study
-from renderer.checkpoints.study_points import on_faces
 from renderer.cli.main import main
 from renderer.cluster import connected, render_on, run_on
 from renderer.mesh.load import save_ply
+from renderer.studies.points import on_faces
 from validation.benchmark.measures.meshes import named
 
 pytestmark = pytest.mark.judges(
@@ -98,13 +98,10 @@ def process(*arguments: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
         child.communicate()
 
 
-@pytest.mark.parametrize("kind", ["study", "picture"])
-def test_a_command_that_is_killed_twice_ends_with_the_bytes_of_one_that_was_not(
-    kind: str, city: Path, tmp_path: Path
-) -> None:
+def test_a_command_that_is_killed_twice_ends_with_the_bytes_of_one_that_was_not(tmp_path: Path) -> None:
+    """A picture; a study goes on by the same loop, and does so below under a scheduler that is killed."""
     result, undisturbed = tmp_path / "a.npy", tmp_path / "b.npy"
-    picture = ["render", "scenes/glass.toml", "--resolution", "80x60", "--samples", "16"]
-    command = ["study", "ao", str(city), "--samples", "64"] if kind == "study" else picture
+    command = ["render", "scenes/glass.toml", "--resolution", "80x60", "--samples", "16"]
     (tmp_path / "command.py").write_text(COMMAND)
     told, parts = [*command, "-o", str(result), "--cluster", "local", "--threads", "1", "--quiet"], result.parent
     for most in (2, 4):
@@ -182,7 +179,7 @@ def test_a_scheduler_that_is_killed_is_told_and_another_goes_on_from_the_manifes
         wait_for(lambda: bool(client.nthreads()))
         parts = run_on(client, octree, study, points, folder, size=32)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept and parts.plan.parts > len(kept)
-    assert parts.joined().tobytes() == study.answer(octree, points).tobytes()
+    assert parts.joined().tobytes() == study.evaluate(octree, points).tobytes()
 
 
 def is_there(group: int) -> bool:
@@ -194,12 +191,10 @@ def is_there(group: int) -> bool:
     return True
 
 
-@pytest.mark.parametrize("kind", ["study", "render"])
-def test_ctrl_c_ends_a_command_and_its_workers_with_one_line(kind: str, city: Path, tmp_path: Path) -> None:
+def test_ctrl_c_ends_a_command_and_its_workers_with_one_line(city: Path, tmp_path: Path) -> None:
     """Sent to all processes of the group, as a terminal does."""
     (tmp_path / "command.py").write_text(COMMAND)
-    told = ["study", "ao", str(city)] if kind == "study" else ["render", "scenes/glass.toml", "--resolution", "80x60"]
-    told += ["--samples", "16", "-o", str(tmp_path / "a.npy"), "--cluster", "--threads", "1"]
+    told = ["study", "ao", str(city), "--samples", "16", "-o", str(tmp_path / "a.npy"), "--cluster", "--threads", "1"]
     with process(str(tmp_path / "command.py"), "2", *told, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                  start_new_session=True) as child:  # fmt: skip
         wait_for(lambda: len(list(tmp_path.glob("a.npy.parts/*.part"))) >= 2, child)

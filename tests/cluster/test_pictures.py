@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 from watched import Watched
 
 from renderer import PerspectiveCamera, Scene, load_scene, render
@@ -29,11 +30,15 @@ def camera_at(x: float) -> Camera:
     return PerspectiveCamera(eye=(x, 2.0, 7.0), target=(0.0, 0.5, 0.0))
 
 
-@pytest.mark.parametrize(
+@cases(
     "band, options",
-    [(None, {}), (7, {"split": "sah", "offset": "mitsuba"}), (16, {"planes": ("rays",), "max_rays": 9}),
-     (1000, {"accelerator": "octree", "shadows": False, "camera": camera_at(3.0)})],
-)  # fmt: skip
+    [
+        (None, {}),
+        (7, {"split": "sah", "offset": "mitsuba"}),
+        (16, {"planes": ("rays",), "max_rays": 9}),
+        (1000, {"accelerator": "octree", "shadows": False, "camera": camera_at(3.0)}),
+    ],
+)
 def test_a_picture_has_the_bits_of_render(
     client: Any, glass: Scene, tmp_path: Path, band: int | None, options: dict[str, Any]
 ) -> None:
@@ -147,27 +152,37 @@ def test_frames_go_on_where_the_parts_of_one_that_is_done_were_left(
     assert done.stat().st_mtime_ns == before and not folder.exists()
 
 
-@pytest.mark.parametrize(
+@cases(
     "bad, said",
-    [({"scene": "glass.toml"}, "scene: expected a Scene, got str"), ({"camera": 3}, "camera: expected a camera"),
-     ({"band": 0}, "band: expected an integer >= 1"), ({"folder": 3}, "folder: expected a string or path"),
-     ({"samples": 3}, "samples: expected a square number"), ({"colour": 1}, "render: expected settings among"),
-     ({"planes": "depth"}, "planes: expected some of"), ({"offset": "x"}, "offset: expected 'bounded', 'mitsuba'"),
-     ({"accelerator": "x"}, "accelerator: expected 'auto', 'octree' or 'brute'"), ({"split": 1}, "split: expected one"),
-     ({"client": None}, "client: expected a distributed.Client, got NoneType")],
-)  # fmt: skip
+    [
+        ({"scene": "glass.toml"}, "scene: expected a Scene, got str"),
+        ({"camera": 3}, "camera: expected a camera"),
+        ({"band": 0}, "band: expected an integer >= 1"),
+        ({"folder": 3}, "folder: expected a string or path"),
+        ({"samples": 3}, "samples: expected a square number"),
+        ({"colour": 1}, "render: expected settings among"),
+        ({"planes": "depth"}, "planes: expected some of"),
+        ({"offset": "x"}, "offset: expected 'bounded', 'mitsuba'"),
+        ({"accelerator": "x"}, "accelerator: expected 'auto', 'octree' or 'brute'"),
+        ({"split": 1}, "split: expected one"),
+        ({"client": None}, "client: expected a distributed.Client, got NoneType"),
+    ],
+)
 def test_bad_arguments_are_named(glass: Scene, tmp_path: Path, bad: dict[str, Any], said: str) -> None:
     good = {"client": None, "scene": glass, "folder": tmp_path / "parts"}
     with pytest.raises(ValueError, match=said):
         render_on(**(good | bad))
 
 
-@pytest.mark.parametrize(
+@cases(
     "count, names, said",
-    [(1, ("a.npy", "b.npy"), "scenes: expected 2, as outputs are, got 1"),
-     (2, ("a.npy",), "scenes: expected 1, as outputs are, got 2"),
-     (2, ("a.npy", "./a.npy"), "outputs: expected a file for each frame"), (1, ("a.txt",), "output: expected a .png")],
-)  # fmt: skip
+    [
+        (1, ("a.npy", "b.npy"), "scenes: expected 2, as outputs are, got 1"),
+        (2, ("a.npy",), "scenes: expected 1, as outputs are, got 2"),
+        (2, ("a.npy", "./a.npy"), "outputs: expected a file for each frame"),
+        (1, ("a.txt",), "output: expected a .png"),
+    ],
+)
 def test_frames_have_a_file_each(
     client: Any, glass: Scene, tmp_path: Path, count: int, names: tuple[str, ...], said: str
 ) -> None:

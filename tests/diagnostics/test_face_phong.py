@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from numpy.typing import NDArray
 
 from renderer.diagnostics import face_phong
@@ -129,7 +130,7 @@ def test_every_code_begins_where_srgb_says() -> None:
 class TestStandIns:
     """What has no colour of its own shows as matte, half as bright as what it reflects or lets through."""
 
-    @pytest.mark.parametrize(
+    @cases(
         ("material", "grey"),
         [
             (Mirror(type="mirror"), (0.5, 0.5, 0.5)),
@@ -204,7 +205,7 @@ def test_no_faces() -> None:
     assert colors_of(scene()).shape == (0, 3)
 
 
-@pytest.mark.parametrize("eye", [(0, 0), (0, 0, np.nan), (0, np.inf, 0), 1.0, np.zeros((1, 3))])
+@cases("eye", [(0, 0), (0, 0, np.nan), (0, np.inf, 0), 1.0, np.zeros((1, 3))])
 def test_a_bad_eye_is_named(eye: Any) -> None:
     with pytest.raises(ValueError, match="eye: expected three finite numbers"):
         colors_of(scene((box(), MATTE)), eye)

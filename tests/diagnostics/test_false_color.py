@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from numpy.typing import NDArray
 
 from renderer.diagnostics.false_color import AOVS, VIRIDIS, false_color, limits_of
@@ -209,7 +210,7 @@ def test_other_pictures_have_no_limits() -> None:
     assert limits_of(nothing, "depth") == (0.0, 0.0)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("aov", "limits", "message"),
     [
         ("colour", None, "aov: expected one of .*'cost'.*, got 'colour'"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.diagnostics.ray_path import MAX_RAYS, Segment, ray_path
 from renderer.mesh.mesh import Mesh
@@ -100,7 +101,7 @@ def check_tree(path: tuple[Segment, ...], max_depth: int) -> None:
     assert depths == sorted(depths)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("options", "smooth", "accelerator"),
     [
         ({"max_depth": 0}, False, "octree"),
@@ -227,7 +228,7 @@ def test_without_faces_there_is_a_background() -> None:
     assert not segment.hit and segment.radiance == (1, 2, 3) and segment.end != segment.start
 
 
-@pytest.mark.parametrize(
+@cases(
     ("origin", "direction", "max_depth", "message"),
     [
         ((0, 0), (0, 0, 1), 1, "origin: expected three finite numbers"),

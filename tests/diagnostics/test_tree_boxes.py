@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -61,8 +62,7 @@ def octrees() -> list[Any]:
     flat = Octree(*make_mesh("flat", 3, 60))
     tiny = Octree(2.0**-90 * icosphere(2).vertices, icosphere(2).faces)
     assert tiny.tree.scale != 1.0
-    built = (Octree.from_mesh(torus(), split="sah"), Octree(*make_mesh("sizes", 1, 90)), flat, tiny)
-    return [pytest.param(o, id=name) for o, name in zip(built, ("sah", "sizes", "flat", "tiny"), strict=True)]
+    return [Octree.from_mesh(torus(), split="sah"), Octree(*make_mesh("sizes", 1, 90)), flat, tiny]
 
 
 @pytest.mark.parametrize("octree", octrees())
@@ -137,7 +137,7 @@ def check_visits(octree: Octree, origin: Any, direction: Any, t_max: float) -> N
 
 
 @pytest.mark.judges("Octree.count_steps")
-@pytest.mark.parametrize("octree", octrees())
+@cases("octree", octrees())
 def test_what_the_ray_enters_before_its_hit_is_visited(octree: Octree) -> None:
     origins, directions = rays_at(octree.mesh.vertices, octree.mesh.faces, 5, count=4)
     for origin, direction in zip(origins, directions, strict=True):
@@ -196,13 +196,13 @@ def test_without_a_tree_there_is_nothing_to_show() -> None:
         assert visited(target, (0, 0, 9), (0, 0, -1)) == []
 
 
-@pytest.mark.parametrize("level", [-1, 1.0, True, None])
+@cases("level", [-1, 1.0, True, None])
 def test_a_bad_level_is_refused(level: Any) -> None:
     with pytest.raises(ValueError, match="level: expected an integer >= 0"):
         boxes_at(Octree.from_mesh(icosphere(0)), level)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("origin", "direction", "t_max", "named"),
     [
         ((0, 0, np.nan), (0, 0, 1), 1.0, "origins"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import make_mesh
@@ -13,7 +14,8 @@ from renderer.distance.nearest import LISTED, measure_faces
 from renderer.distance.rational import nearest_exactly
 from renderer.inside import contains as inside
 from renderer.mesh.shapes import box, icosphere, torus
-from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.oracle.distance import nearest, ulps_from_root
+from validation.oracle.vectors import rational
 from validation.queries.distances import points_about
 from validation.stability.cases.queries.inside import closed_solids
 
@@ -40,7 +42,7 @@ def assert_nearest(mesh, points):
             assert ulps_from_root(found.distance[i], other) < 0.51 and found.face[i] < faces[0]
 
 
-@pytest.mark.parametrize("name", SOLIDS)
+@cases("name", SOLIDS)
 def test_distances_are_the_exact_ones_rounded(name):
     assert_nearest(SOLIDS[name], points_about(SOLIDS[name], np.random.default_rng(5), 25))
 
@@ -141,7 +143,7 @@ def test_a_refit_serves_it_too():
     assert octree.closest_point([[10.5, 10.5, 12.0]]).distance.tolist() == [1.0]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("arguments", "said"),
     [
         ({"points": [[0.0, 0.0]]}, r"points: expected shape \(\.\.\., 3\), got shape \(1, 2\)"),
@@ -223,7 +225,7 @@ def test_on_the_face_beside_an_edge_the_distance_is_0():
     assert octree.closest_point([[0.25, 2.0**-95, 0.0], [0.25, -(2.0**-95), 0.0]]).distance.tolist() == [0.0, 2.0**-95]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("vertices", "point"),
     [
         (
@@ -282,9 +284,16 @@ def test_rational_arithmetic_says_what_float64_says():
             assert abs(u - found.u[i]) < 1e-9 and abs(v - found.v[i]) < 1e-9
 
 
-@pytest.mark.parametrize("points", [((0.72, 0, 0), (0.7, 0.7, 0.7)), ((0.7, 0.7, 0.7), (0.72, 0, 0)),
-                                    ((0.1, 0.1, 0.1), (0.72, 0, 0)), ((0.7, 0, 0), (1e-3, 0, 0))])  # fmt: skip
-@pytest.mark.parametrize("unit", [2.0**-537, 2.0**-540, 2.0**-530])
+@cases(
+    "points",
+    [
+        ((0.72, 0, 0), (0.7, 0.7, 0.7)),
+        ((0.7, 0.7, 0.7), (0.72, 0, 0)),
+        ((0.1, 0.1, 0.1), (0.72, 0, 0)),
+        ((0.7, 0, 0), (1e-3, 0, 0)),
+    ],
+)
+@cases("unit", [2.0**-537, 2.0**-540, 2.0**-530])
 def test_faces_whose_squared_distances_vanish_are_told_apart(points, unit):
     """Their bounds were none: the farther of two faces was named, at 1.7 times the least distance."""
     tiny = np.array(points) * unit
@@ -296,8 +305,8 @@ def test_faces_whose_squared_distances_vanish_are_told_apart(points, unit):
         assert found.distance == pytest.approx(least, rel=1e-15)
 
 
-@pytest.mark.parametrize(("head", "steps"), [(1.0 + 2.0**-52, 1), (1.0 + 2.0**-51, 0)])
-@pytest.mark.parametrize("side", [1.0, -1.0])
+@cases(("head", "steps"), [(1.0 + 2.0**-52, 1), (1.0 + 2.0**-51, 0)])
+@cases("side", [1.0, -1.0])
 def test_what_is_halfway_but_for_lost_digits_goes_to_the_even_neighbour(head: float, steps: int, side: float) -> None:
     """Two faces in one plane may have such a distance, and the digits that they lose differ."""
     for lost in (0.0, 2.0**-150, 2.0**-144):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Octree
 from renderer.mesh.shapes import box
@@ -13,7 +14,7 @@ pytestmark = pytest.mark.judges("Octree.signed_distance")
 SOLIDS = closed_solids()
 
 
-@pytest.mark.parametrize("name", SOLIDS)
+@cases("name", SOLIDS)
 def test_the_sign_is_that_of_exact_arithmetic(name):
     mesh = SOLIDS[name]
     points = points_at(mesh, np.random.default_rng(2), 5)

@@ -185,7 +185,7 @@ def expect_named(error: BaseException, path: Any) -> None:
     """One line that names the path, as it is or as ``repr`` writes it."""
     text = str(error)
     if "embedded null byte" in text or (isinstance(error, RuntimeError) and "Symlink loop" in text):
-        return  # Known: see tests/front/test_fuzz.py.
+        return  # Known: see tests/boundary/test_fuzz.py.
     assert isinstance(error, ValueError | OSError), repr(error)
     assert "\n" not in text, f"more than one line: {text!r}"
     names = [name for p in (path, Path(path)) for name in (str(p), repr(str(p))[1:-1])]

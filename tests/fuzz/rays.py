@@ -199,7 +199,7 @@ def expect_sound(hits: Hits, octree: Octree, t_min: Any, t_max: Any) -> None:
     assert np.isposinf(hits.t[~hit]).all() and np.isnan(hits.u[~hit]).all() and np.isnan(hits.v[~hit]).all()
     assert (hits.face[~hit] == -1).all()
     assert np.isfinite(hits.points[hit]).all(), "a point of a hit that is not finite"
-    # Known: a face whose sides are beyond float64 has no normal; see tests/front/test_fuzz.py.
+    # Known: a face whose sides are beyond float64 has no normal; see tests/boundary/test_fuzz.py.
     if np.abs(mesh.vertices).max(initial=0.0) < 2.0**1023:
         assert np.isfinite(hits.normals[hit]).all(), "a normal of a hit that is not finite"
 
@@ -217,7 +217,7 @@ def _built(given: Values) -> tuple[Octree, BruteForce] | None:
     told: list[Any] = []
     for build in (lambda: Octree.from_mesh(mesh, split=given["split"], threads=1), lambda: BruteForce.from_mesh(mesh)):
         try:
-            # Known: an unused vertex may overflow; see tests/front/test_fuzz.py.
+            # Known: an unused vertex may overflow; see tests/boundary/test_fuzz.py.
             with np.errstate(over="ignore"):
                 told.append(build())
         except MeshError as error:

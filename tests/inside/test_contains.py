@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,8 +14,8 @@ from renderer.inside.rational import _on_upright
 from renderer.mesh.shapes import box, torus
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
 from renderer.trace.walk import stack_size
-from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
+from validation.oracle.vectors import rational
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
 pytestmark = pytest.mark.judges(
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.judges(
 MESHES = closed_solids()
 
 
-@pytest.mark.parametrize("name", MESHES)
+@cases("name", MESHES)
 def test_every_answer_is_that_of_exact_arithmetic(name):
     mesh, rng = MESHES[name], np.random.default_rng(7)
     points = points_at(mesh, rng, 4)
@@ -249,9 +250,7 @@ def test_points_amid_many_solids_keep_control_c_waiting_for_milliseconds(monkeyp
     assert len(calls) > 5 and calls[-1] == 4000
 
 
-@pytest.mark.parametrize(
-    ("heights", "on"), [((-1, 1, 2), True), ((0, 1, 2), True), ((1, 2, 3), False), ((0, 0, 0), True)]
-)
+@cases(("heights", "on"), [((-1, 1, 2), True), ((0, 1, 2), True), ((1, 2, 3), False), ((0, 0, 0), True)])
 def test_a_point_on_an_upright_face_without_an_area_is_on_it(heights, on):
     """In rational arithmetic; corners relative to the point."""
     a, b, c = ((Fraction(0), Fraction(0), Fraction(height)) for height in heights)

@@ -6,6 +6,7 @@ import weakref
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, make_mesh
@@ -66,7 +67,7 @@ def around(mesh, rng, count):
 # --- what it is -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SOLIDS)
+@cases("name", SOLIDS)
 def test_around_closed_meshes_it_is_the_exact_integer(name):
     """At points anywhere, in planes of corners, and one ulp beside corners, edges and faces."""
     mesh = SOLIDS[name]
@@ -93,7 +94,7 @@ def check_numbers(vertices, faces, points, expected):
         np.testing.assert_array_equal(np.sign(distance), np.where(expected > 0.5, -1, 1))
 
 
-@pytest.mark.parametrize("wide", [1e-10, 1e-15, 1e-20, 1e-60])
+@cases("wide", [1e-10, 1e-15, 1e-20, 1e-60])
 def test_in_and_around_needles(wide):
     """Boxes a thousandth or less of a rounding wide: from within, all long edges are near at once."""
     rng, size = np.random.default_rng(0), np.array([wide, 1.0, wide])
@@ -105,7 +106,7 @@ def test_in_and_around_needles(wide):
     check_numbers(cube.vertices * size, cube.faces, points, np.repeat([1, 0], [101, 200]))
 
 
-@pytest.mark.parametrize("bits", [60, 80, 100, 150, 500, 530, 600, 700, 900, 1000, 1060])
+@cases("bits", [60, 80, 100, 150, 500, 530, 600, 700, 900, 1000, 1060])
 def test_at_any_nearness_to_edges_and_corners(bits):
     d = 2.0**-bits
     within = [
@@ -126,7 +127,7 @@ def test_at_coordinates_that_the_trees_units_do_not_hold():
     check_numbers(box().vertices * size, box().faces, points, [1, 1, 0, 0, 0])
 
 
-@pytest.mark.parametrize("bits", [54, 80, 100, 200, 600])
+@cases("bits", [54, 80, 100, 200, 600])
 def test_near_an_edge_askew(bits):
     """An edge through the origin along no axis: the exact sides of the two faces that meet there tell."""
     vertices = np.array([[-3.0, -1, -2], [3, 1, 2], [0.5, 3, 0], [0.25, 1, 3]])
@@ -165,7 +166,7 @@ def test_contains_by_winding_numbers_is_contains_where_the_mesh_is_closed(mesh):
     np.testing.assert_array_equal(octree.contains(points, winding=True)[far], octree.contains(points)[far])
 
 
-@pytest.mark.parametrize("name", OPEN)
+@cases("name", OPEN)
 def test_around_open_meshes_it_is_within_the_tolerance(name):
     mesh = OPEN[name]
     points = around(mesh, np.random.default_rng(6), 300)
@@ -237,7 +238,7 @@ def test_from_one_rounding_beside_a_face_to_the_other_it_falls_by_one(offset):
     np.testing.assert_array_equal(octree.contains(below, winding=True)[:2], [False, False])
 
 
-@pytest.mark.parametrize("scale", [1e-200, 1e-5, 1e5, 1e250])
+@cases("scale", [1e-200, 1e-5, 1e5, 1e250])
 def test_scaled_by_a_power_of_two_it_has_the_same_bits(scale):
     power, mesh = 2.0 ** round(np.log2(scale)), OPEN["shaken ball"]
     points = around(mesh, np.random.default_rng(2), 300)
@@ -285,7 +286,7 @@ def errors_and_bounds(mesh, points, share):
     return np.abs(np.float64(out[:, 0] - reference(mesh, points))), out[:, 1]
 
 
-@pytest.mark.parametrize("share", [4.0, 1.0, 0.1, 1e-3, 1e-6, 1e-9])
+@cases("share", [4.0, 1.0, 0.1, 1e-3, 1e-6, 1e-9])
 def test_the_bound_is_never_exceeded(share):
     rng = np.random.default_rng(1)
     for name, mesh in {**OPEN, "ball": icosphere(3), "spots": two_spots()}.items():
@@ -439,22 +440,20 @@ def test_signed_distances_of_an_open_mesh():
 # --- what is refused ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "bad", [None, -1, -1e-300, np.nan, np.inf, "0.1", [0.1], (1, 2), True, 1j, {}, np.longdouble("1e4000"), 10**400]
-)
+@cases("bad", [None, -1, -1e-300, np.nan, np.inf, "0.1", [0.1], (1, 2), True, 1j, {}, np.longdouble("1e4000"), 10**400])
 def test_a_tolerance_is_a_finite_number_from_0(bad):
     with pytest.raises(ValueError, match=r"^tolerance: expected .*, got "):
         Octree.from_mesh(box()).winding_number([[0, 0, 0]], bad)
 
 
-@pytest.mark.parametrize("bad", [[[0.0, 0.0]], [[0.0, np.nan, 0.0]], [["a", "b", "c"]], None, 3.0])
+@cases("bad", [[[0.0, 0.0]], [[0.0, np.nan, 0.0]], [["a", "b", "c"]], None, 3.0])
 def test_bad_points_are_named(bad):
     for ask in (Octree.from_mesh(box()).winding_number, BruteForce.from_mesh(box()).winding_number):
         with pytest.raises(ValueError, match=r"^points: expected .*, got "):
             ask(bad)
 
 
-@pytest.mark.parametrize("bad", [None, 1, 0.0, "True", [True]])
+@cases("bad", [None, 1, 0.0, "True", [True]])
 def test_winding_is_true_or_false(bad):
     with pytest.raises(ValueError, match=r"^winding: expected True or False, got "):
         Octree.from_mesh(box()).contains([[0, 0, 0]], winding=bad)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import llvmlite.binding as llvm
 import pytest
+from cases import cases
 from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, copy_package, run, start, write_package
 
 from renderer.jit.cache import _user_cache, _versions, runnable_levels
@@ -224,7 +225,7 @@ def test_two_processes_that_compile_at_the_same_time_agree(package):
     assert run(package) == LOADED
 
 
-@pytest.mark.parametrize(
+@cases(
     ("lacks", "triple", "levels"),
     [
         ((), "x86_64-unknown-linux-gnu", ("x86-64-v4", "x86-64-v3", "x86-64-v2")),
@@ -242,7 +243,7 @@ def test_a_machine_runs_the_levels_whose_features_it_has(monkeypatch, lacks, tri
     assert runnable_levels.__wrapped__() == levels
 
 
-@pytest.mark.parametrize(
+@cases(
     ("has", "level", "lacks"),
     [
         ("x86-64-v2", "x86-64-v2", []),

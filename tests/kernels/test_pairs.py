@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 import numpy as np
-import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
@@ -65,7 +65,7 @@ def call_one(vector):
     return pairs.as_pairs(vector)
 
 
-@pytest.mark.parametrize("x", [1.0, 1.5, 2.0**-1022, 3e-300, 2.0 - 2.0**-52, 1e308])
+@cases("x", [1.0, 1.5, 2.0**-1022, 3e-300, 2.0 - 2.0**-52, 1e308])
 def test_the_power_of_two_below(x):
     below = power(x)
     assert below <= x < 2.0 * below

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 from numba import njit
 
 from renderer.numerics.simd import (
@@ -76,8 +77,8 @@ def bits_of(mask):
     return int((mask * 2 ** np.arange(len(mask))).sum())
 
 
-@pytest.mark.parametrize("lanes, stored", [(8, np.float32), (4, np.float64), (4, np.float32)])
-@pytest.mark.parametrize("seed", range(5))
+@cases("lanes, stored", [(8, np.float32), (4, np.float64), (4, np.float32)])
+@cases("seed", range(5))
 def test_operations_equal_numpy(lanes, stored, seed):
     rng = np.random.default_rng(seed)
     kind = np.float32 if lanes == 8 else np.float64
@@ -177,7 +178,7 @@ def extremes_of(a, b):
     return larger(a, b), smaller(a, b)
 
 
-@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int32, np.int64])
+@cases("kind", [np.float32, np.float64, np.int32, np.int64])
 def test_larger_and_smaller_are_those_of_python(kind):
     """Also which of two equal ones, and of a NaN and a number, is taken: the first."""
     values = [kind(v) for v in ([0, 1, -5, 7] if np.issubdtype(kind, np.integer) else F32)]
@@ -209,7 +210,7 @@ def sort_octants(distances, links, limit, out):
     store(out, 1, farthest_first(octants <= splat8(limit), octants, pointer(links), 2))
 
 
-@pytest.mark.parametrize("seed", range(200))
+@cases("seed", range(200))
 def test_octants_are_sorted_as_numpy_sorts_them(seed):
     """Any number of them, among them equal distances, -0.0 and infinity; what is not met comes last.
 

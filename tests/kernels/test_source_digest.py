@@ -4,6 +4,7 @@ import ast
 import shutil
 
 import pytest
+from cases import cases
 from kernel_package import MIDDLE, PACKAGE, bottom_of, run, write_package
 
 from renderer.jit.digest import imported_files, source_digest
@@ -89,13 +90,20 @@ def package_imports(path, package=PACKAGE):
     return found
 
 
-@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.relative_to(PACKAGE).as_posix())
+@cases("path", sorted(PACKAGE.rglob("*.py")))
 def test_every_import_in_the_package_has_the_form_that_the_digest_follows(path):
     assert set(imported_files(path)) == package_imports(path)
 
 
-@pytest.mark.parametrize("line", ["from . import jit", "from .jit import kernel", "import renderer.jit.decorators as j",
-                                  "import numpy, renderer.jit"])  # fmt: skip
+@cases(
+    "line",
+    [
+        "from . import jit",
+        "from .jit import kernel",
+        "import renderer.jit.decorators as j",
+        "import numpy, renderer.jit",
+    ],
+)
 def test_forms_that_the_digest_does_not_follow_are_found(tmp_path, line):
     (tmp_path / "a.py").write_text(line)
     with pytest.raises(AssertionError, match=r"a\.py:"):

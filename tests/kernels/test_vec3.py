@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.numerics.vec3 import length, normalized
 
 
-@pytest.mark.parametrize("size", [5e-324, 1e-310, 1e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300])
+@cases("size", [5e-324, 1e-310, 1e-308, 1e-300, 1e-160, 1.0, 1e160, 1e300])
 def test_any_size_has_a_direction_and_a_length(size):
     """1 over a denormal number had made infinities, and NaN of them."""
     for vector in ((0.0, 0.0, size), (size, 0.0, -size)):

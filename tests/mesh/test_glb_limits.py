@@ -4,6 +4,7 @@ import json
 import struct
 
 import pytest
+from cases import cases
 
 from renderer import MeshError, load_mesh
 
@@ -46,7 +47,7 @@ def test_of_thousands_of_primitives_none_is_lost_and_they_keep_their_order(tmp_p
     assert mesh.triangles[:, 0, 2].tolist() == [0.0, 2.0] * (count // 2)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("document", "message"),
     [
         (chain(256), "nodes at most 256 deep"),
@@ -61,8 +62,8 @@ def test_what_has_no_end_is_refused(tmp_path, document, message):
         load_mesh(glb(tmp_path, document))
 
 
-@pytest.mark.parametrize("kind", [5120, 5121, 5122, 5123])
-@pytest.mark.parametrize("required", [[], ["KHR_mesh_quantization"]])
+@cases("kind", [5120, 5121, 5122, 5123])
+@cases("required", [[], ["KHR_mesh_quantization"]])
 def test_quantized_positions_are_refused(tmp_path, kind, required):
     """They were read as they stand: 32767 for 1.0."""
     accessor = {"bufferView": 0, "componentType": kind, "normalized": True, "count": 3, "type": "VEC3"}

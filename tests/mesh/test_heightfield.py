@@ -4,6 +4,7 @@ import doctest
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import MeshError, Octree
 from renderer.mesh import heightfield
@@ -35,7 +36,7 @@ def test_nothing_is_built_around_unknown_heights():
     assert len(heightfield_mesh(np.full((3, 3), np.nan)).faces) == 0
 
 
-@pytest.mark.parametrize(
+@cases(
     ("argument", "value", "said"),
     [
         ("grid", [1, 2, 3], "shape"),

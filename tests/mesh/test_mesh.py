@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -40,7 +41,7 @@ def affine(linear: Any, shift: Any = (0, 0, 0)) -> np.ndarray:
     return matrix
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int16, list])
+@cases("dtype", [np.float32, np.float64, np.int16, list])
 def test_accepts_real_numbers_of_any_type(dtype: Any) -> None:
     vertices = TRIANGLE["vertices"] if dtype is list else np.array(TRIANGLE["vertices"], dtype=dtype)
     mesh = Mesh(vertices, TRIANGLE["faces"])
@@ -48,7 +49,7 @@ def test_accepts_real_numbers_of_any_type(dtype: Any) -> None:
     assert mesh.vertices.tolist() == TRIANGLE["vertices"]
 
 
-@pytest.mark.parametrize("dtype", [np.int8, np.uint8, np.int64, np.uint64])
+@cases("dtype", [np.int8, np.uint8, np.int64, np.uint64])
 def test_accepts_any_integer_faces(dtype: Any) -> None:
     mesh = Mesh(TRIANGLE["vertices"], np.asfortranarray(np.array([[0, 1, 2], [2, 1, 0]], dtype=dtype)))
     assert mesh.faces.dtype == np.int32 and mesh.faces.flags.c_contiguous
@@ -68,7 +69,7 @@ def test_is_read_only_and_apart_from_the_callers_arrays() -> None:
         mesh.name = "other"  # type: ignore[misc]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("change", "message"),
     [
         ({"vertices": [[0, 0], [1, 0], [0, 1]]}, "vertices: expected shape (n, 3), got (3, 2)"),
@@ -90,7 +91,7 @@ def test_is_read_only_and_apart_from_the_callers_arrays() -> None:
         ({"colors": [[0, 1e300, 0]] * 3}, "colors: expected finite values"),
         ({"texcoords": [[0, 0, 0]] * 3}, "texcoords: expected shape (n, 2), got (3, 3)"),
     ],
-)  # fmt: skip
+)
 def test_says_what_is_wrong(change: dict[str, Any], message: str) -> None:
     with pytest.raises(MeshError, match=re.escape(message)):
         Mesh(**(TRIANGLE | change))
@@ -148,7 +149,7 @@ def test_is_float32() -> None:
     assert not Mesh([[1e-300, 0, 0]], []).is_float32
 
 
-@pytest.mark.parametrize("exponent", [-500, -60, 0, 60, 500])
+@cases("exponent", [-500, -60, 0, 60, 500])
 def test_normals_do_not_depend_on_scale(exponent: int) -> None:
     mesh = torus(around=7, across=5)
     scaled = Mesh(np.ldexp(mesh.vertices, exponent), mesh.faces)
@@ -235,7 +236,7 @@ def test_transformed_may_flatten() -> None:
     assert flat.normals is not None and flat.normals.tolist() == [[0, 0, 1]] * 3
 
 
-@pytest.mark.parametrize("matrix", [np.eye(3), np.full((4, 4), np.nan), np.diag([1, 1, 1, 2]), "matrix"])
+@cases("matrix", [np.eye(3), np.full((4, 4), np.nan), np.diag([1, 1, 1, 2]), "matrix"])
 def test_transformed_refuses_what_is_not_affine(matrix: Any) -> None:
     with pytest.raises(MeshError, match=r"^pot: matrix: expected"):
         Mesh(**TRIANGLE, name="pot").transformed(matrix)

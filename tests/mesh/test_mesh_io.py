@@ -13,6 +13,7 @@ import numpy as np
 import plyfile
 import pytest
 import trimesh
+from cases import cases
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from ply_bytes import FORMATS, Rows, ply
@@ -60,10 +61,8 @@ def test_ply_triangles(tmp_path: Path, form: str) -> None:
     assert load_mesh(tmp_path / "model.ply", name="pot").name == "pot"
 
 
-@pytest.mark.parametrize("form", FORMATS)
-@pytest.mark.parametrize(
-    "index", ["list uchar int vertex_index", "list int uint vertex_indices", "list ushort uchar vertex_index"]
-)
+@cases("form", FORMATS)
+@cases("index", ["list uchar int vertex_index", "list int uint vertex_indices", "list ushort uchar vertex_index"])
 def test_ply_polygons_become_fans(tmp_path: Path, form: str, index: str) -> None:
     vertices = [[np.cos(a), np.sin(a), 0.5] for a in np.arange(6)]
     for polygons, expected in [
@@ -148,9 +147,9 @@ def test_ply_ignores_what_it_need_not_know(tmp_path: Path, form: str) -> None:
     assert mesh.colors is None and mesh.texcoords is None
 
 
-@pytest.mark.parametrize("form", FORMATS)
-@pytest.mark.parametrize("names", [("s", "t"), ("u", "v"), ("texture_u", "texture_v")])
-@pytest.mark.parametrize(("type_", "full"), [("uchar", 255), ("ushort", 65535), ("float", 1.0)])
+@cases("form", FORMATS)
+@cases("names", [("s", "t"), ("u", "v"), ("texture_u", "texture_v")])
+@cases(("type_", "full"), [("uchar", 255), ("ushort", 65535), ("float", 1.0)])
 def test_ply_keeps_normals_colors_texcoords(tmp_path: Path, form: str, names: Any, type_: str, full: float) -> None:
     properties = [
         *XYZ,
@@ -250,14 +249,14 @@ def test_ply_against_plyfile(tmp_path: Path, text: bool) -> None:
     assert mesh.faces.tolist() == expected
 
 
-def test_a_million_faces_load_in_two_seconds(tmp_path: Path) -> None:
-    """Quiet, it takes 0.15 s; the rest is room for a loaded machine."""
+def test_many_faces_load_without_a_step_a_face(tmp_path: Path) -> None:
+    """Quiet, it takes 0.03 s; the rest is room for a loaded machine. A step of Python a face takes longer."""
     path = tmp_path / "large.ply"
-    save_ply(torus(around=1000, across=500), path)
+    save_ply(torus(around=500, across=200), path)
     start = time.process_time()
     mesh = load_mesh(path)
-    assert time.process_time() - start < 2.0
-    assert len(mesh.faces) == 1_000_000
+    assert time.process_time() - start < 0.4
+    assert len(mesh.faces) == 200_000
 
 
 # --- PLY that is wrong ----------------------------------------------------------------------------------------
@@ -273,8 +272,8 @@ def colored(type_: str, value: float) -> tuple[str, list[str], Rows]:
     return "vertex", [*XYZ, f"{type_} red", f"{type_} green", f"{type_} blue"], [[*p, *[value] * 3] for p in SQUARE]
 
 
-@pytest.mark.parametrize("form", FORMATS)
-@pytest.mark.parametrize(
+@cases("form", FORMATS)
+@cases(
     ("elements", "message"),
     [
         ([VERTEX], "holds no faces"),
@@ -303,7 +302,7 @@ def colored(type_: str, value: float) -> tuple[str, list[str], Rows]:
         ([colored("char", 1), FACE], "expected colours of an unsigned or floating type, got int8"),
         ([colored("float", 9), FACE], "colors: expected values in [0, 1], got [9.0, 9.0, 9.0] in row 0"),
     ],
-)  # fmt: skip
+)
 def test_ply_content_faults(tmp_path: Path, form: str, elements: Any, message: str) -> None:
     assert message in fault(tmp_path, ply(form, *elements))
 
@@ -311,7 +310,7 @@ def test_ply_content_faults(tmp_path: Path, form: str, elements: Any, message: s
 GOOD = ply("ascii", VERTEX, FACE).decode()
 
 
-@pytest.mark.parametrize(
+@cases(
     ("old", "new", "message"),
     [
         ("ply\n", "plx\n", "expected a first line 'ply', got b'plx"),
@@ -349,7 +348,7 @@ GOOD = ply("ascii", VERTEX, FACE).decode()
         ("3 0 1 2", "4294967295 0 1 2", "truncated"),
         ("3 0 1 2", "3 0 1.5 2", "expected whole vertex indices, got 1.5"),
     ],
-)  # fmt: skip
+)
 def test_ply_text_faults(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in GOOD
     start = time.process_time()
@@ -415,7 +414,7 @@ def test_signalling_nan_fails_like_any_other(tmp_path: Path, place: str) -> None
 V = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "faces"),
     [
         (V + "f 1 2 3\nf 1 3 4\n", [[0, 1, 2], [0, 2, 3]]),
@@ -454,7 +453,7 @@ def test_obj_vertex_colors(tmp_path: Path) -> None:
     assert mixed.colors is None
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "message"),
     [
         ("", "holds no faces"),
@@ -491,8 +490,8 @@ def test_obj_notched_polygons_are_cut_right(tmp_path: Path, face: str) -> None:
     assert (mesh.texcoords is not None) == ("/" in face)
 
 
-@pytest.mark.parametrize("indent", ["", " "])  # a blank before a keyword is read line by line
-@pytest.mark.parametrize(
+@cases("indent", ["", " "])  # a blank before a keyword is read line by line
+@cases(
     ("text", "faces"),
     [
         ("f 1 2 3\n" + V + "f 1 3 4\n", [[0, 1, 2], [0, 2, 3]]),
@@ -512,7 +511,7 @@ def test_obj_attributes_may_stand_after_their_faces(tmp_path: Path) -> None:
         assert mesh.normals is not None and mesh.normals.tolist() == [[0, 0, 1]] * 3
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "message"),
     [
         ("f 1 2 5\n" + V, "line 1: face index out of range: expected 1 to 4 or -0 to -1, got 'f 1 2 5'"),
@@ -575,7 +574,7 @@ def test_obj_both_readers_agree(statements: list[str], newline: str, ends: bool,
     read_both(content)
 
 
-@pytest.mark.parametrize("odd", ODD)
+@cases("odd", ODD)
 def test_obj_both_readers_agree_on_each_odd_statement(odd: str) -> None:
     """Wherever it stands among others; most are left to the reader of any file."""
     for face in ("f 1 2 3", SLASHED[0]):
@@ -646,7 +645,7 @@ def test_obj_the_common_reader_is_used(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_obj_loads_no_slower_than_trimesh(tmp_path: Path) -> None:
     """It takes 0.6 of trimesh's processor time, which other processes hardly change."""
-    mesh = torus(around=150, across=100)
+    mesh = torus(around=75, across=50)
     vertices = "".join("v {:.9g} {:.9g} {:.9g}\n".format(*p) for p in mesh.vertices)
     corners = (mesh.faces + 1).tolist()
     for form, more in [("{0}", ""), ("{0}/{0}/{0}", "vt 0.5 0.25\nvn 0.6 0.8 0\n" * len(mesh.vertices))]:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 
 SCENES = Path(__file__).parents[2] / "scenes"
 sys.path.insert(0, str(SCENES))
@@ -36,7 +37,7 @@ def test_the_script_writes_the_committed_bytes(tmp_path: Path) -> None:
     assert sum(map(len, committed.values())) < 4_000_000
 
 
-@pytest.mark.parametrize("name", NAMES)
+@cases("name", NAMES)
 def test_each_piece_is_closed_and_winds_outwards(name: str) -> None:
     mesh = load(name)
     assert mesh.is_closed() and mesh.is_float32

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -84,8 +85,8 @@ def assert_right(points: NDArray[np.float64], triangles: list[list[int]]) -> Non
     assert parts.min() > 1e-9 and parts.sum() == pytest.approx(np.linalg.norm(whole), rel=1e-9)
 
 
-@pytest.mark.parametrize("frame", FRAMES)
-@pytest.mark.parametrize("name", NOTCHED)
+@cases("frame", FRAMES)
+@cases("name", NOTCHED)
 def test_notched_polygons_are_covered_once(name: str, frame: str) -> None:
     points = placed(NOTCHED[name], FRAMES[frame])
     for shift in {0, 1, 2, len(points) // 2, len(points) - 1}:  # whichever corner comes first
@@ -93,7 +94,7 @@ def test_notched_polygons_are_covered_once(name: str, frame: str) -> None:
             assert_right(turned, cut(turned))
 
 
-@pytest.mark.parametrize("name", NOTCHED)
+@cases("name", NOTCHED)
 def test_the_fan_is_wrong_for_each_of_these(name: str) -> None:
     """From some corner: the test above would see it."""
     with pytest.raises(AssertionError):
@@ -181,7 +182,7 @@ def test_detail_finer_than_what_counts_as_flat_is_cut_as_it_is() -> None:
 PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
 
 
-@pytest.mark.parametrize(
+@cases(
     "outline",
     [
         [(0, 0)] * 6,
@@ -197,7 +198,7 @@ PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
         *([*L_SHAPE[:k], (bad, 0.0), *L_SHAPE[k:]] for bad in (np.nan, np.inf, -np.inf) for k in (0, 3)),
         [(x * y, y) for x, y in zip([1e308, -1e308] * 4, [1.0, -1.0, 2, 3, -5, 1, 7, 1], strict=True)],
     ],
-)  # fmt: skip
+)
 def test_polygons_that_nothing_is_right_for_keep_their_fan(outline: Outline) -> None:
     assert cut(placed(outline) if np.isfinite(outline).all() else np.array([[x, y, 0.0] for x, y in outline])) == fan(
         len(outline)
@@ -229,7 +230,7 @@ def test_bent_polygons_keep_their_fan_slightly_bent_ones_are_cut() -> None:
         assert (cut(points) == fan(6)) == kept
 
 
-@pytest.mark.parametrize("index", [-1, 6, 2**62, -(2**62)])
+@cases("index", [-1, 6, 2**62, -(2**62)])
 def test_indices_out_of_range_keep_the_fan(index: int) -> None:
     corners = np.array([0, 1, 2, 3, 4, index, *range(6)])  # NumPy would take -1 for the last
     triangles = triangulate(placed(L_SHAPE), corners, np.array([0, 6, 12]))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 from meshes import assert_same_hits, make_mesh, rays_at
@@ -42,8 +43,8 @@ def test_the_bad_is_dropped_and_reported() -> None:
     assert repairs and str(repairs) == "dropped 3 of 5 faces; 1 vertices are not finite"
 
 
-@pytest.mark.parametrize("value", BAD)
-@pytest.mark.parametrize("axis", range(3))
+@cases("value", BAD)
+@cases("axis", range(3))
 def test_each_coordinate_counts(value: float, axis: int) -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)
     vertices[3, axis] = value
@@ -52,10 +53,8 @@ def test_each_coordinate_counts(value: float, axis: int) -> None:
     assert repairs.dropped_faces.tolist() == [0, 2]
 
 
-@pytest.mark.parametrize(
-    "index", [3, -1, np.iinfo(np.int64).max, np.iinfo(np.int64).min, np.uint64(2**64 - 1), np.uint64(2**63)]
-)
-@pytest.mark.parametrize("corner", range(3))
+@cases("index", [3, -1, np.iinfo(np.int64).max, np.iinfo(np.int64).min, np.uint64(2**64 - 1), np.uint64(2**63)])
+@cases("corner", range(3))
 def test_each_corner_counts(index: Any, corner: int) -> None:
     faces = np.array([[0, 1, 2], [0, 1, 2]], np.uint64 if isinstance(index, np.uint64) else np.int64)
     faces[0, corner] = index
@@ -129,7 +128,7 @@ def test_the_given_arrays_stay() -> None:
     assert [a.tobytes() for a in (vertices, faces, normals)] == before
 
 
-@pytest.mark.parametrize(
+@cases(
     ("change", "message"),
     [
         ({"vertices": [[0, 0], [1, 1]]}, "vertices: expected shape"),
@@ -141,7 +140,7 @@ def test_the_given_arrays_stay() -> None:
         ({"texcoords": [[0, np.nan]] * 5}, "texcoords: expected finite values"),
         ({"colors": [[0, 0, 2]] * 5}, "colors: expected values in [0, 1]"),
     ],
-)  # fmt: skip
+)
 def test_other_faults_stay_errors(change: dict[str, Any], message: str) -> None:
     with pytest.raises(MeshError) as caught:
         Mesh.repaired(**{"vertices": VERTICES, "faces": FACES, "name": "pot", **change})
@@ -240,7 +239,7 @@ FILES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FILES)
+@cases("name", FILES)
 def test_files(tmp_path: Path, name: str) -> None:
     content, dropped, of, bad = FILES[name]
     path = tmp_path / name
@@ -264,11 +263,14 @@ def test_a_file_without_faults_loads_without_a_warning(tmp_path: Path) -> None:
         assert load_mesh(path, repair=True).faces.tolist() == load_mesh(path).faces.tolist()
 
 
-@pytest.mark.parametrize(
+@cases(
     ("name", "content", "message"),
     [
-        ("a.ply", ply_text("0 0 0,1 0 0,0 nan 0", "3 0 1 2"),
-         "holds no good faces: dropped 1 of 1 faces; 1 vertices are not finite"),
+        (
+            "a.ply",
+            ply_text("0 0 0,1 0 0,0 nan 0", "3 0 1 2"),
+            "holds no good faces: dropped 1 of 1 faces; 1 vertices are not finite",
+        ),
         ("a.obj", (OBJ + "f 1 2 9\n").encode(), "holds no good faces: dropped 1 of 1 faces"),
         ("a.obj", OBJ.encode(), "holds no good faces: dropped 0 of 0 faces; 1 vertices"),
         ("a.ply", ply_text("0 0 0,1 0 0,0 1 0", "2 0 1"), "element face: expected at least 3 vertices"),
@@ -276,7 +278,7 @@ def test_a_file_without_faults_loads_without_a_warning(tmp_path: Path) -> None:
         ("a.obj", b"v 0 0 0\nf 1 x 1\n", "line 2: "),
         ("a.stl", STL[:-1], "expected text"),
     ],
-)  # fmt: skip
+)
 def test_files_that_cannot_be_repaired(tmp_path: Path, name: str, content: bytes, message: str) -> None:
     path = tmp_path / name
     path.write_bytes(content)

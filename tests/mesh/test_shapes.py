@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere, torus
@@ -12,7 +13,7 @@ def signed_volume(mesh: Mesh) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
-@pytest.mark.parametrize("level", range(6))
+@cases("level", range(6))
 def test_icosphere(level: int) -> None:
     mesh = icosphere(level)
     assert len(mesh.faces) == 20 * 4**level and len(mesh.vertices) == 10 * 4**level + 2
@@ -51,7 +52,7 @@ def test_grid() -> None:
     assert mesh.texcoords[-1].tolist() == [1, 1] and mesh.vertices[-1].tolist() == [3, 0, -2]
 
 
-@pytest.mark.parametrize(
+@cases(
     "call",
     [
         lambda: icosphere(-1),

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 
 from renderer import Mesh, load_mesh
 from renderer.mesh.load import save_ply
@@ -27,8 +28,8 @@ def mesh_with(attributes: tuple[str, ...], exact: bool) -> Mesh:
     return Mesh(vertices, faces, **{name: given[name] for name in attributes})
 
 
-@pytest.mark.parametrize("exact", [True, False])
-@pytest.mark.parametrize("attributes", [(), ("normals",), ("colors",), ("texcoords",), tuple(NAMES)], ids=str)
+@cases("exact", [True, False])
+@cases("attributes", [(), ("normals",), ("colors",), ("texcoords",), tuple(NAMES)])
 def test_a_file_has_what_the_mesh_has_and_nothing_else(
     tmp_path: Path, attributes: tuple[str, ...], exact: bool
 ) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import PIL.Image
 import pytest
+from cases import cases
 
 from renderer.picture.image import Image, check_picture_path, srgb, srgb_steps
 from renderer.system.files import write_atomically
@@ -66,7 +67,7 @@ def test_png_holds_the_srgb_codes_with_row_zero_at_the_top(tmp_path: Path) -> No
     assert PIL.Image.open(io.BytesIO(picture._repr_png_())).size == (7, 5)
 
 
-@pytest.mark.parametrize("height", [1, 64, 65, 129])
+@cases("height", [1, 64, 65, 129])
 def test_each_row_of_a_png_is_written_and_looked_at(height: int) -> None:
     """Rows are taken 64 at a time: the last few, or one alone, count too."""
     picture = image(np.full((height, 2, 3), 1.0))
@@ -219,8 +220,8 @@ def test_an_existing_file_is_replaced(tmp_path: Path) -> None:
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG") and len(list(tmp_path.iterdir())) == 1
 
 
-@pytest.mark.parametrize("error", [OSError("disk full"), KeyboardInterrupt()])
-@pytest.mark.parametrize("existed", [False, True])
+@cases("error", [OSError("disk full"), KeyboardInterrupt()])
+@cases("existed", [False, True])
 def test_a_failure_midway_leaves_what_was_there(tmp_path: Path, error: BaseException, existed: bool) -> None:
     path = tmp_path / "a.npy"
     if existed:
@@ -280,7 +281,7 @@ def test_names_as_long_as_the_file_system_allows(tmp_path: Path) -> None:
     assert path.stat().st_size > 0
 
 
-@pytest.mark.parametrize("name", ["a.jpg", "a", "a.png.txt", ".png", "png"])
+@cases("name", ["a.jpg", "a", "a.png.txt", ".png", "png"])
 def test_unknown_suffixes(tmp_path: Path, name: str) -> None:
     for call in (check_picture_path, image().save):
         with pytest.raises(ValueError, match=r"output: expected a \.png, \.exr or \.npy file, got .*" + name):

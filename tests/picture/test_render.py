@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.mesh.shapes import icosphere
 from renderer.picture import prepare as preparing
@@ -63,8 +64,8 @@ def test_the_scenes_settings_hold_unless_others_are_given() -> None:
     assert scene.render.resolution == (3, 2)
 
 
-@pytest.mark.parametrize("accelerator", ["octree", "brute"])
-@pytest.mark.parametrize("samples", [4, 9, 16, 36])
+@cases("accelerator", ["octree", "brute"])
+@cases("samples", [4, 9, 16, 36])
 def test_depth_normal_and_face_are_those_of_the_pixels_centres(
     samples: int, accelerator: Literal["octree", "brute"]
 ) -> None:
@@ -80,9 +81,7 @@ def test_depth_normal_and_face_are_those_of_the_pixels_centres(
     assert (more.rays.min(), one.rays.min()) == (samples, 1)
 
 
-@pytest.mark.parametrize(
-    "resolution", [(1, 1), (TILE, TILE), (TILE + 1, TILE - 1), (3 * TILE + 5, 2), (1, 2 * TILE + 1)]
-)
+@cases("resolution", [(1, 1), (TILE, TILE), (TILE + 1, TILE - 1), (3 * TILE + 5, 2), (1, 2 * TILE + 1)])
 def test_every_pixel_is_written_once(resolution: tuple[int, int]) -> None:
     image = render(ball(), resolution=resolution, threads=2, max_depth=0)
     assert image.depth.shape == resolution[::-1]
@@ -91,7 +90,7 @@ def test_every_pixel_is_written_once(resolution: tuple[int, int]) -> None:
     np.testing.assert_array_equal(image.radiance[image.face < 0], 0.25)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("argument", "value", "got"),
     [
         ("accelerator", "bvh", "bvh"),
@@ -161,8 +160,8 @@ def test_the_bar_shows_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> No
         assert ("tile" in stream.getvalue()) == shows, (stream, progress)
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+@cases("threads", [1, 3])
+@cases("error", [KeyboardInterrupt, MemoryError])
 def test_an_exception_in_a_tile_stops_the_rest(monkeypatch: pytest.MonkeyPatch, threads: int, error: type) -> None:
     tiles, lock = [], threading.Lock()
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
@@ -98,7 +99,7 @@ def test_minus_one_stands_for_no_face():
     assert octree.visible(one, one[::-1], leaving=top, reaching=top).all()
 
 
-@pytest.mark.parametrize("scale", [1e-200, 1e-3, 1e6, 1e250])
+@cases("scale", [1e-200, 1e-3, 1e6, 1e250])
 def test_at_any_size(scale):
     octree = Octree.from_mesh(Mesh(box().vertices * scale, box().faces))
     points = np.array([[0.5, 0.5, 3], [0.5, 0.5, 3], [3, 0.4, 3]]) * scale
@@ -117,7 +118,7 @@ def test_shapes_are_broadcast():
     assert octree.visible(points[0], targets[0]).shape == ()
 
 
-@pytest.mark.parametrize(
+@cases(
     ("arguments", "said"),
     [
         ({"points": [[0, 0]]}, r"points: expected shape \(\.\.\., 3\)"),

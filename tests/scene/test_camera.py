@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -50,8 +51,8 @@ def test_row_zero_is_the_top_and_column_zero_the_left() -> None:
         np.testing.assert_allclose(ray, np.array([x / 2, y / 2, -1]) / math.sqrt(1.5), atol=4 * U)
 
 
-@pytest.mark.parametrize("fov", [1.0, 45.0, 90.0, 170.0])
-@pytest.mark.parametrize(("width", "height"), [(8, 8), (16, 4), (3, 9)])
+@cases("fov", [1.0, 45.0, 90.0, 170.0])
+@cases(("width", "height"), [(8, 8), (16, 4), (3, 9)])
 def test_fov_is_vertical_whatever_the_aspect(fov: float, width: int, height: int) -> None:
     """Rays through the middle of the film's upper and lower edge enclose the field of view."""
     rows = perspective(fov=fov).rows(width, height)
@@ -82,16 +83,23 @@ def test_frame_is_orthonormal_right_handed_and_upright(seed: int) -> None:
     assert above @ up > 0 and forward @ (target - eye) > 0
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-160, 1e-6, 1e6, 1e160, 1e300])
+@cases("scale", [1e-300, 1e-160, 1e-6, 1e6, 1e160, 1e300])
 def test_frame_does_not_depend_on_the_distance(scale: float) -> None:
     """Squares of such numbers overflow and vanish; the directions they stand for do neither."""
     camera = perspective(eye=(0, 0, 0), target=(0, 0, -scale), up=(0, 1 / scale, 0))
     assert np.array(camera.frame()).tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, -1]]
 
 
-@pytest.mark.parametrize("kind", [perspective, lambda **c: OrthographicCamera(
-    **{"type": "orthographic", "height": 2.0, "eye": (0, 0, 5), "target": (0, 0, 0), **c})])  # fmt: skip
-@pytest.mark.parametrize(
+@cases(
+    "kind",
+    [
+        perspective,
+        lambda **c: OrthographicCamera(
+            **{"type": "orthographic", "height": 2.0, "eye": (0, 0, 5), "target": (0, 0, 0), **c}
+        ),
+    ],
+)
+@cases(
     "fault",
     [
         {"target": (0, 0, 5)},
@@ -132,7 +140,7 @@ def test_sample_offsets() -> None:
     assert len({tuple(p) for p in sample_offsets(64).tolist()}) == 64
 
 
-@pytest.mark.parametrize("samples", [0, 2, 3, 5, 8])
+@cases("samples", [0, 2, 3, 5, 8])
 def test_samples_must_be_square(samples: int) -> None:
     with pytest.raises(ValueError, match=f"samples: expected a square number.*got {samples}"):
         sample_offsets(samples)

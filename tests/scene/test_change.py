@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import DirectionalLight, Mirror, OrthographicCamera, Scene
 from renderer.cli.main import main
@@ -37,7 +38,7 @@ def test_what_is_named_changes_and_nothing_else() -> None:
 
 
 @pytest.mark.judges("octree-render render --change")
-@pytest.mark.parametrize(
+@cases(
     ("hidden", "left"),
     [([], [0, 1, 2, 3]), (["objects.0"], [1, 2, 3]), (["floor"], [0, 1]), (["floor", "objects.1"], [0])],
 )
@@ -48,7 +49,7 @@ def test_what_is_hidden_is_left_out_and_the_rest_is_not_placed_again(hidden: lis
     assert len(SCENE.instances) == 4 and len(SCENE.objects) == 2
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "said"),
     [
         ("render.samples = ", "expected TOML, got a syntax error"),

@@ -6,6 +6,7 @@ from typing import get_args
 import numpy as np
 import pytest
 import tomlkit
+from cases import cases
 from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of, write_meshes
 
 from renderer import RenderSettings
@@ -47,7 +48,7 @@ def test_every_table_that_can_be_changed_is_varied_in_each_of_its_types() -> Non
     assert {other.record for other in CHANGED} == types
 
 
-@pytest.mark.parametrize("other", CHANGED, ids=str)
+@cases("other", CHANGED)
 def test_a_change_gives_the_picture_of_a_file_that_has_it(folder: Path, other: Variation) -> None:
     """All other keys stay as they are: none of the file's has its default."""
     found = written_by(folder, other.table, text_of(other))
@@ -55,7 +56,7 @@ def test_a_change_gives_the_picture_of_a_file_that_has_it(folder: Path, other: V
     assert found.tobytes() != picture(scene_of(folder, other.table)).radiance.tobytes()
 
 
-@pytest.mark.parametrize("name", ["objects.0", "objects.1", "objects.2", "floor"])
+@cases("name", ["objects.0", "objects.1", "objects.2", "floor"])
 def test_what_is_hidden_gives_the_picture_of_a_file_without_it(folder: Path, name: str) -> None:
     assert name in object_names(scene_of(folder, BASE))
     left = {key: value for key, value in BASE.items() if key != name}

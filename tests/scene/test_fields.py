@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from cases import cases
 
 from renderer import (
     Dielectric,
@@ -190,23 +191,19 @@ FIELDS: dict[type, dict[str, Field]] = {
 }  # fmt: skip
 
 
-EACH = [
-    pytest.param(model, name, field, id=f"{model.__name__}.{name}")
-    for model, fields in FIELDS.items()
-    for name, field in fields.items()
-]
+EACH = [(model, name, field) for model, fields in FIELDS.items() for name, field in fields.items()]
 
 
 def made(model: Any, **changed: Any) -> Any:
     return model(**{**LEAST[model], **changed})
 
 
-@pytest.mark.parametrize("model", FIELDS, ids=lambda model: model.__name__)
+@cases("model", FIELDS)
 def test_no_field_is_missing_here(model: Any) -> None:
     assert set(FIELDS[model]) == set(model.model_fields)
 
 
-@pytest.mark.parametrize(("model", "name", "field"), EACH)
+@cases(("model", "name", "field"), EACH)
 def test_a_field_that_is_left_out_has_its_default_or_is_asked_for(model: Any, name: str, field: Field) -> None:
     given = {key: value for key, value in LEAST[model].items() if key != name}
     if field.default is NEEDED:
@@ -217,14 +214,14 @@ def test_a_field_that_is_left_out_has_its_default_or_is_asked_for(model: Any, na
         assert found == field.default and type(found) is type(field.default)
 
 
-@pytest.mark.parametrize(("model", "name", "field"), EACH)
+@cases(("model", "name", "field"), EACH)
 def test_a_field_takes_values_to_the_ends_of_its_range(model: Any, name: str, field: Field) -> None:
     for given, expected in field.takes:
         found = getattr(made(model, **{name: given}), name)
         assert found == expected and type(found) is type(expected), given
 
 
-@pytest.mark.parametrize(("model", "name", "field"), EACH)
+@cases(("model", "name", "field"), EACH)
 def test_a_field_refuses_other_values_and_its_error_names_it(model: Any, name: str, field: Field) -> None:
     for given in field.refuses:
         with pytest.raises(SceneError) as caught:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Image, Mesh, Needs, Scene, load_scene, needs_of, render
 from renderer.cli.main import main
@@ -73,7 +74,7 @@ LIT = replace(NOTHING, shadows=True, lights=1)
 FINE = icosphere(0)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("what", "expected"),
     [
         (scene(UNLIT), NOTHING),
@@ -138,7 +139,7 @@ EVERYTHING = [
 ]
 
 
-@pytest.mark.parametrize("what", EVERYTHING)
+@cases("what", EVERYTHING)
 def test_more_than_needed_changes_no_bit(what: Scene) -> None:
     needs, expected = needs_of(what), picture(what)
     lights = len(what.lights)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -244,7 +245,7 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("table", "line", "where", "says"), FAULTS, ids=[f"{t} {line}" for t, line, _, _ in FAULTS])
+@cases(("table", "line", "where", "says"), FAULTS)
 def test_each_fault_is_one_line_with_its_place(
     folder: Path, table: str, line: str, where: str, says: list[str]
 ) -> None:
@@ -274,12 +275,12 @@ WRONG_TYPES = [
 ]
 
 
-@pytest.mark.parametrize(("table", "line", "where"), WRONG_TYPES, ids=[f"{t} {line}" for t, line, _ in WRONG_TYPES])
+@cases(("table", "line", "where"), WRONG_TYPES)
 def test_a_value_of_another_type_is_not_taken_for_a_number(folder: Path, table: str, line: str, where: str) -> None:
     assert error_of(folder, with_key(table, line)).startswith(where)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "says"),
     [
         ("", ["camera: ", "required"]),
@@ -311,16 +312,14 @@ def test_faults_of_whole_tables(folder: Path, text: str, says: list[str]) -> Non
         assert words in message, message
 
 
-@pytest.mark.parametrize(
-    "name", ["perspective", "phong", "mirror", "dielectric", "point", "function-before", "is-instance"]
-)
+@cases("name", ["perspective", "phong", "mirror", "dielectric", "point", "function-before", "is-instance"])
 def test_a_material_may_bear_the_name_of_a_type(folder: Path, name: str) -> None:
     """The key's path names the user's own keys, whatever they are called."""
     message = error_of(folder, CAMERA + f"[materials.{name}]\nspeed = 3\n")
     assert message.startswith(f"materials.{name}.speed: unknown key")
 
 
-@pytest.mark.parametrize("digits", [400, 4000, 4400, 6000])
+@cases("digits", [400, 4000, 4400, 6000])
 def test_huge_integers(folder: Path, digits: int) -> None:
     """Python reads no decimal number of more than 4300 digits, and writes none."""
     for number in ("1" * digits, "0x" + "f" * digits):
@@ -457,7 +456,7 @@ def test_any_file_is_a_scene_or_one_line(folder: Path, text: str) -> None:
     np.testing.assert_allclose(np.linalg.norm(towards, axis=1), 1.0, rtol=1e-12)
 
 
-@pytest.mark.parametrize("size", [1e-300, 1e-200, 1e-160, 1.0, 1e160, 1e300])
+@cases("size", [1e-300, 1e-200, 1e-160, 1.0, 1e160, 1e300])
 def test_directional_lights_of_any_length_shine_alike(size: float) -> None:
     row = DirectionalLight(direction=(0, -size, 0), irradiance=2.0).row()
     assert row.tolist() == [0, 0, 1, 0, 2, 2, 2]
@@ -527,11 +526,15 @@ class TestPlacing:
         np.testing.assert_allclose(box().vertices @ matrix[:3, :3].T + matrix[:3, 3], expected, atol=12 * 16 * 2.0**-53)
         assert matrix[3].tolist() == [0, 0, 0, 1]
 
-    @pytest.mark.parametrize(
+    @cases(
         ("rotate", "image"),
-        [((90, 0, 0), [(1, 0, 0), (0, 0, 1), (0, -1, 0)]), ((0, 90, 0), [(0, 0, -1), (0, 1, 0), (1, 0, 0)]),
-         ((0, 0, 90), [(0, 1, 0), (-1, 0, 0), (0, 0, 1)]), ((90, 90, 0), [(0, 0, -1), (1, 0, 0), (0, -1, 0)])],
-    )  # fmt: skip
+        [
+            ((90, 0, 0), [(1, 0, 0), (0, 0, 1), (0, -1, 0)]),
+            ((0, 90, 0), [(0, 0, -1), (0, 1, 0), (1, 0, 0)]),
+            ((0, 0, 90), [(0, 1, 0), (-1, 0, 0), (0, 0, 1)]),
+            ((90, 90, 0), [(0, 0, -1), (1, 0, 0), (0, -1, 0)]),
+        ],
+    )
     def test_quarter_turns(self, rotate: Any, image: Any) -> None:
         """Where the x, y and z axes go; the last case tells x-then-y from y-then-x."""
         matrix = SceneObject(mesh=box(), material="a", rotate=rotate).matrix()
@@ -542,8 +545,8 @@ class TestPlacing:
         objects = (SceneObject(mesh=mesh, material="a", **how),)
         return Scene(camera=camera, materials={"a": Phong()}, objects=objects).instances[0].mesh
 
-    @pytest.mark.parametrize("move", [0.7, 1000.1, 5e6])
-    @pytest.mark.parametrize("dtype", [np.float32, np.float64])
+    @cases("move", [0.7, 1000.1, 5e6])
+    @cases("dtype", [np.float32, np.float64])
     def test_placed_corners_are_float64_whatever_the_file_holds(self, dtype: Any, move: float) -> None:
         mesh = Mesh(icosphere(2).vertices.astype(dtype), icosphere(2).faces)
         placed = self.place(mesh, scale=0.3, rotate=(10, 20, 30), translate=(0.1, move, -0.2))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera, primary_rays
@@ -18,7 +19,7 @@ def test_they_are_all_here() -> None:
     assert {"three_models", "glass", "mirrors", "stairs"} <= {path.stem for path in FILES}
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@cases("path", FILES)
 def test_each_renders(path: Path) -> None:
     scene = load_scene(path)
     image = render(scene, resolution=(32, 32), threads=2)
@@ -37,7 +38,7 @@ def test_each_renders(path: Path) -> None:
     assert len(seen) >= min(4, len(ends)), f"only instances {seen} of {len(ends)} are seen"
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@cases("path", FILES)
 def test_octree_and_brute_force_give_the_same_bits(path: Path) -> None:
     scene = load_scene(path)
     tree, brute = (render(scene, resolution=(12, 12), accelerator=a, threads=2) for a in ("octree", "brute"))

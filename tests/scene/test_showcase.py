@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Mesh, SceneError, load_scene, render
 from renderer.cli.main import main
@@ -27,9 +28,9 @@ def file_of(folder: Path, mesh: Mesh, scale: float = 1.0, offset: Any = (0, 0, 0
 
 
 @pytest.mark.judges("load_scene", "octree-render render scene", "octree-render view scene")
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize("offset", [(0, 0, 0), (30, -20, 10)])
+@cases("shape", SHAPES)
+@cases("scale", [1e-6, 1.0, 1e6])
+@cases("offset", [(0, 0, 0), (30, -20, 10)])
 def test_the_whole_mesh_is_seen_and_lit_and_large_enough(tmp_path: Path, shape: str, scale: float, offset: Any) -> None:
     mesh = SHAPES[shape]
     image = render(load_scene(file_of(tmp_path, mesh, scale, offset)), resolution=(80, 80))
@@ -43,7 +44,7 @@ def test_the_whole_mesh_is_seen_and_lit_and_large_enough(tmp_path: Path, shape: 
 
 
 @pytest.mark.judges("octree-render render --write-scene")
-@pytest.mark.parametrize("leads_to", [None, ".", "far/away", "models"])
+@cases("leads_to", [None, ".", "far/away", "models"])
 def test_the_written_scene_is_the_one_that_is_rendered(tmp_path: Path, leads_to: str | None) -> None:
     """Also where the scene is written through a link, into whichever folder it leads."""
     for name in ("models", "scenes", "far/away"):

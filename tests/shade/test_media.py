@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Dielectric, OrthographicCamera, Phong, Scene, SceneObject, load_scene, render
 from renderer.mesh.mesh import Mesh
@@ -51,7 +52,7 @@ def _open_at_the_top(low: float, high: float) -> Mesh:
     return Mesh(mesh.vertices, mesh.faces[~_upper(mesh)])
 
 
-@pytest.mark.parametrize(
+@cases(
     ("others", "below"),
     [
         ([], []),

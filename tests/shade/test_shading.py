@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -109,15 +110,15 @@ def snell_faults(d: Vector, n: Vector, n1: float, n2: float) -> str:
     return ""
 
 
-@pytest.mark.parametrize("eta", [1e-3, 0.1, 1 / 1.5, 1.0, 1.0000001, 1.33, 1.5, 10.0, 1e3])
+@cases("eta", [1e-3, 0.1, 1 / 1.5, 1.0, 1.0000001, 1.33, 1.5, 10.0, 1e3])
 def test_refraction_obeys_snell(eta: float) -> None:
     for n1, n2 in ((eta, 1.0), (1.0, 1.0 / eta)):
         faults = [(d, n, f) for d, n in unit_pairs(300, 2) if (f := snell_faults(d, n, n1, n2))]
         assert not faults, faults[0]
 
 
-@pytest.mark.parametrize("eta", [1.0000001, 1.33, 1.5, 10.0, 1e3])
-@pytest.mark.parametrize("off", [-1e-2, -1e-7, -1e-12, 1e-12, 1e-7, 1e-2])
+@cases("eta", [1.0000001, 1.33, 1.5, 10.0, 1e3])
+@cases("off", [-1e-2, -1e-7, -1e-12, 1e-12, 1e-7, 1e-2])
 def test_both_sides_of_the_critical_angle(eta: float, off: float) -> None:
     s = (1 + off) / eta
     if s > 1:
@@ -155,7 +156,7 @@ def textbook_reflectance(s: Decimal, n1: float, n2: float) -> Decimal:
     return (across + along) / 2
 
 
-@pytest.mark.parametrize(("n1", "n2"), [(1.0, 1.5), (1.5, 1.0), (1.0, 1e3), (1.33, 1.5), (1e3, 1.0), (1.0, 1.0)])
+@cases(("n1", "n2"), [(1.0, 1.5), (1.5, 1.0), (1.0, 1e3), (1.33, 1.5), (1e3, 1.0), (1.0, 1.0)])
 def test_reflectance_against_the_sine_and_tangent_form(n1: float, n2: float) -> None:
     largest = min(1.0, n2 / n1)
     for share in (1e-3, 0.1, 0.3, 0.5, 0.77, 0.9, 0.99, 0.9999):
@@ -202,7 +203,7 @@ def phong_lobe(d: Vector, n: Vector, light: Vector, shininess: float) -> tuple[D
     return (cosine ** Decimal(shininess) if cosine > 0 else Decimal(0)), cosine
 
 
-@pytest.mark.parametrize("shininess", [0.0, 1.0, 2.5, 32.0, 1e6])
+@cases("shininess", [0.0, 1.0, 2.5, 32.0, 1e6])
 def test_specular_lobe(shininess: float) -> None:
     rng = np.random.default_rng(4)
     seen = 0
@@ -262,8 +263,8 @@ def random_hits(scale: float, shift: float, count: int) -> Any:
 
 
 @pytest.mark.judges("render")
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize("shift", [0.0, 1.0, 1e3, 1e6])
+@cases("scale", [1e-6, 1.0, 1e6])
+@cases("shift", [0.0, 1.0, 1e3, 1e6])
 def test_a_spawned_ray_starts_beyond_the_exact_plane(scale: float, shift: float) -> None:
     rng = np.random.default_rng(7)
     for p0, p1, p2, n_g, u, v, p in random_hits(scale, shift, 200):
@@ -277,8 +278,8 @@ def test_a_spawned_ray_starts_beyond_the_exact_plane(scale: float, shift: float)
         assert moved <= 4 * error + 2 * np.linalg.norm(np.spacing(np.abs(p)))
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize("shift", [0.0, 1.0, 1e6])
+@cases("scale", [1e-6, 1.0, 1e6])
+@cases("shift", [0.0, 1.0, 1e6])
 def test_offset_distance_is_a_small_multiple_of_the_rounding(scale: float, shift: float) -> None:
     for p0, p1, p2, n_g, u, v, p in random_hits(scale, shift, 100):
         error, _ = offset_distance(p, p0, p1, p2, u, v, facet_of(p0, p1, p2, n_g))
@@ -313,8 +314,8 @@ def test_mitsubas_rule() -> None:
     assert pytest.approx(8.940697e-05, rel=1e-7) == MITSUBA_EPSILON
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize("shift", [0.0, 10.0])
+@cases("scale", [1e-6, 1.0, 1e6])
+@cases("shift", [0.0, 10.0])
 def test_reflected_rays_never_meet_a_convex_mesh_again(scale: float, shift: float) -> None:
     vertices = (icosphere(3).vertices + shift) * scale
     faces = icosphere(3).faces

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.diagnostics.ray_path import MAX_RAYS, ray_path
 from renderer.mesh.mesh import Mesh
@@ -70,9 +71,9 @@ def alike(one: Image, other: Image, most: float) -> None:
 
 
 class TestOnTheGround:
-    @pytest.mark.parametrize("eye", EYES[:3])
-    @pytest.mark.parametrize("y", [0.0, 0.1, -3.7, 1e3 / 3])
-    @pytest.mark.parametrize("material", [clear(1.5), Phong(diffuse=0.0, transmittance=0.9, ior=1.0)])
+    @cases("eye", EYES[:3])
+    @cases("y", [0.0, 0.1, -3.7, 1e3 / 3])
+    @cases("material", [clear(1.5), Phong(diffuse=0.0, transmittance=0.9, ior=1.0)])
     def test_no_sky_is_seen_through_the_ground(self, material: Material, y: float, eye: Any) -> None:
         seen = {"eye": np.add(eye, (0, y, 0)).tolist(), "target": (0.0, y + 0.4, 0.0)}
         for turned in (False, True):
@@ -83,8 +84,8 @@ class TestOnTheGround:
                 image = picture(scene(*parts, **seen))
                 assert image.radiance[image.face >= 0].max() < 2.0
 
-    @pytest.mark.parametrize("eye", EYES)
-    @pytest.mark.parametrize("material", [GLASS, clear(1.5), Phong(diffuse=0.0, transmittance=0.9, ior=1.0)])
+    @cases("eye", EYES)
+    @cases("material", [GLASS, clear(1.5), Phong(diffuse=0.0, transmittance=0.9, ior=1.0)])
     def test_as_if_sunk_into_the_ground(self, material: Material, eye: Any) -> None:
         sun = {"lights": (DirectionalLight(direction=(1, -3, -2), irradiance=1.0),)}
         ground = Floor(min=(-9, -9), max=(9, 9), materials=("ground",), squares=(3, 3))
@@ -159,7 +160,7 @@ class TestGlassOnGlass:
                 np.testing.assert_allclose(two.radiance, passed(angle, 1, 1.5, 1), rtol=5e-6)
         assert passed(50, 1, 1.5, 1) == pytest.approx(0.888, abs=5e-4)
 
-    @pytest.mark.parametrize("eye", [(0.3, 1.0, 0.2), (0.5, 1.0, 0.5), (-1.0, 0.25, 0.1), (0.2, 0.0, 0.3)])
+    @cases("eye", [(0.3, 1.0, 0.2), (0.5, 1.0, 0.5), (-1.0, 0.25, 0.1), (0.2, 0.0, 0.3)])
     def test_an_eye_on_glass_that_looks_in_is_outside(self, eye: Any) -> None:
         """Straight through two sides, each of which passes 96 %, whichever triangle the eye is on."""
         body = box((-1, 0, -1), (1, 1, 1))
@@ -175,8 +176,8 @@ class TestGlassOnGlass:
             seen = [picture(scene(*parts, eye=eye, target=target, fov=0.01), 1, max_depth=12) for parts in (pair, one)]
             assert seen[0].radiance[0, 0, 2] == pytest.approx(float(seen[1].radiance[0, 0, 2]), rel=1e-6)
 
-    @pytest.mark.parametrize("iors", [(1.5, 1.33, 1.8), (1.2, 2.4, 1.2), (1.33, 1.5, 1.33), (1.5, 1.5, 1.7)])
-    @pytest.mark.parametrize("angle", [0.0, 33.0, 65.0])
+    @cases("iors", [(1.5, 1.33, 1.8), (1.2, 2.4, 1.2), (1.33, 1.5, 1.33), (1.5, 1.5, 1.7)])
+    @cases("angle", [0.0, 33.0, 65.0])
     def test_three_media(self, iors: tuple[float, ...], angle: float) -> None:
         parts = [(slab(-k, 1 - k), clear(ior)) for k, ior in enumerate(iors)]
         for order in ((0, 1, 2), (2, 1, 0), (1, 0, 2), (2, 0, 1)):
@@ -234,7 +235,7 @@ class TestTurned:
             Scene(camera=camera, materials=materials, objects=objects, ambient=1.0, **more), 40, max_depth=12
         )
 
-    @pytest.mark.parametrize("seed", range(6))
+    @cases("seed", range(6))
     def test_glass_on_the_ground(self, seed: int) -> None:
         rotate = np.random.default_rng(seed).uniform(-180, 180, 3).tolist()
         for mesh in (cube(0.0), other_diagonals(cube(0.0))):
@@ -242,7 +243,7 @@ class TestTurned:
                 image = self.seen(rotate, parts, (1, 3, 2), (0, 0.4, 0), fov=20, background=SKY)
                 assert image.radiance.max() < 2.0
 
-    @pytest.mark.parametrize("seed", range(6))
+    @cases("seed", range(6))
     def test_glass_on_glass(self, seed: int) -> None:
         rotate = np.random.default_rng(seed).uniform(-180, 180, 3).tolist()
         t = math.radians(50)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -104,7 +105,7 @@ class TestLocalLight:
             value = pixel(scene(FROM_SIDE, (floor(), material), ambient=(1, 2, 3)))
             np.testing.assert_allclose(value, np.array(expected) * [1, 2, 3], rtol=REL)
 
-    @pytest.mark.parametrize("shininess", [0.0, 1.0, 7.0, 200.0])
+    @cases("shininess", [0.0, 1.0, 7.0, 200.0])
     def test_highlight(self, shininess: float) -> None:
         """The eye stands at 45 degrees, the light 10 degrees off the mirror direction."""
         angle = math.radians(55)
@@ -144,8 +145,8 @@ class TestLocalLight:
         away = towards((0, 5, 9), (0, 10, 0))
         assert pixel(scene(away, (floor(), WHITE), background=(1, 2, 3))).tolist() == [1, 2, 3]
 
-    @pytest.mark.parametrize("lights", [(), (SUN,)])
-    @pytest.mark.parametrize("materials", [{}, {"m": WHITE}])
+    @cases("lights", [(), (SUN,)])
+    @cases("materials", [{}, {"m": WHITE}])
     def test_an_empty_scene_is_all_background(self, lights: Any, materials: Any) -> None:
         empty = Scene(camera=FROM_SIDE, materials=materials, lights=lights, background=(1, 2, 3))
         for accelerator in ("octree", "brute"):
@@ -192,7 +193,7 @@ class TestShadows:
             blocker = quad((0, 2 + beyond, 0), (0, 0, 0.2), (0.2, 0, 0))
             assert self.lit(light, blocker, offset=offset) == pytest.approx(1.0, rel=REL), beyond
 
-    @pytest.mark.parametrize(
+    @cases(
         ("offset", "short"),
         [("bounded", 2.0**-36), ("mitsuba", 10.0 * MITSUBA_EPSILON), (2.0**-10, 10.0 * 2.0**-10), (0.01, 0.1)],
     )
@@ -274,7 +275,7 @@ def facing_mirrors(k_r: float) -> Scene:
 
 
 class TestRecursion:
-    @pytest.mark.parametrize(
+    @cases(
         ("k_r", "options", "expected"),
         [
             (0.9, {"max_depth": 64}, 9.98939),  # (1 - .9^65) / .1
@@ -534,8 +535,8 @@ def assert_same_bits(a: Image, b: Image) -> None:
 
 
 class TestLaws:
-    @pytest.mark.parametrize("offset", ["bounded", "mitsuba"])
-    @pytest.mark.parametrize("split", ["midpoint", "sah"])
+    @cases("offset", ["bounded", "mitsuba"])
+    @cases("split", ["midpoint", "sah"])
     def test_the_tree_changes_no_bit(self, split: Any, offset: Any) -> None:
         options: Any = {"resolution": (50, 37), "samples": 4, "offset": offset, "threads": 1}
         brute = render(mixed(), accelerator="brute", **options)

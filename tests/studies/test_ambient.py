@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Octree
 from renderer.mesh.shapes import box, grid, icosphere, torus
@@ -31,8 +32,8 @@ def walls(*planes):
     return Octree(np.concatenate([corners[plane] for plane in planes]), np.arange(3 * len(planes)).reshape(-1, 3))
 
 
-@pytest.mark.parametrize("samples", SAMPLES)
-@pytest.mark.parametrize(("planes", "share"), [("z", 1.0), ("xz", 0.5), ("xyz", 0.25)])
+@cases("samples", SAMPLES)
+@cases(("planes", "share"), [("z", 1.0), ("xz", 0.5), ("xyz", 0.25)])
 def test_in_the_open_beside_a_wall_and_in_a_corner(planes, share, samples):
     octree = walls(*planes)
     # Beside the walls, on the floor, whose face is the last.
@@ -41,8 +42,8 @@ def test_in_the_open_beside_a_wall_and_in_a_corner(planes, share, samples):
     assert share < 1.0 or found[0] == 1.0
 
 
-@pytest.mark.parametrize("samples", SAMPLES)
-@pytest.mark.parametrize("away", [0.0625, 0.25, 0.5, 0.75, 1.0, 1.5])
+@cases("samples", SAMPLES)
+@cases("away", [0.0625, 0.25, 0.5, 0.75, 1.0, 1.5])
 def test_a_wall_within_a_distance_hides_a_segment_of_the_disc(away, samples):
     """Directions that meet it within 1 have |x| >= away; over the disc of cosines that is cut off by a chord."""
     chord = min(away, 1.0)
@@ -52,7 +53,7 @@ def test_a_wall_within_a_distance_hides_a_segment_of_the_disc(away, samples):
     assert away < 1.0 or found[0] == 1.0
 
 
-@pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -2), (0, 1, 0), (1, 1, 1), (-3, 2, 1e-9)])
+@cases("normal", [(0, 0, 1), (0, 0, -2), (0, 1, 0), (1, 1, 1), (-3, 2, 1e-9)])
 def test_directions_are_about_each_points_normal(normal):
     """A wall across the normal's side hides half, however both are turned."""
     n = np.array(normal) / np.linalg.norm(normal)
@@ -114,8 +115,8 @@ def test_a_closed_cube_from_inside_is_dark():
     assert openness(octree, np.random.default_rng(5).random((50, 3))).max() == 0.0
 
 
-@pytest.mark.parametrize("samples", [100, 1024, 20000])
-@pytest.mark.parametrize("away", [1.125, 1.5, 3.0])
+@cases("samples", [100, 1024, 20000])
+@cases("away", [1.125, 1.5, 3.0])
 def test_openness_beside_a_ball(samples, away):
     """A ball of radius 1 hides the cap of half angle asin(1 / away): (1 - cos) / 2 of all directions."""
     ball = Octree.from_mesh(icosphere(5))
@@ -126,7 +127,7 @@ def test_openness_beside_a_ball(samples, away):
     assert found[1] == 1.0
 
 
-@pytest.mark.parametrize(
+@cases(
     ("argument", "value", "said"),
     [
         ("normals", None, "vectors, got None"),

@@ -5,6 +5,7 @@ import importlib
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.studies import Pattern, cosine_hemisphere, fibonacci_hemisphere, fibonacci_sphere, reinhart, tregenza
 from renderer.studies.directions import turned
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.judges(
 MODULES = ["ambient", "directions", "hidden", "places", "sky", "views"]
 
 
-@pytest.mark.parametrize("name", MODULES)
+@cases("name", MODULES)
 def test_the_examples_of_the_docstrings_hold(name):
     module = importlib.import_module(f"renderer.studies.{name}")
     results = doctest.testmod(module)
@@ -37,7 +38,7 @@ PATTERNS = {
 }
 
 
-@pytest.mark.parametrize("name", PATTERNS)
+@cases("name", PATTERNS)
 def test_directions_are_unit_vectors_that_share_the_whole(name):
     pattern, whole = PATTERNS[name]
     assert pattern.directions.dtype == pattern.weights.dtype == np.float64
@@ -49,7 +50,7 @@ def test_directions_are_unit_vectors_that_share_the_whole(name):
     assert len(np.unique(pattern.directions, axis=0)) == len(pattern.weights)
 
 
-@pytest.mark.parametrize("m", [1, 2, 3, 7])
+@cases("m", [1, 2, 3, 7])
 def test_tregenza_has_its_rows(m):
     """Rows from the horizon up, in each clockwise from +y; weights are the solid angles of their parts of the rows."""
     pattern, azimuths, heights, areas = reinhart(subdivision=m), [], [], []
@@ -108,8 +109,8 @@ def test_turned_patterns_look_about_their_pole():
     assert (turned(ways, np.array([0.0, 0.0, 2.0])) == ways).all()
 
 
-@pytest.mark.parametrize("make", [fibonacci_hemisphere, fibonacci_sphere, cosine_hemisphere, reinhart])
-@pytest.mark.parametrize("bad", [0, -1, 2**24 + 1, 1.5, True, "9", None])
+@cases("make", [fibonacci_hemisphere, fibonacci_sphere, cosine_hemisphere, reinhart])
+@cases("bad", [0, -1, 2**24 + 1, 1.5, True, "9", None])
 def test_numbers_of_directions_that_are_none(make, bad):
     name = "subdivision" if make is reinhart else "count"
     with pytest.raises(ValueError, match=f"^{name}: expected an integer from 1 to .*, got "):

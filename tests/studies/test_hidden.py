@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 from meshes import make_mesh, meshes
@@ -68,8 +69,8 @@ def test_bits_are_those_of_rays_that_are_written_down(mesh, seed, count, size, w
     np.testing.assert_array_equal(again, bits)
 
 
-@pytest.mark.parametrize("count", [1, 15, TILE - 1, TILE, TILE + 1, 3 * TILE + 7])
-@pytest.mark.parametrize("size", [1, 7, 8, 9, 145])
+@cases("count", [1, 15, TILE - 1, TILE, TILE + 1, 3 * TILE + 7])
+@cases("size", [1, 7, 8, 9, 145])
 def test_bits_at_the_sizes_of_tiles(count, size):
     octree, rng = Octree.from_mesh(torus()), np.random.default_rng(count)
     place = face_points(octree.mesh)
@@ -230,7 +231,7 @@ def test_faces_without_a_plane_are_left_as_any_hit_leaves_them():
 GOOD = {"points": np.zeros((4, 3)), "normals": np.ones((4, 3)), "directions": np.eye(3)}
 
 
-@pytest.mark.parametrize(
+@cases(
     ("argument", "value", "said"),
     [
         ("points", [[0, np.nan, 0]], "finite numbers .* in row 0"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Mesh, Octree
 from renderer.mesh.shapes import box, grid
@@ -39,8 +40,8 @@ def bound(count):
     return 0.5 * np.sqrt(2.0 * np.pi / count) * 4.0 / np.pi
 
 
-@pytest.mark.parametrize("count", SIZES)
-@pytest.mark.parametrize(("width", "depth"), [(2.0, 1.0), (2.0, 3.0), (10.0, 1.0), (1.0, 4.0)])
+@cases("count", SIZES)
+@cases(("width", "depth"), [(2.0, 1.0), (2.0, 3.0), (10.0, 1.0), (1.0, 4.0)])
 def test_the_middle_of_a_streets_floor(count, width, depth):
     """cos(atan(2 h / w)) by cosine (Oke 1987); 1 - 2 atan(2 h / w) / pi of the sky's solid angle, a wedge."""
     octree, angle = trench(width, depth), np.arctan(2.0 * depth / width)
@@ -60,8 +61,8 @@ def test_errors_fall_with_the_number_of_directions():
     assert errors[2] < errors[0] / np.sqrt(counts[2] / counts[0]), errors
 
 
-@pytest.mark.parametrize("count", SIZES)
-@pytest.mark.parametrize(("radius", "depth"), [(1.0, 0.5), (1.0, 1.0), (1.0, 3.0)])
+@cases("count", SIZES)
+@cases(("radius", "depth"), [(1.0, 0.5), (1.0, 1.0), (1.0, 3.0)])
 def test_the_bottom_of_a_shaft(count, radius, depth):
     """The form factor of a disc above a point of a parallel plane, r^2 / (r^2 + h^2)."""
     octree = shaft(radius, depth)
@@ -71,15 +72,15 @@ def test_the_bottom_of_a_shaft(count, radius, depth):
     assert abs(cap[0] - (1.0 - depth / np.hypot(radius, depth))) < bound(count)
 
 
-@pytest.mark.parametrize("count", SIZES)
-@pytest.mark.parametrize("definition", ["cosine", "geometric"])
+@cases("count", SIZES)
+@cases("definition", ["cosine", "geometric"])
 def test_beside_an_endless_wall_half_the_sky_is_seen(count, definition):
     octree = Octree([[0, -1e7, -1], [0, 1e7, -1], [0, 0, 1e7]], [[0, 1, 2]])
     seen = sky_view_factor(octree, [[0.01, 0.0, 0.0]], patches=count, definition=definition)
     assert abs(seen[0] - 0.5) < bound(count)
 
 
-@pytest.mark.parametrize("count", SIZES)
+@cases("count", SIZES)
 def test_in_the_open_it_is_that_of_the_points_tilt(count):
     octree = Octree([[0, 0, -9], [1, 0, -9], [0, 1, -9]], [[0, 1, 2]])
     tilts = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 180.0])
@@ -152,7 +153,7 @@ def test_hours_are_those_of_the_suns_that_are_seen():
     assert sun_hours(octree, [0, 0, 9], [1, 0, 0], suns).tolist() == 89.0  # not those behind it, nor that along it
 
 
-@pytest.mark.parametrize(
+@cases(
     ("argument", "value", "said"),
     [
         ("patches", 0, "an integer from 1 to .*, or a Pattern, got 0"),
@@ -187,7 +188,7 @@ def test_of_a_sky_within_a_points_horizon_nothing_is_seen():
         assert sky_view_factor(octree, np.zeros((2, 3)), [[1, 0, 0], [0, 0, 1]], patches=patches).tolist() == [0.0, 1.0]
 
 
-@pytest.mark.parametrize("bad", [[1.0], np.full(3, np.nan), [[1.0, 1.0, 1.0]], [-1, 0, 0]])
+@cases("bad", [[1.0], np.full(3, np.nan), [[1.0, 1.0, 1.0]], [-1, 0, 0]])
 def test_bad_hours_are_named(bad):
     with pytest.raises(ValueError, match=r"^weights: expected "):
         sun_hours(Octree.from_mesh(box()), np.zeros((4, 3)), None, np.eye(3), bad)

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Mesh, Octree, OrthographicCamera, PerspectiveCamera, Phong, Scene, SceneObject, render
 from renderer.mesh.shapes import box, grid, icosphere, torus
@@ -109,8 +110,8 @@ def test_the_points_of_a_cut_face_are_the_centroids_of_equal_parts(cuts):
     np.testing.assert_allclose(places.mean(axis=0), 1.0 / 3.0, rtol=1e-14)
 
 
-@pytest.mark.parametrize("samples", [1, 4, 9])
-@pytest.mark.parametrize("camera", CAMERAS, ids=["perspective", "orthographic"])
+@cases("samples", [1, 4, 9])
+@cases("camera", CAMERAS)
 def test_depths_have_the_bits_of_pictures(camera, samples):
     body = torus()
     scene = Scene(camera=camera, materials={"m": Phong()}, objects=[SceneObject(mesh=body, material="m")], ambient=1.0)
@@ -139,7 +140,7 @@ def test_a_scan_has_the_hits_of_its_rays():
     assert len(scan(octree, [0.0, 2.0, 0.5], [[0, 1, 0]]).points) == 0
 
 
-@pytest.mark.parametrize("integer", [np.int64, np.int16, np.uint16, np.uint64])
+@cases("integer", [np.int64, np.int16, np.uint16, np.uint64])
 def test_counts_may_be_integers_of_numpy(integer):
     octree, flat = Octree.from_mesh(torus()), Octree.from_mesh(box())
     np.testing.assert_array_equal(scan(octree, [0, 2, 0.5], integer(1000)).rays, scan(octree, [0, 2, 0.5], 1000).rays)
@@ -170,7 +171,7 @@ def test_rows_of_a_camera_of_ones_own_may_be_a_list():
     np.testing.assert_array_equal(depth_map(octree, _camera_of(rows), 31, 23), depth_map(octree, CAMERAS[0], 31, 23))
 
 
-@pytest.mark.parametrize(
+@cases(
     ("ask", "argument", "said"),
     [
         (lambda o: visible_faces(o, [0, 0]), "eye", "shape"),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 
 from renderer import (
     BruteForce,
@@ -143,9 +144,7 @@ def flat(answers: Any) -> list[bytes]:
     return [np.asarray(answers).tobytes()]
 
 
-@pytest.mark.parametrize(
-    ("module", "name", "few", "done"), SIZES, ids=[f"{m}-{n}-{k}" for k, (m, n, _, _) in enumerate(SIZES)]
-)
+@cases(("module", "name", "few", "done"), SIZES)
 def test_some_at_a_time_are_all_at_once(
     monkeypatch: pytest.MonkeyPatch, module: str, name: str, few: int, done: Callable[[], list[Any]]
 ) -> None:

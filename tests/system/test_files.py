@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import load_scene, render
 from renderer.cli import main as cli
@@ -271,7 +272,7 @@ def test_a_relative_path_in_a_folder_that_was_removed_is_named(tmp_path: Path, m
 
 
 @pytest.mark.judges("Image", "render")
-@pytest.mark.parametrize("planes", [(), ("rays",), ("depth", "face"), ("normal",), PLANES])
+@cases("planes", [(), ("rays",), ("depth", "face"), ("normal",), PLANES])
 def test_planes_that_are_not_kept_have_no_pixels_and_others_the_same(tmp_path: Path, planes: tuple[str, ...]) -> None:
     scene = load_scene(STAIRS)
     whole, image = render(scene, resolution=(20, 16)), render(scene, resolution=(20, 16), planes=planes)
@@ -284,7 +285,7 @@ def test_planes_that_are_not_kept_have_no_pixels_and_others_the_same(tmp_path: P
 
 
 @pytest.mark.judges("render")
-@pytest.mark.parametrize("planes", ["depth", ["color"], ["depth", 3], np.array(4), None])
+@cases("planes", ["depth", ["color"], ["depth", 3], np.array(4), None])
 def test_unknown_planes_are_refused(planes: Any) -> None:
     with pytest.raises(ValueError, match=r"^planes: expected some of radiance, depth, normal, face, rays, got "):
         render(load_scene(STAIRS), resolution=(4, 4), planes=planes)
@@ -319,14 +320,14 @@ def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
     os.close(reader)
 
 
-@pytest.mark.parametrize("name", ["a.obj", "a.ply", "a.stl", "a.glb", "a.toml"])
+@cases("name", ["a.obj", "a.ply", "a.stl", "a.glb", "a.toml"])
 def test_a_device_without_an_end_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / name).symlink_to("/dev/zero")
     with pytest.raises(ValueError, match=rf"{name}: cannot be read: expected a file, got a device"):
         load_scene(tmp_path / name)
 
 
-@pytest.mark.parametrize("name", ["a\x1bb.ply", "a\nb.ply", "a\x7fb.ply", 'a"b.ply'])
+@cases("name", ["a\x1bb.ply", "a\nb.ply", "a\x7fb.ply", 'a"b.ply'])
 def test_a_bare_mesh_of_any_name_is_shown(tmp_path: Path, name: str) -> None:
     save_ply(icosphere(1), tmp_path / name)
     assert load_scene(tmp_path / name).instances

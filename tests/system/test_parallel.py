@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.system import threads as parallel
 from renderer.system.threads import available_threads, checked_threads, for_chunks
@@ -17,8 +18,8 @@ from renderer.system.threads import available_threads, checked_threads, for_chun
 pytestmark = pytest.mark.judges("Octree", "PreparedScene.picture", "octree-render render --threads", "render")
 
 
-@pytest.mark.parametrize("threads", [1, 2, 5])
-@pytest.mark.parametrize("count, size", [(0, 4), (1, 4), (4, 4), (5, 4), (1000, 7), (3, 100)])
+@cases("threads", [1, 2, 5])
+@cases("count, size", [(0, 4), (1, 4), (4, 4), (5, 4), (1000, 7), (3, 100)])
 def test_every_item_is_worked_on_once(count, size, threads):
     times = np.zeros(count, int)
     ends = []
@@ -63,8 +64,8 @@ def test_finished_is_called_by_one_thread_at_a_time():
     for_chunks(lambda begin, end: None, 40, 1, 5, finished)
 
 
-@pytest.mark.parametrize("threads", [1, 2, 5])
-@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt, SystemExit])
+@cases("threads", [1, 2, 5])
+@cases("error", [ZeroDivisionError, KeyboardInterrupt, SystemExit])
 def test_an_exception_comes_out_and_stops_the_rest(error, threads):
     done = []
 
@@ -299,7 +300,7 @@ except {error}:
 """
 
 
-@pytest.mark.parametrize("error", ["KeyboardInterrupt", "TimeoutError", "SystemExit", "RuntimeError"])
+@cases("error", ["KeyboardInterrupt", "TimeoutError", "SystemExit", "RuntimeError"])
 def test_a_signal_while_a_thread_starts_leaves_none_that_the_interpreter_waits_for(error):
     """The thread was on no list, so nobody woke it, and the process said that it was interrupted and never ended."""
     command = [sys.executable, "-c", INTERRUPTED.format(error=error)]
@@ -331,23 +332,6 @@ def test_no_helper_is_left_at_work_whatever_a_signal_raises(monkeypatch, error):
     with pytest.raises(error):
         for_chunks(work, 2, 1, 2)
     assert len(slept) > 2 and not at_work
-
-
-DAEMON = """
-import threading
-from renderer.system.threads import for_chunks
-begun = threading.Barrier(3)
-def work(begin, end):
-    begun.wait()
-    while True:
-        yield
-threading.Thread(target=for_chunks, args=(work, 2, 1, 2), daemon=True).start()
-begun.wait()
-"""
-
-
-def test_a_daemons_helpers_do_not_outlive_the_main_thread():
-    subprocess.run([sys.executable, "-P", "-c", DAEMON], check=True, timeout=60)
 
 
 DAEMON_LIVES_ON = """

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from meshes import answers, arrays, make_mesh, rays_at
 
 from renderer import BruteForce, Image, Mesh, Octree, Repairs, Scene, load_scene, render
@@ -257,8 +258,8 @@ QUERIES: dict[str, Callable[[Any, Any], Any]] = {
 
 
 @pytest.mark.judges("Octree.refit")
-@pytest.mark.parametrize("query", QUERIES)
-@pytest.mark.parametrize("kind", ["octree", "brute force", "mapped"])
+@cases("query", QUERIES)
+@cases("kind", ["octree", "brute force", "mapped"])
 def test_a_refit_in_the_midst_of_a_query_changes_nothing_of_it(kind: str, query: str, tmp_path: Path) -> None:
     target, ask = TARGETS[kind](tmp_path), QUERIES[query]
     points = ORIGINS[:5] if query == "few" else ORIGINS / 2.0

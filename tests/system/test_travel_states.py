@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
+from cases import cases
 from pydantic import BaseModel
 
 import renderer
@@ -34,9 +34,9 @@ from renderer import (
     studies,
 )  # fmt: skip
 from renderer.checkpoints.study import Study
-from renderer.checkpoints.study_points import on_faces
 from renderer.mesh.shapes import box, icosphere
 from renderer.picture.image import PLANES
+from renderer.studies.points import on_faces
 
 BALL, RAYS = icosphere(1), ([[0.1, 0.2, 3.0], [9.0, 9.0, 9.0]], [0.0, 0.0, -1.0])
 EYE = PerspectiveCamera(eye=(0, 0, 6), target=(0, 0, 0), fov=30)
@@ -143,7 +143,7 @@ def content(thing: Any) -> Any:
     return thing
 
 
-@pytest.mark.parametrize("name", THINGS)
+@cases("name", THINGS)
 def test_a_copy_holds_and_answers_the_same(name: str) -> None:
     thing = THINGS[name]
     expected = content(thing)

@@ -4,6 +4,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import BruteForce, Octree
 from renderer.all_hits import all_hits
@@ -62,8 +63,8 @@ def in_pieces(ask, *arrays):
     return np.concatenate([ask(*(a[i : i + 64] for a in arrays)) for i in range(0, len(arrays[0]), 64)], axis=-1)
 
 
-@pytest.mark.parametrize("kind", ["stream", "packets", "both"])
-@pytest.mark.parametrize("any_hit", [False, True])
+@cases("kind", ["stream", "packets", "both"])
+@cases("any_hit", [False, True])
 def test_rays_amid_slivers(slivers, monkeypatch, kind, any_hit):
     """1024 rays had been one call; of 200,000 slivers it kept Ctrl-C waiting for a minute."""
 
@@ -149,8 +150,8 @@ def test_all_hits(monkeypatch, mesh, max_hits):
     assert len(calls) >= 2 and reached == sorted(set(reached)) and reached[-1] == len(origins)
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize("side_alone", [False, True])
+@cases("accelerator", [Octree, BruteForce])
+@cases("side_alone", [False, True])
 def test_winding_numbers_amid_slivers(monkeypatch, side_alone, accelerator):
     """512 points had been one call."""
     asked, points = accelerator(*hair(5000), threads=1), np.random.default_rng(3).random((512, 3))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from meshes import make_mesh
 from numba import njit
 from numpy.typing import NDArray
@@ -85,9 +86,9 @@ def in_range(origins, directions, t_min, t_max, starts):
     return near & fits & np.isfinite(directions).all(axis=1) & (t_min >= 0.0) & (t_min < np.inf) & (t_max >= 0.0)
 
 
-@pytest.mark.parametrize("alike", [False, True], ids=["streams", "packets"])
-@pytest.mark.parametrize("kind", ["soup", "lattice", "sphere", "flat"])
-@pytest.mark.parametrize("any_hit", [False, True])
+@cases("alike", [False, True])
+@cases("kind", ["soup", "lattice", "sphere", "flat"])
+@cases("any_hit", [False, True])
 def test_no_ray_leaves_its_stack_or_spoils_another(kind, alike, any_hit):
     rng = np.random.default_rng([1, len(kind), alike])
     mesh = icosphere(3) if kind == "sphere" else Mesh(*make_mesh(kind, 5, 500))
@@ -130,8 +131,8 @@ def scene_before(camera: Any) -> Scene:
     return Scene(camera=camera, materials={"grey": Phong()}, objects=[ball], ambient=1)
 
 
-@pytest.mark.parametrize("far", [1e38, 3.5e38, 1e40, 1e60, 1e300])
-@pytest.mark.parametrize("camera", [PerspectiveCamera, OrthographicCamera])
+@cases("far", [1e38, 3.5e38, 1e40, 1e60, 1e300])
+@cases("camera", [PerspectiveCamera, OrthographicCamera])
 def test_an_eye_too_far_away_is_refused_by_name(camera: Any, far: float, tmp_path: Any) -> None:
     lens = {"height": 4.0} if camera is OrthographicCamera else {"fov": 1e-9}
     with pytest.raises(SceneError, match=r"eye: expected coordinates within 8.51e\+37.* got \[0, 0, "):
@@ -148,10 +149,9 @@ def film(image: Any) -> list[NDArray[Any]]:
     return [image.radiance, image.depth, image.face, image.normal]
 
 
-@pytest.mark.parametrize(
+@cases(
     "lens",
     [{"height": h} for h in (5e-324, 1e-300, 1e30, FARTHEST)] + [{"fov": f} for f in (5e-324, 1e-9, 180 - 2.0**-45)],
-    ids=str,
 )
 def test_any_camera_ends_and_sees_what_brute_force_sees(lens: Any) -> None:
     kind: Any = OrthographicCamera if "height" in lens else PerspectiveCamera

@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import BruteForce, Hits, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
@@ -16,8 +17,8 @@ ORIGINS, DIRECTIONS = 2 * RNG.normal(size=(24, 3)), RNG.normal(size=(24, 3))
 
 
 @pytest.mark.judges("AllHits.counts", "Hits", "Hits.shaped", "Octree.any_hit")
-@pytest.mark.parametrize("queries", QUERIES, ids=["octree", "brute"])
-@pytest.mark.parametrize("shape", [(24,), (4, 6), (2, 3, 4), (24, 1), (1, 24)])
+@cases("queries", QUERIES)
+@cases("shape", [(24,), (4, 6), (2, 3, 4), (24, 1), (1, 24)])
 def test_answers_have_the_dimensions_of_the_rays(queries, shape):
     flat = queries.closest_hit(ORIGINS, DIRECTIONS)
     o, d = ORIGINS.reshape(*shape, 3), DIRECTIONS.reshape(*shape, 3)
@@ -44,8 +45,8 @@ def test_answers_have_the_dimensions_of_the_rays(queries, shape):
 TWICE = Mesh.concatenate([box(), Mesh(box().vertices, box().faces[:, ::-1])])
 
 
-@pytest.mark.parametrize("queries", [Octree.from_mesh(TWICE), BruteForce.from_mesh(TWICE)], ids=["octree", "brute"])
-@pytest.mark.parametrize("shape", [(4, 6), (24, 1), (1, 2, 12)])
+@cases("queries", [Octree.from_mesh(TWICE), BruteForce.from_mesh(TWICE)])
+@cases("shape", [(4, 6), (24, 1), (1, 2, 12)])
 def test_rays_of_any_dimensions_go_on_through_coinciding_faces(queries, shape):
     """Through two faces at each wall, and out."""
     directions = np.array([0.5, 0.25, 0.5]) - ORIGINS

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import BruteForce, Octree
 from validation.oracle import exact
@@ -54,7 +55,7 @@ def test_a_closed_mesh_whose_corners_lie_a_few_roundings_apart_does_not_leak():
         assert accelerator.closest_hit(*ray).t[0] == pytest.approx(1.0, abs=1e-14)
 
 
-@pytest.mark.parametrize("width", [0.0, 1e-15, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-3])
+@cases("width", [0.0, 1e-15, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-3])
 def test_a_ray_that_leaves_a_thin_face_starts_there(width):
     """The start had moved by 264 u over the face's relative width, without end. Now it moves by 2^-31 at most."""
     vertices = [[1, -1, -1], [-0.5, 0.5 + width, -1], [-1, 1, -1], [-9, -9, 1], [9, -9, 1], [0, 20, 1]]
@@ -65,8 +66,8 @@ def test_a_ray_that_leaves_a_thin_face_starts_there(width):
     assert float(hits.t) == pytest.approx(2.0 / direction[2], rel=2.0**-29)
 
 
-@pytest.mark.parametrize("turn", range(3))
-@pytest.mark.parametrize("axes", [(0, 1), (1, 0)])
+@cases("turn", range(3))
+@cases("axes", [(0, 1), (1, 0)])
 def test_a_ray_beside_an_edge_by_less_than_its_products_hold_is_on_one_side_of_it(turn, axes):
     """The products of 1e-200 vanish, so the edge function is 0 as rounded; the ray passes it by 1e-400."""
     for far, hit in ((-1.0, True), (1.0, False)):

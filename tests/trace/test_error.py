@@ -4,14 +4,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 from meshes import make_mesh, rays_at
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.trace import error as bounding
 from validation.oracle import exact
-from validation.oracle.distance import cross, difference, dot
 from validation.oracle.starts import start_near
+from validation.oracle.vectors import cross, difference, dot
 
 pytestmark = pytest.mark.judges("AllHits", "Hits", "Octree.closest_hit")
 
@@ -33,9 +34,9 @@ def shares(octree, origins, directions, hits, rows):
     return np.array(found)
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e6])
-@pytest.mark.parametrize("offset", [0.0, 1e5])
-@pytest.mark.parametrize("kind", ["soup", "lattice", "slivers"])
+@cases("scale", [1.0, 1e-3, 1e6])
+@cases("offset", [0.0, 1e5])
+@cases("kind", ["soup", "lattice", "slivers"])
 def test_no_error_is_above_its_bound(kind, offset, scale):
     if kind == "slivers":
         ball = icosphere(2)
@@ -160,9 +161,9 @@ def test_flat_faces_at_the_origin_keep_their_bound(power):
     assert beyond(corners, origins, directions, hits) == (1, [])
 
 
-@pytest.mark.parametrize("scale", [2.0**-500, 1.0, 2.0**500])
-@pytest.mark.parametrize("height", [5e-324, 3e-320, 4.5e-309])
-@pytest.mark.parametrize("length", [1.0, 3.0, 7e199, 1e-9])
+@cases("scale", [2.0**-500, 1.0, 2.0**500])
+@cases("height", [5e-324, 3e-320, 4.5e-309])
+@cases("length", [1.0, 3.0, 7e199, 1e-9])
 def test_a_denormal_t_has_a_bound(scale, height, length):
     octree = Octree(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]) * scale, [[0, 1, 2]])
     hits = octree.closest_hit([0.25 * scale, 0.25 * scale, height], [0.0, 0.0, -length], t_error=True)

@@ -4,11 +4,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import BruteForce, Octree
 from renderer.mesh.shapes import box
 from renderer.studies import fibonacci_sphere, occlusion, scan, sky_view_factor, sun_hours
-from validation.oracle.distance import cross, difference, dot
+from validation.oracle.vectors import cross, difference, dot
 
 BOTH = pytest.mark.parametrize("accelerator", [Octree, BruteForce])
 GROUND = np.array([[-10, -10, 0], [30, -10, 0], [-10, 30, 0]], float), np.array([[0, 1, 2]])
@@ -28,8 +29,8 @@ def together(*parts):
     )
 
 
-@pytest.mark.parametrize("order", [1, -1])
-@pytest.mark.parametrize("place", [0.0, 0.1, 500000.5])
+@cases("order", [1, -1])
+@cases("place", [0.0, 0.1, 500000.5])
 def test_at_the_feet_and_corners_of_a_house_the_sky_is_what_it_is_a_little_beside(order, place):
     """A half at a wall, and 3/4 of the directions at a corner, less what is below the point's own horizon."""
     floor = np.array([[0, 0, 0], [8, 0, 0], [8, 8, 0], [0, 8, 0]], float), np.array([[0, 1, 2], [0, 2, 3]])

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import example, given
 from hypothesis import strategies as st
 from meshes import make_mesh, rays_at
@@ -196,7 +197,7 @@ def woop(corners, origin, direction):
     return (u * a[z] + v * b[z] + w * c[z]) / (whole * direction[z]), v / whole, w / whole
 
 
-@pytest.mark.parametrize("kind", ["soup", "soup_float32", "lattice", "sizes", "far_away"])
+@cases("kind", ["soup", "soup_float32", "lattice", "sizes", "far_away"])
 def test_the_kernel_equals_its_slow_twin_bit_for_bit(kind):
     vertices, faces = make_mesh(kind, 11, 12)
     origins, directions = rays_at(vertices, faces, 12, 25)
@@ -211,7 +212,7 @@ def test_the_kernel_equals_its_slow_twin_bit_for_bit(kind):
         np.testing.assert_array_equal((hits.t[row], hits.face[row], hits.u[row], hits.v[row]), best)
 
 
-@pytest.mark.parametrize("height", [10.0**-k for k in range(1, 9)])
+@cases("height", [10.0**-k for k in range(1, 9)])
 def test_slivers_are_hit_as_exactly(height):
     rng = np.random.default_rng(13)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
@@ -315,7 +316,7 @@ def boxes_and_rays(seed):
     return node, lower, upper, at - directions / size * rng.choice([0.0, 0.5, 4.0, 1e4], (200, 1)), directions
 
 
-@pytest.mark.parametrize("seed", range(10))
+@cases("seed", range(10))
 def test_no_box_is_missed_that_a_ray_meets_and_no_entry_is_late(seed):
     node, lower, upper, origins, directions = boxes_and_rays(seed)
     entry = np.empty(8, np.float32)
@@ -338,7 +339,7 @@ def test_no_box_is_missed_that_a_ray_meets_and_no_entry_is_late(seed):
     assert wrongly_entered < 0.2 * (7 * len(origins) - met)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@cases("seed", range(4))
 def test_the_interval_keeps_boxes_at_its_ends_and_drops_those_beyond(seed):
     node, lower, upper, origins, directions = boxes_and_rays(seed)
     entry = np.empty(8, np.float32)

@@ -4,14 +4,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 from meshes import make_mesh
 
 from renderer import BruteForce, Octree
 from renderer.mesh.shapes import box, grid, icosphere, torus
+from renderer.results.hits import Hits
 from renderer.trace import batch
-from renderer.trace.hits import Hits
 from renderer.trace.intersect import CORNER
 from renderer.trace.starts.record import EDGE, HEAD, ROW, SLACK
 
@@ -35,10 +36,10 @@ def on_faces(vertices, faces, seed, count=400):
     return face, points, rng.normal(size=(count, 3)) * 10.0 ** rng.integers(-3, 4, (count, 1))
 
 
-@pytest.mark.parametrize("kind", ["icosphere", "torus", "box", "soup", "sizes"])
-@pytest.mark.parametrize("scale", SCALES)
+@cases("kind", ["icosphere", "torus", "box", "soup", "sizes"])
+@cases("scale", SCALES)
 # In float32 nothing is left of a mesh 1e8 away.
-@pytest.mark.parametrize(("offset", "single"), [(o, s) for o in OFFSETS for s in (False, True) if not (s and o > 1e7)])
+@cases(("offset", "single"), [(o, s) for o in OFFSETS for s in (False, True) if not (s and o > 1e7)])
 def test_no_ray_meets_the_face_that_it_leaves(kind, scale, offset, single):
     shapes = {"icosphere": lambda: icosphere(3), "torus": torus, "box": box}
     mesh = shapes[kind]() if kind in shapes else None
@@ -146,7 +147,7 @@ def test_minus_one_leaves_no_face_and_one_number_stands_for_all():
     assert octree.any_hit(np.empty((0, 3)), np.empty((0, 3)), leaving=np.empty(0, int)).shape == (0,)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("bad", "told"),
     [
         ([0.0, 1.0], r"an integer or integers of shape \(2,\), got float64 of shape \(2,\)"),
@@ -179,7 +180,7 @@ def test_an_origin_out_of_bounds_is_told_as_it_was_given(origin):
     assert str(origin) in str(told.value)
 
 
-@pytest.mark.parametrize("exponent", [-1000, -830, -600, -512, 512, 700, 1000])
+@cases("exponent", [-1000, -830, -600, -512, 512, 700, 1000])
 def test_meshes_of_extreme_size_are_left_too(exponent):
     """The cross product of the sides vanished, or was infinite: NaN for a start, or the face itself at t = 0."""
     rng = np.random.default_rng(1)
@@ -195,8 +196,8 @@ def test_a_direction_that_is_no_number_is_blamed_not_the_origin():
         octree.any_hit(np.zeros((2, 3)), [[0.0, 0.0, 1.0], [np.nan, 0.0, 1.0]], leaving=[0, 1])
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize("toward", [0, 1])
+@cases("accelerator", [Octree, BruteForce])
+@cases("toward", [0, 1])
 def test_a_ray_along_a_face_on_a_line_leaves_it(accelerator, toward):
     """Of a direction along the side no normal looked back, so the start was not moved."""
     corners = np.array(
@@ -237,8 +238,8 @@ def test_no_kernel_is_compiled_for_other_arrays(monkeypatch):
     assert len(seen) == 6 and all(all(row) for row in seen)
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize("count", [7, 3000])
+@cases("accelerator", [Octree, BruteForce])
+@cases("count", [7, 3000])
 def test_hits_know_the_side_of_the_face_that_their_ray_came_from(accelerator, count):
     queries, rng = accelerator(*make_mesh("soup", 4, 300)), np.random.default_rng(6)
     origins, directions = rng.normal(size=(2, count, 3))
@@ -258,9 +259,9 @@ def test_hits_know_the_side_of_the_face_that_their_ray_came_from(accelerator, co
 ABOVE, BELOW, UP, DOWN = 1, -1, (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize("count", [1, 40])
-@pytest.mark.parametrize(
+@cases("accelerator", [Octree, BruteForce])
+@cases("count", [1, 40])
+@cases(
     ("side", "direction", "met"),
     [
         (ABOVE, UP, []),
@@ -323,8 +324,8 @@ def test_rays_go_on_from_hits_on_the_side_that_they_came_from_and_through_them_o
     np.testing.assert_array_equal(octree.closest_hit(origins, directions, leaving=missed).t, hits.t)
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize("scale", SCALES)
+@cases("accelerator", [Octree, BruteForce])
+@cases("scale", SCALES)
 def test_at_corners_and_edges_of_a_box_its_faces_stop_what_leads_through_them_and_nothing_else(accelerator, scale):
     """The box is the octant of each corner, and a quarter of space at an edge."""
     solid = box()
@@ -414,8 +415,8 @@ def test_hits_of_other_rays_and_sides_beside_hits_are_errors():
             octree.any_hit(off, rays[1], leaving=left)
 
 
-@pytest.mark.parametrize("largest", [1.0, 1e-9, 1e6])
-@pytest.mark.parametrize("direction", [0, 1])
+@cases("largest", [1.0, 1e-9, 1e6])
+@cases("direction", [0, 1])
 def test_a_point_that_is_far_from_the_face_that_it_names_is_an_error(largest, direction):
     """Farther than 2^-18 of the largest coordinate, off the plane or beside the face; nearer ones are rounded."""
     octree = Octree(np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]]) * largest, [[0, 1, 2]])

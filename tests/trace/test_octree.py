@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 from meshes import arrays, assert_same_hits, make_mesh, rays_at
 
 from renderer.mesh.mesh import Mesh
@@ -292,15 +293,15 @@ def test_the_caller_may_change_its_arrays_afterwards():
     assert cast(octree, [0.25, 0.25, 1], [0, 0, -1]) == (1, 0)
 
 
-@pytest.mark.parametrize("exponent", [-140, -110, 0, 110])
+@cases("exponent", [-140, -110, 0, 110])
 def test_normals_are_unit_at_every_scale(exponent):
     vertices = np.ldexp([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], exponent)
     hits = Octree(vertices, [[0, 1, 2]]).closest_hit(np.ldexp([[0.25, 0.25, 1]], exponent), [[0, 0, -1]])
     np.testing.assert_array_equal(hits.normals, [[0, 0, 1]])
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize("scale", [1e-300, 1e-40, 1e-30, 1e30, 1e40, 1e300])
+@cases("accelerator", [Octree, BruteForce])
+@cases("scale", [1e-300, 1e-40, 1e-30, 1e30, 1e40, 1e300])
 def test_meshes_beyond_float32_are_traced_exactly(accelerator, scale):
     """Their vertices are brought near 1 by a power of two, and t comes back by the same."""
     sphere = icosphere(2)

@@ -4,6 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at, separate
@@ -43,8 +44,8 @@ def test_octree_equals_brute_force_bit_for_bit(mesh, chosen, seed):
     assert np.isinf(got.t[~got.hit]).all() and np.isnan(got.u[~got.hit]).all() and np.isnan(got.v[~got.hit]).all()
 
 
-@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"duplicates"}))
-@pytest.mark.parametrize("split", ["midpoint", "sah"])
+@cases("kind", sorted(set(KINDS) - {"duplicates"}))
+@cases("split", ["midpoint", "sah"])
 def test_octree_equals_brute_force_on_thousands_of_faces(kind, split):
     mesh = make_mesh(kind, 3, 3000)
     rays = rays_at(*mesh, 4, 100)
@@ -53,8 +54,8 @@ def test_octree_equals_brute_force_on_thousands_of_faces(kind, split):
     assert_same_hits(hits, BruteForce(*mesh).closest_hit(*rays))
 
 
-@pytest.mark.parametrize("split", ["midpoint", "sah"])
-@pytest.mark.parametrize("through", ["anywhere", "the triangle"])
+@cases("split", ["midpoint", "sah"])
+@cases("through", ["anywhere", "the triangle"])
 def test_rays_in_the_plane_of_a_triangle_agree_with_brute_force(split, through):
     # All three edge functions of such a ray are rounding noise.
     rng = np.random.default_rng(0)
@@ -216,7 +217,7 @@ def big_endian(array):
     return array.astype(">f8")
 
 
-@pytest.mark.parametrize(
+@cases(
     "form", [strided, fortran, reversed_twice, read_only, big_endian, np.float32, np.int64, np.int8, np.ndarray.tolist]
 )
 def test_the_form_of_the_input_does_not_matter(form):

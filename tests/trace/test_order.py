@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import assert_same_hits, make_mesh, options, rays_at, separate
@@ -15,7 +16,7 @@ from numpy.random import Generator
 from renderer.jit.decorators import kernel
 from renderer.numerics.simd import extract
 from renderer.octree import BruteForce, Octree
-from renderer.trace.hits import Hits
+from renderer.results.hits import Hits
 from renderer.trace.intersect import FAR_PADDING, Ray, box_limit, hit_triangles, largest_of, make_shear, round_down
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import tree_pointers
@@ -61,8 +62,8 @@ def test_most_rays_beside_the_plane_hit_near_it(expected):
 
 
 @pytest.mark.judges("Octree.closest_hit")
-@pytest.mark.parametrize("threads", [1, 2, 3])
-@pytest.mark.parametrize("split", ["midpoint", "sah"])
+@cases("threads", [1, 2, 3])
+@cases("split", ["midpoint", "sah"])
 def test_rays_beside_a_plane_hit_the_same_with_any_threads(flat, expected, threads, split):
     assert_same_hits(Octree(*flat, split=split, threads=threads).closest_hit(*beside(1e-12)), expected)
 
@@ -86,8 +87,8 @@ def test_rays_beside_a_plane_hit_the_same_without_the_first_eight(flat, expected
         np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name)[8:])
 
 
-@pytest.mark.parametrize("factor", [1 - 1e-6, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-6])
-@pytest.mark.parametrize("bound", ["t_min", "t_max"])
+@cases("factor", [1 - 1e-6, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-6])
+@cases("bound", ["t_min", "t_max"])
 def test_bounds_close_to_a_hit_mean_the_same_to_all(flat, expected, bound, factor):
     bounds = {bound: np.where(expected.hit, expected.t, 1.0) * factor}
     rays = beside(1e-12)

@@ -1,7 +1,7 @@
 """Rays that travel together find what each finds alone: packets of coherent rays, streams of others."""
 
 import numpy as np
-import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at
@@ -44,8 +44,8 @@ def test_fans_equal_brute_force_bit_for_bit(mesh, chosen, seed):
     np.testing.assert_array_equal(octree.any_hit(origins, directions, 0.0, t_max), expected.hit)
 
 
-@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"duplicates", "far_away"}))
-@pytest.mark.parametrize("split", ["midpoint", "sah"])
+@cases("kind", sorted(set(KINDS) - {"duplicates", "far_away"}))
+@cases("split", ["midpoint", "sah"])
 def test_fans_equal_single_rays_on_thousands_of_faces(kind, split):
     octree = Octree(*make_mesh(kind, 3, 3000), split=split)
     origins, directions = fans(octree.mesh.vertices, octree.mesh.faces, 5, 40)
@@ -97,7 +97,7 @@ def _prepare_both(rays, numbers, together, alone):
         prepare_ray(Prepared(pointer(floats), pointer(doubles), pointer(integers)), 8 + k, ray, t_max)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@cases("seed", range(40))
 def test_eight_rays_are_prepared_as_each_is_alone(seed):
     """Bit for bit: directions along axes, of equal components and of -0.0, origins and bounds of any size."""
     rng = np.random.default_rng(seed)
@@ -153,7 +153,7 @@ def _beam_and_rays(nodes, origins, directions, t_max):
     return _meet_beam_and_rays(nodes, origins, directions, t_max, room)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@cases("seed", range(12))
 def test_a_beam_meets_every_box_that_one_of_its_rays_meets(seed):
     rng = np.random.default_rng(seed)
     met = missed = 0

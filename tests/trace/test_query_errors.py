@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.errors import MeshError
 from renderer.octree import BruteForce, Octree
@@ -122,18 +123,38 @@ class TestRays:
         call([[1, 2, 3]], np.array([[0, 0, 1]], np.uint8), [0.0], [1.0])
 
 
-@pytest.mark.parametrize(
+@cases(
     "options",
     [
-        {"split": "SAH"}, {"split": ""}, {"split": None}, {"split": 0}, {"split": ["sah"]},
-        {"leaf_size": 0}, {"leaf_size": 33}, {"leaf_size": -1}, {"leaf_size": 4.0}, {"leaf_size": "4"},
-        {"leaf_size": None}, {"leaf_size": True}, {"leaf_size": np.nan}, {"leaf_size": [4]},
-        {"max_depth": 0}, {"max_depth": 65}, {"max_depth": -3}, {"max_depth": 8.5}, {"max_depth": True},
-        {"max_depth": None}, {"max_depth": np.array([3, 4])},
-        {"threads": 0}, {"threads": -1}, {"threads": 1.5}, {"threads": "2"}, {"threads": True}, {"threads": [2]},
+        {"split": "SAH"},
+        {"split": ""},
+        {"split": None},
+        {"split": 0},
+        {"split": ["sah"]},
+        {"leaf_size": 0},
+        {"leaf_size": 33},
+        {"leaf_size": -1},
+        {"leaf_size": 4.0},
+        {"leaf_size": "4"},
+        {"leaf_size": None},
+        {"leaf_size": True},
+        {"leaf_size": np.nan},
+        {"leaf_size": [4]},
+        {"max_depth": 0},
+        {"max_depth": 65},
+        {"max_depth": -3},
+        {"max_depth": 8.5},
+        {"max_depth": True},
+        {"max_depth": None},
+        {"max_depth": np.array([3, 4])},
+        {"threads": 0},
+        {"threads": -1},
+        {"threads": 1.5},
+        {"threads": "2"},
+        {"threads": True},
+        {"threads": [2]},
     ],
-    ids=repr,
-)  # fmt: skip
+)
 def test_options(options):
     (name,) = options
     assert refused(lambda: Octree(VERTICES, FACES, **options)).startswith(f"{name}: ")
@@ -153,8 +174,8 @@ def test_options_are_keywords():
         Octree(VERTICES, FACES, "sah")
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize(
+@cases("accelerator", [Octree, BruteForce])
+@cases(
     "vertices, faces, parts",
     [
         ([*VERTICES, [0, np.nan, 0]], FACES, ("vertices", "row 3")),

@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 import numpy as np
-import pytest
+from cases import cases
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -37,7 +37,7 @@ def test_products_that_rounding_makes_one(seed, scale):
     assert products_sign(a, b, c, d) == sign(exact) == -products_sign(c, d, a, b) == -products_sign(a, -b, c, -d)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("sides", "within"),
     [
         ((1, 1, 1), 1),

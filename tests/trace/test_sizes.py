@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import BruteForce, MeshError, Octree
 from renderer.arguments.limits import SHORTEST
@@ -23,8 +24,8 @@ def directions(count=300):
     return np.random.default_rng(7).normal(size=(count, 3))
 
 
-@pytest.mark.parametrize("radius", [1.0, 1e-20, 1e-40, 1e-80, 1e-98])
-@pytest.mark.parametrize("kind", [Octree, BruteForce])
+@cases("radius", [1.0, 1e-20, 1e-40, 1e-80, 1e-98])
+@cases("kind", [Octree, BruteForce])
 def test_a_closed_ball_of_any_size_that_is_taken_leaks_nowhere(kind, radius):
     vertices, faces = beside_a_triangle(radius)
     hits = kind(vertices, faces).closest_hit([0, 0, 0], directions())
@@ -36,8 +37,8 @@ def test_a_closed_ball_of_any_size_that_is_taken_leaks_nowhere(kind, radius):
     np.testing.assert_allclose(hits.t, t, rtol=64 * 2.0**-53)
 
 
-@pytest.mark.parametrize("radius", [1e-101, 1e-108, 1e-165, 1e-300])
-@pytest.mark.parametrize("kind", [Octree, BruteForce])
+@cases("radius", [1e-101, 1e-108, 1e-165, 1e-300])
+@cases("kind", [Octree, BruteForce])
 def test_smaller_ones_beside_it_are_refused_by_row(kind, radius):
     with pytest.raises(MeshError, match=r"faces: expected a second longest side .* 4.57e-100, got .* in row \d+"):
         kind(*beside_a_triangle(radius))
@@ -87,7 +88,7 @@ def test_the_bound_is_where_it_says():
                 Octree(vertices, [[0, 1, 2], [3, 4, 5]])
 
 
-@pytest.mark.parametrize("exponent", [-320, -200, -108, -40])
+@cases("exponent", [-320, -200, -108, -40])
 def test_no_hit_is_at_infinity_or_minus_zero(exponent):
     octree = Octree(UNIT * [1, 1, 0], [[0, 1, 2]])
     z = 10.0**exponent
@@ -97,8 +98,8 @@ def test_no_hit_is_at_infinity_or_minus_zero(exponent):
     assert np.isfinite(hits.t[hits.hit]).all()
 
 
-@pytest.mark.parametrize("accelerator", [Octree, BruteForce])
-@pytest.mark.parametrize("side", [2.0**-329, 1e-90, 1e-72])
+@cases("accelerator", [Octree, BruteForce])
+@cases("side", [2.0**-329, 1e-90, 1e-72])
 def test_the_smallest_box_with_the_shortest_directions_leaks_nowhere(accelerator, side):
     """A determinant times a direction vanished: rays passed the box to the triangle behind it, and t was wrong."""
     small = box((-0.37, -0.37, -0.37), (0.63, 0.63, 0.63))

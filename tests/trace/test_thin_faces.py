@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import (
     BruteForce,
@@ -22,8 +23,8 @@ from renderer.mesh.shapes import icosphere
 from validation.stability.cases.thin import BESIDE, SHORT, at_the_needle, at_the_side, needle, split_side
 
 
-@pytest.mark.parametrize("beside", BESIDE)
-@pytest.mark.parametrize("turned", [False, True])
+@cases("beside", BESIDE)
+@cases("turned", [False, True])
 def test_no_ray_from_within_is_lost_at_a_split_side(beside, turned):
     mesh, rays = split_side(beside), at_the_side(20_000)
     origins, directions = rays.origins, rays.directions
@@ -41,8 +42,8 @@ def test_no_ray_from_within_is_lost_at_a_split_side(beside, turned):
         np.testing.assert_array_equal(np.concatenate(few), hits.t[:500])
 
 
-@pytest.mark.parametrize("short", SHORT)
-@pytest.mark.parametrize("turned", [False, True])
+@cases("short", SHORT)
+@cases("turned", [False, True])
 def test_no_ray_from_within_is_lost_at_the_short_side_of_a_needle(short, turned):
     """A needle that is taken for a line was met where the line passes, not where its end does."""
     mesh, rays = needle(short), at_the_needle(short, 20_000)
@@ -72,7 +73,7 @@ def test_the_barycentrics_of_a_needle_name_the_place_at_its_short_side():
         np.testing.assert_allclose(hits.u[hits.hit], u, rtol=0, atol=1e-2)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@cases("seed", range(12))
 def test_spheres_rounded_until_faces_collapse_do_not_leak(seed):
     rng = np.random.default_rng(seed)
     centre = rng.normal(size=3) * 2.0**17
@@ -103,7 +104,7 @@ def test_a_ray_leaves_a_face_of_no_area():
     assert not octree.any_hit(hits.points[thin], outwards[thin], leaving=hits.face[thin]).any()
 
 
-@pytest.mark.parametrize("beside", [0.0, 1e-17, 1e-16, 1e-15, 3e-15, 1e-14, 5e-14, 1e-12, 1e-9, 1e-6])
+@cases("beside", [0.0, 1e-17, 1e-16, 1e-15, 3e-15, 1e-14, 5e-14, 1e-12, 1e-9, 1e-6])
 def test_a_ray_leaves_a_face_however_thin_in_whatever_direction(beside):
     """The start had stayed within rounding of the face, because the normal pointed along it."""
     rng = np.random.default_rng(4)

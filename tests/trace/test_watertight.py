@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, torus
@@ -48,8 +49,8 @@ CLOSED = {
 }
 
 
-@pytest.mark.parametrize("split", ["midpoint", "sah"])
-@pytest.mark.parametrize("name", CLOSED)
+@cases("split", ["midpoint", "sah"])
+@cases("name", CLOSED)
 def test_no_ray_from_inside_leaks(name, split):
     make, inside = CLOSED[name]
     mesh = make()
@@ -65,7 +66,7 @@ def test_no_ray_from_inside_leaks(name, split):
     assert (hits.t > 1 + 1e-6).sum() < 1e-3 * len(hits.t)
 
 
-@pytest.mark.parametrize("offset, scale", [(1e6, 1.0), (0.0, 1e-3), (0.0, 1e6), (1e4, 1e3)])
+@cases("offset, scale", [(1e6, 1.0), (0.0, 1e-3), (0.0, 1e6), (1e4, 1e3)])
 def test_no_ray_leaks_from_a_moved_and_scaled_sphere(offset, scale):
     sphere = icosphere(3)
     mesh = Mesh(sphere.vertices * scale + offset, sphere.faces)

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 from meshes import KINDS, arrays, make_mesh
@@ -117,7 +118,7 @@ def test_octants_lie_on_their_sides_of_the_middle(kind):
     assert len(whole) == 8
 
 
-@pytest.mark.parametrize(("extent", "octants"), [((9, 5, 5), 8), ((5, 9, 4), 4), ((2, 4, 9), 2), ((9, 4, 5), 4)])
+@cases(("extent", "octants"), [((9, 5, 5), 8), ((5, 9, 4), 4), ((2, 4, 9), 2), ((9, 4, 5), 4)])
 def test_flat_parts_are_not_cut_across(extent, octants):
     """An axis less than half as long as the longest: its cuts fall to the cells within."""
     rng = np.random.default_rng(1)
@@ -126,7 +127,7 @@ def test_flat_parts_are_not_cut_across(extent, octants):
     assert (tree.halves < 0).sum() == octants and len(numbers) == 400 and own.shape == (400, 2, 3)
 
 
-@pytest.mark.parametrize("kind", ["soup", "soup_float32", "sizes", "lattice"])
+@cases("kind", ["soup", "soup_float32", "sizes", "lattice"])
 def test_the_last_few_faces_are_cut_by_the_heuristic_under_either_rule(kind):
     """Of 32 faces the first cut is the same, of 33 it is not."""
     for count, same in ((8, True), (32, True), (33, False)):
@@ -135,7 +136,7 @@ def test_the_last_few_faces_are_cut_by_the_heuristic_under_either_rule(kind):
         assert alike == same
 
 
-@pytest.mark.parametrize("seed", range(5))
+@cases("seed", range(5))
 def test_the_sah_cut_is_as_cheap_as_the_best_of_its_planes(seed):
     count = 200
     numbers, own, tree = cut("soup", seed, count, "sah")

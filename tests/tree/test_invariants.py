@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from meshes import KINDS, make_mesh, meshes, options
 
@@ -24,15 +25,15 @@ def test_every_tree_is_sound(mesh, chosen):
     check_safe(octree.tree, len(octree.mesh.faces))
 
 
-@pytest.mark.parametrize("split", ["midpoint", "sah"])
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@cases("split", ["midpoint", "sah"])
+@cases("kind", sorted(KINDS))
 def test_larger_trees_are_sound(kind, split):
     octree = Octree(*make_mesh(kind, 1, 2000), split=split)
     assert faults(octree.tree, octree.mesh) == []
     check_safe(octree.tree, len(octree.mesh.faces))
 
 
-@pytest.mark.parametrize("seed", range(15))
+@cases("seed", range(15))
 def test_what_a_traversal_could_crash_at_is_a_fault_too(seed):
     """Links and faces are changed by little, so that some of it is found by both checks, and some by the slow one."""
     rng, broken = np.random.default_rng(seed), Broken()
@@ -141,8 +142,8 @@ ON_A_CHILD = {
 }
 
 
-@pytest.mark.parametrize("fault", ON_A_CHILD)
-@pytest.mark.parametrize("child", ["some_node", "some_leaf"])
+@cases("fault", ON_A_CHILD)
+@cases("child", ["some_node", "some_leaf"])
 def test_a_fault_in_a_child_is_found(fault, child):
     broken = Broken()
     inject, said = ON_A_CHILD[fault]
@@ -235,7 +236,7 @@ def test_an_unused_place_has_the_face_that_says_so():
     assert broken.found()
 
 
-@pytest.mark.parametrize("word", range(9))
+@cases("word", range(9))
 def test_a_changed_vertex_is_found(word):
     broken = Broken()
     place = int(np.flatnonzero(broken.tree.faces >= 0)[7])
@@ -244,8 +245,8 @@ def test_a_changed_vertex_is_found(word):
     assert any(f"face {broken.tree.faces[place]}:" in fault for fault in broken.found())
 
 
-@pytest.mark.parametrize("value", [0.0, 1e3])
-@pytest.mark.parametrize("word", range(9))
+@cases("value", [0.0, 1e3])
+@cases("word", range(9))
 def test_an_unused_place_that_is_not_empty_is_found(word, value):
     broken = Broken()
     place = broken.unused_place()
@@ -275,7 +276,7 @@ def test_another_mesh_is_found():
         assert faults(broken.tree, other)
 
 
-@pytest.mark.parametrize("seed", range(15))
+@cases("seed", range(15))
 def test_random_words_are_found_and_crash_nothing(seed):
     rng = np.random.default_rng(seed)
     broken = Broken()

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 from trimesh.ray import ray_triangle
@@ -53,8 +54,8 @@ def test_shapes_and_types_are_trimeshs() -> None:
     assert ours.mesh is mesh
 
 
-@pytest.mark.parametrize("mesh", [trimesh.creation.box(), trimesh.Trimesh()], ids=["box", "empty"])
-@pytest.mark.parametrize("rays", [([], []), (np.empty((0, 3)), np.empty((0, 3))), ([[0, 9, 9]], DOWN)])
+@cases("mesh", [trimesh.creation.box(), trimesh.Trimesh()])
+@cases("rays", [([], []), (np.empty((0, 3)), np.empty((0, 3))), ([[0, 9, 9]], DOWN)])
 def test_nothing_found_is_empty_arrays_of_the_usual_kinds(mesh: Any, rays: Any) -> None:
     places, which, faces = asked(mesh).intersects_location(*rays)
     assert (places.shape, which.shape, faces.shape) == ((0, 3), (0,), (0,))
@@ -77,7 +78,7 @@ def test_rays_that_are_none_miss_and_the_others_keep_their_numbers() -> None:
     assert ray.contains_points([[0, 0, 0], [np.nan, 0, 0]]).tolist() == [True, False]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("origins", "directions", "named"),
     [
         ([[0, 0, 1], [0, 0, 2]], [[0, 0, 1]], "ray_directions"),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 
 from renderer.trimesh_ray import RayMeshIntersector, installed
 
@@ -164,7 +165,7 @@ def test_1919_trimesh_itself_agrees_on_a_simple_mesh() -> None:
     np.testing.assert_array_equal(mesh.ray.intersects_any(origins, directions), own)
 
 
-@pytest.mark.parametrize("count", [1023, 1024, 1025, 2048, 10000])
+@cases("count", [1023, 1024, 1025, 2048, 10000])
 def test_1180_the_arrays_have_one_length(count: int) -> None:
     directions = trimesh.unitize(np.add([0, 0, 0.8], np.random.default_rng(count).uniform(-0.5, 0.5, (count, 3))))
     places, rays, faces = trimesh.creation.icosphere().ray.intersects_location(

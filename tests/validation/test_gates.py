@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from cases import cases
 
 from validation.gates import Gate
 
@@ -11,7 +12,7 @@ def gate(value: float, bound: str = "at most", threshold: float = 1.0) -> Gate:
     return Gate("s", "subject", "quantity", value, bound, threshold, "reason")  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("value", "bound", "passed"),
     [
         (0.5, "at most", True),

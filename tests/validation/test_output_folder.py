@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from cases import cases
 
 from validation import suite
 
@@ -42,8 +43,8 @@ def test_a_list_that_leads_elsewhere_removes_nothing(tmp_path: Path) -> None:
     assert files(kept) == [".written", "b.png"]
 
 
-@pytest.mark.parametrize("defects", [False, True])
-@pytest.mark.parametrize(
+@cases("defects", [False, True])
+@cases(
     ("there", "message"),
     [
         ("report/index.html", "expected a new folder or one with a report, got .* with another index.html"),

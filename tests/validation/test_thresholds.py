@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from cases import cases
 
 from validation.thresholds import Thresholds, _flat, load_thresholds
 
@@ -43,7 +44,7 @@ def test_an_empty_file_moves_nothing(tmp_path: Path) -> None:
     assert load_thresholds(write(tmp_path, "")).moved() == {}
 
 
-@pytest.mark.parametrize(
+@cases(
     ("text", "where", "why"),
     [
         ("magic = 1", "magic", "unknown key"),

@@ -9,27 +9,32 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
+from cases import cases
 
 from validation import __main__ as command
 from validation import suite
 from validation.defects import run as defects
+from validation.defects.answers import Answer
 from validation.defects.list import DEFECTS
+from validation.defects.record import gates, record
 from validation.gates import Gate
 from validation.job import Job
-from validation.mutants import run as mutants
-from validation.mutants.equivalent import EQUIVALENT
-from validation.mutants.verdict import Verdict
 from validation.report import page as report
 from validation.report import schema
 from validation.sections import NAMES, SECTIONS
 from validation.stability import section as stability
 
 pytestmark = pytest.mark.judges(
-    "octree-validate --defects", "octree-validate --gate", "octree-validate --mesh", "octree-validate --mutants",
-    "octree-validate --of", "octree-validate --only", "octree-validate --output", "octree-validate --quick",
-    "octree-validate --random", "octree-validate --scene", "octree-validate --seed",
+    "octree-validate --defects",
+    "octree-validate --gate",
+    "octree-validate --mesh",
+    "octree-validate --only",
+    "octree-validate --output",
+    "octree-validate --quick",
+    "octree-validate --random",
+    "octree-validate --scene",
     "octree-validate --write-baseline",
-)  # fmt: skip
+)
 
 
 SCENE = Path(__file__).parents[2] / "scenes" / "stairs.toml"
@@ -164,22 +169,14 @@ class TestUserFiles:
         assert "pictures.own.ssim" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
+@cases(
     ("arguments", "words"),
     [
         (["--only", "hits,magic"], "'magic'"),
         (["--only", "hits", "--scene", "a.toml"], "no section is left to run"),
         (["--defects", "--only", "hits"], "got --only too"),
         (["--defects", "--mesh", "a.ply"], "got --mesh too"),
-        (["--mutants", "0"], "expected a positive integer, got '0'"),
-        (["--mutants", "5", "--only", "hits"], "got --only too"),
-        (["--mutants", "5", "--of", "scenes"], "invalid choice: 'scenes'"),
-        (["--mutants", "5", "--defects"], "got --mutants too"),
-        (["--mutants", "²"], "expected a positive integer, got '²'"),
-        (["--mutants", "5", "--quick"], "--mutants goes with --output, --of and --seed alone, got --quick too"),
-        (["--mutants", "5", "--seed", "-1"], "expected an integer from 0, got '-1'"),
-        (["--only", "hits", "--seed", "5"], "--of and --seed are those of --mutants N"),
-        (["--defects", "--of", "judges"], "--of and --seed are those of --mutants N"),
+        (["--defects", "--write-baseline"], "--defects goes with --output and --quick alone, got --write-baseline too"),
         (["--write-baseline", "--gate", "a.toml"], "got --gate too"),
     ],
 )
@@ -193,7 +190,7 @@ def test_arguments_at_odds_are_refused(arguments: list[str], words: str, capsys:
 def test_help_documents_the_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         command.main(["--help"])
-    assert "1    a gate fails, nothing was judged, or nothing notices a mutant" in capsys.readouterr().out
+    assert "1    a gate fails, or nothing was judged" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -240,25 +237,24 @@ def test_the_baseline_is_written_read_and_named_in_the_summary(
 
 class TestDefects:
     @pytest.fixture
-    def answers(self, monkeypatch: pytest.MonkeyPatch) -> list[defects.Answer]:
+    def answers(self, monkeypatch: pytest.MonkeyPatch) -> list[Answer]:
         """What each process would have said; the first is the control."""
-        answers: list[defects.Answer] = []
+        answers: list[Answer] = []
 
-        def run(quick: bool, step: Callable[[str], None]) -> tuple[dict[str, Any], list[Gate]]:
-            chosen = list(DEFECTS[:1])
-            return defects.record(chosen, answers[0], answers[1:]), defects.gates(chosen, answers[0], answers[1:])
+        def run(*_: object, known: object) -> tuple[dict[str, Any], list[Gate]]:
+            return record(DEFECTS[:1], answers[0], answers[1:]), gates(DEFECTS[:1], answers[0], answers[1:])
 
         monkeypatch.setattr(defects, "run", run)
         return answers
 
     def test_the_record_is_stored_and_every_report_shows_it(
-        self, tmp_path: Path, sections: dict[str, Fake], answers: list[defects.Answer], monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path, sections: dict[str, Fake], answers: list[Answer], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         output = ["--output", str(tmp_path)]
         assert command.main(["--only", "hits", *output]) == 0
         assert "No run is stored" in (tmp_path / "index.html").read_text(encoding="utf-8")
-        gates = ("hits: a: b",)
-        answers += [defects.Answer(gates, red, None, 1.0) for red in ((), gates)]
+        names = ("hits: a: b",)
+        answers += [Answer(names, red, None, 1.0) for red in ((), names)]
         assert command.main(["--defects", *output]) == 0
         assert "The sources are the same now" in (tmp_path / "index.html").read_text(encoding="utf-8")
         assert metrics(tmp_path)["facts"][0]["value"] == 1
@@ -267,22 +263,22 @@ class TestDefects:
         assert "The sources have changed since" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
     def test_one_that_is_let_through_is_exit_code_1(
-        self, tmp_path: Path, answers: list[defects.Answer], capsys: pytest.CaptureFixture[str]
+        self, tmp_path: Path, answers: list[Answer], capsys: pytest.CaptureFixture[str]
     ) -> None:
-        answers += [defects.Answer(("hits: a: b",), (), None, 1.0)] * 2
+        answers += [Answer(("hits: a: b",), (), None, 1.0)] * 2
         assert command.main(["--defects", "--output", str(tmp_path)]) == 1
         assert "gates turned red is 0, expected at least 1" in capsys.readouterr().out
         assert json.loads((tmp_path / "defects.json").read_text(encoding="utf-8"))["caught"] == 0
 
 
 def test_reports_need_neither_the_extra_dev_nor_the_viewer() -> None:
-    """Reading the record of mutants imported coverage and pytest, at the end of every run."""
+    """Reading a record had imported coverage and pytest, at the end of every run."""
     program = """
 import sys
 
 class Without:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {"coverage", "pytest", "_pytest", "hypothesis", "uvicorn", "starlette"}:
+        if name.partition(".")[0] in {"pytest", "_pytest", "hypothesis", "uvicorn", "starlette"}:
             raise ModuleNotFoundError(name)
 
 sys.meta_path.insert(0, Without())
@@ -298,50 +294,11 @@ def test_a_folder_that_cannot_be_made_and_a_run_that_is_missing_are_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").touch()
-    for more in (["--only", "hits"], ["--defects"], ["--mutants", "3"]):
+    for more in (["--only", "hits"], ["--defects"]):
         assert command.main([*more, "--output", str(tmp_path / "file" / "below")]) == 2
         assert "--output: expected a folder that can be made, got " in capsys.readouterr().err
     assert command.main(["--write-baseline", "--output", str(tmp_path)]) == 2
     assert "--write-baseline: expected " in capsys.readouterr().err
-
-
-def test_mutants_are_judged_listed_and_drawn(
-    tmp_path: Path, sections: dict[str, Fake], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """With a judge that notices the mutants in kernels and no other; a second run has nothing left to judge."""
-    judged: list[str] = []
-
-    def judge(waiting: Any, shops: Any, touched: Any, keep: Any, step: Any) -> None:
-        for one in waiting:
-            judged.append(one.key)
-            keep(one, Verdict("hits: a: b" if one.kernel else None, True, "fails" if one.kernel else None, 1.0))
-
-    # One room of the renderer: all of it takes seconds to look through.
-    monkeypatch.setattr(mutants, "files", lambda _, root: sorted((root / "renderer" / "points").rglob("*.py")))
-    monkeypatch.setattr(mutants, "_judge_all", judge)
-    monkeypatch.setattr(mutants, "_touched", lambda *_: {})
-    monkeypatch.setattr(mutants, "Workshop", lambda *_: None)
-    output = ["--output", str(tmp_path)]
-    assert command.main(["--only", "hits", *output]) == 0
-    for _ in range(2):
-        assert command.main(["--mutants", "6", "--seed", "3", *output]) == 1
-        printed = capsys.readouterr().out
-        assert "mutants in kernels: 3 of 3 noticed, 3 by a gate" in printed
-        assert "mutants in python: 0 of 3 noticed" in printed and printed.count("SURVIVED renderer/") == 3
-        assert len(judged) == 6
-    # Fewer leave the record as it is; it is one of a seed.
-    assert command.main(["--mutants", "2", "--seed", "3", *output]) == 1
-    assert "mutants in kernels: 3 of 3 noticed" in capsys.readouterr().out and len(judged) == 6
-    assert command.main(["--mutants", "6", "--seed", "4", *output]) == 2
-    assert "--seed: expected 3, as in " in capsys.readouterr().err
-    page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "6 of 6 mutants by seed 3 are judged" in page and "Nothing noticed these in Python: 3" in page
-    # One that is proved to change no answer is not run.
-    monkeypatch.setitem(EQUIVALENT, judged[-1], "the same either way")
-    (tmp_path / "mutants.json").unlink()
-    command.main(["--mutants", "6", "--seed", "3", *output])
-    assert len(judged) == 11 and judged[5] not in judged[6:]
-    assert "1 change no answer" in capsys.readouterr().out
 
 
 def test_stability_counts_its_steps(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

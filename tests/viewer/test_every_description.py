@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 import tomlkit
-from varied import VARIATIONS, Variation, write_meshes
+from cases import cases
+from varied import VARIATIONS, Variation
 
 from renderer import load_mesh
 from renderer.viewer.payload import description, mesh_payload
@@ -25,25 +26,18 @@ def fetched(folder: Path, table: Any) -> tuple[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("described")
-    write_meshes(folder)
-    return folder
-
-
-@pytest.fixture(scope="module")
 def usual(folder: Path) -> dict[str, tuple[str, bytes]]:
     """By the types of their cameras, the scenes that fields are varied of."""
     return {v.table["camera"]["type"]: fetched(folder, v.table) for v in (VARIATIONS[0], VARIATIONS[-1])}
 
 
-@pytest.mark.parametrize("other", VARIATIONS, ids=str)
+@cases("other", VARIATIONS)
 def test_a_page_is_told_of_another_value(folder: Path, usual: dict[str, tuple[str, bytes]], other: Variation) -> None:
     told = fetched(folder, other.varied())
     assert (told == usual[other.table["camera"]["type"]]) == (other.keys[-1] in UNTOLD)
 
 
-@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] in ("objects", "floor")], ids=str)
+@cases("other", [v for v in VARIATIONS if v.keys[0] in ("objects", "floor")])
 def test_each_object_has_the_faces_of_its_mesh_and_the_floor_two_for_each_square(
     folder: Path, other: Variation
 ) -> None:

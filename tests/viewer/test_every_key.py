@@ -7,6 +7,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 import tomlkit
+from cases import cases
 from PIL import Image as Pillow
 from varied import BASE, Table, write_meshes
 from viewer_ways import INSIDE, WAYS, WRITTEN, Case, page_of, phong, same, save, save_camera
@@ -47,8 +48,8 @@ def test_every_key_has_a_case() -> None:
         assert own == HERE.get(message, set()) | ELSEWHERE.get(message, set()), message
 
 
-@pytest.mark.parametrize("way", [*WAYS, *WRITTEN])
-@pytest.mark.parametrize("key", VIEWS)
+@cases("way", [*WAYS, *WRITTEN])
+@cases("key", VIEWS)
 def test_a_view_is_the_one_that_is_sent(usual: Case, key: str, way: Any) -> None:
     """Whichever message says so. A saved file has no size of a page."""
     found, expected = way(usual.seen(**{key: VIEWS[key]}))
@@ -66,7 +67,7 @@ def frames(file: bytes) -> list[Any]:
     return found
 
 
-@pytest.mark.parametrize("key", TURN)
+@cases("key", TURN)
 def test_a_turn_is_the_one_that_is_asked_for(usual: Case, key: str) -> None:
     turn = TURN | {key: OTHER_TURN[key]}
     files = [turntable(usual.shown, usual.message("turntable", seq=1, **t), lambda rays: None) for t in (turn, TURN)]

@@ -10,7 +10,8 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 import tomlkit
-from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of, write_meshes
+from cases import cases
+from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
 from viewer_ways import (
     INSIDE,
     WAYS,
@@ -94,13 +95,6 @@ UNWRITTEN = {"reflection", "refraction"}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("shown")
-    write_meshes(folder)
-    return folder
-
-
-@pytest.fixture(scope="module")
 def shown(folder: Path) -> ShownScene:
     """The scene, in a file that stays as it is."""
     (folder / "shown.toml").write_text(tomlkit.dumps(BASE))
@@ -128,15 +122,15 @@ def test_every_setting_has_a_case() -> None:
     assert ViewSettings.model_fields.keys() == here | OWN | ELSEWHERE
 
 
-@pytest.mark.parametrize(("name", "way"), [(n, way) for n in SETTINGS for way in (*WAYS, *WRITTEN) if shows(way, n)])
+@cases(("name", "way"), [(n, way) for n in SETTINGS for way in (*WAYS, *WRITTEN) if shows(way, n)])
 def test_a_setting_is_as_if_the_file_said_so(folder: Path, shown: ShownScene, name: str, way: Any) -> None:
     case = with_setting(folder, shown, name)
     assert same(way(case))
     assert case.picture().radiance.tobytes() != Case(shown, {}, shown.scene).seen().picture().radiance.tobytes()
 
 
-@pytest.mark.parametrize("way", [octree, brute, a_still, click])
-@pytest.mark.parametrize("name", SETTINGS)
+@cases("way", [octree, brute, a_still, click])
+@cases("name", SETTINGS)
 def test_a_setting_holds_for_an_eye_in_two_bodies(folder: Path, shown: ShownScene, name: str, way: Any) -> None:
     case = with_setting(folder, shown, name).seen(m=INSIDE)
     assert len(media_around(shown.scene, case.scene.camera)) == 2
@@ -146,7 +140,7 @@ def test_a_setting_holds_for_an_eye_in_two_bodies(folder: Path, shown: ShownScen
 EDITED = [other for other in VARIATIONS if other.keys[0] in ("materials", "lights")]
 
 
-@pytest.mark.parametrize("other", EDITED, ids=str)
+@cases("other", EDITED)
 def test_each_field_that_is_edited_is_shown_and_written(folder: Path, shown: ShownScene, other: Variation) -> None:
     """A saved camera has the lights too, but no materials."""
     table, kind, name = other.varied(), other.keys[0], other.keys[1]
@@ -156,19 +150,19 @@ def test_each_field_that_is_edited_is_shown_and_written(folder: Path, shown: Sho
         assert same(way(case)), way
 
 
-@pytest.mark.parametrize("way", [*WAYS, *WRITTEN])
-@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] == "render"], ids=str)
+@cases("way", [*WAYS, *WRITTEN])
+@cases("other", [v for v in VARIATIONS if v.keys[0] == "render"])
 def test_the_files_settings_hold(folder: Path, other: Variation, way: Any) -> None:
     assert same(way(of_file(folder, other)))
 
 
-@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] not in ("render", "camera")], ids=str)
+@cases("other", [v for v in VARIATIONS if v.keys[0] not in ("render", "camera")])
 def test_the_picture_is_that_of_the_file(folder: Path, other: Variation) -> None:
     assert same(octree(of_file(folder, other)))
 
 
-@pytest.mark.parametrize("mode", ["octree", "brute"])
-@pytest.mark.parametrize("other", [v for v in VARIATIONS if v.keys[0] == "render"], ids=str)
+@cases("mode", ["octree", "brute"])
+@cases("other", [v for v in VARIATIONS if v.keys[0] == "render"])
 def test_the_files_settings_hold_in_every_band(
     folder: Path, monkeypatch: pytest.MonkeyPatch, other: Variation, mode: str
 ) -> None:
@@ -198,7 +192,7 @@ def test_a_picture_grows_to_as_many_samples_as_are_asked_for(shown: ShownScene, 
     assert np.array_equal(case.colors("octree"), srgb(case.picture(samples=refine).radiance))
 
 
-@pytest.mark.parametrize("aov", get_args(ViewSettings.model_fields["aov"].annotation))
+@cases("aov", get_args(ViewSettings.model_fields["aov"].annotation))
 def test_a_value_is_drawn_in_its_colours(shown: ShownScene, aov: Any) -> None:
     case = Case(shown, page_of(shown.scene) | {"aov": aov}, shown.scene).seen()
     if aov in ("nodes", "triangles"):
@@ -211,7 +205,7 @@ def test_a_value_is_drawn_in_its_colours(shown: ShownScene, aov: Any) -> None:
         assert np.array_equal(way(case)[0], expected)
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@cases("name", SETTINGS)
 def test_another_renderer_is_asked_for_the_picture_with_the_setting(
     folder: Path, shown: ShownScene, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from viewer_page import SCENE
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
@@ -275,7 +276,7 @@ shininess = 40
 RED_DOTTED = "red.diffuse = [0.7, 0.1, 0.1] # d\nred.specular = 0.4\n"
 
 
-@pytest.mark.parametrize(
+@cases(
     "text",
     [
         SCENE.replace(RED_TABLE, f"[materials]\n{RED_DOTTED}red.shininess = 40\n"),
@@ -286,7 +287,6 @@ RED_DOTTED = "red.diffuse = [0.7, 0.1, 0.1] # d\nred.specular = 0.4\n"
             "ambient", f"materials.{RED_DOTTED.replace(chr(10) + 'red', chr(10) + 'materials.red')}ambient", 1
         ),
     ],
-    ids=["dotted", "apart", "one", "inline", "at the top"],
 )
 def test_a_material_in_dotted_keys_becomes_one_of_another_type(tmp_path: Path, text: str) -> None:
     """tomlkit failed, and that ended the connection."""
@@ -341,8 +341,8 @@ def test_others_are_answered_while_a_scene_is_saved(url: str, monkeypatch: pytes
         assert one.told("saved")["name"] == "blocks.toml"
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n"])
-@pytest.mark.parametrize("mark", ["", "\ufeff"])
+@cases("end", ["\n", "\r\n"])
+@cases("mark", ["", "\ufeff"])
 def test_ends_of_lines_and_the_mark_of_the_encoding_stay(tmp_path: Path, mark: str, end: str) -> None:
     """Each line ended in a line feed, which the diff did not show."""
     file = tmp_path / "a.toml"
@@ -365,8 +365,8 @@ def places(far: float) -> Iterator[tuple[float, float, float]]:
         yield x + far, y, z - far
 
 
-@pytest.mark.parametrize("far", [0.0, 5.4e6])
-@pytest.mark.parametrize("film", [{}, {"height": 3.0}])
+@cases("far", [0.0, 5.4e6])
+@cases("film", [{}, {"height": 3.0}])
 def test_a_saved_camera_has_the_rays_of_the_picture_to_the_bit(
     tmp_path: Path, film: dict[str, Any], far: float
 ) -> None:

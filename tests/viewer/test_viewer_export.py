@@ -16,11 +16,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image as Pillow
-from viewer_page import CHROMIUM, SCENE, Viewer
+from viewer_page import SCENE
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
-from viewer_client import HEAVY, Client, Got, looking, rendered
+from viewer_client import HEAVY, Client, Got, decoded, frames, looking, rendered
 
 import renderer
 from renderer import load_scene, render
@@ -30,7 +30,6 @@ from renderer.viewer.protocol import FILE, Still, parse
 from renderer.viewer.shown import ShownScene, open_file
 from renderer.viewer.viewpoint import camera_of
 
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 EYE = (0.5, 2.6, 5.5)
 TURN: dict[str, Any] = {"pivot": [0.0, 0.5, 0.0], "axis": [0.0, 1.0, 0.0], "frames": 6}
 
@@ -91,22 +90,6 @@ def pieces(client: Client, seq: int = 1) -> tuple[list[float], list[Got]]:
 def received(client: Client, asked: dict[str, Any]) -> bytes:
     client.send(**asked)
     return b"".join(piece.payload for piece in pieces(client, asked["seq"])[1])
-
-
-def decoded(file: bytes) -> Any:
-    return np.asarray(Pillow.open(io.BytesIO(file)).convert("RGB"))
-
-
-def frames(file: bytes) -> list[Any]:
-    opened = Pillow.open(io.BytesIO(file))
-    seen: list[Any] = []
-    for i in range(opened.n_frames):
-        opened.seek(i)
-        seen.append(np.asarray(opened.convert("RGB")))
-    return seen
-
-
-# Stills
 
 
 @pytest.mark.parametrize("settings", [{}, {"samples": 4, "max_depth": 2}, {"shadows": False}])
@@ -344,62 +327,3 @@ def test_a_file_of_a_scene_is_made_though_another_is_opened(client: Any) -> None
 
 
 # The page
-
-
-def shared(viewer: Viewer) -> None:
-    viewer.page.evaluate("() => (document.querySelector('#share').open = true)")
-
-
-@needs_browser
-def test_the_page_saves_a_still(viewer: Viewer, scenes: Path, tmp_path: Path) -> None:
-    shared(viewer)
-    before = viewer.pixels("picture")
-    viewer.page.select_option("#still-size", "1920x1080")
-    with viewer.page.expect_download() as download:
-        viewer.page.click("#export-still")
-        viewer.page.wait_for_selector("#exporting:not([hidden])")
-        assert viewer.page.is_disabled("#export-still") and viewer.page.is_disabled("#export-turntable")
-    assert download.value.suggested_filename == "blocks-1920x1080.png"
-    download.value.save_as(tmp_path / "still.png")
-    seen = camera_of(viewer.camera["m"], viewer.camera["fovy"])
-    expected = render(load_scene(scenes / "blocks.toml"), camera=seen, resolution=(1920, 1080)).srgb
-    assert np.array_equal(decoded((tmp_path / "still.png").read_bytes()), expected)
-    viewer.page.wait_for_selector("#exporting", state="hidden")
-    assert viewer.page.is_enabled("#export-still")
-    assert np.array_equal(viewer.pixels("picture"), before)  # the view stays
-
-
-@needs_browser
-def test_the_page_saves_a_still_of_the_views_own_shape(viewer: Viewer, tmp_path: Path) -> None:
-    shared(viewer)
-    viewer.page.select_option("#still-size", "2")
-    with viewer.page.expect_download() as download:
-        viewer.page.click("#export-still")
-    download.value.save_as(tmp_path / "still.png")
-    h, w = viewer.pixels("picture").shape[:2]
-    assert decoded((tmp_path / "still.png").read_bytes()).shape == (2 * h, 2 * w, 3)
-
-
-@needs_browser
-def test_the_page_saves_a_turntable(viewer: Viewer, tmp_path: Path) -> None:
-    shared(viewer)
-    for field, value in (("height", "240"), ("frames", "24"), ("format", "gif")):
-        viewer.page.select_option(f"#turntable-{field}", value)
-    with viewer.page.expect_download() as download:
-        viewer.page.click("#export-turntable")
-    assert download.value.suggested_filename == "blocks-turntable.gif"
-    download.value.save_as(tmp_path / "turn.gif")
-    seen = frames((tmp_path / "turn.gif").read_bytes())
-    size = viewer.page.evaluate("() => window.viewer.size")
-    assert len(seen) == 24 and seen[0].shape == (240, round(240 * size["w"] / size["h"]), 3)
-
-
-@needs_browser
-def test_the_page_can_cancel_a_file(viewer: Viewer) -> None:
-    shared(viewer)
-    viewer.page.select_option("[name=samples]", "16")
-    viewer.page.click("#export-still")
-    viewer.page.wait_for_selector("#exporting:not([hidden])")
-    viewer.page.click("#stop-export")
-    viewer.page.wait_for_selector("#exporting", state="hidden")
-    assert viewer.page.is_enabled("#export-still") and "3840" not in viewer.page.inner_text("#notices")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from viewer_page import CHROMIUM, SCENE, Viewer
+from viewer_page import SCENE
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
@@ -16,8 +16,6 @@ import renderer
 from renderer import load_scene
 from renderer.picture.image import srgb
 from renderer.viewer import passes
-
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 
 
 @pytest.fixture(scope="module")
@@ -94,60 +92,3 @@ def test_a_newer_view_comes_before_a_finer_picture(client: Client) -> None:
     client.passes(old)
     new = client.view(w=64, h=64)
     assert [got.seq for got in client.passes(new)][-1] == new
-
-
-@needs_browser
-def test_the_page_grows_its_picture_and_says_so(browser: Any, url: str, scene: Path) -> None:
-    page = Viewer(browser, url, refine=True).open()
-    page.page.wait_for_function(
-        "() => document.querySelector('#hud').textContent.startsWith('16 samples a pixel, within')"
-    )
-    shown = page.camera
-    from renderer.viewer.viewpoint import camera_of
-
-    seen = load_scene(scene).model_copy(update={"camera": camera_of(shown["m"], shown["fovy"])})
-    expected = renderer.render(seen, resolution=(shown["w"], shown["h"]), samples=16)
-    assert np.array_equal(page.pixels("picture")[..., :3], srgb(expected.radiance))
-    page.context.close()
-
-
-@needs_browser
-def test_what_is_copied_and_saved_has_the_samples_of_the_picture_that_is_seen(viewer: Viewer) -> None:
-    """It had the one that the picture began with."""
-    viewer.page.evaluate("() => { viewer.panel.fields.refine.value = '4'; viewer.changed('refine'); }")
-    viewer.page.wait_for_function("() => document.querySelector('#hud').textContent.startsWith('4 samples')")
-    asked = viewer.page.evaluate(
-        """() => {
-            const { connection } = viewer, samples = [];
-            connection.send = ({ settings }) => samples.push(settings.samples);
-            const press = () => ["copy-command", "save-camera"].map((id) => document.getElementById(id).click());
-            press();
-            viewer.camera.orbit(0.1, 0);
-            viewer.moved(); // after which another picture is to come
-            press();
-            delete connection.send;
-            return samples;
-        }"""
-    )
-    assert asked == [4, 4, 1, 1]
-
-
-@needs_browser
-def test_what_is_left_of_an_error_is_read_only_of_the_picture_that_is_seen(viewer: Viewer) -> None:
-    """It stayed in other modes and for other scenes."""
-    read = viewer.page.evaluate(
-        """() => {
-            const { readings, scene } = viewer, picture = { kind: 1, step: 1, last: true, w: 8, h: 8, ms: 5, rate: 1 };
-            const later = [
-                () => readings.ofPicture({ ...picture, seq: 7 }, 6, 1, { w: 8, h: 8 }),
-                () => readings.ofPicture({ ...picture, seq: 8 }, 6, 1, { w: 8, h: 8 }),
-                () => readings.ofGl({ w: 8, h: 8 }), () => readings.ofScene(scene),
-            ];
-            return later.map((happens) => {
-                readings.refined({ seq: 7, samples: 16, error: 0.5 });
-                happens();
-                return readings.values.refined.textContent;
-            });
-        }"""
-    )
-    assert read == ["16 samples a pixel, within about 0.50 of 255", "–", "–", "–"]

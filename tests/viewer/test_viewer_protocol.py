@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -86,7 +87,7 @@ def said(message: Any) -> str:
     return json.dumps(message)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("message", "kind"),
     [
         (VIEW, CameraMessage),
@@ -123,7 +124,7 @@ def test_what_is_left_out_is_as_a_scene_is_first_shown() -> None:
     assert isinstance(walk, SaveCamera) and not walk.walk
 
 
-@pytest.mark.parametrize(
+@cases(
     ("key", "values"),
     [
         ("seq", [0, 2**32 - 1]),
@@ -152,7 +153,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(
+@cases(
     ("message", "key", "values", "where"),
     [(said, *bad) for said in (VIEW, PICK, CAMERA, COMMAND, STILL, TURNTABLE) for bad in BAD if bad[0] in said],
 )
@@ -162,7 +163,7 @@ def test_a_bad_value_is_refused_by_its_key(message: dict[str, Any], key: str, va
             parse(said(message | {key: value}))
 
 
-@pytest.mark.parametrize(
+@cases(
     ("key", "values"),
     [
         ("max_depth", [-1, 65, 1.5, "3", None]),
@@ -188,20 +189,20 @@ def test_bad_settings_are_refused_by_their_key(key: str, values: list[Any]) -> N
                 parse(said(message | {"settings": SETTINGS | {key: value}}))
 
 
-@pytest.mark.parametrize("pixel", [{"x": 320}, {"y": 240}, {"x": -1}, {"y": -1}, {"x": 1.5}, {"x": 1024, "w": 1024}])
+@cases("pixel", [{"x": 320}, {"y": 240}, {"x": -1}, {"y": -1}, {"x": 1.5}, {"x": 1024, "w": 1024}])
 def test_a_pick_lies_in_its_picture(pixel: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"^pick(\.[xy])?: .*, got "):
         parse(said(PICK | pixel))
 
 
-@pytest.mark.parametrize("file", ["a" * 256, None, 1, ["a.toml"]])
+@cases("file", ["a" * 256, None, 1, ["a.toml"]])
 def test_a_scene_has_a_name_that_a_file_may_have(file: Any) -> None:
     for kind in ("scene", "hello"):
         with pytest.raises(ValueError, match=rf"^{kind}\.file: "):
             parse(said({"type": kind, "file": file}))
 
 
-@pytest.mark.parametrize(
+@cases(
     "text",
     [
         "",
@@ -250,7 +251,7 @@ def test_whatever_comes_is_a_message_or_a_value_error(text: str) -> None:
     assert isinstance(read, known)
 
 
-@pytest.mark.parametrize(
+@cases(
     ("key", "values"),
     [
         ("frames", [0, 1, -36, MAX_FRAMES + 1, 36.5, "36", None]),
@@ -298,7 +299,7 @@ def test_a_turntable_has_at_most_so_many_pixels() -> None:
     assert isinstance(left_out, Turntable) and (left_out.frames, left_out.format) == (36, "webp")
 
 
-@pytest.mark.parametrize("message", [VIEW, PICK, COMMAND, STILL])
+@cases("message", [VIEW, PICK, COMMAND, STILL])
 def test_a_picture_has_at_most_so_many_pixels(message: dict[str, Any]) -> None:
     assert parse(said(message | {"w": MAX_SIDE, "h": MAX_PIXELS // MAX_SIDE}))
     with pytest.raises(ValueError, match=rf"{message['type']}: .*at most {MAX_PIXELS} pixels, got 4096 x 2049"):

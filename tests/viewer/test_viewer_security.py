@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from cases import cases
 from viewer_page import SCENE
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
@@ -117,10 +118,8 @@ def test_only_this_machine_reaches_it(port: int) -> None:
     socket.create_connection(("127.0.0.1", port), timeout=5).close()
 
 
-@pytest.mark.parametrize("path", [*PATHS, "/ws"])
-@pytest.mark.parametrize(
-    "host", ["evil.example", "evil.example:{}", "127.0.0.1.evil.example:{}", "127.0.0.1@evil.example", ""]
-)
+@cases("path", [*PATHS, "/ws"])
+@cases("host", ["evil.example", "evil.example:{}", "127.0.0.1.evil.example:{}", "127.0.0.1@evil.example", ""])
 def test_a_foreign_name_that_points_here_is_refused(port: int, path: str, host: str) -> None:
     named = host.format(port)
     headers = {**HANDSHAKE, "Origin": f"http://{named}"} if path == "/ws" else {}
@@ -133,7 +132,7 @@ def test_this_machines_own_names_are_served(port: int, name: str) -> None:
     assert opening(port, Host=f"{name}:{port}", Origin=f"http://{name}:{port}") == 101
 
 
-@pytest.mark.parametrize(
+@cases(
     "origin",
     [
         "http://evil.example",
@@ -156,7 +155,7 @@ def test_a_program_without_origin_is_refused_where_there_is_no_token(port: int) 
     assert opening(port) == 403
 
 
-@pytest.mark.parametrize("path", PATHS)
+@cases("path", PATHS)
 def test_answers_say_what_the_page_may_do(port: int, path: str) -> None:
     foreign = asked(port, path, {"Host": "evil.example", "Origin": "http://evil.example"})
     posted = asked(port, path, method="POST")
@@ -191,7 +190,7 @@ def test_a_notebook_of_this_machine_may_frame_the_page(shown: ShownScene) -> Non
     assert policy.endswith("; frame-ancestors 'self' http://127.0.0.1:* http://localhost:*")
 
 
-@pytest.mark.parametrize(
+@cases(
     "path",
     [
         "/static/../app.py",
@@ -212,7 +211,7 @@ def test_no_file_but_the_pages_is_served(port: int, path: str) -> None:
     assert asked(port, path).status == 404
 
 
-@pytest.mark.parametrize("level", ["", "-1", "1.5", "1e3", "100", "٣", "%00", "0&level=x", "9" * 5000])
+@cases("level", ["", "-1", "1.5", "1e3", "100", "٣", "%00", "0&level=x", "9" * 5000])
 def test_a_level_is_a_small_integer(port: int, level: str) -> None:
     answer = asked(port, f"/octree?level={_quoted(level)}")
     assert answer.status == 400 and answer.body.startswith("level: expected an integer from 0 to 99, got ")
@@ -227,7 +226,7 @@ def test_a_level_that_the_tree_lacks_has_no_boxes(port: int) -> None:
     assert answer.status == 200 and struct.unpack("<I", answer.body[:4].encode("latin-1")) == (0,)
 
 
-@pytest.mark.parametrize(
+@cases(
     "file",
     ["../secret.toml", "{0}/secret.toml", "{0}/scenes/other.toml", "./other.toml", "other", "", ".", "other.toml\0"],
 )
@@ -246,8 +245,8 @@ def test_a_message_of_the_largest_size_is_read(port: int) -> None:
     assert told(port, "x" * MAX_MESSAGE_BYTES)["type"] == "error"
 
 
-@pytest.mark.parametrize("kind", [str, bytes])
-@pytest.mark.parametrize("pieces", [1, 3])
+@cases("kind", [str, bytes])
+@cases("pieces", [1, 3])
 def test_a_larger_message_ends_its_connection_and_no_other(port: int, kind: type, pieces: int) -> None:
     text = "x" * (MAX_MESSAGE_BYTES // pieces + 1)
     piece = text if kind is str else text.encode()
@@ -297,7 +296,7 @@ LONG_STILL = FILE_OF_VIEW | {"type": "still", "settings": {"samples": 64}}
 TURN = FILE_OF_VIEW | {"type": "turntable", "pivot": [0, 0, 0], "axis": [0, 1, 0]}
 
 
-@pytest.mark.parametrize(
+@cases(
     ("asked", "says"),
     [
         (LONG_STILL | {"w": 4096, "h": 4096}, "still: .*at most 8388608 pixels, got 4096 x 4096"),
@@ -384,10 +383,8 @@ def test_two_servers_have_two_tokens_of_256_bits(shown: ShownScene, wide: Viewer
     assert tokens[0] != tokens[1]
 
 
-@pytest.mark.parametrize("path", ["/", "/scene", "/mesh", "/octree", "/static/main.js", "/nowhere", "/ws"])
-@pytest.mark.parametrize(
-    "query", ["", "?token=", "?token=wrong", "?token=%ff%00", "?Token={}", "?token={}x", "?token={}%20"]
-)
+@cases("path", ["/", "/scene", "/mesh", "/octree", "/static/main.js", "/nowhere", "/ws"])
+@cases("query", ["", "?token=", "?token=wrong", "?token=%ff%00", "?Token={}", "?token={}x", "?token={}%20"])
 def test_without_the_token_nothing_is_served(wide: ViewerServer, path: str, query: str) -> None:
     url = urlsplit(wide.url)
     given = query.format(url.query.removeprefix("token="))
@@ -426,7 +423,7 @@ def test_tokens_are_compared_in_constant_time(wide: ViewerServer, monkeypatch: p
     assert asked(url.port, f"/scene?{url.query}").status == 403
 
 
-@pytest.mark.parametrize(
+@cases(
     ("host", "port", "message"),
     [
         (None, 0, "host: expected a string, got NoneType"),

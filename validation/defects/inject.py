@@ -1,71 +1,44 @@
-"""Loads one module of ``renderer`` with one rule broken: the only way in which a seeded defect takes effect.
+"""Breaks one rule of ``renderer`` in this process: the only way in which a seeded defect takes effect.
 
-The files stay unchanged. A process that is to have a defect calls ``inject`` before it imports the renderer; from then
-on the module is compiled from altered text. The digest that identifies compiled kernels on disk reads that text too, so
-a defect gets its own kernels, and unaffected ones are reused. Such a process still needs its own ``NUMBA_CACHE_DIR``:
-saving a kernel removes those of other texts.
+The files stay unchanged. A process that is to have a defect calls ``inject`` before it imports the renderer. A changed
+source is compiled from altered text; the digest that identifies compiled kernels on disk reads that text too, so a
+defect in kernels gets its own, and unaffected ones are reused. Such a process needs its own ``NUMBA_CACHE_DIR``: saving
+a kernel removes those of other texts.
 """
 
+import functools
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
 
-from validation.defects.syntax import Place, find_place, replaced
+from validation.defects.changes import Altered, Change, Wrapped
+from validation.defects.places import find_name
 
-_PACKAGE = Path(__file__).resolve().parents[2] / "renderer"
+PACKAGE = Path(__file__).resolve().parents[2] / "renderer"
 _DIGEST = "renderer.jit.digest"
 _LOADED = "renderer.jit.loaded"
 
 
-@dataclass(frozen=True)
-class Replacement:
-    """Replace the code ``rule`` in ``place`` by ``broken``.
+def inject(change: Change) -> None:
+    """Make this process load the renderer with one change.
 
-    place   the end of the dotted name of one function, method or module-level constant: "Mesh.normals", "DOUBT";
-            with its module where the name alone is not unique: "spawn._leave"
-    rule    one expression, or one or more statements, that occur there once. They are compared as syntax: layout and
-            comments do not count, and local variables may have other names
-    broken  the code that replaces them, with the rule's own names for local variables
-    """
-
-    place: str
-    rule: str
-    broken: str
-
-    @cached_property
-    def _found(self) -> Place:
-        return find_place(_PACKAGE, self.place)
-
-    @property
-    def path(self) -> Path:
-        """The file, which is only read."""
-        return self._found.path
-
-    @property
-    def module(self) -> str:
-        """The module's full name."""
-        return ".".join(self.path.relative_to(_PACKAGE.parent).with_suffix("").parts)
-
-    def text(self) -> str:
-        """The module's altered text. Raises ``ValueError`` unless there is one place, with the rule in it once."""
-        return replaced(self._found, self.rule, self.broken)
-
-
-def inject(replacement: Replacement) -> None:
-    """Make this process load the module with its rule broken.
-
-    Raises ``ValueError`` unless the rule occurs there exactly once, and ``RuntimeError`` where the renderer was
-    imported already: loaded modules would stay sound.
+    Raises ``ValueError`` unless what it names is there once, and ``RuntimeError`` where the renderer was imported
+    already: loaded modules would stay sound.
     """
     loaded = sorted(_sound_modules())
     if loaded:
         raise RuntimeError(f"inject: expected a process without modules of renderer, got {loaded[0]}")
-    sys.meta_path.insert(0, _Finder(replacement))
+    if isinstance(change, Wrapped):
+        module, name = find_name(PACKAGE, change.name)
+        _on_load(module, functools.partial(_wrap, name=name, wrapper=change.wrapper))
+        return
+    altered = change.altered(PACKAGE)
+    _on_load(altered.module, text=altered.text)
+    if altered.compiled:
+        _on_load(_DIGEST, functools.partial(_digest_altered, altered=altered))
 
 
 def _sound_modules() -> Iterator[str]:
@@ -75,39 +48,59 @@ def _sound_modules() -> Iterator[str]:
             yield name
 
 
-class _Finder(MetaPathFinder):
-    """Finds the altered module, and the module that digests sources."""
+def _wrap(module: ModuleType, name: str, wrapper: Callable[..., object]) -> None:
+    """Replace a function of a module, or a method such as "Mesh.normals", by a wrapper of it."""
+    path, _, last = name.rpartition(".")
+    owner = functools.reduce(getattr, path.split(".") if path else [], module)
+    sound = vars(owner)[last]
+    assert callable(sound), f"{name}: expected a function or method, got {sound!r}"
 
-    def __init__(self, replacement: Replacement) -> None:
-        self._replacement, self._text = replacement, replacement.text()
+    @functools.wraps(sound, updated=())
+    def broken(*arguments: object, **options: object) -> object:
+        return wrapper(sound, *arguments, **options)
+
+    setattr(owner, last, broken)
+
+
+def _digest_altered(digest: ModuleType, altered: Altered) -> None:
+    """Have the module that digests sources read the altered text."""
+    sound = vars(digest)["_source"]
+    vars(digest)["_source"] = lambda path: altered.text.encode() if path.resolve() == altered.path else sound(path)
+
+
+def _on_load(module: str, then: Callable[[ModuleType], None] = lambda _: None, text: str | None = None) -> None:
+    """When ``module`` is imported, from ``text`` if one is given, call ``then`` with it."""
+    sys.meta_path.insert(0, _Finder(module, then, text))
+
+
+class _Finder(MetaPathFinder):
+    """Finds one module as its path does, and has it loaded by ``_Loader``."""
+
+    def __init__(self, module: str, then: Callable[[ModuleType], None], text: str | None) -> None:
+        self._module, self._then, self._text = module, then, text
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        altered = self._replacement.module
-        if fullname not in (altered, _DIGEST):
-            return None
-        spec = PathFinder.find_spec(fullname, path, target)
+        spec = PathFinder.find_spec(fullname, path, target) if fullname == self._module else None
         if spec is not None:
-            source = str(spec.origin)
-            text = self._text if fullname == altered else Path(source).read_text(encoding="utf-8")
-            spec.loader = _Loader(fullname, source, text, {self._replacement.path: self._text.encode()})
+            spec.loader = _Loader(fullname, str(spec.origin), self._then, self._text)
         return spec
 
 
 class _Loader(SourceFileLoader):
-    """Compiles a module from a given text, and passes the altered text to the module that digests sources."""
+    """Loads a module, from another text where one is given, and then calls a function with it."""
 
-    def __init__(self, fullname: str, path: str, text: str, altered: dict[Path, bytes]) -> None:
+    def __init__(self, fullname: str, path: str, then: Callable[[ModuleType], None], text: str | None) -> None:
         super().__init__(fullname, path)
-        self._text, self._altered = text, altered
+        self._then, self._text = then, text
 
-    def get_code(self, fullname: str) -> CodeType:
+    def get_code(self, fullname: str) -> CodeType | None:
         # Not the base class's method, which would use the sound text's bytecode from __pycache__.
+        if self._text is None:
+            return super().get_code(fullname)
         return compile(self._text, self.path, "exec", dont_inherit=True)
 
     def exec_module(self, module: ModuleType) -> None:
         super().exec_module(module)
-        if module.__name__ == _DIGEST:
-            sound = vars(module)["_source"]
-            vars(module)["_source"] = lambda path: self._altered.get(path.resolve()) or sound(path)
+        self._then(module)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
+from renderer.results.hits import Hits
 from renderer.system.threads import available_threads
-from renderer.trace.hits import Hits
 from validation.error_curves import front
 from validation.hits.compare import HitArrays
 from validation.hits.rays import RayFamily, camera_rays, float32_exact, leak_rays

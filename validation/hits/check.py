@@ -49,7 +49,7 @@ _ROUNDOFF = {"float32": FLOAT32_ROUNDOFF, "float64": FLOAT64_ROUNDOFF}
 
 @dataclass(frozen=True)
 class HitEffort:
-    """How many rays to check, and against which references.
+    """The number of rays to check, and the references.
 
     rays        of each family on each mesh
     exact       of these, judged by exact arithmetic whether or not a reference disagrees

@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.mesh.mesh import Mesh
-from renderer.mesh.shapes import box
 from renderer.octree import Octree
 from validation.gates import Gate
-from validation.hits.bodies import prism, tetrahedron, turned
 from validation.hits.watertight import KINDS, aimed
 from validation.job import Job
+from validation.meshes import mirror_bodies
 
 Floats = NDArray[np.float64]
 
@@ -25,16 +23,6 @@ QUICK, FULL = 500, 20_000
 # A wedge of angle a reflects a ray at most 180 / a times, and one more by rounding: 3 or 4 times between two of these
 # bodies' faces, for up to three pairs of faces at a corner. A ray that stays goes on to ``BOUNCES``.
 STAYS = 12
-
-
-def mirror_bodies() -> dict[str, Mesh]:
-    """Convex bodies, to be seen from inside."""
-    return {
-        "tetrahedron": tetrahedron(),
-        "prism of 60 degrees": prism(60.0),
-        "cube": box(),
-        "turned box": turned(box((0, 0, 0), (1.0, 1.5, 0.75))),
-    }
 
 
 def steps() -> int:
@@ -65,7 +53,7 @@ def check_mirrors(job: Job, rays: int | None = None, make: Callable[..., Any] = 
 
 
 def reflected(tracer: Any, origins: Floats, directions: Floats) -> tuple[int, int]:
-    """How many rays are lost within ``BOUNCES`` reflections, and how many of the others stay at a place."""
+    """The number of rays that are lost within ``BOUNCES`` reflections, and of others that stay at a place."""
     lost, began = 0, len(origins)
     while len(origins):
         kept, stays = _reflected_once(tracer, origins, directions)

@@ -19,8 +19,8 @@ from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits.bodies import Body, bodies
 from validation.job import Job
-from validation.oracle.distance import cross, difference, dot, rational
 from validation.oracle.starts import First, Start, Surface, stopped
+from validation.oracle.vectors import cross, difference, dot, rational, whole_vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -241,7 +241,7 @@ def judged_at_once(surface: Surface, batch: Batch) -> tuple[Bools, Bools]:
         keys = np.concatenate([signs, batch.sides[rows, None]], axis=1)
         _, one, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         for k, row in enumerate(rows[one]):
-            some, way = group.ravel() == k, _whole(batch.directions[row])
+            some, way = group.ravel() == k, whole_vector(batch.directions[row])
             stops = _stops(surface, regions, start, (way, int(batch.sides[row]), batch.through))
             t, face, here = batch.t[rows[some]], batch.face[rows[some]], at[some]
             stopped_right = (t == 0.0) & np.isin(face, [stop for stop in stops if stop is not None])
@@ -282,7 +282,7 @@ def _is_beside_another(surface: Surface, start: Start) -> bool:
 
 
 def _from_edges(triangles: Floats, place: Floats) -> Floats:
-    """How far a place is from the edges of triangles (n, 3, 3), (n, 3)."""
+    """Distances (n, 3) of a place from the edges of triangles (n, 3, 3)."""
     along, way = np.roll(triangles, -1, axis=1) - triangles, place - triangles
     share = np.einsum("nex,nex->ne", along, way) / np.maximum(np.einsum("nex,nex->ne", along, along), 2.0**-1000)
     distances: Floats = np.linalg.norm(way - np.clip(share, 0.0, 1.0)[..., None] * along, axis=2)
@@ -304,16 +304,9 @@ def exact_signs(normals: Sequence[tuple[int, int, int]], directions: Floats) -> 
     sizes = np.abs(directions) @ np.abs(rounded).T
     signs = np.sign(products).astype(np.int8)
     for ray, k in zip(*np.nonzero(~(np.abs(products) > _SIGN_ROUNDINGS * sizes + 2.0**-1000)), strict=True):
-        value = dot(normals[k], _whole(directions[ray]))
+        value = dot(normals[k], whole_vector(directions[ray]))
         signs[ray, k] = (value > 0) - (value < 0)
     return signs
-
-
-def _whole(direction: Floats) -> tuple[int, int, int]:
-    ratios = [x.as_integer_ratio() for x in direction.tolist()]
-    unit = max(bottom for _, bottom in ratios)
-    x, y, z = (top * (unit // bottom) for top, bottom in ratios)
-    return x, y, z
 
 
 def is_right(
@@ -357,7 +350,7 @@ def _is_closer(surface: Surface, face: int, start: Start, direction: Floats, nea
 
 
 def _reach(surface: Surface, first: First, direction: Floats, face: int) -> float:
-    """How far t may be from the exact one, by the slope of a face."""
+    """The largest error of t that is right, by the slope of a face."""
     normal = np.array([float(x) for x in surface.normal(face)])
     along = abs(float(normal @ direction)) / float(np.abs(normal).max())
     return _RELATIVE * float(first.t or 0) + (_ABSOLUTE * surface.largest / along if along else np.inf)

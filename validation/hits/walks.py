@@ -54,7 +54,7 @@ def _narrowest(mesh: Mesh) -> float:
 
 
 def walk(body: Body, count: int, rng: Generator, make: Callable[..., Any] = Octree) -> int:
-    """How many of some rays through a body's faces do not meet all that exact arithmetic says, in its order."""
+    """The number of rays through a body's faces that do not meet all that exact arithmetic says, in its order."""
     origins, directions = _rays(body.mesh, count, rng)
     vertices = np.asarray(body.mesh.vertices, np.float64)
     tracer, by_length = make(body.mesh.vertices, body.mesh.faces), defaultdict[int, list[int]](list)
@@ -73,7 +73,7 @@ def walk(body: Body, count: int, rng: Generator, make: Callable[..., Any] = Octr
 
 
 def _wrong(tracer: Any, origins: Floats, directions: Floats, want: Ints, piles: Ints) -> int:
-    """How many rays do not meet the faces of their rows (n, k), one after the other, and then nothing.
+    """The number of rays that do not meet the faces of their rows (n, k), one after the other, and then nothing.
 
     ``piles`` numbers the places along the ray: faces at one place, whose t are equal but for rounding, may be met from
     any of them on, each once.

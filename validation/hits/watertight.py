@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
-from renderer.mesh.shapes import icosphere, lattice_faces, torus
+from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from validation.gates import Gate
 from validation.hits.rays import RayFamily, float32_exact
+from validation.meshes import AWAY, TURN, hilly, integer_box
 from validation.references.embree import Embree
 from validation.scenes import SCENES
 
@@ -34,10 +35,6 @@ SCALES = (1e-6, 1.0, 1e6)
 # long.
 CROWDED = 0.1
 KINDS = ("edge", "vertex")
-# Direction of the offset: its three coordinates differ.
-_AWAY = np.array([1.0, -0.75, 0.375])
-# An orthogonal matrix with no structure; its rounding moves vertices, but neighbours still share them.
-_TURN = np.linalg.qr(np.array([[2.0, 3.0, 1.0], [-1.0, 2.0, 5.0], [4.0, -1.0, 1.0]]))[0]
 
 
 class ClosedMesh(NamedTuple):
@@ -99,7 +96,7 @@ class Placement:
 
     def place(self, points: Floats) -> Floats:
         """Transform points (n, 3) of the mesh's own frame into this placement."""
-        return self._turn(points) * self.scale + self.offset * _AWAY
+        return self._turn(points) * self.scale + self.offset * AWAY
 
     def vertices(self) -> Floats:
         """The placed vertices, rounded to float64; with the same faces the mesh is still closed."""
@@ -125,7 +122,7 @@ class Placement:
         return {"mesh": self.closed.name, "turned": self.turned, "offset": self.offset, "scale": self.scale}
 
     def _turn(self, points: Floats) -> Floats:
-        return points @ _TURN.T if self.turned else points
+        return points @ TURN.T if self.turned else points
 
 
 def aimed(kind: str, vertices: Floats, faces: NDArray[np.int32], origins: Floats, rng: Generator) -> RayFamily:
@@ -164,32 +161,13 @@ def closed_meshes() -> tuple[ClosedMesh, ...]:
     knot = load_mesh(SCENES / "models" / "torus_knot.ply")
     # Its vertices are ordered by cross-section, 50 each: the mean of a section is in the middle of the tube.
     core = knot.vertices.reshape(-1, 50, 3).mean(axis=1)
-    hills = icosphere(4)
     return (
         *balls,
         ClosedMesh("integer box", integer_box(), _cube(4.0, 3.0)),
         ClosedMesh("torus", ring, _in_ring),
-        ClosedMesh("hilly sphere", Mesh(hilly(hills.vertices), hills.faces), _cube(0.0, 0.2)),
+        ClosedMesh("hilly sphere", hilly(4), _cube(0.0, 0.2)),
         ClosedMesh("torus knot", knot, lambda rng, count: core[rng.integers(0, len(core), count)]),
     )
-
-
-def integer_box(size: int = 8) -> Mesh:
-    """The box [0, size]^3 of unit squares, two faces each; neighbours share vertices, every number is an integer."""
-    row, column = np.divmod(np.arange((size + 1) ** 2), size + 1)
-    squares = lattice_faces(size + 1, size + 1)
-    corners = []
-    for axis in range(3):
-        for side in ((column, row, np.full(row.shape, size)), (row, column, np.zeros(row.shape, int))):
-            corners.append(np.roll(side, axis, axis=0).T[squares])
-    vertices, index = np.unique(np.concatenate(corners).reshape(-1, 3), axis=0, return_inverse=True)
-    return Mesh(vertices.astype(np.float64), index.reshape(-1, 3).astype(np.int32), name="integer box")
-
-
-def hilly(points: Floats) -> Floats:
-    """Points of the unit sphere moved along their radius by up to 0.3: not convex, but star-shaped about the centre."""
-    x, y, z = 6.0 * points.T
-    return points * (1.0 + 0.3 * np.sin(x) * np.sin(y + 1.0) * np.sin(z + 2.0))[:, None]
 
 
 def placements(closed: ClosedMesh) -> Iterator[Placement]:

@@ -8,12 +8,10 @@ cells that share an arc of a plane lie in one region where some of the arc is in
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cmp_to_key
-from math import gcd
 from typing import NamedTuple
 
-from validation.oracle.distance import cross, difference, dot
+from validation.oracle.vectors import Whole, cross, difference, dot, opposite, shortest, sign
 
-Vector = tuple[int, int, int]
 Signs = tuple[int, ...]
 
 
@@ -25,9 +23,9 @@ class Cone:
     """
 
     face: int
-    normal: Vector
-    first: Vector | None
-    last: Vector | None
+    normal: Whole
+    first: Whole | None
+    last: Whole | None
 
     def holds(self, direction: Sequence[int], closed: bool = True) -> bool:
         """Whether a direction of the cone's plane lies in it; one along its border only where it is ``closed``."""
@@ -42,7 +40,7 @@ class Cone:
         return sign(dot(self.normal, direction))
 
 
-def cone_at(face: int, corners: Sequence[Vector], on_sides: Sequence[bool]) -> Cone:
+def cone_at(face: int, corners: Sequence[Whole], on_sides: Sequence[bool]) -> Cone:
     """The cone of a face with an area at a point that it holds and that lies on some sides: 01, 12, 20 of its corners.
 
     >>> cone_at(7, [(0, 0, 0), (4, 0, 0), (0, 4, 0)], [True, False, True])
@@ -76,7 +74,7 @@ class Regions:
 
     def __init__(self, cones: Iterable[Cone]) -> None:
         self.cones = {cone.face: cone for cone in cones}
-        planes: dict[Vector, list[Cone]] = {}
+        planes: dict[Whole, list[Cone]] = {}
         for cone in self.cones.values():
             planes.setdefault(_upper(cone.normal), []).append(cone)
         self._normals = list(planes)
@@ -106,9 +104,9 @@ class Regions:
             if all(own in (0, its) for own, its in zip(signs, cell, strict=True))
         }
 
-    def _crossings(self, place: int, within: Sequence[Cone]) -> set[Vector]:
+    def _crossings(self, place: int, within: Sequence[Cone]) -> set[Whole]:
         """The directions in which one plane meets the others, and the borders of its own cones."""
-        normal, found = self._normals[place], set[Vector]()
+        normal, found = self._normals[place], set[Whole]()
         for other in [*self._normals[:place], *self._normals[place + 1 :]]:
             line = shortest(cross(normal, other))
             found |= {line, opposite(line)}
@@ -138,13 +136,13 @@ def _joined(arcs: Sequence[tuple[Signs, Signs, list[Cone]]]) -> dict[Signs, int]
     return region
 
 
-def _middles(normal: Vector, crossings: set[Vector]) -> list[Vector]:
+def _middles(normal: Whole, crossings: set[Whole]) -> list[Whole]:
     """A direction within each arc between neighbouring directions of a plane; one of the plane where there are none."""
     if not crossings:
         return [_across(normal)]
     start = min(crossings)
 
-    def turned(a: Vector, b: Vector) -> int:
+    def turned(a: Whole, b: Whole) -> int:
         halves = [_half(normal, start, x) for x in (a, b)]
         return halves[0] - halves[1] or -sign(dot(normal, cross(a, b)))
 
@@ -157,34 +155,17 @@ def _middles(normal: Vector, crossings: set[Vector]) -> list[Vector]:
     return found
 
 
-def _half(normal: Vector, start: Vector, direction: Vector) -> int:
+def _half(normal: Whole, start: Whole, direction: Whole) -> int:
     """0 from ``start`` to less than half a turn to the left, 1 beyond."""
     turn = sign(dot(normal, cross(start, direction)))
     return 0 if turn > 0 or (turn == 0 and dot(start, direction) > 0) else 1
 
 
-def _across(normal: Vector) -> Vector:
+def _across(normal: Whole) -> Whole:
     x, y, z = normal
     return shortest((y, -x, 0) if x or y else (z, 0, -x))
 
 
-def _upper(normal: Vector) -> Vector:
+def _upper(normal: Whole) -> Whole:
     """The one of a normal and its opposite by which a plane is known."""
     return max(normal, opposite(normal))
-
-
-def shortest(vector: Iterable[int]) -> Vector:
-    """A whole vector without the factor that its components share."""
-    x, y, z = vector
-    shared = gcd(x, y, z) or 1
-    return x // shared, y // shared, z // shared
-
-
-def opposite(vector: Vector) -> Vector:
-    """The vector the other way."""
-    return -vector[0], -vector[1], -vector[2]
-
-
-def sign(number: int) -> int:
-    """1, 0 or -1."""
-    return (number > 0) - (number < 0)

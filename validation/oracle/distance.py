@@ -5,54 +5,41 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import TypeVar
 
-Vector = Sequence[Fraction]
+from validation.oracle.vectors import cross, difference, dot
+
 Number = TypeVar("Number", int, Fraction)
 
 
-def rational(rows: Sequence[Sequence[float]]) -> list[list[Fraction]]:
-    """Rows of finite numbers as fractions."""
-    return [[Fraction(float(x)) for x in row] for row in rows]
-
-
-def squared_distance(point: Vector, triangle: Sequence[Vector]) -> Fraction:
-    """The squared distance of a point from a closed triangle, which may be a side or a point.
-
-    >>> squared_distance(*rational([[0.25, 0.25, 2.0]]), rational([[0, 0, 0], [1, 0, 0], [0, 1, 0]]))
-    Fraction(4, 1)
-    """
+def way_to(point: Sequence[Number], triangle: Sequence[Sequence[Number]]) -> list[Fraction]:
+    """The way from a point to the nearest point of a closed triangle, which may be a side or a point."""
     a, b, c = triangle
     normal = cross(difference(b, a), difference(c, a))
     sides = ((a, b), (b, c), (c, a))
     if any(normal) and all(dot(cross(normal, difference(q, p)), difference(point, p)) >= 0 for p, q in sides):
-        return dot(normal, difference(point, a)) ** 2 / dot(normal, normal)
-    return min(_from_side(point, p, q) for p, q in sides)
+        share = Fraction(dot(normal, difference(a, point)), dot(normal, normal))
+        return [share * x for x in normal]
+    return min((_way_to_side(point, p, q) for p, q in sides), key=lambda way: dot(way, way))
 
 
-def _from_side(point: Vector, start: Vector, end: Vector) -> Fraction:
-    """The squared distance from a side, which may be a point."""
-    side, offset = difference(end, start), difference(point, start)
+def _way_to_side(point: Sequence[Number], start: Sequence[Number], end: Sequence[Number]) -> list[Fraction]:
+    """The way from a point to the nearest point of a side, which may be a point."""
+    side, offset = difference(end, start), difference(start, point)
     square = dot(side, side)
-    share = max(Fraction(0), min(Fraction(1), dot(side, offset) / square)) if square else Fraction(0)
-    rest = [x - share * s for x, s in zip(offset, side, strict=True)]
-    return dot(rest, rest)
+    share = max(Fraction(0), min(Fraction(1), Fraction(-dot(side, offset), square))) if square else Fraction(0)
+    return [x + share * s for x, s in zip(offset, side, strict=True)]
 
 
-def dot(a: Sequence[Number], b: Sequence[Number]) -> Number:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def squared_distance(point: Sequence[Number], triangle: Sequence[Sequence[Number]]) -> Fraction:
+    """The squared distance of a point from a closed triangle, which may be a side or a point.
+
+    >>> squared_distance([0, 0, 2], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    Fraction(4, 1)
+    """
+    way = way_to(point, triangle)
+    return dot(way, way)
 
 
-def cross(a: Sequence[Number], b: Sequence[Number]) -> list[Number]:
-    """Vector product."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def difference(a: Sequence[Number], b: Sequence[Number]) -> list[Number]:
-    """a - b."""
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
-def nearest(point: Vector, triangles: Sequence[Sequence[Vector]]) -> tuple[Fraction, list[int]]:
+def nearest(point: Sequence[Number], triangles: Sequence[Sequence[Sequence[Number]]]) -> tuple[Fraction, list[int]]:
     """The least squared distance of a point from some triangles, and those that have it, ascending."""
     squares = [squared_distance(point, triangle) for triangle in triangles]
     least = min(squares)

@@ -22,10 +22,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from validation.oracle.vectors import Whole, whole
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Vector = tuple[int, int, int]
 Ratio = tuple[int, int]
 
 FLOAT64_ROUNDOFF = 2.0**-53
@@ -78,18 +79,10 @@ def determinants(
         _rows(direction, "direction"),
     )
     # For one triangle ``_Scaled`` would spend most of its time on calls of numpy.
-    (a, b, c, o), place = _whole([*corners.tolist(), origins[0].tolist()])
-    (d,), way = _whole([directions[0].tolist()])
+    (a, b, c, o), place = whole([*corners.tolist(), origins[0].tolist()])
+    (d,), way = whole([directions[0].tolist()])
     u, v, w = (Fraction(value, place * place * way) for value in _edge_determinants(a, b, c, o, d))
     return u, v, w, Fraction(_depth(a, b, c, o), place**3)
-
-
-def _whole(rows: list[list[float]]) -> tuple[list[Vector], int]:
-    """Rows of three finite numbers as integers, and the power of two that they were multiplied by."""
-    ratios = [[x.as_integer_ratio() for x in row] for row in rows]
-    unit = max(bottom for row in ratios for _, bottom in row)
-    whole = [[top * (unit // bottom) for top, bottom in row] for row in ratios]
-    return [(x, y, z) for x, y, z in whole], unit
 
 
 def mesh_determinants(
@@ -222,7 +215,7 @@ class _Scaled:
         best: Ratio = (1, 0)  # 1/0 is infinity: every fraction is smaller
         tied: list[int] = []
         for face, i, j, k in candidates:
-            found = _ratio(self.vertices[i], self.vertices[j], self.vertices[k], o, d)
+            found = ratio(self.vertices[i], self.vertices[j], self.vertices[k], o, d)
             if found is None or not (_not_after(first, found) and _not_after(found, last)):
                 continue
             difference = found[0] * best[1] - best[0] * found[1]
@@ -245,8 +238,8 @@ def _not_after(first: Ratio, second: Ratio) -> bool:
     return first[0] * second[1] <= second[0] * first[1]
 
 
-def _ratio(p0: Vector, p1: Vector, p2: Vector, o: Vector, d: Vector) -> Ratio | None:
-    """T and U + V + W with a positive denominator, or None on a miss."""
+def ratio(p0: Whole, p1: Whole, p2: Whole, o: Whole, d: Whole) -> Ratio | None:
+    """T and U + V + W of one face, with a positive denominator, or None on a miss."""
     u, v, w = _edge_determinants(p0, p1, p2, o, d)
     if (u < 0 or v < 0 or w < 0) and (u > 0 or v > 0 or w > 0):
         return None
@@ -257,7 +250,7 @@ def _ratio(p0: Vector, p1: Vector, p2: Vector, o: Vector, d: Vector) -> Ratio | 
     return (depth, det) if det > 0 else (-depth, -det)
 
 
-def _edge_determinants(p0: Vector, p1: Vector, p2: Vector, o: Vector, d: Vector) -> Vector:
+def _edge_determinants(p0: Whole, p1: Whole, p2: Whole, o: Whole, d: Whole) -> Whole:
     """U, V, W: each the triple product of d and two corners relative to o."""
     ox, oy, oz = o
     dx, dy, dz = d
@@ -270,7 +263,7 @@ def _edge_determinants(p0: Vector, p1: Vector, p2: Vector, o: Vector, d: Vector)
     return u, v, w
 
 
-def _depth(p0: Vector, p1: Vector, p2: Vector, o: Vector) -> int:
+def _depth(p0: Whole, p1: Whole, p2: Whole, o: Whole) -> int:
     """T = a . (b x c), which equals the triangle's area vector dotted with a."""
     ax, ay, az = p0[0] - o[0], p0[1] - o[1], p0[2] - o[2]
     bx, by, bz = p1[0] - o[0], p1[1] - o[1], p1[2] - o[2]
@@ -289,7 +282,7 @@ def _common_exponent(*arrays: Floats) -> int:
     return int((exponent - 54 + lowest_bit).min())
 
 
-def _integers(values: Floats, exponent: int) -> list[Vector]:
+def _integers(values: Floats, exponent: int) -> list[Whole]:
     """Rows of ``values`` (n, 3) divided by 2^exponent, as Python integers."""
     fraction, power = np.frexp(values)
     mantissas = (fraction * 2.0**53).astype(np.int64).ravel().tolist()

@@ -5,8 +5,8 @@ It takes one pass over the faces for a direction, where the cells of ``cones.Reg
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from validation.oracle.cones import Cone, Piece, Vector, opposite, sign
-from validation.oracle.distance import cross, dot
+from validation.oracle.cones import Cone, Piece
+from validation.oracle.vectors import Whole, cross, dot, opposite, sign
 
 
 class Fan:
@@ -22,7 +22,7 @@ class Fan:
 
     def _turned(self) -> dict[int, int]:
         """The region above each face: 0 above the first, and so on from neighbour to neighbour."""
-        at: dict[Vector, list[Cone]] = {}
+        at: dict[Whole, list[Cone]] = {}
         for cone in self.cones.values():
             if cone.first is None or cone.last is None or cone.first == opposite(cone.last):
                 raise ValueError(f"cones: expected sectors at a corner, got another of face {cone.face}")

@@ -3,40 +3,26 @@
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from validation.oracle.distance import Vector, cross, difference, dot, squared_distance
+from validation.oracle.distance import squared_distance
+from validation.oracle.vectors import cross, difference, dot, relative, volume
 
 
-def winding_number(point: Vector, triangles: Sequence[Sequence[Vector]]) -> int | None:
+def winding_number(point: Sequence[Fraction], triangles: Sequence[Sequence[Sequence[Fraction]]]) -> int | None:
     """The winding number of a closed mesh's triangles around a point, None where the point lies on one of them.
 
     By the signed crossings of a ray in a direction that meets no edge and no corner; others are tried until one does.
     """
-    relative = _relative(point, triangles)
-    origin = [Fraction(0)] * 3
-    flat = [triangle for triangle in relative if dot(triangle[0], cross(triangle[1], triangle[2])) == 0]
-    if any(squared_distance(origin, [[Fraction(x) for x in corner] for corner in triangle]) == 0 for triangle in flat):
+    # In whole numbers, which change no sign, and are many times as fast.
+    around, _ = relative(point, triangles)
+    if any(volume(face) == 0 and squared_distance((0, 0, 0), face) == 0 for face in around):
         return None
     # Without faces that are lines or points: a ray that meets no edge crosses none of them.
-    faces = [[a, b, c] for a, b, c in relative if any(cross(difference(b, a), difference(c, a)))]
+    faces = [[a, b, c] for a, b, c in around if any(cross(difference(b, a), difference(c, a)))]
     for direction in _directions():
         crossings = [_crossing(triangle, direction) for triangle in faces]
         if None not in crossings:
             return sum(crossing for crossing in crossings if crossing is not None)
     raise AssertionError("there are infinitely many directions")
-
-
-def _relative(point: Vector, triangles: Sequence[Sequence[Vector]]) -> list[list[list[int]]]:
-    """Corners less the point, times a power of two that makes integers of them: it changes no sign, and these are many
-    times as fast.
-    """
-    numbers = [x for triangle in triangles for corner in triangle for x in corner]
-    unit = max(x.denominator for x in (*numbers, *point))
-
-    def whole(vector: Vector) -> list[int]:
-        return [x.numerator * (unit // x.denominator) for x in vector]
-
-    own = whole(point)
-    return [[difference(whole(corner), own) for corner in triangle] for triangle in triangles]
 
 
 def _directions() -> Iterator[Sequence[int]]:
@@ -55,6 +41,5 @@ def _crossing(triangle: Sequence[Sequence[int]], direction: Sequence[int]) -> in
         return 0
     if 0 in sides:
         return None
-    volume = dot(a, cross(b, c))
     # t = volume / sum of the sides.
-    return 0 if (volume > 0) != (sides[0] > 0) else (1 if sides[0] > 0 else -1)
+    return 0 if (volume(triangle) > 0) != (sides[0] > 0) else (1 if sides[0] > 0 else -1)

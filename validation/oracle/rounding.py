@@ -1,4 +1,4 @@
-"""Which answers floating-point arithmetic may give for a ray, derived from exact arithmetic.
+"""Bounds on the answers that floating-point arithmetic may give for a ray, derived from exact arithmetic.
 
 The exact determinants of ``validation.oracle.exact`` and derived bounds on their rounding judge each face. ``RayView``
 decides whether an answer is the exact one, and if not, whether rounding permits it.

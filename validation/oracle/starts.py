@@ -23,14 +23,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from validation.oracle.cones import Regions, cone_at, sign
-from validation.oracle.distance import cross, difference, dot, rational
-from validation.oracle.exact import determinant_bounds
+from validation.oracle.cones import Regions, cone_at
+from validation.oracle.distance import way_to
+from validation.oracle.exact import determinant_bounds, ratio
 from validation.oracle.fans import Fan
+from validation.oracle.vectors import Whole, cross, difference, dot, rational, whole
 
 Floats = NDArray[np.float64]
 Place = tuple[Fraction, Fraction, Fraction]
-Whole = tuple[int, int, int]
 
 # ``Regions`` makes some cells for each pair of faces: above this a corner has to be a closed fan.
 MOST_CONES = 16
@@ -38,7 +38,7 @@ _RAYS_AT_ONCE = 1024
 
 
 class Start(NamedTuple):
-    """Where a ray starts, and the face that it leaves; -1 where none is named.
+    """The start of a ray, and the face that it leaves; -1 where none is named.
 
     ``pile`` is the face at which it came upon those that coincide with ``face``: None where that is ``face``.
     """
@@ -79,25 +79,8 @@ def start_near(corners: ArrayLike, point: ArrayLike) -> Place:
     [1.0, 0.0, 0.0]
     """
     (given,) = rational([np.asarray(point, np.float64).tolist()])
-    return _nearest_on(rational(np.asarray(corners, np.float64).tolist()), given)
-
-
-def _nearest_on(corners: Sequence[Sequence[Fraction]], given: Sequence[Fraction]) -> Place:
-    a, b, c = corners
-    normal, sides = cross(difference(b, a), difference(c, a)), ((a, b), (b, c), (c, a))
-    if any(normal) and all(dot(cross(normal, difference(q, p)), difference(given, p)) >= 0 for p, q in sides):
-        share = dot(normal, difference(given, a)) / dot(normal, normal)
-        x, y, z = (k - share * n for k, n in zip(given, normal, strict=True))
-        return x, y, z
-    nearest = [_on_side(given, p, q) for p, q in sides]
-    return min(nearest, key=lambda place: dot(difference(place, given), difference(place, given)))
-
-
-def _on_side(given: Sequence[Fraction], start: Sequence[Fraction], end: Sequence[Fraction]) -> Place:
-    side = difference(end, start)
-    square = dot(side, side)
-    share = max(Fraction(0), min(Fraction(1), dot(side, difference(given, start)) / square)) if square else Fraction(0)
-    x, y, z = (k + share * s for k, s in zip(start, side, strict=True))
+    way = way_to(given, rational(np.asarray(corners, np.float64).tolist()))
+    x, y, z = (k + w for k, w in zip(given, way, strict=True))
     return x, y, z
 
 
@@ -127,7 +110,7 @@ class Surface:
         self._corners = points[self.faces]
         self.largest = float(np.abs(self._corners).max(initial=0.0))
         self._low, self._high = self._corners.min(axis=1), self._corners.max(axis=1)
-        self._whole, self._unit = _whole(points.tolist())
+        self._whole, self._unit = whole(points.tolist())
         self._triangles = [(self._whole[i], self._whole[j], self._whole[k]) for i, j, k in self.faces.tolist()]
         self._normals = [cross(difference(b, a), difference(c, a)) for a, b, c in self._triangles]
         self._cut: dict[tuple[tuple[int, tuple[bool, ...]], ...], Regions | Fan] = {}
@@ -196,7 +179,7 @@ class Surface:
             rows = range(begin, min(begin + _RAYS_AT_ONCE, len(starts)))
             kept = self.possible([starts[row].place for row in rows], directions[begin : rows.stop])
             for row, possible in zip(rows, kept, strict=True):
-                (way,), unit = _whole([directions[row].tolist()])
+                (way,), unit = whole([directions[row].tolist()])
                 found.append(self._first(starts[row], (way, unit), possible, (int(sides[row]), bool(through[row]))))
         return found
 
@@ -234,16 +217,13 @@ class Surface:
         (origin, bottom), (d, d_unit) = self._scaled(place), way
         best, tied = (1, 0), list[int]()
         for face in faces:
-            a, b, c = self._relative(face, origin, bottom)
-            across = [cross(b, c), cross(c, a), cross(a, b)]
-            sides = [dot(d, one) for one in across]
-            whole = sum(sides)
-            if min(sides) < 0 < max(sides) or whole == 0:
+            a, b, c = ((bottom * x, bottom * y, bottom * z) for x, y, z in self._triangles[face])
+            found = ratio(a, b, c, origin, d)
+            if found is None or found[0] < 0:
                 continue
-            depth = dot(a, across[0]) * sign(whole)
-            later = depth * best[1] - best[0] * abs(whole)
-            if depth >= 0 and later <= 0:
-                best, tied = (depth, abs(whole)), [*([] if later else tied), face]
+            later = found[0] * best[1] - best[0] * found[1]
+            if later <= 0:
+                best, tied = found, [*([] if later else tied), face]
         if not tied:
             return _MISS
         return First(Fraction(*best) * Fraction(d_unit, bottom * self._unit), tied[0], tuple(tied))
@@ -309,10 +289,3 @@ def _behind(regions: Regions | Fan, region: int, way: Whole) -> set[int]:
     if not some:
         raise AssertionError("a direction outside a region is beyond a face of its border")
     return some
-
-
-def _whole(rows: Sequence[Sequence[float]]) -> tuple[list[Whole], int]:
-    """Rows of three finite numbers as integers, and the power of two that they were multiplied by."""
-    ratios = [[float(x).as_integer_ratio() for x in row] for row in rows]
-    unit = max((bottom for row in ratios for _, bottom in row), default=1)
-    return [(x, y, z) for x, y, z in ([top * (unit // bottom) for top, bottom in row] for row in ratios)], unit

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.picture.encoding import write_pixels
 from renderer.picture.image import srgb, write_exr
 from renderer.system.files import write_atomically
 from validation.pictures.compare import ImageComparison, Picture
@@ -44,9 +45,7 @@ def write_failed(folder: Path, stem: str, ours: Picture, reference: Picture, res
 
 def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
     """Write 8-bit pixels, (h, w, 3) or grey (h, w), whole or not at all."""
-    from PIL import Image as Pillow
-
-    write_atomically(path, lambda file: Pillow.fromarray(pixels).save(file, "png", optimize=True))
+    write_atomically(path, lambda file: write_pixels(file, pixels, optimize=True))
 
 
 def _grey(values: NDArray[np.floating]) -> NDArray[np.uint8]:

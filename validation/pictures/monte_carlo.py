@@ -188,7 +188,8 @@ def _glass(scene: Scene) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
 def _explained(
     scene: Scene, size: int, ours: NDArray[np.float64], rows: NDArray[np.intp]
 ) -> tuple[int, NDArray[np.bool_]]:
-    """How many of some pixels differ from reference B without a reason; and which are judged: all that differ for none.
+    """The number of pixels that differ from reference B without a reason; and a mask of those that are judged, all that
+    differ for none.
 
     One pixel that a float32 rounding decides weighs more than the scatter of its group where Fresnel's share is small.
     """

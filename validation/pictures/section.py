@@ -95,8 +95,8 @@ def check_scene(
 
 
 def _theirs(name: str, scene: Scene, plan: Plan, job: Job) -> dict[Any, Any]:
-    """What references make of a scene, which takes long: of each rung and reference, (rung's name, reference's key),
-    the picture and its seconds; of AOVS the same; of random paths the verdict. What takes longest comes first.
+    """The references' results on a scene: of each rung and reference, (rung's name, reference's key), the picture and
+    its seconds; of AOVS the same; of random paths the verdict. The longest tasks come first.
     """
     tasks: dict[Any, Task] = {}
     if plan.paths:
@@ -115,7 +115,7 @@ def _theirs(name: str, scene: Scene, plan: Plan, job: Job) -> dict[Any, Any]:
 
 
 def _timed(make: Callable[[], Any]) -> tuple[Any, float]:
-    """What is made, and the seconds that it took."""
+    """The result of ``make``, and the seconds that it took."""
     began = time.perf_counter()
     return make(), time.perf_counter() - began
 
@@ -153,7 +153,7 @@ def _check_aovs(
 
 
 def _announced(name: str, scene: Scene, drawn: Drawn, job: Job) -> list[str]:
-    """What is said of the scene before references see it: where the rule for media decides."""
+    """Lines about a scene before references see it: where the rule for media decides."""
     share = float(verdict.differs(drawn.images["own"].radiance, drawn.normal["own"]).mean())
     lines = [f"glass {mesh} is open at {edges:,} edges" for mesh, edges in open_glass(scene).items()]
     if share > 0.0:

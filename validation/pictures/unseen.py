@@ -20,6 +20,8 @@ from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import UNLIMITED_RAYS, Floor, Scene, SceneObject
 from validation.gates import Gate
 from validation.job import Job
+from validation.meshes import mirror_bodies
+from validation.pictures.explain.optics import fresnel
 
 Floats = NDArray[np.float64]
 Part = tuple[Mesh, Material]
@@ -38,7 +40,6 @@ _EYES = ((2.3, 3.0, 4.1), (-1.7, 5.0, 0.4), (0.0, 4.0, 4.0))
 _FLOOR = Floor(min=(-99.0, -99.0), max=(99.0, 99.0), materials=("dark",), squares=(3, 3))
 # Heights of the ground: a third has no float64, so that the same plane has many roundings.
 _HEIGHTS = (0.0, 1e3 / 3.0)
-_TURN = np.linalg.qr(np.array([[2.0, 3.0, 1.0], [-1.0, 2.0, 5.0], [4.0, -1.0, 1.0]]))[0]
 
 
 class Row(NamedTuple):
@@ -80,7 +81,7 @@ def _gate(row: Row) -> Gate:
 
 
 def unseen(scene: Scene, size: int, **options: Any) -> tuple[int, int]:
-    """How many pixels of a picture see a surface, and how many of these see light, of which there is none."""
+    """The number of pixels of a picture that see a surface, and of these that see light, of which there is none."""
     image = render(scene, resolution=(size, size), samples=1, max_rays=UNLIMITED_RAYS, min_weight=0.0, **options)
     met = image.face >= 0
     return int(met.sum()), int((met & ~(image.radiance == 0.0).all(axis=-1)).sum())
@@ -95,20 +96,6 @@ def scene_of(parts: Sequence[Part], camera: Any, **more: Any) -> Scene:
 
 
 # ------------------------------------------------------------------------------------------------- closed mirrors
-
-
-def mirror_bodies() -> dict[str, Mesh]:
-    """Convex bodies, to be seen from their middle."""
-    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], np.float64)
-    tetrahedron = Mesh(corners, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
-    rim = [[0.0, 0.0], [1.0, 0.0], [math.cos(math.pi / 3.0), math.sin(math.pi / 3.0)]]
-    prism = Mesh(
-        [[x, y, z] for z in (0.0, 1.0) for x, y in rim],
-        [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]],
-    )
-    cuboid = box((0.0, 0.0, 0.0), (1.0, 1.5, 0.75))
-    turned = Mesh(cuboid.vertices @ _TURN.T, cuboid.faces)
-    return {"tetrahedron": tetrahedron, "prism of 60 degrees": prism, "cube": box(), "turned box": turned}
 
 
 def _mirrors(name: str, mesh: Mesh, size: int) -> Row:
@@ -216,8 +203,7 @@ def passed(angle: float, *indices: float) -> float:
     share, sine = 1.0, math.sin(math.radians(angle)) * indices[0]
     for n1, n2 in pairwise(indices):
         c1, c2 = math.sqrt(1.0 - (sine / n1) ** 2), math.sqrt(1.0 - (sine / n2) ** 2)
-        s, p = (n1 * c1 - n2 * c2) / (n1 * c1 + n2 * c2), (n1 * c2 - n2 * c1) / (n1 * c2 + n2 * c1)
-        share *= 1.0 - (s * s + p * p) / 2.0
+        share *= 1.0 - fresnel(c1, c2, n1, n2)
     return share
 
 
@@ -268,7 +254,7 @@ def _worst(subject: str, asked: Sequence[tuple[Sequence[Part], float, float]], s
 
 
 def through(parts: Sequence[Part], angle: float, size: int) -> Floats:
-    """What parallel rays at an angle from above see of a sky of 1."""
+    """The radiance along parallel rays at an angle from above, under a sky of 1."""
     t = math.radians(angle)
     target = np.array([0.3, 0.0, 0.2])
     eye = target + 20.0 * np.array([math.sin(t), math.cos(t), 0.0])

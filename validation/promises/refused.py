@@ -5,7 +5,7 @@ from typing import Any
 
 
 def refused(ask: Callable[..., Any], *given: Any, **options: Any) -> str | None:
-    """What a call's ``ValueError`` says; None where it is answered."""
+    """The message of a call's ``ValueError``; None where it is answered."""
     try:
         ask(*given, **options)
     except ValueError as error:

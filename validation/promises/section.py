@@ -14,10 +14,8 @@ from validation.promises.hits.bounds import check_bounds
 from validation.promises.hits.counts import check_counts
 from validation.promises.hits.errors import check_errors
 from validation.promises.hits.files import check_files
-from validation.promises.hits.formats import check_formats
 from validation.promises.hits.kept import check_kept
 from validation.promises.hits.limits import check_limits
-from validation.promises.hits.meshes import check_meshes
 from validation.promises.hits.outlines import check_outlines
 from validation.promises.hits.places import check_places
 from validation.promises.hits.planes import check_planes
@@ -97,10 +95,10 @@ HITS = {
     "refits": Check(check_refits, ("Octree.refit",)),
     "trees": Check(lambda: check_trees(_random()), ("Octree", "Octree.tree", "Octree.refit")),
     "counts": Check(lambda: check_counts(_random()), ("Octree.stats", "Octree.from_mesh", *_of_both("count_steps"))),
-    "files": Check(check_files, ("load_mesh", "Octree.save", "Octree.load")),
-    "formats": Check(lambda: check_formats(_random()), ("load_mesh",)),
-    "changed meshes": Check(check_meshes, ("Octree",)),
-    "kept arrays": Check(lambda: check_kept(_random()), ("Mesh", "Octree.save", "Octree.load", "Octree.refit")),
+    "mesh files": Check(lambda: check_files(_random()), ("load_mesh",)),
+    "kept arrays": Check(
+        lambda: check_kept(_random()), ("Mesh", "Octree", "BruteForce", "Octree.save", "Octree.load", "Octree.refit")
+    ),
     "shapes of rays": Check(lambda: check_shapes(_random()), (*_RAYS_ASKED, *_of_both("closest_point"))),
     "refusals": Check(lambda: check_refusals(_random()), (*_RAYS_ASKED, *_of_both("count_steps", "refit"))),
     "polygons": Check(lambda: check_outlines(_random(), _POLYGONS), ("load_mesh",)),

@@ -11,7 +11,8 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from validation.job import Job
-from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.oracle.distance import nearest, ulps_from_root
+from validation.oracle.vectors import rational
 from validation.queries.peers import OPEN3D, peers
 from validation.queries.solids import solids
 
@@ -125,7 +126,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def _others(mesh: Mesh, points: Floats, squares: list[tuple[Any, int]]) -> dict[str, int]:
-    """How many distances of other libraries are off by more than some ulp."""
+    """The number of distances of other libraries that are off by more than some ulp."""
     wrong = {}
     for name, peer in peers().items():
         found, most = (

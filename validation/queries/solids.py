@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
+from validation.meshes import loose
 from validation.oracle.star import Star
 
 Floats = NDArray[np.float64]
@@ -44,9 +45,7 @@ class Solid:
             for part in self.parts
         ]
         whole = Mesh.concatenate(meshes)
-        if not self.soup:
-            return whole
-        return Mesh(whole.triangles.reshape(-1, 3), np.arange(3 * len(whole.faces)).reshape(-1, 3))
+        return loose(whole.triangles) if self.soup else whole
 
     def winding(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Winding numbers (n,) around whole points (n, 3), and which lie on the surface, where they mean nothing."""

@@ -9,8 +9,8 @@ from renderer.mesh.heightfield import heightfield_mesh
 from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, torus
-from validation.hits.bodies import notched, prism, soup, turned
 from validation.hits.rays import float32_exact
+from validation.meshes import hilly, loose, prism, turned
 from validation.scenes import SCENES
 
 _MODELS = ("block", "displaced_sphere", "stairs", "teapot", "torus_knot")
@@ -22,7 +22,7 @@ def draw_mesh(rng: Generator) -> Mesh:
     if rng.random() < 0.2:
         mesh = _without_some(mesh, rng)
     if rng.random() < 0.2:
-        mesh = soup(mesh)
+        mesh = loose(mesh.triangles)
     if rng.random() < 0.3:
         mesh = turned(mesh)
     return Mesh(float32_exact(mesh.vertices), mesh.faces)
@@ -62,21 +62,19 @@ def _hills(rng: Generator) -> Mesh:
 
 def _crowd(rng: Generator) -> Mesh:
     """Triangles in no order, which cross each other."""
-    corners = rng.normal(size=(60, 1, 3)) + 0.3 * rng.normal(size=(60, 3, 3))
-    return Mesh(corners.reshape(-1, 3), np.arange(180, dtype=np.int32).reshape(-1, 3))
+    return loose(rng.normal(size=(60, 1, 3)) + 0.3 * rng.normal(size=(60, 3, 3)))
 
 
 def _twice(rng: Generator) -> Mesh:
     """A body that overlaps itself, moved by a part of its size."""
     ball = icosphere(2)
-    other = ball.vertices + rng.uniform(-0.8, 0.8, 3)
-    return Mesh(np.concatenate([ball.vertices, other]), np.concatenate([ball.faces, ball.faces + len(ball.vertices)]))
+    return Mesh.concatenate([ball, Mesh(ball.vertices + rng.uniform(-0.8, 0.8, 3), ball.faces)])
 
 
-def _notched(_: Generator) -> Mesh:
-    return notched()
+def _hilly(_: Generator) -> Mesh:
+    return hilly(1)
 
 
 _BODIES: tuple[Callable[[Generator], Mesh], ...] = (
-    _model, _model, _sphere, _torus, _box, _prism, _hills, _crowd, _twice, _notched,
+    _model, _model, _sphere, _torus, _box, _prism, _hills, _crowd, _twice, _hilly,
 )  # fmt: skip

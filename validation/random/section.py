@@ -87,7 +87,7 @@ def judge_mesh(seed: int, number: int, folder: Path) -> dict[str, Any]:
 
 
 def _scene_gates(drawn: Drawn) -> tuple[dict[str, Any], list[str]]:
-    """What a scene's verdict counts, and the quantities of the gates that fail."""
+    """The counts of a scene's verdict, and the quantities of the gates that fail."""
     with TemporaryDirectory(prefix="random-") as name:
         folder = Path(name)
         path = drawn.write(folder / "scene")

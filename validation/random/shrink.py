@@ -1,4 +1,4 @@
-"""What fails, made smaller as long as it still fails: fewer parts, plainer materials, fewer faces."""
+"""Makes a failing scene or mesh smaller while it still fails: fewer parts, plainer materials, fewer faces."""
 
 from collections.abc import Callable, Iterator
 from copy import deepcopy

@@ -8,17 +8,16 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation.report import efficiency_figures, monte_carlo_figure, studies_figures
-from validation.report.plots import stability_figures
+from validation.report import efficiency_figures, figures
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
 # Functions for templates that draw curves from a record: figures with a title and an SVG, or the SVG alone.
 FIGURES: dict[str, Callable[..., Any]] = {
-    "figures": stability_figures,
+    "stability_figures": figures.stability_figures,
     "efficiency_figures": efficiency_figures.figures,
-    "monte_carlo_figure": monte_carlo_figure.figure,
-    "studies_figures": studies_figures.figures,
+    "monte_carlo_figure": figures.monte_carlo_figure,
+    "studies_figures": figures.studies_figures,
 }
 
 # The sections in the page's order: title and template, which reads the section's record as m.<section>.

@@ -35,8 +35,6 @@ _HREF = "{http://www.w3.org/1999/xlink}href"
 _FONT = "DejaVu Sans"  # comes with matplotlib; text is laid out with it and shown in the page's own sans-serif
 _PIXELS = 100.0  # an inch
 
-_NAMES = {"ours": "ours (float64)", "embree_default": "Embree default", "embree_robust": "Embree robust"}
-
 
 class Series(NamedTuple):
     """One curve; a y of None, as where nothing was hit, is left out.
@@ -114,39 +112,6 @@ def _add_legend(figure: Figure, handles: Mapping[str, Any]) -> None:
         if columns == 1 or legend.get_window_extent(renderer).width <= figure.bbox.width:
             return
         legend.remove()
-
-
-def stability_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Figures of the record of ``stability.sweeps.run``: for each a title (also its caption) and an SVG."""
-    sweeps = {name: part for name, part in record.items() if isinstance(part, dict) and "points" in part}
-    return [_error_figure(name, part) for name, part in sweeps.items()] + [_leak_figure(record["leaks"])]
-
-
-def _error_figure(name: str, sweep: Mapping[str, Any]) -> dict[str, str]:
-    points = sweep["points"]
-    x = [p["x"] for p in points]
-    errors = [Series(shown, x, [p[kernel]["relative_max"] for p in points]) for kernel, shown in _NAMES.items()]
-    wrong = [Series(shown, x, [p[kernel]["wrong_share"] for p in points]) for kernel, shown in _NAMES.items()]
-    panels = [Panel(errors, "largest relative error of t", roundoffs=True), Panel(wrong, "wrong", share=True)]
-    title = (
-        f"Error against {name}: the largest of {points[0]['rays']} rays at each point, and the share with a wrong "
-        f"verdict (missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}; a point is left out "
-        "where nothing was hit."
-    )
-    return {"title": title, "svg": draw(panels, x_label=sweep["label"], title=f"Error of t against {name}")}
-
-
-def _leak_figure(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    x = [row["faces"] for row in rows]
-    # No leak is drawn as half a ray, the resolution of this many rays.
-    floor = 0.5e6 / max(row["rays"] for row in rows)
-    series = [Series(s, x, [1e6 * row[k] / row["rays"] or floor for row in rows]) for k, s in _NAMES.items()]
-    title = (
-        f"Leaks from inside icospheres: of {rows[0]['rays']:,} rays a mesh, half aimed at edges and half at vertices. "
-        f"No leak at all is drawn at {floor:.3g} a million, half a ray."
-    )
-    svg = loglog(series, x_label="faces", y_label="leaks per million rays", title="Leaks against mesh size")
-    return {"title": title, "svg": svg}
 
 
 def _plot(panel: Panel, axes: Axes) -> None:

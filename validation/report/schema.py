@@ -106,7 +106,6 @@ class Metrics(_Strict):
     random: SectionRecord | None = None
     efficiency: SectionRecord | None = None
     defects: dict[str, Any] | None = None
-    mutants: dict[str, Any] | None = None
 
 
 def check(metrics: Any, name: str = "metrics") -> None:

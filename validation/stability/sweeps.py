@@ -19,6 +19,7 @@ from validation.gates import Gate
 from validation.hits import watertight
 from validation.hits.compare import HitArrays
 from validation.hits.rays import RayFamily
+from validation.meshes import AWAY
 from validation.oracle import exact
 from validation.oracle.distance import way_from
 from validation.oracle.exact import ExactHit
@@ -206,7 +207,7 @@ def leak_row(level: int, count: int) -> dict[str, object]:
 def moved(offset: float, count: int, rng: Generator) -> list[Sample]:
     """A sphere and its rays moved by ``offset`` along each axis."""
     origins, targets = _around_sphere(count, rng)
-    place = np.array([1.0, -0.75, 0.375]) * offset
+    place = AWAY * offset
     return [Sample(_SPHERE.vertices + place, _SPHERE.faces, rays_towards(origins + place, targets + place))]
 
 

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, lattice_faces
+from validation.meshes import loose
 
 Floats = NDArray[np.float64]
 # What stands for endless: beyond so many units lies less than 1e-10 of a hemisphere by cosine, 1e-5 by solid angle.
@@ -38,7 +39,7 @@ def walls(planes: str) -> Mesh:
         "y": [[-far, 0, -far], [far, 0, -far], [0, 0, far]],
         "z": [[-far, -far, 0], [far, -far, 0], [0, far, 0]],
     }
-    return Mesh(np.concatenate([corners[plane] for plane in planes]), np.arange(3 * len(planes)).reshape(-1, 3))
+    return loose([corners[plane] for plane in planes])
 
 
 def town(houses: int = 5, ground: int = 24) -> Mesh:
@@ -77,8 +78,7 @@ def soup(faces: int = 1500) -> Mesh:
     """Loose triangles of all sizes, which cross each other."""
     rng = np.random.default_rng(_SEED + 1)
     size = 0.3 * rng.random((faces, 1, 1)) ** 3 + 0.01
-    corners = rng.random((faces, 1, 3)) + rng.normal(size=(faces, 3, 3)) * size
-    return Mesh(corners.reshape(-1, 3), np.arange(3 * faces).reshape(-1, 3))
+    return loose(rng.random((faces, 1, 3)) + rng.normal(size=(faces, 3, 3)) * size)
 
 
 def slivers(faces: int = 400) -> Mesh:
@@ -88,7 +88,7 @@ def slivers(faces: int = 400) -> Mesh:
     across = 1e-3 * np.cross(way, rng.normal(size=(faces, 3)))
     pairs = np.repeat(np.stack([start, start + way, start + way / 2.0 + across], axis=1), 2, axis=0)
     pairs[1::2] += 1e-4
-    return Mesh(pairs.reshape(-1, 3), np.arange(6 * faces).reshape(-1, 3))
+    return loose(pairs)
 
 
 def bodies() -> dict[str, Mesh]:

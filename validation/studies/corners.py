@@ -17,6 +17,7 @@ from renderer.mesh.shapes import box, icosphere, lattice_faces
 from renderer.octree import Octree
 from renderer.studies import face_points, fibonacci_sphere, occlusion, sky_view_factor
 from validation.oracle.starts import Start, Surface
+from validation.oracle.vectors import whole_vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -151,17 +152,10 @@ def hidden_by_law(surface: Surface, starts: list[Start], normals: Floats, ways: 
     for row, start in enumerate(starts):
         held = surface.holding(start.place)
         regions = surface.regions(held)
-        hidden[row] = not regions.around(_whole(normals[row])) & regions.around(_whole(ways[row]))
+        hidden[row] = not regions.around(whole_vector(normals[row])) & regions.around(whole_vector(ways[row]))
         # Of a start that names a face and no side, no face that holds it stops the ray.
         left.append(Start(start.place, held[0][0]))
     goes = np.flatnonzero(~hidden)
     firsts = surface.each([left[row] for row in goes], ways[goes], [0] * len(goes), [False] * len(goes))
     hidden[goes] = [found[0].t is not None for found in firsts]
     return hidden
-
-
-def _whole(direction: Floats) -> tuple[int, int, int]:
-    ratios = [x.as_integer_ratio() for x in direction.tolist()]
-    unit = max(bottom for _, bottom in ratios)
-    x, y, z = (top * (unit // bottom) for top, bottom in ratios)
-    return x, y, z

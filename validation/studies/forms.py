@@ -37,7 +37,7 @@ class Form:
 
 
 def sky_bound(count: int) -> float:
-    """How far a share of the sky may be off.
+    """The largest error of a share of the sky.
 
     Patches are sqrt(2 pi / count) wide, so boundaries of length 2 pi, the longest here, run through sqrt(2 pi count) of
     them, each wrong by half its weight at most: that is 1 / count, or by cosine 2 cos / count, whose mean along half a

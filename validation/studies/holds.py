@@ -1,4 +1,4 @@
-"""What holds of studies exactly: each check counts the answers that are not as they must be."""
+"""Exact laws of studies: each check counts the answers that break one."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.checkpoints.study import Study
-from renderer.checkpoints.study_points import of_file, on_grid
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.octree import Octree
@@ -27,6 +26,8 @@ from renderer.studies import (
     tregenza,
     visible_faces,
 )
+from renderer.studies.points import of_file, on_grid
+from validation.meshes import tetrahedron
 from validation.oracle.exact import closest_hits
 from validation.oracle.starts import Surface
 from validation.studies.bodies import FAR, bodies, street, terrain, touching, town
@@ -235,15 +236,15 @@ def places_of_a_grid() -> Asked:
             path = Path(folder) / "points.npy"
             np.save(path, np.concatenate([grid_points.points, grid_points.normals], axis=1))
             read = of_file(octree, path).points
-        found.append(study.answer(octree, read) == study.answer(octree, grid_points))
+        found.append(study.evaluate(octree, read) == study.evaluate(octree, grid_points))
     return _count(np.concatenate(found))
 
 
 def edges_from_both_sides() -> Asked:
     """Points of a tetrahedron's edges see its middle, each other, and what is before one of their two faces."""
     rng = np.random.default_rng(_SEED)
-    corners = np.array([[0.1, 0.2, 0.3], [1.3, 0.1, 0.2], [0.4, 1.7, 0.1], [0.3, 0.4, 1.1]])
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    mesh = tetrahedron()
+    corners, faces = mesh.vertices, mesh.faces
     octree, middle = Octree(corners, faces), corners.mean(axis=0)
     normals = octree.mesh.face_normals()
     right = []

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from renderer.cli import study_drawing as drawing
-from renderer.cli.study_view import from_above
+from renderer.diagnostics import mesh_values as drawing
 from renderer.octree import Octree
 from renderer.picture.render import render
 from renderer.scene.material import Phong
+from renderer.scene.overview import from_above
 from renderer.scene.scene import Scene, SceneObject
 from renderer.studies import face_points, sky_view_factor
 from validation.studies.bodies import town

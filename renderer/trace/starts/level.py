@@ -43,7 +43,7 @@ class Members(NamedTuple):
     the ray is before it passes all of them and after it. Of faces that it passes at once, the highest is last.
     """
 
-    count: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
     near: Spot
     far: Spot
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 
 from validation.hits import rays
 from validation.hits.compare import HitArrays, compare, exact_errors, judge, judge_all
@@ -139,8 +140,8 @@ def test_a_hit_behind_the_origin_is_not_right():
     assert comparison.verdicts[OURS_RIGHT] == 1
 
 
-@pytest.mark.parametrize("side", [1, -1])
-@pytest.mark.parametrize("place", [(0, 0), (1, 0), (0, 1), (-1, 0), (-1, -1)], ids=str)
+@cases("side", [1, -1])
+@cases("place", [(0, 0), (1, 0), (0, 1), (-1, 0), (-1, -1)])
 def test_their_hit_at_an_edge_or_corner_is_right_from_either_side(place, side):
     triangle = np.array([[-1.0, -1, 0], [1, -1, 0], [-1, 1, 0]])
     batch, faces = one_ray([*place, side], [0, 0, -side]), np.array([[0, 1, 2]])
@@ -335,7 +336,7 @@ def test_malformed_hits_are_refused():
         exact_errors(OURS, EXACT[:-1], VERTICES, FACES, RAYS)
 
 
-@pytest.mark.parametrize(("ray", "t", "face"), [(HIT, np.inf, 0), (HIT, np.nan, 0), (HIT, 1.0, -1), (MISS, 1.0, -1)])
+@cases(("ray", "t", "face"), [(HIT, np.inf, 0), (HIT, np.nan, 0), (HIT, 1.0, -1), (MISS, 1.0, -1)])
 def test_what_contradicts_itself_is_judged_wrong(ray, t, face):
     """It was refused before it was judged, and a judge that raises finds nothing."""
     told, named = OURS.t.copy(), OURS.face.copy()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 
 from validation.hits import rays
 from validation.oracle import exact
@@ -22,7 +23,7 @@ def test_names():
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@cases("name", FAMILIES)
 def test_float32_exact_finite_and_never_zero(name):
     batch = FAMILIES[name]
     for array in (batch.origins, batch.directions):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
-from renderer.trace.hits import Hits
+from renderer.results.hits import Hits
 from renderer.trace.layout import BLOCK_FACES
 from validation.gates import Gate
 from validation.hits import check as check_hits

@@ -4,6 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
@@ -42,7 +43,7 @@ def moller_trumbore_misses(mesh, rays):
     return missed
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@cases("name", SHAPES)
 def test_what_is_shot_at_is_closed(name):
     closed = SHAPES[name]
     assert closed.mesh.is_closed()
@@ -67,8 +68,8 @@ def test_the_hilly_sphere_is_not_convex():
     assert in_front.max() > 1e-6
 
 
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("kind", watertight.KINDS)
+@cases("place", PLACES)
+@cases("kind", watertight.KINDS)
 def test_the_rays_come_so_close_that_a_leaky_kernel_leaks(place, kind):
     placement = PLACES[place]
     rays = placement.rays(kind, 400, rng())

@@ -4,13 +4,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 
-from validation.oracle.distance import rational, squared_distance, way_from
+from validation.oracle.distance import squared_distance, way_from
+from validation.oracle.vectors import rational
 
 TRIANGLE = rational([[0, 0, 0], [4, 0, 0], [0, 3, 0]])
 
 
-@pytest.mark.parametrize(
+@cases(
     ("point", "expected"),
     [
         ((1, 1, 2), 4),  # above the face

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -33,8 +34,8 @@ def by_cramer(triangle, origin, direction):
     return t if u >= 0 and v >= 0 and u + v <= 1 else None
 
 
-@pytest.mark.parametrize("x, y", [(0, 0), (4, 0), (0, 4), (2, 0), (0, 2), (2, 2), (1, 1)])
-@pytest.mark.parametrize("dz", [-2.0, -3.0])
+@cases("x, y", [(0, 0), (4, 0), (0, 4), (2, 0), (0, 2), (2, 2), (1, 1)])
+@cases("dz", [-2.0, -3.0])
 def test_triangle_is_closed_and_t_counts_directions(x, y, dz):
     assert exact.intersect(TRIANGLE, [x, y, 6], [0, 0, dz]) == Fraction(6) / Fraction(-dz)
     assert exact.intersect(TRIANGLE, [x, y, -6], [0, 0, dz]) == Fraction(-6) / Fraction(-dz)
@@ -203,7 +204,7 @@ def test_overflow_and_denormals_lose_nothing():
     assert hits[0] is not None and hits[0].t == (Fraction(1e308) + Fraction(1.7e308)) / Fraction(1e300)
 
 
-@pytest.mark.parametrize(
+@cases(
     "arguments, message",
     [
         ((TRIANGLE, [[0, 1, 3]], [[0, 0, 1]], [[0, 0, 1]]), "faces: expected indices 0 ... 2"),

@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import trimesh
+from cases import cases
 
 from validation.hits import rays
 from validation.oracle import exact
@@ -61,9 +62,9 @@ def needles(rng, height):
     return rays.float32_exact(corners), origins, rays.float32_exact(target - origins)
 
 
-@pytest.mark.parametrize("real, roundoff", [(np.float64, FLOAT64_ROUNDOFF), (np.float32, FLOAT32_ROUNDOFF)])
-@pytest.mark.parametrize("height", [1.0, 1e-2, 1e-4])
-@pytest.mark.parametrize("offset", [0.0, 64.0])
+@cases("real, roundoff", [(np.float64, FLOAT64_ROUNDOFF), (np.float32, FLOAT32_ROUNDOFF)])
+@cases("height", [1.0, 1e-2, 1e-4])
+@cases("offset", [0.0, 64.0])
 def test_bound_holds_for_the_kernel(real, roundoff, height, offset):
     corners, origins, directions = needles(np.random.default_rng(9), height)
     # Shift by a coarse number and round again: the mesh stays float32-exact.

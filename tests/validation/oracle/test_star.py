@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from renderer.mesh.shapes import icosphere
-from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
 from validation.oracle.star import Star
+from validation.oracle.vectors import rational
 
 CORNERS = np.array([[3, 0, 0], [0, 3, 0], [-3, 0, 0], [0, -3, 0], [0, 0, 3], [0, 0, -3]], float)
 FACES = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]], np.int32)

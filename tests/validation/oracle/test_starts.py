@@ -6,12 +6,14 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from cases import cases
 
 from validation.oracle import exact
 from validation.oracle.cones import Regions, cone_at
-from validation.oracle.distance import dot, rational, squared_distance
+from validation.oracle.distance import squared_distance
 from validation.oracle.fans import Fan
 from validation.oracle.starts import First, Start, Surface, first_hit, start_near, start_on, stopped
+from validation.oracle.vectors import dot, rational
 
 ZERO = Fraction(0)
 WAYS = [way for way in product((-2, -1, 0, 1, 3), repeat=3) if any(way)]
@@ -95,7 +97,7 @@ def test_a_tetrahedron_from_each_corner_in_both_directions_of_each_side():
         assert surface.first(start, along, -1)[0].t == 1 and surface.first(start, along, 1)[0].t == 1
 
 
-@pytest.mark.parametrize("degrees", [0.1, 1.0, 30.0, 90.0, 179.9, 180.1, 270.0, 300.0, 359.0])
+@cases("degrees", [0.1, 1.0, 30.0, 90.0, 179.9, 180.1, 270.0, 300.0, 359.0])
 def test_a_prism_is_a_wedge_at_its_edge(degrees):
     """Two walls from the z axis: along x and turned by the angle. Inside is what lies between."""
     angle = math.radians(degrees)
@@ -249,7 +251,7 @@ def star(count, rng):
     return [cone_at(k, [(0, 0, 0), *pair], [True, False, True]) for k, pair in ordered]
 
 
-@pytest.mark.parametrize("seed", range(8))
+@cases("seed", range(8))
 def test_cells_and_parity_tell_the_regions_of_a_closed_fan_apart_alike(seed):
     rng = np.random.default_rng(seed)
     cones = star(int(rng.integers(4, 12)), rng)

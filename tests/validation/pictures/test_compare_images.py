@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import cases
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
@@ -62,7 +63,7 @@ def test_equal_pictures_are_perfect() -> None:
     assert result.difference.shape == (SIZE, SIZE) and not result.difference.any()
 
 
-@pytest.mark.parametrize(
+@cases(
     ("defect", "caught_by"),
     [
         ({"shift": 0.5}, {"ssim", "pixels", "mean", "max"}),
@@ -169,7 +170,7 @@ def _with(value: float) -> NDArray[np.float64]:
     return image
 
 
-@pytest.mark.parametrize(
+@cases(
     ("arguments", "message"),
     [
         ({"ours": _with(np.nan)}, "ours: expected finite radiance, got .*nan.* in row 2, column 5"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from scipy.stats import norm
 
@@ -15,7 +16,7 @@ from validation.pictures import monte_carlo
 from validation.pictures.monte_carlo import scatter_of
 from validation.references.mitsuba import path as mitsuba_path
 from validation.report import page
-from validation.report.monte_carlo_figure import figure
+from validation.report.figures import monte_carlo_figure
 from validation.report.page import number
 from validation.scenes import SCENES
 
@@ -122,13 +123,13 @@ def test_a_sound_picture_passes_and_its_record_is_drawn() -> None:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters["number"] = number
-    environment.globals["monte_carlo_figure"] = figure
+    environment.globals["monte_carlo_figure"] = monte_carlo_figure
     page = environment.get_template("monte_carlo.html").render(r=record)
     assert "1 / sqrt(N)" in page and "after" in page.lower() and "Left out" not in page
 
 
 @pytest.mark.judges("Scene.altered")
-@pytest.mark.parametrize(
+@cases(
     ("ours", "red"),
     [
         (with_glass(ior=1.51), {SLOPE, CHANCE}),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from PIL import Image as Pillow
 
 from renderer.mesh.shapes import box, icosphere
@@ -172,7 +173,7 @@ DEFECTS = {
 }
 
 
-@pytest.mark.parametrize("defect", DEFECTS)
+@cases("defect", DEFECTS)
 def test_every_defect_turns_a_gate_red(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, defect: str) -> None:
     known = Reference("whitted", WHITTED, lambda _: None, lambda *_, **__: reference_balls())
     monkeypatch.setattr(plan, "REFERENCES", (known,))

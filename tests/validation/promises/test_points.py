@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation.promises.queries import angles, edges, inside, nearest, piles, series, signed, views, whole
+from validation.oracle.distance import squared_distance
+from validation.oracle.vectors import relative, volume
+from validation.promises.queries import angles, edges, heaps, inside, nearest, piles, series, signed, views
 
 CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
     "inside": inside.check_inside,
@@ -33,8 +36,8 @@ def broken(name: str) -> set[str]:
     return {" ".join(row["promise"].split()[:3]) for row in rows(name) if row["broken"]}
 
 
-@pytest.mark.parametrize("seed", [5, 6])
-@pytest.mark.parametrize("name", CHECKS)
+@cases("seed", [5, 6])
+@cases("name", CHECKS)
 def test_the_sound_renderer_keeps_all_promises(name: str, seed: int) -> None:
     found = rows(name, seed)
     assert found and all(row["asked"] > 0 for row in found)
@@ -112,9 +115,9 @@ def test_hits_in_another_order_and_places_are_found(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize("seed", range(3))
 def test_tetrahedra_of_all_sizes_have_points_on_them(seed: int) -> None:
     on, beside = 0, 0
-    for faces, points in whole.heaps(np.random.default_rng(seed)):
-        for point in points:
-            told = [whole.volume(face) == 0 and inside.lies_on(face) for face in whole.relative(point, faces)[0]]
+    for faces, points in heaps.heaps(np.random.default_rng(seed)):
+        for point in points.tolist():
+            told = [volume(face) == 0 and inside.lies_on(face) for face in relative(point, faces.tolist())[0]]
             on, beside = on + any(told), beside + (not any(told))
     assert on > 100 and beside > 100
 
@@ -123,8 +126,8 @@ def test_whole_numbers_know_a_corner_an_edge_and_a_face() -> None:
     face = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
     squares = {(0.25, 0.25, 2.0): 4, (0.5, -1.0, 0.0): 1, (-3.0, -4.0, 0.0): 25, (1.0, 1.0, 0.0): 0.5}
     for point, square in squares.items():
-        (corners,), unit = whole.relative(np.array(point), face)
-        assert whole.squared_distance(corners) / unit**2 == Fraction(square)
+        (corners,), unit = relative(point, face.tolist())
+        assert squared_distance((0, 0, 0), corners) / unit**2 == Fraction(square)
     assert angles.turns(np.array([0.25, 0.25, -1e-300]), face) == pytest.approx(0.5)
     # Above a corner with a right angle, from outside: an eighth of all directions at most.
     assert angles.turns(np.array([0.0, 0.0, 1e-300]), face) == pytest.approx(-0.125)

@@ -6,13 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Octree
 from renderer.trimesh_ray import RayMeshIntersector
 from validation.job import Job
 from validation.oracle.contacts import contacts
-from validation.oracle.distance import rational
 from validation.oracle.inside import winding_number
+from validation.oracle.vectors import rational
 from validation.queries import section
 from validation.queries.contacts import check_contacts
 from validation.queries.distances import check_distances, meshes, points_about
@@ -80,7 +81,7 @@ def test_wrong_distances_are_counted(monkeypatch, name):
     assert len(wrong(check_distances(6, JOB))) == len(meshes())
 
 
-@pytest.mark.parametrize("query", ["all_hits", "count_hits", "closest_hit", "any_hit"])
+@cases("query", ["all_hits", "count_hits", "closest_hit", "any_hit"])
 def test_wrong_contacts_are_counted(monkeypatch, query):
     asked = getattr(Octree, query)
 

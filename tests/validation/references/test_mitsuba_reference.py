@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
@@ -58,8 +59,8 @@ def plate(x: float, normal: float) -> Mesh:
 # Lights and the Phong model
 
 
-@pytest.mark.parametrize("picture", [whitted, path])
-@pytest.mark.parametrize("angle", [0.0, 30.0, 80.0])
+@cases("picture", [whitted, path])
+@cases("angle", [0.0, 30.0, 80.0])
 def test_directional_light_falls_with_the_cosine(picture: Any, angle: float) -> None:
     direction = (np.sin(np.radians(angle)), -np.cos(np.radians(angle)), 0.0)
     light = {"type": "directional", "direction": direction, "irradiance": (1.0, 2.0, 3.0)}
@@ -85,7 +86,7 @@ def test_lights_add_up_and_light_from_below_the_surface_does_not_count() -> None
     np.testing.assert_allclose(image, 1.0, rtol=FLOAT32)
 
 
-@pytest.mark.parametrize("shininess", [0.0, 1.0, 20.0, 500.0])
+@cases("shininess", [0.0, 1.0, 20.0, 500.0])
 def test_phong_highlight(shininess: float) -> None:
     shiny = {"diffuse": 0.25, "specular": (0.5, 0.25, 0.0), "shininess": shininess}
     slanting = np.array([0.0, -4.0, 3.0]) / 5.0  # reflected near the eye
@@ -134,8 +135,8 @@ def test_ambient_light_and_both_sides_of_a_surface() -> None:
 # Shadows
 
 
-@pytest.mark.parametrize("occluder", ["grey", "glass"])
-@pytest.mark.parametrize("light", [DOWN, {"type": "point", "position": (0.0, 5.0, 0.0), "intensity": 25.0}])
+@cases("occluder", ["grey", "glass"])
+@cases("light", [DOWN, {"type": "point", "position": (0.0, 5.0, 0.0), "intensity": 25.0}])
 def test_whatever_stands_before_a_light_throws_a_shadow(occluder: str, light: dict[str, Any]) -> None:
     lit = scene(
         floor=FLOOR,
@@ -196,7 +197,7 @@ def glass_plate(material: dict[str, Any], **tables: Any) -> Scene:
     return scene(materials={"glass": material}, objects=[slab], background=1.0, **tables)
 
 
-@pytest.mark.parametrize("depth", range(1, 7))
+@cases("depth", range(1, 7))
 def test_dielectric_plate_at_normal_incidence(depth: int) -> None:
     """F, then (1-F)^2 F^j for j = 0 ... depth - 2 inner reflections; tints multiply at each event."""
     glass = {

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 
 from validation.gates import Gate
 from validation.report import baseline
@@ -29,7 +30,7 @@ def change(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
     return baseline.compare(now, baseline.summary(before))
 
 
-@pytest.mark.parametrize(
+@cases(
     ("before", "now", "better", "worse"),
     [
         (gate(0.5), gate(0.5), 0, 0),

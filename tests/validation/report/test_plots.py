@@ -5,7 +5,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from validation.report.plots import FLOOR, Panel, Series, draw, loglog, stability_figures
+from validation.report.figures import stability_figures
+from validation.report.plots import FLOOR, Panel, Series, draw, loglog
 
 SERIES = [Series("ours & theirs", [1.0, 10.0, 100.0], [1e-16, 0.0, 1e-15]), Series("other", [1.0, 100.0], [None, 1e-3])]
 ERRORS = {"relative_max": 1e-7, "wrong_share": 0.25}

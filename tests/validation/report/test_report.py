@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 from jinja2 import UndefinedError
 
 from validation.gates import Gate
@@ -78,7 +79,7 @@ def test_an_extreme_case_is_found_by_its_number(
     metrics: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The site links to it, see docs/case_links.py."""
-    monkeypatch.setitem(report.FIGURES, "figures", lambda record: [])
+    monkeypatch.setitem(report.FIGURES, "stability_figures", lambda record: [])
     said = dict.fromkeys(
         ("construct", "expected", "ours", "embree_default", "embree_robust", "mitsuba", "tolerance"), "x"
     )
@@ -169,7 +170,7 @@ def test_every_key_of_the_schema_is_in_the_readme() -> None:
     assert keys == set(described())
 
 
-@pytest.mark.parametrize(
+@cases(
     ("value", "text"),
     [
         (None, "–"),

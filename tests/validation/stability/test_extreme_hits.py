@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Hits, Mesh, Octree
 from validation.stability.cases import builds as extreme_builds
@@ -20,7 +21,7 @@ def test_the_table_has_every_row_once_and_in_order():
     assert [case.number for case in CASES] == [*range(1, 33), 46, 49, 50, 51, 52, 53, 54]
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: str(case.number))
+@cases("case", CASES)
 def test_the_row_holds(case: ExtremeCase):
     record = case.record(quick=True)
     assert record["holds"] is True, record
@@ -61,7 +62,7 @@ def everything_hit(hits: Hits) -> Hits:
     return Hits(*filled, hits._mesh)
 
 
-@pytest.mark.parametrize(
+@cases(
     "spoil, rows",
     [
         (a_hit_lost, (1, 2, 3, 4, 5, 6, 8, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 26, 29, 30, 31)),
@@ -70,7 +71,6 @@ def everything_hit(hits: Hits) -> Hits:
         (another_duplicate, (18, 19, 21, 30)),
         (everything_hit, (7, 9, 25, 28, 26)),
     ],
-    ids=lambda value: getattr(value, "__name__", ""),
 )
 def test_the_row_fails_when_the_octree_is_broken(monkeypatch, spoil: Break, rows: tuple[int, ...]):
     broken(monkeypatch, spoil)
@@ -114,7 +114,7 @@ def test_bad_meshes_must_be_refused(monkeypatch, row):
     assert not ROWS[row].run(True).holds
 
 
-@pytest.mark.parametrize("row", [21, 22, 23, 32])
+@cases("row", [21, 22, 23, 32])
 def test_builds_that_copy_references_fail(monkeypatch, row):
     right = Octree.stats.fget
     monkeypatch.setattr(
@@ -146,7 +146,7 @@ def test_row_53_fails_on_a_wrong_distance_or_face(monkeypatch, name):
     assert not ROWS[53].run(True).holds
 
 
-@pytest.mark.parametrize("query", ["contains", "count_hits", "all_hits", "winding_number", "signed_distance"])
+@cases("query", ["contains", "count_hits", "all_hits", "winding_number", "signed_distance"])
 def test_row_54_fails_on_a_wrong_answer_at_the_corner_of_many_faces(monkeypatch, query):
     right = getattr(Octree, query)
 

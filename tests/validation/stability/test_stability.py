@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer.octree import Octree
 from validation.hits.compare import HitArrays
@@ -33,14 +34,14 @@ def judged(sweep, x, monkeypatch, change):
 SWEEPS = {sweep.name: sweep for sweep in stability.SWEEPS}
 
 
-@pytest.mark.parametrize("name", SWEEPS)
+@cases("name", SWEEPS)
 def test_our_hits_are_right_at_both_ends_of_each_curve(name, monkeypatch):
     for x in (SWEEPS[name].xs[0], SWEEPS[name].xs[-1]):
         wrong, beyond = judged(SWEEPS[name], x, monkeypatch, lambda found: found)
         assert wrong.passed and beyond.passed
 
 
-@pytest.mark.parametrize("name", SWEEPS)
+@cases("name", SWEEPS)
 def test_a_shift_of_t_by_1e12th_fails(name, monkeypatch):
     x = SWEEPS[name].xs[0]
     wrong, beyond = judged(SWEEPS[name], x, monkeypatch, lambda f: HitArrays(f.t * (1 + 1e-12), f.face))

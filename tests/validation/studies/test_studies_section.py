@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import Octree
-from renderer.checkpoints.study import Points
-from renderer.checkpoints.study_points import Chosen
+from renderer.studies.points import Chosen, Points
 from validation.job import Job
-from validation.report import page, studies_figures
+from validation.report import figures, page
 from validation.studies import bits, bodies, corners, forms, holds, section
 from validation.thresholds import Thresholds
 
@@ -34,7 +34,7 @@ def test_all_gates_pass_and_the_record_draws_a_figure(run):
     assert all(gate.passed for gate in gates)
     assert all(row["asked"] > 0 for row in (*record["bits"], *record["corners"], *record["holds"]))
     assert (folder / section.PICTURE).stat().st_size > 10_000
-    (figure,) = studies_figures.figures(record)
+    (figure,) = figures.studies_figures(record)
     assert "N^-0.7" in figure["svg"] and "as by chance" in figure["svg"]
     assert page.PARTIALS["studies"] == ("Studies", "studies.html")
 
@@ -53,7 +53,7 @@ def test_errors_that_do_not_fall_have_no_slope(monkeypatch):
     assert all(row["slope"] > forms.SLOPE for row in forms.check_slope(False)["curves"])
 
 
-@pytest.mark.parametrize("name", ["town", "terrain", "balls", "loose triangles", "slivers"])
+@cases("name", ["town", "terrain", "balls", "loose triangles", "slivers"])
 def test_a_wrong_bit_is_counted(monkeypatch, name):
     own = bits.occlusion
 
@@ -68,7 +68,7 @@ def test_a_wrong_bit_is_counted(monkeypatch, name):
     assert bits.check_bits(name, 40, 64)["wrong"] == 8
 
 
-@pytest.mark.parametrize("name", corners.MESHES)
+@cases("name", corners.MESHES)
 def test_a_wrong_bit_at_a_vertex_is_counted(monkeypatch, name):
     own, index = corners.occlusion, list(corners.CHECKS).index((name, "vertices"))
     monkeypatch.setattr(corners, "_QUICK", 20)
@@ -146,7 +146,7 @@ BROKEN = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", BROKEN)
+@cases("name", BROKEN)
 def test_what_does_not_hold_is_counted(monkeypatch, name):
     study, broken = BROKEN[name]
     assert BROKEN.keys() == holds.CHECKS.keys()

@@ -18,13 +18,13 @@ import numpy as np
 
 from renderer.checkpoints import study as runs
 from renderer.checkpoints.parts import Parts, digest_of
-from renderer.checkpoints.study_points import on_faces
 from renderer.cli.study import SPLIT
 from renderer.cluster import connected, run_on
 from renderer.cluster.workers import SentMesh
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from renderer.studies.points import on_faces
 from renderer.system.threads import available_threads
 from validation.benchmark.measures.meshes import named
 from validation.timing import RUNS, interleaved, timed
@@ -62,7 +62,7 @@ class Compared:
         tree = Octree.from_mesh(self.mesh, split=SPLIT, threads=threads)
         sent = SentMesh(digest_of(self.mesh.vertices), self.mesh.vertices, self.mesh.faces, SPLIT)
         return {
-            "call": timed(self.study.answer, tree, self.points),
+            "call": timed(self.study.evaluate, tree, self.points),
             "run": lambda: self._seconds(lambda folder: runs.run(tree, self.study, self.points, folder)),
             "built": lambda: self._on_new_mesh(client),
             "workers": lambda: self._on(client),

@@ -11,7 +11,7 @@ import numpy as np
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.trace.hits import Hits
+from renderer.results.hits import Hits
 from validation.efficiency.hits import turned_mesh
 from validation.error_curves import front
 from validation.hits.rays import RayFamily, camera_rays, random_rays

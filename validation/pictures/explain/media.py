@@ -77,7 +77,7 @@ class MediaJudge:
         return found
 
     def _walk(self, node: Node, media: tuple[_Body, ...], turned: bool = False) -> Iterator[str]:
-        """What lets the rules differ along a tree, and what is wrong there.
+        """Yields the reasons that let the rules differ along a tree, and the faults there.
 
         turned : whether an interpolated normal has shown the ray the other side of its face before.
         """

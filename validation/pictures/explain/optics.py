@@ -1,4 +1,4 @@
-"""What leaves a surface by the laws of optics, a second time: mirrored and refracted directions, and their shares."""
+"""The laws of optics, written a second time: mirrored and refracted directions, and their shares."""
 
 from collections.abc import Iterator
 

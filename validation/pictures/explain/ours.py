@@ -35,7 +35,7 @@ class Ours:
         return self.tree(rows[0] + (x * rows[1] + y * rows[2]), rows[3] + (x * rows[4] + y * rows[5]))
 
     def step(self, node: Node) -> Node:
-        """What a ray hits, and the rays that leave there: the children have hit nothing, and no shadow is traced.
+        """One step: a ray's hit, and the rays that leave there. The children have hit nothing, and no shadow is traced.
 
         The ray is that of ``node``. It starts on no surface and is in no medium.
         """

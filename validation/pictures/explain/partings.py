@@ -1,4 +1,4 @@
-"""Where two trees of rays part: the first rays, from the camera on, that do not do the same."""
+"""Partings of two trees of rays: the first rays, from the camera on, that do not do the same."""
 
 from dataclasses import dataclass
 from typing import Any, Literal

@@ -148,7 +148,7 @@ class Explainer:
     def _ours_wrong(
         self, rule: str, ours: Node, color: NDArray[np.floating], wrong: Sequence[Parting]
     ) -> Iterator[str]:
-        """What is wrong with our own tree, whatever Mitsuba's is."""
+        """Yields the faults of our own tree, whatever Mitsuba's is."""
         yield from wrong_sum(ours, color)
         if rule == "own":
             yield from exactly.misplaced(ours, self._scene.lights)

@@ -24,7 +24,7 @@ class Planes:
 
 
 def _within(corners: NDArray[np.float64], node: Node, room: float) -> float:
-    """How far the point of a hit is within a face: negative outside, and -inf in another plane."""
+    """The distance of a hit's point from a face's nearest side: negative outside, and -inf in another plane."""
     a, b, c = corners
     normal = np.cross(b - a, c - a)
     area = float(np.linalg.norm(normal))

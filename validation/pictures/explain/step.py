@@ -34,9 +34,7 @@ class Fault(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """What differs in one step by more than rounding; and whether faces coincide there, of which each renderer took
-    another.
-    """
+    """Differences in one step beyond rounding; and whether each renderer took another of faces that coincide there."""
 
     faults: list[Fault]
     coinciding: bool = False
@@ -64,7 +62,7 @@ def at_one_place(one: Node, other: Node) -> bool:
 
 
 def _place(node: Node) -> float:
-    """How far rounding moves a point of a surface, as Mitsuba's offset counts coordinates."""
+    """The distance by which rounding moves a point of a surface, as Mitsuba's offset counts coordinates."""
     return _FLOOR * (1.0 + float(np.abs(node.point).max()))
 
 
@@ -84,7 +82,7 @@ def _moved_to(theirs: Node, ours: Ours) -> Node | None:
 
 
 def _differing(theirs: Node, mine: Node, ours: Ours) -> list[Fault]:
-    """What differs beyond the floors, and beyond what steps from moved rays differ by."""
+    """Differences beyond the floors, and beyond those of steps from moved rays."""
     if not [*_missing(theirs, mine), *_beyond(theirs, mine, [])]:
         return []
     near = [step for step in map(ours.step, around(theirs)) if step.face == mine.face]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from validation.meshes import squares
 from validation.promises.row import row
-from validation.promises.squares import squares
 
 Floats = NDArray[np.float64]
 # On either side of sixteen rays, of the least and the largest chunk, and of some of these.

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.meshes import squares
 from validation.promises.hits.ways import Indices, asked
 from validation.promises.row import row
-from validation.promises.squares import squares
 
 Floats = NDArray[np.float64]
 _PLANES = 40

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.meshes import loose
 from validation.promises import levels
 from validation.promises.row import row
 
@@ -30,9 +31,8 @@ def check_counts(rng: Generator) -> list[dict[str, Any]]:
     """Faces that fill their last block and faces that do not."""
     leaves, tested = [], []
     for count in _COUNTS:
-        corners = (rng.normal(size=(count, 1, 3)) + 0.1 * rng.normal(size=(count, 3, 3))).reshape(-1, 3)
-        faces = np.arange(3 * count).reshape(-1, 3)
-        octree, brute = Octree(corners, faces, leaf_size=3), BruteForce(corners, faces)
+        mesh = loose(rng.normal(size=(count, 1, 3)) + 0.1 * rng.normal(size=(count, 3, 3)))
+        octree, brute = Octree.from_mesh(mesh, leaf_size=3), BruteForce.from_mesh(mesh)
         links = levels.joined(levels.levels(octree.tree)).links
         leaves.append(octree.stats.leaves == (links < 0).sum())
         steps = brute.count_steps(rng.normal(size=(20, 3)), rng.normal(size=(20, 3)))
@@ -57,8 +57,7 @@ def _same(rng: Generator) -> NDArray[np.bool_]:
 
 def _entered(rng: Generator) -> NDArray[np.bool_]:
     """Rays through small faces far apart, of which most are missed; those that pass a box closely are left out."""
-    corners = (rng.uniform(-1.0, 1.0, (_SMALL, 1, 3)) + 0.01 * rng.normal(size=(_SMALL, 3, 3))).reshape(-1, 3)
-    octree = Octree(corners, np.arange(3 * _SMALL).reshape(-1, 3))
+    octree = Octree.from_mesh(loose(rng.uniform(-1.0, 1.0, (_SMALL, 1, 3)) + 0.01 * rng.normal(size=(_SMALL, 3, 3))))
     origins, directions = rng.uniform(-2.0, 2.0, (2, _MISSING, 3))
     steps = octree.count_steps(origins, directions)
     within, nodes, triangles = np.ones((1, _MISSING), np.bool_), np.ones(_MISSING), np.zeros(_MISSING)

@@ -1,4 +1,4 @@
-"""How far rounding may have moved t, judged by planes whose t is a quotient that float64 must round."""
+"""Bounds on the error of t, judged by planes whose t is a quotient that float64 must round."""
 
 import math
 from fractions import Fraction
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.meshes import squares
 from validation.oracle.distance import way_from
 from validation.promises.row import row
-from validation.promises.squares import squares
 
 # Powers of two, of sizes and of t: usual, and denormal.
 _SIZES = (0, 100, -330)
@@ -114,7 +114,7 @@ def _along(rng: Generator) -> NDArray[np.bool_]:
 
 def _passage(corners: NDArray[np.float64], origin: NDArray[np.float64], direction: NDArray[np.float64]
              ) -> tuple[Fraction, Fraction]:  # fmt: skip
-    """Where a ray of whole numbers enters a face's box and leaves it."""
+    """The t at which a ray of whole numbers enters a face's box, and that at which it leaves it."""
     ways = [
         sorted(Fraction(int(end - o), int(d)) for end in (side.min(), side.max()))
         for side, o, d in zip(corners.T, origin, direction, strict=True)

@@ -1,20 +1,22 @@
-"""What files keep: a stored tree's repairs and counts, what OBJ corners name, PLY strips; and each digit in blocks."""
+"""Mesh files by convention: corners and indices of OBJ, colours and strips of PLY."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
-from renderer.octree import Octree
 from validation.promises.row import row
 
 _JUDGE = "meshes by hand"
-# Triangles with more vertices than are looked at together.
-_MANY = 30_000
+# Lines of few are read one by one, many at once.
+_SIZES = (4, 800)
+_PLY = {"uchar": 255.0, "ushort": 65535.0, "uint": 4294967295.0, "float": 1.0, "double": 1.0}
+_VERTICES = "0 0 0\n1 0 0\n0 1 0\n"
 _CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 0 1\nvn 0 1 0\n"
 _STRIPS = """ply
 format ascii 1.0
@@ -38,33 +40,18 @@ end_header
 """
 
 
-def check_files() -> list[dict[str, Any]]:
-    """Each is written to a folder of its own and read again."""
+def check_files(rng: Generator) -> list[dict[str, Any]]:
+    """Files by hand, in a folder of their own."""
     with TemporaryDirectory(prefix="promises-") as name:
         folder = Path(name)
         return [
-            row("a loaded tree has the repairs and counts of the one that was saved", _JUDGE, _stored(folder)),
             row("an OBJ file's corners with other normals or coordinates are other vertices", _JUDGE, _split(folder)),
             row("an OBJ file's normals are kept where each corner of each face has one", _JUDGE, _normals(folder)),
             row("an OBJ file's corners without texture coordinates get (0, 0)", _JUDGE, _texcoords(folder)),
             row("every second triangle of a PLY strip is turned, after a restart too", _JUDGE, _strips(folder)),
-            row("blocks are float32 only where that holds every vertex", _JUDGE, _digits()),
+            row("an index below 0 in an OBJ file counts back from its face", "places by hand", _back(folder, rng)),
+            row("colours of a PLY file are shares of the largest of their type", "shares by hand", _shares(folder)),
         ]
-
-
-def _stored(folder: Path) -> NDArray[np.bool_]:
-    """Of five faces, two of which a repair drops."""
-    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (np.nan, 0, 0)])
-    octree = Octree(vertices, [[0, 1, 2], [0, 1, 4], [0, 1, 3], [4, 2, 3], [0, 2, 3]], repair=True)
-    octree.save(folder / "a.octree")
-    kept = []
-    for one in (octree, Octree.load(folder / "a.octree")):
-        repairs = one.repairs
-        known = (
-            repairs is not None and repairs.dropped_faces.tolist() == [1, 3] and repairs.bad_vertices.tolist() == [4]
-        )
-        kept += [known, one.stats.faces == 3, one.stats.references == 3]
-    return np.array(kept)
 
 
 def _split(folder: Path) -> NDArray[np.bool_]:
@@ -127,27 +114,38 @@ def _strips(folder: Path) -> NDArray[np.bool_]:
     return np.array(kept)
 
 
-def _digits() -> NDArray[np.bool_]:
-    """A row of triangles of which a single vertex, each in turn, is not a float32 number; a ray meets it there."""
-    x = np.arange(8.0)
-    corners = np.stack(
-        [np.stack([x, 0 * x, 0 * x], 1), np.stack([x + 0.5, 0 * x, 0 * x], 1), np.stack([x, 0 * x + 1, 0 * x], 1)], 1
-    )
-    vertices, kept = corners.reshape(-1, 3), []
-    for k in range(len(vertices)):
-        moved = vertices.copy()
-        moved[k, 2] = 1.0 / 3.0
-        octree = Octree.from_mesh(Mesh(moved, np.arange(len(moved), dtype=np.int32).reshape(-1, 3)))
-        hits = octree.closest_hit(moved[k] + [0.0, 0.0, 2.0], [0.0, 0.0, -1.0])
-        kept.append(hits.face == k // 3 and abs(hits.t - 2.0) <= 2.0**-51)
-    return np.array([*kept, *_last_digit()])
+def _back(folder: Path, rng: Generator) -> NDArray[np.bool_]:
+    """Faces between the vertices, which name their corners from the beginning, or back from where the face stands."""
+    path, kept = folder / "a.obj", []
+    for count in _SIZES:
+        for backwards in (0.0, 0.5, 1.0):
+            places, lines, expected = rng.integers(-99, 100, (count, 3)), [], []
+            for k, place in enumerate(places):
+                lines.append("v {} {} {}".format(*place))
+                if k >= 3 or k == count - 1:
+                    corners = rng.permutation(k + 1)[:3]
+                    back = rng.random(3) < backwards
+                    lines.append("f {} {} {}".format(*np.where(back, corners - k - 1, corners + 1)))
+                    expected.append(places[corners])
+            path.write_text("\n".join(lines) + "\n", encoding="ascii")
+            kept.append((load_mesh(path).triangles == np.array(expected)).all(axis=(1, 2)))
+    return np.concatenate(kept)
 
 
-def _last_digit() -> list[bool]:
-    """The same of the last of very many triangles alone."""
-    x = np.repeat(np.arange(_MANY, dtype=np.float64), 3)
-    vertices = np.stack([x, np.tile([0.0, 1.0, 0.0], _MANY), np.tile([0.0, 0.0, 1.0], _MANY)], 1)
-    vertices[-3:, 0] += 1.0 / 3.0
-    octree = Octree(vertices, np.arange(3 * _MANY).reshape(-1, 3))
-    hits = octree.closest_hit([_MANY + 1.0, 0.25, 0.25], [-1.0, 0.0, 0.0])
-    return [bool(hits.t == _MANY + 1.0 - vertices[-1, 0]), bool(hits.face == _MANY - 1)]
+def _shares(folder: Path) -> NDArray[np.bool_]:
+    path, kept = folder / "a.ply", []
+    for kind, largest in _PLY.items():
+        values = np.array([[0.0, 1.0, 0.5], [1.0, 0.25, 0.0], [0.75, 0.0, 1.0]]) * largest
+        colors = values if kind in ("float", "double") else np.floor(values)
+        names = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
+        rows = zip(_VERTICES.splitlines(), colors.tolist(), strict=True)
+        spelled = "".join(f"{at} {' '.join(str(c if kind in ('float', 'double') else int(c)) for c in color)}\n"
+                          for at, color in rows)  # fmt: skip
+        path.write_text(
+            f"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{names}"
+            f"element face 1\nproperty list uchar int vertex_indices\nend_header\n{spelled}3 0 1 2\n", encoding="ascii",
+        )  # fmt: skip
+        found = load_mesh(path).colors
+        assert found is not None
+        kept.append((found[:, :3] == (colors / largest).astype(np.float32)).ravel())
+    return np.concatenate(kept)

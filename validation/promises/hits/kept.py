@@ -1,4 +1,4 @@
-"""What copies of meshes and trees keep: every array when a mesh is moved, copied, pickled, or a tree is stored."""
+"""Meshes and trees keep their arrays: when a mesh is copied, pickled or written to, or a tree is stored."""
 
 import copy
 import pickle
@@ -13,7 +13,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
-from renderer.octree import Octree
+from renderer.octree import BruteForce, Octree
 from validation.promises.refused import refuses
 from validation.promises.row import row
 
@@ -40,6 +40,8 @@ def check_kept(rng: Generator) -> list[dict[str, Any]]:
         row("a refit keeps normals, colours and texture coordinates", _JUDGE, np.array(moved)),
         row("a loaded tree gives the bits of the saved one, in any units", "the tree before it was saved", _asked(rng)),
         row("damage anywhere in a stored tree is noticed", "a bit that was turned", _damaged(rng)),
+        row("a loaded tree has the repairs and counts of the one that was saved", "meshes by hand", _repaired()),
+        row("a tree does not change with arrays that were made writable", "a face by hand", _writable()),
         row("files of other lengths, versions and orders of bytes are refused", "the file that was saved", _other(rng)),
     ]
 
@@ -72,6 +74,38 @@ def _stored(octree: Octree) -> Octree:
     with TemporaryDirectory(prefix="promises-") as folder:
         octree.save(Path(folder) / "a.octree")
         return Octree.load(Path(folder) / "a.octree")
+
+
+def _repaired() -> NDArray[np.bool_]:
+    """Of five faces, two of which a repair drops."""
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (np.nan, 0, 0)])
+    octree = Octree(vertices, [[0, 1, 2], [0, 1, 4], [0, 1, 3], [4, 2, 3], [0, 2, 3]], repair=True)
+    kept = []
+    for one in (octree, _stored(octree)):
+        repairs = one.repairs
+        known = (
+            repairs is not None and repairs.dropped_faces.tolist() == [1, 3] and repairs.bad_vertices.tolist() == [4]
+        )
+        kept += [known, one.stats.faces == 3, one.stats.references == 3]
+    return np.array(kept)
+
+
+def _writable() -> NDArray[np.bool_]:
+    """Trees of meshes whose vertices, faces or both were made writable before the build, and are changed after it."""
+    kept = []
+    for tracer in (Octree, BruteForce):
+        for names in (("vertices",), ("faces",), ("vertices", "faces")):
+            mesh = Mesh([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (5.0, 5.0, 5.0)], [[0, 1, 2]])
+            for name in names:
+                getattr(mesh, name).flags.writeable = True
+            built = tracer.from_mesh(mesh)
+            if "vertices" in names:
+                mesh.vertices[:3, 2] = 5.0
+            if "faces" in names:
+                mesh.faces[0, 2] = 3
+            found = built.closest_hit([0.125, 0.25, 1.0], [0.0, 0.0, -1.0])
+            kept += [found.points.tolist() == [0.125, 0.25, 0.0], found.normals.tolist() == [0.0, 0.0, 1.0]]
+    return np.array(kept)
 
 
 def _asked(rng: Generator) -> NDArray[np.bool_]:

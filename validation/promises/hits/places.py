@@ -1,4 +1,4 @@
-"""What a hit tells besides its face: t, u, v, the point and the normal, by whole numbers."""
+"""Numbers of a hit besides its face: t, u, v, the point and the normal, by whole numbers."""
 
 from typing import Any, NamedTuple
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.meshes import loose
 from validation.promises.hits.ways import Indices, asked
 from validation.promises.row import row
 
@@ -63,8 +64,7 @@ def _sized() -> NDArray[np.bool_]:
     """Triangles in planes of constant z, from denormals to sides that float64 cannot hold."""
     corner = np.array([(-1.0, -1.0, 0.5), (1.0, -1.0, 0.5), (-0.5, 1.0, 0.5)])
     corners = corner * 2.0 ** np.append(np.arange(-1070, 1023, 7), 1023)[:, None, None]
-    mesh = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3))
-    kept: NDArray[np.bool_] = (mesh.face_normals() == [0.0, 0.0, 1.0]).all(axis=1)
+    kept: NDArray[np.bool_] = (loose(corners).face_normals() == [0.0, 0.0, 1.0]).all(axis=1)
     return kept
 
 
@@ -88,7 +88,7 @@ def _heap(rng: Generator) -> Mesh:
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     longest = np.max([np.linalg.norm(corners[:, k] - corners[:, k - 1], axis=1) for k in range(3)], axis=0)
     corners = corners[area > 0.2 * longest**2][:300]
-    return Mesh(corners.reshape(-1, 3).astype(np.float64), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3))
+    return loose(corners)
 
 
 def _rays(mesh: Mesh, rng: Generator, count: int) -> tuple[Floats, Floats]:

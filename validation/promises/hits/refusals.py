@@ -1,5 +1,6 @@
 """Rays, bounds and refits that are refused: by the argument's name and row, and nothing is changed."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ def check_refusals(rng: Generator) -> list[dict[str, Any]]:
     return [
         row("a ray out of range is refused by the name of what is wrong and its row", "where it was put",
             np.concatenate([_rays(tracer, rng) for tracer in tracers])),
+        row("numbers that are not finite are refused wherever they are", "one in each place",
+            np.concatenate([_coordinates(tracer) for tracer in tracers])),
         row("bounds that are no numbers from 0, or of other dimensions than the rays, are refused by name",
             "what was given", np.concatenate([_bounds(tracer) for tracer in tracers])),
         row("vertices that cannot replace those of the mesh are refused, and change nothing", "the bits before",
@@ -50,6 +53,18 @@ def _rays(tracer: Octree | BruteForce, rng: Generator) -> NDArray[np.bool_]:
                     said = refused(ask, **rays) or ""
                     kept.append(said.startswith(f"{argument}: expected ") and said.endswith(f"in row {at}"))
                 rays[argument][at] = before
+    return np.array(kept)
+
+
+def _coordinates(tracer: Octree | BruteForce) -> NDArray[np.bool_]:
+    """One ray, a few and packets, of which one coordinate is wrong."""
+    kept = []
+    for count in (1, 9, 40):
+        for at, axis in ((0, 0), (count // 2, 1), (count - 1, 2)):
+            for argument, bad in product(("origins", "directions"), (np.nan, np.inf, -np.inf)):
+                rays = {"origins": np.ones((count, 3)), "directions": np.ones((count, 3))}
+                rays[argument][at, axis] = bad
+                kept += [refuses(ask, **rays) for ask in (tracer.closest_hit, tracer.any_hit, tracer.count_hits)]
     return np.array(kept)
 
 

@@ -7,7 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.octree import BruteForce, Octree
-from validation.promises.refused import refuses
+from validation.meshes import loose
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -23,10 +23,9 @@ _ROWS, _COLUMNS = 5, 7
 
 def check_shapes(rng: Generator) -> list[dict[str, Any]]:
     """Rays in rows and columns, with bounds and faces of their own, beside the same rays one after another."""
-    corners = (rng.normal(size=(_FACES, 1, 3)) + rng.normal(size=(_FACES, 3, 3))).reshape(-1, 3)
-    faces = np.arange(3 * _FACES).reshape(-1, 3)
-    rays, near, refused = [], [], []
-    for tracer in (Octree(corners, faces), BruteForce(corners, faces)):
+    mesh = loose(rng.normal(size=(_FACES, 1, 3)) + rng.normal(size=(_FACES, 3, 3)))
+    rays, near = [], []
+    for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
         for of_origins, of_directions in _SHAPES:
             for order in _ORDERS:
                 origins = np.asarray(rng.normal(size=(*of_origins, 3)), order=order)
@@ -34,11 +33,9 @@ def check_shapes(rng: Generator) -> list[dict[str, Any]]:
                 bounds = [np.asarray(rng.uniform(0.0, most, (_ROWS, _COLUMNS)), order=order) for most in (0.5, 5.0)]
                 rays += _kept(tracer, origins, directions, bounds)
         near += [kept for order in _ORDERS for kept in _near(tracer, rng, order)]
-        refused += _refused(tracer)
     return [
         row("rays of any shape and memory order go with their indices", "each ray alone", np.array(rays)),
         row("points of any shape and memory order have their own limits", "each point alone", np.array(near)),
-        row("numbers that are not finite are refused wherever they are", "one in each place", np.array(refused)),
     ]
 
 
@@ -62,15 +59,3 @@ def _near(tracer: Octree | BruteForce, rng: Generator, order: Order) -> list[boo
     found = tracer.closest_point(points, limits).face
     alone = [[tracer.closest_point(points[i, j], limits[i, j]).face for j in range(9)] for i in range(8)]
     return [np.array_equal(found, alone)]
-
-
-def _refused(tracer: Octree | BruteForce) -> list[bool]:
-    kept = []
-    for count in (1, 9, 40):
-        for row_of, axis in ((0, 0), (count // 2, 1), (count - 1, 2)):
-            for bad in (np.nan, np.inf, -np.inf):
-                for which in range(2):
-                    rays = [np.ones((count, 3)), np.ones((count, 3))]
-                    rays[which][row_of, axis] = bad
-                    kept += [refuses(ask, *rays) for ask in (tracer.closest_hit, tracer.any_hit, tracer.count_hits)]
-    return kept

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from validation.meshes import loose
 from validation.promises.row import row
 
 _FACES, _POINTS = 300, 60
@@ -18,7 +18,7 @@ def check_starts(rng: Generator) -> list[dict[str, Any]]:
     height = 2.0 ** -rng.integers(1, 46, (_FACES, 1))
     a, side, across = rng.normal(size=(3, _FACES, 3))
     corners = np.stack([a, a + side, a + 0.4 * side + height * across], 1)
-    mesh = Mesh(corners.reshape(-1, 3), np.arange(3 * _FACES, dtype=np.int32).reshape(-1, 3))
+    mesh = loose(corners)
     face = np.repeat(np.arange(_FACES), _POINTS)
     points = np.einsum("nk,nkx->nx", rng.dirichlet([1.0, 1.0, 1.0], len(face)), corners[face])
     directions = rng.normal(size=points.shape)

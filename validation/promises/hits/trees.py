@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.trace.layout import Tree
+from validation.meshes import loose
 from validation.promises import levels
 from validation.promises.row import row
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+# Triangles with more vertices than are looked at together.
+_MANY = 30_000
 # By this share of its width a face's box is wider than the face, on each side.
 _ROOM = 2.0**-21
 _JUDGE = "the tree's arrays, read again"
@@ -27,7 +30,10 @@ def check_trees(rng: Generator) -> list[dict[str, Any]]:
     for octree in _octrees(rng):
         for promise, kept in _judged(octree.tree, octree.mesh).items():
             found.setdefault(promise, []).append(kept)
-    return [row(promise, _JUDGE, np.concatenate(kept)) for promise, kept in found.items()]
+    return [
+        *(row(promise, _JUDGE, np.concatenate(kept)) for promise, kept in found.items()),
+        row("blocks are float32 only where that holds every vertex", "meshes by hand", _digits()),
+    ]
 
 
 def _octrees(rng: Generator) -> Iterator[Octree]:
@@ -41,9 +47,8 @@ def _octrees(rng: Generator) -> Iterator[Octree]:
         # A part of few faces, which is a leaf beside subtrees of thousands.
         corners[1:4] += 100.0 * (count > 8192)
         single = corners.astype(np.float32).astype(np.float64)
-        faces = np.arange(3 * count).reshape(-1, 3)
         split: Literal["midpoint", "sah"] = "midpoint" if leaf_size == 8 else "sah"
-        octree = Octree(single.reshape(-1, 3), faces, split=split, leaf_size=leaf_size)
+        octree = Octree.from_mesh(loose(single), split=split, leaf_size=leaf_size)
         yield octree
         octree.refit((3.0 * rng.permutation(corners) + 1.0).reshape(-1, 3))
         yield octree
@@ -116,3 +121,29 @@ def _holds(tree: Tree, mesh: Mesh) -> Bools:
     narrow = np.array_equal(mesh.vertices.astype(np.float32), mesh.vertices)
     kept: Bools = np.where(used, same, np.isnan(rows).all(axis=(1, 2)))
     return np.append(kept, tree.blocks.dtype == (np.float32 if narrow else np.float64))
+
+
+def _digits() -> NDArray[np.bool_]:
+    """A row of triangles of which a single vertex, each in turn, is not a float32 number; a ray meets it there."""
+    x = np.arange(8.0)
+    corners = np.stack(
+        [np.stack([x, 0 * x, 0 * x], 1), np.stack([x + 0.5, 0 * x, 0 * x], 1), np.stack([x, 0 * x + 1, 0 * x], 1)], 1
+    )
+    vertices, kept = corners.reshape(-1, 3), []
+    for k in range(len(vertices)):
+        moved = vertices.copy()
+        moved[k, 2] = 1.0 / 3.0
+        octree = Octree.from_mesh(loose(moved))
+        hits = octree.closest_hit(moved[k] + [0.0, 0.0, 2.0], [0.0, 0.0, -1.0])
+        kept.append(hits.face == k // 3 and abs(hits.t - 2.0) <= 2.0**-51)
+    return np.array([*kept, *_last_digit()])
+
+
+def _last_digit() -> list[bool]:
+    """The same of the last of very many triangles alone."""
+    x = np.repeat(np.arange(_MANY, dtype=np.float64), 3)
+    vertices = np.stack([x, np.tile([0.0, 1.0, 0.0], _MANY), np.tile([0.0, 0.0, 1.0], _MANY)], 1)
+    vertices[-3:, 0] += 1.0 / 3.0
+    octree = Octree.from_mesh(loose(vertices))
+    hits = octree.closest_hit([_MANY + 1.0, 0.25, 0.25], [-1.0, 0.0, 0.0])
+    return [bool(hits.t == _MANY + 1.0 - vertices[-1, 0]), bool(hits.face == _MANY - 1)]

@@ -1,4 +1,4 @@
-"""How many bounces a ray makes, and where its weight ends it: sums between two mirrors, and through panes, by hand."""
+"""Numbers of bounces, and the weight that ends a ray: sums between two mirrors, and through panes, by hand."""
 
 from collections.abc import Callable
 from itertools import product

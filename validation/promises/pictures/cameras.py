@@ -51,7 +51,7 @@ def _scene(camera: Camera) -> Scene:
 
 
 def _depth(camera: Camera, width: int, height: int) -> Floats:
-    """How far the plane y = 0 is from each pixel's origin: on the near plane's ray, back to the eye or its film."""
+    """The distance of the plane y = 0 from each pixel's origin: on the near plane's ray, back to the eye or film."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2)
     inverse = np.linalg.inv(_projection(camera, width / height) @ _view(camera)).astype(np.float64)
     near, far = (_points(inverse, x, y, z) for z in (-1.0, 1.0))

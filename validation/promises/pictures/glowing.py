@@ -1,4 +1,4 @@
-"""What the checks of pictures share: surfaces that glow and need no light, and how such pictures compare."""
+"""Scenes of surfaces that glow and need no light, and the comparison of their pictures with colours by hand."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
 from renderer.scene.material import Phong
 from renderer.scene.scene import Scene, SceneObject
-from validation.promises.squares import squares
+from validation.meshes import squares
 
 Floats = NDArray[np.float64]
 BLACK: Color = (0.0, 0.0, 0.0)
@@ -35,14 +35,6 @@ def from_above(eye: tuple[float, float, float], height: float) -> OrthographicCa
 def square(corner: Floats, u: Floats, v: Floats) -> Mesh:
     """The parallelogram from ``corner`` along u and v; u x v is its outside."""
     return squares(np.array([[corner, corner + u, corner + u + v, corner + v]]))
-
-
-def box(low: Floats, high: Floats) -> Mesh:
-    """A closed box, its faces outwards."""
-    vertices = np.array([np.where([i & 1, i & 2, i & 4], high, low) for i in range(8)])
-    sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    faces = [f for a, b, c, d in sides for f in ((a, b, c), (a, c, d))]
-    return Mesh(vertices, np.array(faces, np.int32))
 
 
 def thing(mesh: Mesh, material: str) -> SceneObject:

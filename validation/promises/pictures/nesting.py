@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.mesh.shapes import box
 from renderer.picture.render import prepare
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Color
 from renderer.scene.scene import Scene
-from validation.promises.pictures.glowing import box, equal, glowing, shown, square, thing
+from validation.promises.pictures.glowing import equal, glowing, shown, square, thing
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -73,14 +74,14 @@ _DARK: Color = (0.0, 0.25, 0.5)
 
 
 def _film_x() -> Floats:
-    """Where rays in a straight line would meet the floor."""
+    """The x at which rays in a straight line would meet the floor."""
     width = _SIZE[0]
     across: Floats = (np.arange(width) + 0.5 - width / 2) / width * np.hypot(1.0, _SLANT)
     return across
 
 
 def _shift(slabs: list[tuple[str, float, float]], height: float) -> float:
-    """How much further along x a ray of the slant meets the floor than it would in a straight line."""
+    """The way along x from where a straight ray of the slant would meet the floor to where this one does."""
     borders = sorted([(top, name, True) for name, top, _ in slabs] + [(low, name, False) for name, _, low in slabs])[
         ::-1
     ]
@@ -105,8 +106,7 @@ def _scene(slabs: list[tuple[str, float, float]], height: float) -> Scene:
     """The slabs above the floor y = 0, seen from above it; the ray in the film's middle aims at x = z = 0."""
     far = 200.0
     objects = [
-        thing(box(np.array([-far - i, low, -far - i]), np.array([far + i, top, far + i])), name)
-        for i, (name, top, low) in enumerate(slabs)
+        thing(box((-far - i, low, -far - i), (far + i, top, far + i)), name) for i, (name, top, low) in enumerate(slabs)
     ]
     edges = np.linspace(-_WIDTH / 2, _WIDTH / 2, _STRIPES + 1)
     for k, (left, right) in enumerate(pairwise(edges)):

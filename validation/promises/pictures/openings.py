@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from renderer.diagnostics.tree_boxes import Visit, boxes_at, visited
 from renderer.diagnostics.tree_boxes import levels as count_levels
 from renderer.octree import Octree
+from validation.meshes import loose
 from validation.promises import levels
 from validation.promises.row import row
 
@@ -36,7 +37,7 @@ def check_openings(rng: Generator, count: int) -> list[dict[str, Any]]:
     for unit in (1.0, _TINY):
         corners = rng.normal(size=(_FACES, 1, 3)) + 0.2 * rng.normal(size=(_FACES, 3, 3))
         corners[::2, :, 0] += 12.0
-        octree = Octree(unit * corners.reshape(-1, 3), np.arange(3 * _FACES).reshape(-1, 3))
+        octree = Octree.from_mesh(loose(unit * corners))
         root = _root(octree, corners, unit)
         shown += _shown(octree, root, unit)
         for origin, direction in _rays(rng, count):
@@ -92,7 +93,7 @@ def _visits(root: _Octant, origin: Floats, direction: Floats, t_max: float) -> t
 
 
 def _entry(octant: _Octant, origin: Floats, direction: Floats) -> float:
-    """Where a ray enters a box, from 0 on; infinite where it does not."""
+    """The t at which a ray enters a box, from 0 on; infinite where it does not."""
     ways = (octant.box - origin) / direction
     first, last = max(ways.min(axis=0).max(), 0.0), ways.max(axis=0).min()
     return float(first if first <= last else np.inf)

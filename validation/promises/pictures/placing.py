@@ -1,4 +1,4 @@
-"""Where objects stand: scaled, then turned about x, y and z in this order, then moved; judged by trimesh's matrices."""
+"""Places of objects: scaled, then turned about x, y and z in this order, then moved; by trimesh's matrices."""
 
 from typing import Any, cast
 

@@ -1,6 +1,7 @@
 """Winding numbers of open meshes, near their faces too: by solid angles in whole numbers, and on which side of 1/2."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,9 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation.oracle.distance import dot
-from validation.promises.queries.whole import Face, heaps, relative, volume
+from validation.meshes import loose
+from validation.oracle.vectors import dot, relative, volume
+from validation.promises.queries.heaps import heaps
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -30,9 +32,8 @@ def check_angles(rng: Generator) -> list[dict[str, Any]]:
     for faces, points in heaps(rng):
         # Three of four faces: open.
         some = faces[np.arange(len(faces)) % 4 != 0]
-        mesh = Mesh(some.reshape(-1, 3), np.arange(3 * len(some), dtype=np.int32).reshape(-1, 3))
         exact = np.array([turns(point, some) for point in points])
-        octree = Octree.from_mesh(mesh)
+        octree = Octree.from_mesh(loose(some))
         for tolerance in (0.0, 1e-9):
             off = np.abs(octree.winding_number(points, tolerance) - exact)
             kept.append(off <= tolerance + _OF_A_FACE * len(some))
@@ -57,10 +58,10 @@ def _beside(rng: Generator) -> NDArray[np.bool_]:
 
 def turns(point: Floats, triangles: Floats) -> float:
     """The winding number of triangles (F, 3, 3) around a point: by van Oosterom and Strackee, rounded at the end."""
-    return math.fsum(_angle(face) for face in relative(point, triangles)[0]) / (2.0 * math.pi)
+    return math.fsum(_angle(face) for face in relative(point.tolist(), triangles.tolist())[0]) / (2.0 * math.pi)
 
 
-def _angle(face: Face) -> float:
+def _angle(face: Sequence[Sequence[int]]) -> float:
     """Half the solid angle of a face from the origin; 0 in its plane."""
     over = volume(face)
     if over == 0:
@@ -115,4 +116,4 @@ def _lidless(axis: int, cuts: int = 3) -> Mesh:
         a, b, c = np.moveaxis(faces, 1, 0)
         ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
         faces = np.concatenate([np.stack(three, 1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
-    return Mesh(faces.reshape(-1, 3), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3))
+    return loose(faces)

@@ -1,4 +1,4 @@
-"""Which edges are open: piles of faces, some doubled, tripled or turned, counted edge by edge."""
+"""Open edges: piles of faces, some doubled, tripled or turned, counted edge by edge."""
 
 from collections import Counter
 from typing import Any
@@ -59,7 +59,7 @@ def _ruled() -> NDArray[np.bool_]:
 
 
 def _passed(faces: NDArray[np.int64]) -> Counter[Edge]:
-    """How often each edge is passed each way; one from a place to itself bounds nothing."""
+    """The number of times that each edge is passed each way; one from a place to itself bounds nothing."""
     pairs = ((int(a), int(b)) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True))
     return Counter(pair for pair in pairs if pair[0] != pair[1])
 

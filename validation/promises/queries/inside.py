@@ -1,5 +1,6 @@
 """Points in, on and beside closed solids whose coordinates are of all sizes: each solid alone, in whole numbers."""
 
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -9,10 +10,10 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
-from validation.oracle.distance import cross, dot
-from validation.promises.queries.whole import Corner, Face, heaps, relative, volume
+from validation.meshes import integer_box, loose
+from validation.oracle.vectors import cross, dot, relative, volume
+from validation.promises.queries.heaps import heaps
 from validation.promises.row import row
-from validation.promises.squares import squares
 
 Floats = NDArray[np.float64]
 # Squares along each side of a box, and points beside its sides.
@@ -23,8 +24,8 @@ def check_inside(rng: Generator) -> list[dict[str, Any]]:
     """Tetrahedra that overlap, turned either way, some of them flat, by both rules, with and without surface."""
     found = []
     for faces, points in heaps(rng):
-        mesh = Mesh(faces.reshape(-1, 3), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3))
-        told = [_told(relative(point, faces)[0]) for point in points]
+        mesh = loose(faces)
+        told = [_told(relative(point, faces.tolist())[0]) for point in points.tolist()]
         winding, on = (np.array(one) for one in zip(*told, strict=True))
         for asked in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
             found += [
@@ -43,7 +44,7 @@ def _slabs(rng: Generator) -> NDArray[np.bool_]:
     """Boxes of which each side is a grid, so that nodes of the tree are flat, and points beside their sides."""
     kept = []
     for axis, turn in product(range(3), (1.0, -1.0)):
-        mesh = _grid_box(_SQUARES)
+        mesh = integer_box(_SQUARES)
         size = np.roll([8.25, _SQUARES, _SQUARES], axis) / _SQUARES
         start = np.roll([1.75, 0.0, 0.0], axis)
         vertices = turn * (mesh.vertices * size + start)
@@ -56,19 +57,8 @@ def _slabs(rng: Generator) -> NDArray[np.bool_]:
     return np.concatenate(kept)
 
 
-def _grid_box(count: int) -> Mesh:
-    """The box [0, count]^3 of unit squares."""
-    row, column = np.divmod(np.arange(count**2), count)
-    u, v = row + np.array([[0], [1], [1], [0]]), column + np.array([[0], [0], [1], [1]])
-    sides = []
-    for axis, end in product(range(3), (0, 1)):
-        corners = np.roll(np.stack([np.full(u.shape, count * end), u, v], axis=-1), axis, axis=-1)
-        sides.append(np.moveaxis(corners, 0, 1)[:, :: 1 if end else -1])
-    return squares(np.concatenate(sides).astype(np.float64))
-
-
-def _told(faces: list[Face]) -> tuple[int, bool]:
-    """How often tetrahedra wind around the origin, and whether it lies on a face of one."""
+def _told(faces: list[list[list[int]]]) -> tuple[int, bool]:
+    """The winding number of tetrahedra around the origin, and whether it lies on a face of one."""
     winding, on = 0, False
     for k in range(0, len(faces), 4):
         volumes = [volume(face) for face in faces[k : k + 4]]
@@ -78,13 +68,13 @@ def _told(faces: list[Face]) -> tuple[int, bool]:
     return winding, on
 
 
-def lies_on(face: Face) -> bool:
+def lies_on(face: Sequence[Sequence[int]]) -> bool:
     """Whether the origin, in a face's plane, lies on the face, which may be a line or a point.
 
     Within, it is to the left of all sides or to the right of all. On the line of such a face, coordinates tell.
     """
     a, b, c = face
-    sides: list[Corner] = [cross(a, b), cross(b, c), cross(c, a)]
+    sides = [cross(a, b), cross(b, c), cross(c, a)]
     if any(any(side) for side in sides):
         return all(dot(sides[i], sides[i - 1]) >= 0 for i in range(3))
     return all(min(x) <= 0 <= max(x) for x in zip(a, b, c, strict=True))

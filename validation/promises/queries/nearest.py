@@ -8,10 +8,11 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
-from validation.oracle.distance import ulps_from_root
-from validation.promises.queries.whole import heaps, relative, squared_distance
+from validation.meshes import loose
+from validation.oracle.distance import squared_distance, ulps_from_root
+from validation.oracle.vectors import relative
+from validation.promises.queries.heaps import heaps
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,7 @@ _AWAY = -41.5, -39.0
 _SHELLS, _FACES = 20, 48
 _CORNER = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 _ABOVE = np.array([0.0, 0.0, 1.0])
+_ORIGIN = (0, 0, 0)
 _LARGE, _LEAST = 2.0**59 * np.stack([_CORNER, _CORNER + _ABOVE]), 2.0**-1074
 
 # A large face and a small one nearly in its plane, and a point before both: their distances differ by an ulp, and the
@@ -48,16 +50,16 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
     """Distances, faces and nearest points."""
     heap, shell = [], []
     for faces, points in heaps(rng):
-        for asked in (Octree.from_mesh(_mesh(faces)), BruteForce.from_mesh(_mesh(faces))):
+        for asked in (Octree.from_mesh(loose(faces)), BruteForce.from_mesh(loose(faces))):
             heap.append(_kept(asked, faces, points[::4]))
     # So near a corner of a face so large that the way vanishes in units of the face.
     heap.append(
-        _kept(Octree.from_mesh(_mesh(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
+        _kept(Octree.from_mesh(loose(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
     )
-    heap.append(_kept(Octree.from_mesh(_mesh(_LEANING)), _LEANING, _BEFORE + np.spacing(_BEFORE) * _steps(rng)))
+    heap.append(_kept(Octree.from_mesh(loose(_LEANING)), _LEANING, _BEFORE + np.spacing(_BEFORE) * _steps(rng)))
     for _ in range(_SHELLS):
         faces = _shell(rng)
-        shell.append(_kept(Octree.from_mesh(_mesh(faces)), faces, np.zeros((1, 3))))
+        shell.append(_kept(Octree.from_mesh(loose(faces)), faces, np.zeros((1, 3))))
     return [
         row("the nearest face and its distance, whatever the sizes of coordinates", _JUDGE, np.concatenate(heap)),
         row("the nearest of faces that are as near but for some ulp", _JUDGE, np.concatenate(shell)),
@@ -70,7 +72,7 @@ def _beyond(rng: Generator) -> NDArray[np.bool_]:
     """Points above a face, another is far away, with limits near their heights: one a point, and one for all."""
     heights = rng.uniform(1.0, 2.0, _PLACES)
     points = np.stack([np.full(_PLACES, 0.25), np.full(_PLACES, 0.25), heights], 1)
-    octree, kept = Octree.from_mesh(_mesh(np.stack([_CORNER, _CORNER + 1e3]))), []
+    octree, kept = Octree.from_mesh(loose(np.stack([_CORNER, _CORNER + 1e3]))), []
     for limit in (heights * rng.choice([0.5, 0.999, 1.001], _PLACES), *rng.uniform(1.0, 2.0, 3)):
         found = octree.closest_point(points, limit)
         told = [~np.isnan(found.u), ~np.isnan(found.v), ~np.isnan(found.points).any(axis=1), found.face == 0]
@@ -105,8 +107,8 @@ def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[
 
 def _nearest(point: Floats, faces: Floats) -> tuple[Fraction, int]:
     """The least squared distance, and the lowest face that has it."""
-    whole, unit = relative(point, faces)
-    squares = [squared_distance(face) for face in whole]
+    whole, unit = relative(point.tolist(), faces.tolist())
+    squares = [squared_distance(_ORIGIN, face) for face in whole]
     least = min(squares)
     return least / unit**2, squares.index(least)
 
@@ -131,7 +133,7 @@ def _edges_kept(rng: Generator) -> NDArray[np.bool_]:
     away = 2.0 ** rng.uniform(*_AWAY, (_WEDGES, _PLACES, 1)) * long[:, None]
     points = a[:, None] + share * (b - a)[:, None] + away * out[:, None]
     # No other wedge comes so near.
-    found = Octree.from_mesh(_mesh(faces)).closest_point(points)
+    found = Octree.from_mesh(loose(faces)).closest_point(points)
     kept: NDArray[np.bool_] = (found.face == 2 * np.arange(_WEDGES)[:, None]).ravel()
     return kept
 
@@ -139,10 +141,6 @@ def _edges_kept(rng: Generator) -> NDArray[np.bool_]:
 def _shell(rng: Generator) -> Floats:
     """Faces that are all at a distance of 1 from the origin, but for rounding: at corners, at edges and within."""
     faces = rng.normal(size=(_FACES, 3, 3)) + 2.0 * rng.normal(size=(_FACES, 1, 3))
-    whole, unit = relative(np.zeros(3), faces)
-    distance: Floats = np.sqrt([float(squared_distance(face) / unit**2) for face in whole])
+    whole, unit = relative(_ORIGIN, faces.tolist())
+    distance: Floats = np.sqrt([float(squared_distance(_ORIGIN, face) / unit**2) for face in whole])
     return faces / distance[:, None, None]
-
-
-def _mesh(faces: Floats) -> Mesh:
-    return Mesh(faces.reshape(-1, 3), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3))

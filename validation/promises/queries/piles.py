@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
-from renderer.trace.hits import AllHits
+from renderer.results.hits import AllHits
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]

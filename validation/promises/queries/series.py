@@ -17,6 +17,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.numerics.simd import pointer
 from renderer.octree import Octree
 from renderer.trace.point import Point
+from validation.meshes import loose
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
@@ -56,7 +57,7 @@ def check_series(rng: Generator) -> list[dict[str, Any]]:
 def _series_kept(rng: Generator, count: int, unlike: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Of eight groups of one kind: points around each in random directions, and the octants that they are."""
     body = _body(rng, count, unlike)
-    reach, mesh = np.linalg.norm(body, axis=2), _mesh(body[None] + _places()[:, None, None])
+    reach, mesh = np.linalg.norm(body, axis=2), loose(body[None] + _places()[:, None, None])
     octree = Octree.from_mesh(mesh, leaf_size=32)
     ways = rng.normal(size=(8, len(_RADII), 3, 3))
     ways /= np.linalg.norm(ways, axis=3, keepdims=True)
@@ -128,7 +129,7 @@ def _in_line(rng: Generator, copies: int) -> tuple[Mesh, Floats, Floats]:
     faces += _places()[:, None, None]
     away = np.broadcast_to(1.0 / _NEARNESS, (8, len(_NEARNESS)))
     points = _places()[:, None] + away[..., None] * axis[:, None]
-    return _mesh(faces), points.reshape(-1, 3), away.ravel()
+    return loose(faces), points.reshape(-1, 3), away.ravel()
 
 
 @kernel
@@ -178,8 +179,3 @@ def _body(rng: Generator, count: int, unlike: float) -> Floats:
 def _places() -> Floats:
     """The centres of eight groups, (8, 3)."""
     return _APART * np.array(list(np.ndindex(2, 2, 2)), np.float64)
-
-
-def _mesh(faces: Floats) -> Mesh:
-    corners = faces.reshape(-1, 3)
-    return Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))

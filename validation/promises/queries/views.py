@@ -1,4 +1,4 @@
-"""What points see of each other around a ball: everything from its centre, nothing through it."""
+"""Visibility around a ball: everything from its centre, nothing through it."""
 
 from typing import Any
 
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from renderer.octree import BruteForce, Octree
+from validation.meshes import loose, squares
 from validation.promises.row import row
-from validation.promises.squares import squares
 
 _COUNT = 2000
 # Sizes of the ball and how far away it lies: rounding has moved points off their faces.
@@ -40,6 +40,7 @@ def check_views(rng: Generator) -> list[dict[str, Any]]:
         row("nothing is seen through a ball", "a ball is closed", np.concatenate(hidden)),
         row("what is in front of a face, however near, hides what stands on it", "planes by hand", _covered()),
         row("each pair of points has the room of its own coordinates", "a square by hand", _far()),
+        row("what is nearer to an end than 2^-40 of both ends' coordinates hides nothing", "a square by hand", _room()),
         row("a point sees what is in its own place", "nothing lies between", _same(rng)),
         row("corners at 0.0 and -0.0 are at one place", "a box is closed", _closed()),
     ]
@@ -61,7 +62,7 @@ def _closed() -> NDArray[np.bool_]:
     """A box of corners of its own for each face, with both zeros."""
     corners = box((0.0, -1.0, -1.0), (1.0, 1.0, 1.0)).triangles.reshape(-1, 3)
     corners[::2][corners[::2] == 0.0] = -0.0
-    mesh = Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+    mesh = loose(corners)
     return np.array([len(mesh.open_edges) == 0, len(mesh.odd_edges) == 0])
 
 
@@ -72,9 +73,20 @@ def _covered() -> NDArray[np.bool_]:
     for height in 2.0 ** -np.arange(2.0, 43.0):
         corners = np.concatenate([below, (below + above)[::-1], below + height * above])
         for tracer in (Octree, BruteForce):
-            built = tracer(corners, np.arange(9).reshape(-1, 3))
+            built = tracer.from_mesh(loose(corners))
             kept += [not built.visible(np.zeros(3), above, leaving=0, reaching=1)]
             kept += [bool(built.visible(height * above, above, leaving=2, reaching=1))]
+    return np.array(kept)
+
+
+def _room() -> NDArray[np.bool_]:
+    """A point close behind a square and one farther behind it, each from the origin and the other way round."""
+    mesh = squares(np.array([[(-1.0, -1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, 1.0), (-1.0, 1.0, 1.0)]]))
+    origin, close, behind = (np.array([0.25 * z, 0.125 * z, z]) for z in (0.0, 1.0 + 2.0**-42, 1.0 + 2.0**-38))
+    kept = []
+    for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+        kept += [tracer.visible(origin, close), tracer.visible(close, origin)]
+        kept += [~tracer.visible(origin, behind), ~tracer.visible(behind, origin)]
     return np.array(kept)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.random import Generator
 
 from renderer import Octree
-from validation.oracle.distance import cross, difference, dot, rational, squared_distance
+from validation.oracle.distance import squared_distance
+from validation.oracle.vectors import cross, difference, dot, rational
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import SEED, Floats
 

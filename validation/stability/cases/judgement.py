@@ -113,17 +113,6 @@ def rotation(rng: Generator) -> Floats:
     return np.asarray(np.linalg.qr(rng.standard_normal((3, 3)))[0])
 
 
-def both(first: Mesh, second: Mesh) -> Mesh:
-    """Two meshes as one."""
-    faces = np.concatenate([first.faces, second.faces + len(first.vertices)])
-    return Mesh(np.concatenate([first.vertices, second.vertices]), faces)
-
-
-def soup_of(mesh: Mesh) -> Mesh:
-    """The same triangles, none of which share a vertex."""
-    return Mesh(mesh.triangles.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
-
-
 def float32_mesh(mesh: Mesh) -> Mesh:
     return Mesh(float32_exact(mesh.vertices), mesh.faces)
 

@@ -7,6 +7,7 @@ import numpy as np
 from renderer import BruteForce, Hits, Mesh, Octree
 from validation.hits.compare import HitArrays
 from validation.hits.rays import RayFamily, float32_exact
+from validation.meshes import loose
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import (
     SEED,
@@ -27,7 +28,7 @@ def sheets(count: int) -> Mesh:
     """Overlapping triangles in the plane x = 0: every float32 box around them is flat."""
     corners = float32_exact(np.random.default_rng(SEED).uniform(-0.5, 0.5, (count, 3, 3)))
     corners[..., 0] = 0.0
-    return Mesh(corners.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3))
+    return loose(corners)
 
 
 def beside_sheets(side: int) -> RayFamily:

@@ -7,10 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Mesh, Octree
-from renderer.mesh.shapes import box, grid, icosphere, lattice_faces
+from renderer.mesh.shapes import box, grid, icosphere
 from validation.hits.rays import RayFamily, float32_exact, leak_rays
+from validation.hits.watertight import leaks
+from validation.meshes import integer_box
 from validation.oracle.exact import FLOAT64_ROUNDOFF
 from validation.oracle.rounding import RayView
+from validation.promises.refused import refused
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import (
     FIRST_FACE,
@@ -44,12 +47,12 @@ def _leaks(kind: int) -> Callable[[bool], Outcome]:
         mesh = float32_mesh(icosphere(5))
         rays = leak_rays(mesh.vertices, mesh.faces, 100_000 if quick else 1_000_000, SEED)[kind]
         octree = Octree.from_mesh(mesh)
-        leaks = ~closest(octree, rays).hit | ~octree.any_hit(rays.origins, rays.directions)
+        lost = leaks(octree, rays)
 
         def say(t: Floats, face: Ints) -> str:
             return of(face < 0, "leak")
 
-        return Outcome(f"{leaks.sum():,} leaks of {len(rays):,}", not leaks.any(), *embree_says(mesh, rays, say))
+        return Outcome(f"{lost:,} leaks of {len(rays):,}", lost == 0, *embree_says(mesh, rays, say))
 
     return run
 
@@ -75,9 +78,9 @@ def _integer_box(quick: bool) -> Outcome:
     def say(t: Floats, face: Ints) -> str:
         return f"t == 1 on {(t == 1).sum():,}, |t - 1| <= {np.abs(t - 1).max():.0e}"
 
-    holds, equal, largest, texts = True, 0, 0.0, []
+    whole, holds, equal, largest, texts = integer_box(), True, 0, 0.0, []
     for shift in (0.0, 2.0**20):
-        mesh, rays = _unit_quad_box(8, shift), ray_batch(origins + shift, directions)
+        mesh, rays = Mesh(whole.vertices + shift, whole.faces), ray_batch(origins + shift, directions)
         hits = closest(Octree.from_mesh(mesh), rays)
         errors = against_exact(mesh, rays, hits)
         holds &= as_exact(errors) and errors.hits == count and bool((hits.t[unrounded] == 1).all())
@@ -85,20 +88,6 @@ def _integer_box(quick: bool) -> Outcome:
         texts.append(embree_says(mesh, rays, say))
     ours = f"t == 1 on {equal:,} of {2 * count:,}, all {2 * unrounded.sum():,} unrounded; |t - 1| <= {largest:.1e}"
     return Outcome(ours, holds, *(f"{a}; shifted {b}" for a, b in zip(*texts, strict=True)))
-
-
-def _unit_quad_box(side: int, shift: float) -> Mesh:
-    """The surface of [0, side]^3 + shift in unit quads of two faces with shared vertices."""
-    i, j = np.divmod(np.arange((side + 1) ** 2), side + 1)
-    points: list[Floats] = []
-    faces = []
-    for axis in range(3):
-        for level in (0, side):
-            faces.append(lattice_faces(side + 1, side + 1) + len(points) * len(i))
-            points.append(np.roll(np.stack([np.full(len(i), level), i, j], axis=1), axis, axis=1))
-    vertices, place = np.unique(np.concatenate(points), axis=0, return_inverse=True)
-    corners = place.reshape(-1)[np.concatenate(faces)].astype(np.int32)
-    return Mesh(vertices + shift, corners)
 
 
 def _grid_vertices(quick: bool) -> Outcome:
@@ -188,11 +177,8 @@ def _bad_rays(quick: bool) -> Outcome:
         else:
             arrays[argument][row, 1] = value
         for query in (octree.closest_hit, octree.any_hit):
-            try:
-                query(arrays["origins"], arrays["directions"])
-                caught.append(False)
-            except ValueError as error:
-                caught.append(str(error).startswith(f"{argument}: ") and str(error).endswith(f"in row {row}"))
+            said = refused(query, arrays["origins"], arrays["directions"]) or ""
+            caught.append(said.startswith(f"{argument}: ") and said.endswith(f"in row {row}"))
     return Outcome(of(caught, "rejected by argument and row"), all(caught))
 
 

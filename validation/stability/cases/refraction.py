@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable
 from decimal import Decimal, localcontext
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from renderer.mesh.shapes import box, icosphere, torus
 from renderer.scene.material import Dielectric, Material, Phong
 from renderer.scene.scene import Floor
 from renderer.shade.shading import refract
+from validation.oracle.vectors import cross, dot
 from validation.references.mitsuba.whitted import whitted
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.scenes import (
@@ -84,14 +84,6 @@ def _pairs(count: int, sines: NDArray[np.float64]) -> list[tuple[Vector, Vector]
     return pairs
 
 
-def _cross(a: Any, b: Any) -> list[Any]:
-    return [a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3] for k in range(3)]
-
-
-def _dot(a: Any, b: Any) -> Any:
-    return sum(x * y for x, y in zip(a, b, strict=True))
-
-
 def snell_residual(d: Vector, n: Vector, t: Vector, n1: float, n2: float) -> float:
     """|n1 sin i - n2 sin t| in units of u max(n1, n2), in fifty digits.
 
@@ -100,15 +92,15 @@ def snell_residual(d: Vector, n: Vector, t: Vector, n1: float, n2: float) -> flo
     with localcontext() as context:
         context.prec = 50
         dd, nn, tt = ([Decimal(x) for x in v] for v in (d, n, t))
-        sines = [(_dot(c, c) / _dot(w, w)).sqrt() for c, w in ((_cross(nn, dd), dd), (_cross(nn, tt), tt))]
+        sines = [(dot(c, c) / dot(w, w)).sqrt() for c, w in ((cross(nn, dd), dd), (cross(nn, tt), tt))]
         return float(abs(Decimal(n1) * sines[0] - Decimal(n2) * sines[1]) / Decimal(U * max(n1, n2)))
 
 
 def _beyond_critical(d: Vector, n: Vector, n1: float, n2: float) -> Fraction:
     """(n1 sin i / n2)^2 - 1 of these very floats, exactly; the vectors need not be of unit length to the last bit."""
     dd, nn = ([Fraction(x) for x in v] for v in (d, n))
-    c = _cross(dd, nn)
-    return Fraction(n1) ** 2 * _dot(c, c) / (Fraction(n2) ** 2 * _dot(dd, dd) * _dot(nn, nn)) - 1
+    c = cross(dd, nn)
+    return Fraction(n1) ** 2 * dot(c, c) / (Fraction(n2) ** 2 * dot(dd, dd) * dot(nn, nn)) - 1
 
 
 def critical_angle(rule: Refract, count: int) -> tuple[int, int, float]:

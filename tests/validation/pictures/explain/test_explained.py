@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 
 from renderer import (
     Dielectric,
@@ -142,7 +143,7 @@ FAULTS: dict[str, tuple[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@cases("fault", FAULTS)
 def test_a_fault_in_our_rays_gets_no_reason(monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
     name, broken = FAULTS[fault]
     monkeypatch.setattr(Steps, name, broken)

@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-import pytest
+from cases import cases
 
 from renderer import Dielectric, PointLight
 from validation.pictures.explain.exactly import misplaced
@@ -29,7 +29,7 @@ def test_rays_that_leave_as_they_should_are_not_named() -> None:
     assert list(misplaced(hit(), [LIGHT])) == list(misplaced(hit(face=4, by=7), [LIGHT])) == []
 
 
-@pytest.mark.parametrize(
+@cases(
     ("fault", "said"),
     [
         ({"face": 3}, "reflected ray hits face 3, which it leaves"),

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.random import Generator
 
 from renderer import BruteForce, Mesh, Octree
+from validation.meshes import loose
 from validation.oracle.contacts import contacts, hits
 from validation.stability.cases.case import ExtremeCase, Outcome
-from validation.stability.cases.judgement import SEED, Floats, both, soup_of
+from validation.stability.cases.judgement import SEED, Floats
 from validation.stability.cases.queries.inside import closed_solids
 
 # Powers of two and whole numbers, so that a mesh of whole numbers stays one that float64 holds exactly.
@@ -21,7 +22,7 @@ def whole_meshes() -> dict[str, Mesh]:
     solids = {name: mesh for name, mesh in closed_solids().items() if (mesh.vertices == np.round(mesh.vertices)).all()}
     star = solids["integers"]
     flat = Mesh(np.floor(solids["nested boxes"].vertices / [1, 1, 4]), solids["nested boxes"].faces)
-    return solids | {"twice": both(star, star), "walls": flat, "soup of integers": soup_of(star)}
+    return solids | {"twice": Mesh.concatenate([star, star]), "walls": flat, "soup of integers": loose(star.triangles)}
 
 
 def rays_of(mesh: Mesh, rng: Generator, count: int) -> tuple[Floats, Floats]:

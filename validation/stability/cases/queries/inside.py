@@ -5,10 +5,11 @@ from numpy.random import Generator
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
-from validation.oracle.distance import rational
+from validation.meshes import loose
 from validation.oracle.inside import winding_number
+from validation.oracle.vectors import rational
 from validation.stability.cases.case import ExtremeCase, Outcome
-from validation.stability.cases.judgement import SEED, Floats, both, soup_of
+from validation.stability.cases.judgement import SEED, Floats
 
 # Places and sizes at which each mesh is asked: offset and scale.
 PLACES = ((0.0, 1.0), (1e6, 1.0), (0.0, 1e-6), (1e6, 1e6))
@@ -21,11 +22,11 @@ def closed_solids() -> dict[str, Mesh]:
     return {
         "box": small,
         "ball": ball,
-        "nested boxes": both(large, small),
-        "hollow box": both(large, turned),
-        "overlapping boxes": both(box((-2, -2, -2), (1, 1, 1)), box((-1, -1, -1), (2, 2, 2))),
-        "touching boxes": both(box((-2, -1, -1), (0, 1, 1)), box((0, -1, -1), (2, 1, 1))),
-        "soup": soup_of(ball),
+        "nested boxes": Mesh.concatenate([large, small]),
+        "hollow box": Mesh.concatenate([large, turned]),
+        "overlapping boxes": Mesh.concatenate([box((-2, -2, -2), (1, 1, 1)), box((-1, -1, -1), (2, 2, 2))]),
+        "touching boxes": Mesh.concatenate([box((-2, -1, -1), (0, 1, 1)), box((0, -1, -1), (2, 1, 1))]),
+        "soup": loose(ball.triangles),
         "integers": _integer_star(1),
         "more integers": _integer_star(2),
     }

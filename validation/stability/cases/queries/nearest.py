@@ -4,9 +4,11 @@ import numpy as np
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
-from validation.oracle.distance import nearest, rational, ulps_from_root
+from validation.oracle.distance import nearest, ulps_from_root
+from validation.oracle.vectors import rational
+from validation.promises.refused import refused
 from validation.stability.cases.case import ExtremeCase, Outcome
-from validation.stability.cases.judgement import SEED, Floats, both
+from validation.stability.cases.judgement import SEED, Floats
 
 # The exact distance, rounded: half an ulp, and as little more as twice the digits leave.
 _ULPS = 0.51
@@ -19,8 +21,8 @@ def hard_meshes() -> dict[str, Mesh]:
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     return {
         "lines and points": lines,
-        "twice": both(cube, cube),
-        "touching": both(cube, box((1, -1, -1), (3, 1, 1))),
+        "twice": Mesh.concatenate([cube, cube]),
+        "touching": Mesh.concatenate([cube, box((1, -1, -1), (3, 1, 1))]),
         "slivers": Mesh(ball.vertices * [1, 1e-4, 1e-8], ball.faces),
         "far away": Mesh(corners + 1e9, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
     }
@@ -55,15 +57,6 @@ def wrong_distances(mesh: Mesh, points: Floats) -> int:
     return int(wrong.sum())
 
 
-def _is_refused() -> bool:
-    """Whether a point that is no number is refused by its row."""
-    try:
-        Octree.from_mesh(box()).closest_point([[0.0, 0.0, 0.0], [0.0, np.nan, 0.0]])
-    except ValueError as error:
-        return str(error).startswith("points: ") and str(error).endswith("in row 1")
-    return False
-
-
 def _nearest(quick: bool) -> Outcome:
     rng, wrong, asked = np.random.default_rng(SEED), 0, 0
     for mesh in hard_meshes().values():
@@ -77,7 +70,8 @@ def _nearest(quick: bool) -> Outcome:
     # At the hub, straight above it and below: the hub is the nearest point of all faces, or its slope is.
     hub = Octree.from_mesh(wheel).closest_point([[0, 0, 0.5], [0, 0, 0.75], [0, 0, 1e6]])
     wrong += hub.distance.tolist() != [0.0, 0.25, 1e6 - 0.5] or hub.face.tolist() != [0, 0, 0]
-    wrong += not _is_refused()
+    said = refused(Octree.from_mesh(box()).closest_point, [[0.0, 0.0, 0.0], [0.0, np.nan, 0.0]]) or ""
+    wrong += not (said.startswith("points: ") and said.endswith("in row 1"))
     return Outcome(f"{wrong} of {asked + 4:,} answers wrong", wrong == 0)
 
 

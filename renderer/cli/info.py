@@ -1,0 +1,44 @@
+"""``octree-render info``: what a scene holds, and what its pictures need."""
+
+import argparse
+from typing import Any
+
+from renderer.cli.main.scene import add_scene
+from renderer.errors import expect
+from renderer.system.terminal import say
+
+
+def add_info(commands: Any) -> None:
+    """Add the command to a parser's ``commands``."""
+    info = commands.add_parser("info", help="say what a scene holds and what its octree looks like")
+    add_scene(info, written=False)
+    info.add_argument("--split", choices=("midpoint", "sah"), default="midpoint")
+    info.set_defaults(command=_info)
+
+
+def _info(options: argparse.Namespace) -> None:
+    from renderer.octree import Octree
+    from renderer.picture.pack import pack
+    from renderer.scene.needs import examine, features_of
+    from renderer.scene.scene import load_scene
+
+    scene = load_scene(options.scene)
+    expect(bool(scene.instances), "scene", "at least one object or a floor", "none")
+    say(f"{options.scene}: {len(scene.instances)} meshes, {len(scene.lights)} lights, {scene.camera.type} camera")
+    for instance in scene.instances:
+        material = scene.materials[instance.material]
+        normals = "smooth" if instance.smooth else "flat"
+        say(
+            f"  {instance.mesh.name or 'mesh':<20} {len(instance.mesh.faces):>9} faces  {normals:<7} "
+            f"{instance.material} ({material.type})"
+        )
+    findings = examine(scene)
+    if features_of(findings).octree:
+        stats = Octree.from_mesh(pack(scene)[0], split=options.split).stats
+        say(
+            f"octree ({options.split}): {stats.nodes} nodes, {stats.leaves} leaves, depth {stats.depth}, "
+            f"{stats.references} references in {stats.blocks} blocks ({stats.fill:.0%} full), "
+            f"{stats.bytes / 1e6:.1f} MB"
+        )
+    for feature, value, reason in findings:
+        say(f"  {feature.replace('_', ' '):<16} {'needed' if value else 'left out'}: {reason}")

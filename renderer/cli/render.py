@@ -1,0 +1,138 @@
+"""``octree-render render``: a scene file in, a picture out."""
+
+import argparse
+import os
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any
+
+from renderer.cli.cluster import add_cluster, render_on_cluster
+from renderer.cli.main.scene import add_scene, write_scene_of
+from renderer.errors import expect
+from renderer.system.terminal import say
+
+_CHANGE = (
+    "camera, lights, materials or keys of render in place of the file's, such as 'render.shadows = false', or objects "
+    'to leave out, such as \'hide = ["objects.0", "floor"]\'; may be given again'
+)
+
+
+def add_render(commands: Any) -> None:
+    """Add the command to a parser's ``commands``."""
+    render = commands.add_parser("render", help="render a scene file to a picture")
+    add_scene(render)
+    formats = ".png, or .exr or .npy for linear radiance"
+    render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=formats)
+    render.add_argument("--resolution", type=resolution, metavar="WxH", help="pixels, such as 512x512")
+    render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
+    render.add_argument("--samples", type=int, metavar="N", help="samples a pixel: 1, 4, 9, ...")
+    render.add_argument("--min-weight", type=float, metavar="W", help="end rays that weigh less")
+    render.add_argument("--max-rays", type=int, metavar="N", help="rays of a sample of a pixel after which it is cut")
+    render.add_argument("--change", action="append", default=[], metavar="TOML", help=_CHANGE)
+    render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto")
+    render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help="how the octree is cut")
+    render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
+    add_cluster(render)
+    render.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
+    render.set_defaults(command=_render)
+
+
+def resolution(text: str) -> tuple[int, int]:
+    """Width and height of the text WxH."""
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT such as 512x512, got {text!r}")
+    return int(width), int(height)
+
+
+def _render(options: argparse.Namespace) -> None:
+    # Imported here so that --help and --version need no compiler.
+    from renderer.picture.image import PLANES, check_picture_path
+
+    check_picture_path(options.output)
+    scene = _scene(options)
+    names = ("resolution", "samples", "max_depth", "min_weight", "max_rays", "accelerator", "split")
+    asked: dict[str, Any] = {name: getattr(options, name) for name in names}
+    asked["planes"] = PLANES if options.output.suffix.lower() == ".exr" else ("rays",)
+    if options.cluster is None:
+        image = _rendered_here(scene, asked, options)
+        _save(image, options.output)
+    else:
+        run, image = render_on_cluster(scene, asked, options)
+        image.save(options.output)
+        # Only now, so that a file that cannot be written costs no picture.
+        run.remove()
+    if image.cut:
+        print(f"octree-render: {image.cut_message(options.max_rays or scene.render.max_rays)}", file=sys.stderr)
+    if not options.quiet:
+        say(_summary(image, options))
+
+
+def _scene(options: argparse.Namespace) -> Any:
+    """The scene that is rendered, with the changes of the options."""
+    from renderer.scene.change import changed
+    from renderer.scene.scene import load_scene
+
+    scene = load_scene(options.scene)
+    _check_output_is_no_input(options, scene)  # nor one of an object that a change hides
+    for text in options.change:
+        try:
+            scene = changed(scene, text)
+        except ValueError as error:
+            raise ValueError(f"--change: {error}") from None
+    write_scene_of(options)
+    return scene
+
+
+def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespace) -> Any:
+    """The picture, by this machine."""
+    from renderer.picture.image import CutWarning
+    from renderer.picture.render import render
+    from renderer.precompile import compile_in_two
+
+    compile_in_two()
+    warnings.simplefilter("ignore", CutWarning)  # reported on one line
+    return render(scene, **asked, threads=options.threads, progress=not options.quiet)
+
+
+def _summary(image: Any, options: argparse.Namespace) -> str:
+    """The line about a picture that is written."""
+    height, width = image.rays.shape
+    rays = int(image.rays.sum())
+    # On a cluster a run may have found parts of an earlier one, and workers built their trees meanwhile.
+    speed = (
+        f"({rays / image.render_seconds / 1e6:.1f} million a second), scene ready in {image.build_seconds:.2f} s"
+        if options.cluster is None
+        else "on the cluster"
+    )
+    return f"{options.output}: {width} x {height}, {rays} rays in {image.render_seconds:.2f} s {speed}"
+
+
+def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
+    """Refuse to write the picture over a file that it is made of, whatever links lead there."""
+    from renderer.system.files import are_apart
+
+    read = [options.scene, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
+    written = [options.write_scene] if options.write_scene else []
+    apart, output = are_apart([options.output], [*read, *written]), os.path.realpath(options.output)
+    expect(apart, "--output", "another file than the scene's own", f"{output} by a link")
+
+
+def _save(image: Any, path: Path) -> None:
+    """Save a picture; where that fails after all its work, keep it elsewhere and raise an error that says where."""
+    try:
+        image.save(path)
+    except (OSError, MemoryError) as error:
+        # Its radiance is written as it is, where there is no memory to encode it.
+        name = path.name if isinstance(error, OSError) else f"{path.stem}.npy"
+        folder = tempfile.mkdtemp(prefix="octree-render-")
+        kept = Path(folder) / name
+        try:
+            image.save(kept)
+        except OSError:
+            os.rmdir(folder)
+            raise error from None
+        reason = str(error) if isinstance(error, OSError) else "there is not enough memory to encode the picture"
+        raise OSError(f"{reason}; the picture is kept as {kept}") from error

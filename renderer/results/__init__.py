@@ -1,0 +1,1 @@
+"""Results of queries: records of arrays, one row a ray or point."""

@@ -1,0 +1,17 @@
+from .ambient import ambient_occlusion as ambient_occlusion
+from .ambient import openness as openness
+from .directions import Pattern as Pattern
+from .directions import cosine_hemisphere as cosine_hemisphere
+from .directions import fibonacci_hemisphere as fibonacci_hemisphere
+from .directions import fibonacci_sphere as fibonacci_sphere
+from .directions import reinhart as reinhart
+from .directions import tregenza as tregenza
+from .hidden import occlusion as occlusion
+from .places import FacePoints as FacePoints
+from .places import face_points as face_points
+from .sky import sky_view_factor as sky_view_factor
+from .sky import sun_hours as sun_hours
+from .views import Scan as Scan
+from .views import depth_map as depth_map
+from .views import scan as scan
+from .views import visible_faces as visible_faces

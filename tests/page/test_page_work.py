@@ -1,0 +1,472 @@
+"""Work on a scene in the viewer's page: materials, lights, objects, cameras, and the view in its address."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlencode
+
+import numpy as np
+import pytest
+from cases import cases
+from viewer_page import CHROMIUM, MODELS, SCENE, Viewer, served
+
+from renderer import Mirror, Phong, PointLight, load_scene, render
+from renderer.picture.image import srgb
+from renderer.scene.hide import without
+from renderer.viewer.viewpoint import camera_of
+
+pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+
+RED = "#materials details[data-name=red]"
+
+
+def settled(viewer: Viewer, mode: str = "octree") -> None:
+    """Once what was asked for has reached the page's next picture."""
+    viewer.page.wait_for_timeout(50)
+    viewer.settled(mode)
+
+
+def expected(viewer: Viewer, scene: Any) -> Any:
+    """The command line's picture for what the page shows."""
+    shown = viewer.camera
+    camera = camera_of(shown["m"], shown["fovy"], height=shown.get("height"))
+    size, depth = (shown["w"], shown["h"]), int(viewer.page.input_value("[name=max_depth]"))
+    return srgb(render(scene.model_copy(update={"camera": camera}), resolution=size, max_depth=depth).radiance)
+
+
+def shows(viewer: Viewer, scene: Any) -> None:
+    np.testing.assert_array_equal(viewer.pixels("picture")[..., :3], expected(viewer, scene))
+
+
+def unfold(viewer: Viewer, entry: str) -> None:
+    if viewer.page.locator(entry).get_attribute("open") is None:
+        viewer.page.click(f"{entry} > summary")
+
+
+def test_a_material_is_changed_live_and_taken_back(viewer: Viewer, scenes: Path) -> None:
+    scene = load_scene(scenes / "blocks.toml")
+    before = viewer.pixels("picture")
+    unfold(viewer, RED)
+    viewer.page.locator(f"{RED} [aria-label='diffuse, green']").fill("0.625")
+    viewer.page.locator(f"{RED} >> text=shininess").locator("..").locator("input").fill("7")
+    settled(viewer)
+    red = scene.materials["red"].model_copy(update={"diffuse": (0.7, 0.625, 0.1), "shininess": 7.0})
+    shows(viewer, scene.model_copy(update={"materials": {**scene.materials, "red": red}}))
+    assert viewer.page.inner_text(f"{RED} summary output") == "phong, changed"
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    settled(viewer)
+    shows(viewer, scene.model_copy(update={"materials": {**scene.materials, "red": Mirror()}}))
+    viewer.page.click(f"{RED} .undo")
+    settled(viewer)
+    np.testing.assert_array_equal(viewer.pixels("picture"), before)
+    assert viewer.page.is_disabled(f"{RED} .undo")
+
+
+def test_a_colour_is_picked(viewer: Viewer, scenes: Path) -> None:
+    scene = load_scene(scenes / "blocks.toml")
+    unfold(viewer, RED)
+    viewer.page.locator(f"{RED} input[type=color]").first.fill("#3366ff")
+    settled(viewer)
+    edited = viewer.page.evaluate("() => viewer.panel.settings.edits.materials.red")
+    # IEC 61966-2-1, to the four digits that are kept.
+    assert edited["diffuse"] == [0.03310, 0.1329, 1.0]
+    shows(viewer, scene.model_copy(update={"materials": {**scene.materials, "red": Phong(**edited)}}))
+
+
+def test_what_is_no_number_changes_nothing(viewer: Viewer) -> None:
+    before = viewer.page.evaluate("() => viewer.seq")
+    unfold(viewer, RED)
+    for wrong in ("", "-1"):
+        viewer.page.locator(f"{RED} [aria-label='diffuse, green']").fill(wrong)
+        assert viewer.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
+    assert viewer.page.evaluate("() => viewer.seq") == before
+
+
+def test_webgl_and_the_card_show_the_materials_as_they_are(viewer: Viewer) -> None:
+    viewer.choose("gl")
+    before, glass = (
+        viewer.pixels("gl"),
+        "() => viewer.layer.model.runs.glass.reduce((sum, [, count]) => sum + count, 0)",
+    )
+    few = viewer.page.evaluate(glass)
+    unfold(viewer, RED)
+    viewer.page.select_option("[aria-label='Type of red']", "dielectric")
+    viewer.page.wait_for_timeout(50)
+    viewer.settled("gl")
+    assert (viewer.pixels("gl") != before).any()
+    assert viewer.page.evaluate(glass) > few > 0
+    viewer.choose("octree")
+    found = [
+        viewer.page.evaluate(f"() => viewer.{scene}.materials.map((m) => m.type)") for scene in ("dressed", "scene")
+    ]
+    assert found == [["dielectric", "dielectric", "phong"], ["phong", "dielectric", "phong"]]
+
+
+def test_webgl_has_the_materials_in_the_order_of_the_scene_whatever_their_names(viewer: Viewer) -> None:
+    """Those with names like integers came first, and faces had the colours of others."""
+    found = viewer.page.evaluate(
+        """async () => {
+            const { Edits } = await import("./static/edits.js");
+            const [materials, lights] = [document.createElement("div"), document.createElement("div")];
+            const edits = new Edits({ materials, lights, changed() {} });
+            const names = ["z9", "7", "1"];
+            const own = viewer.scene.materials.map((material, i) => ({ ...material, name: names[i] }));
+            edits.load({ ...viewer.scene, materials: own });
+            const listed = [...materials.querySelectorAll("details")];
+            const types = listed.map((entry) => entry.querySelector("summary output").textContent);
+            return [edits.dressed.materials.map((m) => m.name), listed.map((entry) => entry.dataset.name), types];
+        }"""
+    )
+    assert found == [["z9", "7", "1"], ["z9", "7", "1"], ["phong", "dielectric", "phong"]]
+
+
+def test_lights_come_and_go(viewer: Viewer, scenes: Path) -> None:
+    scene = load_scene(scenes / "blocks.toml")
+    viewer.page.click("text=Add point light")
+    settled(viewer)
+    point = viewer.page.evaluate("() => viewer.panel.settings.edits.lights[1]")
+    shows(viewer, scene.model_copy(update={"lights": (*scene.lights, PointLight(**point))}))
+    viewer.page.locator("#lights details").first.locator("summary").click()
+    viewer.page.locator("#lights details").first.locator("text=Remove").click()
+    settled(viewer)
+    shows(viewer, scene.model_copy(update={"lights": (PointLight(**point),)}))
+    assert viewer.page.is_disabled("[name=azimuth]")  # there is no directional light to turn any more
+    viewer.page.click("text=Add directional light")
+    settled(viewer)
+    assert not viewer.page.is_disabled("[name=azimuth]")
+
+
+def test_sliders_and_fields_of_a_light_are_one_direction(viewer: Viewer, scenes: Path) -> None:
+    """Once a slider had moved, what was typed changed nothing, and was what Reset light went back to."""
+    scene, first = load_scene(scenes / "blocks.toml"), "#lights details:nth-of-type(1)"
+    before = viewer.pixels("picture")
+    unfold(viewer, first)
+    fields = [viewer.page.locator(f"{first} [aria-label='direction, {axis}']") for axis in "xyz"]
+    viewer.page.locator("[name=azimuth]").fill("90")
+    settled(viewer)
+    turned = [float(field.input_value()) for field in fields]
+    assert turned[0] < -0.5 and abs(turned[2]) < 1e-9 and viewer.page.inner_text("#light-note") == "Moved"
+    shows(viewer, scene.model_copy(update={"lights": (scene.lights[0].model_copy(update={"direction": turned}),)}))
+    fields[2].fill("-2")
+    settled(viewer)
+    typed = (turned[0], turned[1], -2.0)
+    shows(viewer, scene.model_copy(update={"lights": (scene.lights[0].model_copy(update={"direction": typed}),)}))
+    assert float(viewer.page.input_value("[name=azimuth]")) == round(np.degrees(np.arctan2(-turned[0], 2.0)))
+    viewer.page.click("#reset-light")
+    settled(viewer)
+    np.testing.assert_array_equal(viewer.pixels("picture"), before)
+    assert [float(field.input_value()) for field in fields] == [-0.6, -1.4, -0.8]
+    assert viewer.page.inner_text("#light-note") == "As the scene has it" and viewer.page.is_disabled("#reset-light")
+
+
+def test_opened_lights_stay_open_and_so_is_a_new_one(viewer: Viewer) -> None:
+    def opened() -> list[bool]:
+        return viewer.page.evaluate("() => [...document.querySelectorAll('#lights details')].map((one) => one.open)")
+
+    viewer.page.click("text=Add point light")
+    assert opened() == [False, True]
+    unfold(viewer, "#lights details:nth-of-type(1)")
+    viewer.page.click("text=Add directional light")
+    assert opened() == [True, True, True]
+    unfold(viewer, RED)
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    assert opened() == [True, True, True]
+    viewer.page.click("#lights details:nth-of-type(2) > summary")
+    viewer.page.click("#lights details:nth-of-type(1) >> text=Remove")
+    assert opened() == [False, True]
+
+
+def test_a_material_of_another_type_comes_back_as_it_was(viewer: Viewer) -> None:
+    """Its colours were lost, because a mirror has none of them."""
+    unfold(viewer, RED)
+    viewer.page.locator(f"{RED} [aria-label='diffuse, green']").fill("0.625")
+    before = viewer.page.evaluate("() => viewer.panel.settings.edits")
+    for kind in ("mirror", "dielectric", "phong"):
+        viewer.page.select_option("[aria-label='Type of red']", kind)
+    assert viewer.page.evaluate("() => viewer.panel.settings.edits") == before
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    viewer.page.click(f"{RED} .undo")
+    viewer.page.select_option("[aria-label='Type of red']", "mirror")
+    viewer.page.select_option("[aria-label='Type of red']", "phong")
+    assert viewer.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
+
+
+def test_objects_are_hidden_and_seen_again_with_all_else_as_it_was(viewer: Viewer, scenes: Path) -> None:
+    scene = load_scene(scenes / "blocks.toml")
+    viewer.page.locator("[name=max_depth]").fill("2")
+    viewer.drag(40, 10)
+    settled(viewer)
+    camera = viewer.camera
+    turns = [("objects.0", ["objects.0"]), ("floor", ["objects.0", "floor"]), ("objects.0", ["floor"]), ("floor", [])]
+    for name, hidden in turns:
+        before = viewer.page.evaluate("() => viewer.scene.id")
+        viewer.page.click(f"#objects [data-name='{name}']")
+        viewer.page.wait_for_function("(id) => viewer.scene.id !== id && viewer.layer.loaded", arg=before)
+        settled(viewer)
+        smaller = without(scene, hidden)
+        shows(viewer, smaller)
+        assert viewer.camera == camera and viewer.page.input_value("[name=max_depth]") == "2"
+        assert viewer.page.evaluate("() => viewer.layer.model.faces") == sum(
+            len(i.mesh.faces) for i in smaller.instances
+        )
+        assert viewer.page.evaluate("() => viewer.objects.hidden") == hidden
+
+
+def test_the_last_object_cannot_be_hidden(viewer: Viewer) -> None:
+    for name in ("objects.0", "objects.1"):
+        before = viewer.page.evaluate("() => viewer.scene.id")
+        viewer.page.click(f"#objects [data-name='{name}']")
+        viewer.page.wait_for_function("(id) => viewer.scene.id !== id", arg=before)
+        settled(viewer)
+    assert viewer.page.is_disabled("#objects [data-name=floor]")
+    viewer.page.evaluate("() => viewer.hide([])")
+    viewer.page.wait_for_function("() => viewer.objects.hidden.length === 0")
+
+
+def test_the_projection_changes_and_what_is_at_the_pivot_keeps_its_size(viewer: Viewer, scenes: Path) -> None:
+    scene = load_scene(scenes / "blocks.toml")
+    extent, before = viewer.page.evaluate("() => [viewer.camera.extent, viewer.camera.matrix()]")
+    viewer.page.select_option("[name=projection]", "orthographic")
+    settled(viewer)
+    assert viewer.camera["height"] == extent and viewer.page.is_disabled("[name=focal]")
+    shows(viewer, scene)
+    viewer.page.select_option("[name=projection]", "perspective")
+    settled(viewer)
+    assert "height" not in viewer.camera
+    np.testing.assert_allclose(viewer.camera["m"], before, rtol=1e-12, atol=1e-12)
+
+
+def test_a_longer_lens_sees_less_from_the_same_eye(viewer: Viewer, scenes: Path) -> None:
+    before = viewer.camera
+    viewer.page.locator("[name=focal]").fill("2")
+    settled(viewer)
+    # 100 mm before a film that is 24 mm high.
+    assert viewer.camera["fovy"] == pytest.approx(2 * np.arctan(0.12), rel=1e-12)
+    assert viewer.camera["m"] == before["m"] and "100 mm" in viewer.page.inner_text("#fold-camera > summary")
+    shows(viewer, load_scene(scenes / "blocks.toml"))
+
+
+def address(viewer: Viewer) -> str:
+    """The address once the page has written the view that it shows."""
+    viewer.page.wait_for_function("() => !viewer.writing")
+    return viewer.page.url
+
+
+def test_the_address_brings_the_view_back(browser: Any, url: str, scenes: Path) -> None:
+    one = Viewer(browser, url).open()
+    try:
+        one.drag(50, 20)
+        one.page.select_option("[name=samples]", "4")
+        one.page.click("[name=shadows]")
+        one.page.locator("[name=focal]").fill("1.7")
+        unfold(one, RED)
+        one.page.locator(f"{RED} [aria-label='diffuse, blue']").fill("0.5")
+        before = one.page.evaluate("() => viewer.scene.id")
+        one.page.click("#objects [data-name=floor]")
+        one.page.wait_for_function("(id) => viewer.scene.id !== id", arg=before)
+        settled(one)
+        link, camera, picture = address(one), one.camera, one.pixels("picture")
+    finally:
+        one.context.close()
+    two = Viewer(browser, link)
+    try:
+        two.page.goto(link)
+        two.page.wait_for_function("() => window.viewer?.objects.hidden.length === 1")
+        settled(two)
+        assert two.camera == camera
+        np.testing.assert_array_equal(two.pixels("picture"), picture)
+        assert not two.page.is_checked("[name=shadows]") and two.page.input_value("[name=samples]") == "4"
+        # Another address in the same tab is gone to; loading it again stays there.
+        other = re.sub("#.*", f"#{urlencode({'file': 'other.toml', 'mode': 'phong'})}", link)
+        two.page.evaluate("(hash) => (location.hash = hash)", other.split("#")[1])
+        two.shows("other.toml")
+        two.settled("phong")
+        assert parse_qs(address(two).split("#")[1])["file"] == ["other.toml"]
+        two.page.reload()
+        two.shows("other.toml")
+        two.settled("phong")
+    finally:
+        two.context.close()
+
+
+def told(viewer: Viewer) -> dict[str, list[str]]:
+    return parse_qs(address(viewer).split("#")[1])
+
+
+def test_the_address_keeps_the_settings_of_the_page_when_the_scene_is_loaded_again(viewer: Viewer) -> None:
+    """They were left out from then on, as if they were the scene's own; and an address without them left them."""
+    chosen = {"size": "0.25", "aov": "depth", "refine": "4"}
+    for name, value in chosen.items():
+        viewer.page.select_option(f"[name={name}]", value)
+    before = viewer.page.evaluate("() => viewer.scene.id")
+    viewer.page.click("#reload")
+    viewer.page.wait_for_function("(id) => viewer.scene.id !== id", arg=before)
+    settled(viewer)
+    assert {name: told(viewer).get(name) for name in chosen} == {name: [value] for name, value in chosen.items()}
+    viewer.page.evaluate("() => (location.hash = 'file=blocks.toml')")
+    viewer.page.wait_for_function("() => viewer.panel.fields.size.value === '1'")
+    assert viewer.page.evaluate("() => viewer.panel.chosen") == {}
+    settled(viewer)
+
+
+def test_the_address_has_the_mode_and_what_a_proof_compares(viewer: Viewer) -> None:
+    """A change of mode was written with the next movement, and the pair never."""
+    told(viewer)
+    viewer.page.evaluate("() => viewer.setMode('proof')")
+    assert told(viewer)["mode"] == ["proof"] and "pair" not in told(viewer)
+    viewer.page.select_option("[name=pair]", "samples")
+    link = address(viewer)
+    assert parse_qs(link.split("#")[1])["pair"] == ["samples"]
+    viewer.page.select_option("[name=pair]", "brute")
+    address(viewer)
+    viewer.page.evaluate("(hash) => (location.hash = hash)", link.split("#")[1])
+    viewer.page.wait_for_function("() => viewer.panel.settings.pair === 'samples'")
+    viewer.page.evaluate("() => viewer.setMode('octree')")
+    settled(viewer)
+
+
+@pytest.mark.parametrize("hidden", ["floor,objects.0", "objects.0,objects.0"])
+def test_an_address_hides_objects_once(viewer: Viewer, hidden: str) -> None:
+    """In another order than the scene's, or one of them twice: the server built trees without end."""
+    names = sorted(set(hidden.split(",")), reverse=True)
+    viewer.page.evaluate(
+        """(hidden) => {
+            const { connection } = viewer, { send } = connection;
+            window.hides = 0;
+            connection.send = (message) => {
+                window.hides += message.type === "hide";
+                if (window.hides < 4) send.call(connection, message);
+            };
+            location.hash = `#hidden=${hidden}`;
+        }""",
+        hidden,
+    )
+    again = "(names) => window.hides > 1 || (String(viewer.objects.hidden) === names && viewer.finished)"
+    viewer.page.wait_for_function(again, arg=",".join(names))
+    assert viewer.page.evaluate("() => { delete viewer.connection.send; return window.hides; }") == 1
+
+
+def test_an_address_counts_though_the_page_writes_its_own(viewer: Viewer) -> None:
+    """Before it was read, the view that was to be written soon took its place."""
+    samples = viewer.page.evaluate(
+        """() => new Promise((told) => {
+            addEventListener("hashchange", () => setTimeout(() => told(viewer.panel.settings.samples)), { once: true });
+            location.hash = "#samples=16";
+            viewer.writeAddress();
+        })"""
+    )
+    assert samples == 16
+
+
+WRONG = [
+    {"mode": "none", "camera": "1,2,3"},
+    {"camera": "0,0,NaN,,0.5,0,0,0", "max_depth": "many", "samples": "7", "aov": "<b>"},
+    {"camera": "0,0,-4,,0.5,0,0,0", "hidden": "objects.9,floor"},
+    {"camera": "0,0,4,,4,0,0,0", "edits": "{"},
+    {"camera": "0,0,4,0,1,0,0,0", "edits": json.dumps({"materials": {"red": {"type": "phong", "diffuse": "red"}}})},
+    {"edits": json.dumps({"lights": [{"type": "point"}], "materials": {"glass": {"type": "dielectric", "ior": 0}}})},
+    {"edits": json.dumps({"materials": {"__proto__": {"type": "phong"}, "gold": {"type": "mirror"}}, "lights": [3]})},
+    {"edits": "null", "file": "../secret.toml", "unknown": "1"},
+]
+
+
+@cases("wrong", WRONG)
+def test_what_is_no_view_in_an_address_is_left_out(browser: Any, url: str, scenes: Path, wrong: dict[str, str]) -> None:
+    page = Viewer(browser, url)
+    try:
+        page.page.goto(f"{url}#{urlencode(wrong)}")
+        page.page.wait_for_selector("body[data-ready]")
+        page.settled("octree")
+        shows(page, load_scene(scenes / "blocks.toml"))
+        np.testing.assert_allclose(page.camera["m"][12:15], (0.5, 2.6, 5.5), rtol=1e-9)
+        assert page.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
+        assert page.page.locator("#notices p").count() == 0
+    finally:
+        page.context.close()
+
+
+def test_a_scene_is_saved_after_its_diff_was_seen(browser: Any, tmp_path: Path) -> None:
+    file = tmp_path / "blocks.toml"
+    file.write_text(f"# by hand\n{SCENE}")
+    with served(file) as address:
+        page = Viewer(browser, address).open()
+        try:
+            page.page.click("#save-scene")
+            page.page.wait_for_selector("#changes[open]")
+            assert "Nothing" in page.page.inner_text("#changes pre") and page.page.is_disabled("#save-changes")
+            page.page.keyboard.press("3")  # which is no shortcut here
+            page.page.click("#close-changes")
+            unfold(page, RED)
+            page.page.locator(f"{RED} [aria-label='diffuse, green']").fill("0.5")
+            page.page.click("#save-scene")
+            page.page.wait_for_selector("#changes .added")
+            assert page.page.locator("#changes .added").all_inner_texts() == ["+diffuse = [0.7, 0.5, 0.1]\n"]
+            assert page.page.locator("#changes .removed").all_inner_texts() == ["-diffuse = [0.7, 0.1, 0.1]\n"]
+            with page.page.expect_download() as download:
+                page.page.click("#save-changes")
+            assert download.value.suggested_filename == "blocks.toml"
+            text = Path(download.value.path()).read_text()
+            assert text == file.read_text().replace("[0.7, 0.1, 0.1]", "[0.7, 0.5, 0.1]")
+            assert page.page.evaluate("() => viewer.mode") == "octree"
+            # In the place of the file it is what the page shows, and nothing is changed any more.
+            file.write_text(text)
+            page.page.wait_for_function("() => viewer.scene.materials[0].fields.diffuse[1] === 0.5")
+            settled(page)
+            assert page.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
+        finally:
+            page.context.close()
+
+
+def test_everything_is_folded_at_first_and_as_it_was_left_later(browser: Any, url: str) -> None:
+    page = Viewer(browser, url, folded=True, viewport={"width": 1280, "height": 800})
+    try:
+        page.open()
+        assert page.page.locator("aside details[open]").count() == 0 and page.page.is_visible("#panel")
+        page.page.click("#fold-octree > summary")
+        page.page.wait_for_function("() => JSON.parse(localStorage['octree-render-folds'] ?? '{}')['fold-octree']")
+        page.page.click("#toggle-panel")
+        assert page.page.is_hidden("#panel")
+        page.page.reload()
+        page.page.wait_for_selector("body[data-ready]")
+        assert page.page.is_hidden("#panel") and page.page.locator("aside details[open]").count() == 1
+        page.page.set_viewport_size({"width": 900, "height": 700})
+    finally:
+        page.context.close()
+    narrow = Viewer(browser, url, folded=True, viewport={"width": 900, "height": 700})
+    try:
+        narrow.open()
+        assert narrow.page.is_hidden("#panel")
+        assert narrow.page.get_attribute("#toggle-panel", "aria-expanded") == "false"
+        assert narrow.page.locator("#frame").bounding_box()["width"] == 900
+    finally:
+        narrow.context.close()
+
+
+def test_a_scene_has_its_name_and_a_mesh_that_of_its_file(browser: Any) -> None:
+    """It was Block.Ply."""
+    with served(MODELS / "block.ply") as url:
+        page = Viewer(browser, url)
+        try:
+            page.page.goto(url)
+            page.page.wait_for_selector("body[data-ready]")
+            assert page.page.inner_text("#name") == "block.ply"
+        finally:
+            page.context.close()
+
+
+def test_the_hint_goes_with_the_first_click(browser: Any, url: str) -> None:
+    page = Viewer(browser, url, folded=True).open()
+    try:
+        assert page.page.is_visible("#hint")
+        page.page.mouse.click(*page.centre())
+        page.page.wait_for_selector("#card:not([hidden])")
+        assert page.page.is_hidden("#hint")
+        page.page.reload()
+        page.page.wait_for_selector("body[data-ready]")
+        assert page.page.is_hidden("#hint")
+    finally:
+        page.context.close()

@@ -1,0 +1,174 @@
+"""Where a package's source has a name or a marked rule.
+
+A rule is a statement below a comment ``# rule: short-name``; no two have the same name.
+"""
+
+import ast
+import builtins
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+_MARK = re.compile(r"^\s*# rule: (\S+)$")
+# The decorators of functions that are compiled.
+_COMPILED = ("kernel", "inlined", "intrinsic")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A node of a module's syntax, which is read anew for each place.
+
+    name      the module's name, and where the node has one its own: "renderer.mesh.mesh.Mesh.vertex_normals"
+    compiled  whether it is part of a kernel
+    """
+
+    path: Path
+    module: str
+    name: str
+    tree: ast.Module
+    node: ast.stmt
+    compiled: bool
+
+    def text_with(self, *statements: ast.stmt) -> str:
+        """The module's text with other statements in the place of the node.
+
+        Raises ``ValueError`` where they use a name that neither the node nor the module has.
+        """
+        known = {*dir(builtins), *_names(self.node), *(name for node in self.tree.body for name in _bound(node))}
+        new = {name for statement in statements for name in _names(statement)} - known
+        if new:
+            raise ValueError(f"{self.name}: expected names of the module, got {sorted(new)}")
+        _put(self.tree, self.node, statements)
+        return ast.unparse(ast.fix_missing_locations(self.tree))
+
+
+def find_rule(package: Path, name: str) -> Place:
+    """The statement that carries a name. Raises ``ValueError`` unless one does."""
+    places = [
+        place
+        for path in _files(package, f"# rule: {name}\n")
+        for place in _marked(path, package)
+        if place.name.endswith(f": {name}")
+    ]
+    return _one(places, "rule", name)
+
+
+def rules(package: Path) -> list[str]:
+    """The names of all marked rules."""
+    marks = (_MARK.match(line) for path in _files(package) for line in path.read_text(encoding="utf-8").splitlines())
+    return [mark[1] for mark in marks if mark]
+
+
+def find_definition(package: Path, name: str) -> Place:
+    """The one function, method, class or module-level constant whose dotted name ends with ``name``.
+
+    Raises ``ValueError`` where there is none, or more than one.
+    """
+    last = name.rpartition(".")[2]
+    places = [
+        place
+        for path in _files(package, last)
+        for place in _defined(path, package)
+        if f".{place.name}".endswith(f".{name}")
+    ]
+    return _one(places, "name", name)
+
+
+def find_name(package: Path, name: str) -> tuple[str, str]:
+    """Module and name within it of a definition; or, where no definition has that name, of what a module imports."""
+    last = name.rpartition(".")[2]
+    imported = [
+        module
+        for path in _files(package, last)
+        if f".{(module := module_of(path, package))}.{last}".endswith(f".{name}")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.ImportFrom) and last in _bound(node)
+    ]
+    try:
+        found = find_definition(package, name)
+    except ValueError:
+        if len(imported) == 1:
+            return imported[0], last
+        raise
+    return found.module, found.name.removeprefix(f"{found.module}.")
+
+
+def module_of(path: Path, package: Path) -> str:
+    """The full name of a module of the package."""
+    return ".".join(path.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+def _files(package: Path, text: str = "") -> list[Path]:
+    """The sources in which a text stands."""
+    return [path for path in sorted(package.rglob("*.py")) if text in path.read_text(encoding="utf-8")]
+
+
+def _one(places: list[Place], what: str, name: str) -> Place:
+    if len(places) != 1:
+        found = ", ".join(place.name for place in places) or "none"
+        raise ValueError(f"{what}: expected one {name!r}, got {found}")
+    return places[0]
+
+
+def _marked(path: Path, package: Path) -> Iterator[Place]:
+    """Each marked statement of a file."""
+    text = path.read_text(encoding="utf-8")
+    tree, module, lines = ast.parse(text), module_of(path, package), text.splitlines()
+    compiled = {id(node) for function in tree.body if _is_compiled(function) for node in ast.walk(function)}
+    for number, line in enumerate(lines, 1):
+        if mark := _MARK.match(line):
+            below = (node for node in ast.walk(tree) if isinstance(node, ast.stmt) and node.lineno > number)
+            # Of an ``if`` and what is in its line, the outer one is met first.
+            node = min(below, key=lambda node: node.lineno)
+            yield Place(path, module, f"{module}: {mark[1]}", tree, node, id(node) in compiled)
+
+
+def _defined(path: Path, package: Path) -> Iterator[Place]:
+    """Each function, class, method and constant of a file."""
+    tree, module = ast.parse(path.read_text(encoding="utf-8")), module_of(path, package)
+
+    def within(body: list[ast.stmt], prefix: str) -> Iterator[Place]:
+        for node in body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                yield Place(path, module, f"{prefix}.{node.name}", tree, node, _is_compiled(node))
+                yield from within(node.body, f"{prefix}.{node.name}")
+            elif isinstance(node, ast.Assign | ast.AnnAssign):
+                # Constants count as parts of kernels, which may read them.
+                yield from (Place(path, module, f"{prefix}.{name}", tree, node, True) for name in _bound(node))
+
+    yield from within(tree.body, module)
+
+
+def _is_compiled(node: ast.stmt) -> bool:
+    return isinstance(node, ast.FunctionDef) and any(
+        isinstance(name, ast.Name) and name.id in _COMPILED
+        for decorator in node.decorator_list
+        for name in ast.walk(decorator)
+    )
+
+
+def _bound(node: ast.stmt) -> list[str]:
+    """The names that a statement at a module's top binds."""
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        return [alias.asname or alias.name.partition(".")[0] for alias in node.names]
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return [node.name]
+    return [name.id for name in ast.walk(node) if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)]
+
+
+def _names(node: ast.AST) -> set[str]:
+    """The names that code uses, without those that it binds itself."""
+    nodes = list(ast.walk(node))
+    own = {inner.arg for inner in nodes if isinstance(inner, ast.arg)}
+    own |= {inner.id for inner in nodes if isinstance(inner, ast.Name) and not isinstance(inner.ctx, ast.Load)}
+    return {inner.id for inner in nodes if isinstance(inner, ast.Name)} - own
+
+
+def _put(tree: ast.Module, node: ast.stmt, statements: tuple[ast.stmt, ...]) -> None:
+    """Put statements in the place of a node."""
+    for parent in ast.walk(tree):
+        for _, body in ast.iter_fields(parent):
+            if isinstance(body, list) and any(inner is node for inner in body):
+                at = next(i for i, inner in enumerate(body) if inner is node)
+                body[at : at + 1] = statements

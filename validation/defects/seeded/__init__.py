@@ -1,0 +1,1 @@
+"""The seeded defects, a module for each group of checks that runs against them."""
