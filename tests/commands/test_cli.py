@@ -41,11 +41,6 @@ def _compiled() -> None:
     compile_ahead()
 
 
-def run(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "renderer.cli.main", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=120, check=False, **options)
-
-
 def fails(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     """The one line on standard error, after checking that it is one, that the code is 2 and that nothing else came."""
     assert main([str(a) for a in arguments]) == 2
@@ -67,15 +62,6 @@ def test_render_writes_what_the_library_renders(tmp_path: Path, capsys: pytest.C
     assert err == ""
 
 
-def test_accelerator_split_and_threads_change_no_byte(tmp_path: Path) -> None:
-    pictures = []
-    for i, more in enumerate(([], ["--accelerator", "brute"], ["--split", "sah"], ["--threads", "3"])):
-        path = tmp_path / f"{i}.png"
-        assert main(["render", str(STAIRS), "--output", str(path), "--resolution", "40X30", "--quiet", *more]) == 0
-        pictures.append(path.read_bytes())
-    assert pictures[0].startswith(b"\x89PNG") and pictures.count(pictures[0]) == 4
-
-
 def test_compile(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compile"]) == 0
     out, err = capsys.readouterr()
@@ -92,13 +78,6 @@ def test_info(capsys: pytest.CaptureFixture[str], split: str) -> None:
     assert f"2 meshes, {lights} lights, orthographic camera" in lines[0]
     assert re.match(r"  stairs +44 faces +flat +stone \(phong\)", lines[1]) and re.match(r"  floor +2 faces", lines[2])
     assert lines[3].startswith(f"octree ({split}): ") and "46 references" in lines[3]
-
-
-def test_as_a_module(tmp_path: Path) -> None:
-    done = run("render", STAIRS, "-o", tmp_path / "a.png", "--resolution", "8x8")
-    assert (done.returncode, done.stderr) == (0, "") and (tmp_path / "a.png").exists()
-    done = run("render", STAIRS, "-o", tmp_path / "none" / "a.png")
-    assert done.returncode == 2 and done.stdout == "" and len(done.stderr.splitlines()) == 1
 
 
 @cases("arguments", [["--help"], ["--version"], ["render", "--help"], ["info", "--help"], ["compile", "--help"]])
@@ -164,14 +143,6 @@ def test_info_of_an_empty_scene(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "at least one object or a floor" in fails(capsys, "info", tmp_path / "empty.toml")
 
 
-def test_a_scene_without_objects_or_lights_renders(tmp_path: Path) -> None:
-    text = "background = 0.5\n[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n[materials]\n"
-    (tmp_path / "empty.toml").write_text(text)
-    out = tmp_path / "a.npy"
-    assert main(["render", str(tmp_path / "empty.toml"), "-o", str(out), "--resolution", "2x2", "--quiet"]) == 0
-    assert (np.load(out) == 0.5).all()
-
-
 @cases(
     "arguments",
     [
@@ -203,12 +174,6 @@ def test_arguments_that_make_no_sense_are_usage_errors(
         main([str(a) for a in arguments])
     out, err = capsys.readouterr()
     assert caught.value.code == 2 and out == "" and "error: " in err.splitlines()[-1] and "Traceback" not in err
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere") if hasattr(os, "geteuid") else lambda f: f
-def test_a_folder_that_may_not_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    tmp_path.chmod(0o500)
-    assert "ermission" in fails(capsys, "render", STAIRS, "-o", tmp_path / "a.png", "--resolution", "2x2", "--quiet")
 
 
 def test_a_disk_that_fills_up_is_one_line(

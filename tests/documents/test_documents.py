@@ -180,16 +180,6 @@ def test_names_that_are_not_there_are_found():
     ]
 
 
-def test_the_readme_has_python_to_run():
-    assert any(page == README for page, _ in snippets())
-
-
-@cases(("page", "line"), [(p, line) for p in PAGES for line in typed(p) if line.startswith("octree-render ")])
-def test_commands_in_a_page_are_ones_that_there_are(page, line):
-    options = make_parser().parse_args(shlex.split(line)[1:])
-    assert not hasattr(options, "scene") or str(options.scene) in OWN or (ROOT / options.scene).is_file()
-
-
 def runnable():
     """(page, command) of all commands of blocks that are run here."""
     pairs = dict.fromkeys((page, line) for page in PAGES for line in typed(page) if COMMAND.match(line))
@@ -497,19 +487,6 @@ def test_what_a_page_names_is_there(page):
         if not there.exists() or (path.endswith("/") and not there.is_dir()) or (name and name not in defined(there)):
             absent.append(f"{path}::{name}" if name else path)
     assert absent == []
-
-
-@cases(
-    ("text", "found"),
-    [
-        ("`renderer/trace/closest.py::closest_hits`", ("renderer/trace/closest.py", "closest_hits")),
-        ("see renderer/octree.py, and", ("renderer/octree.py", "")),
-        ("in `scenes/`.", ("scenes/", "")),
-        ("(tests/trace/test_order.py).", ("tests/trace/test_order.py", "")),
-    ],
-)
-def test_names_are_found_in_a_sentence(text, found):
-    assert NAMED.findall(text) == [found]
 
 
 @cases("page", PAGES)

@@ -119,17 +119,6 @@ def test_light_and_camera_are_reset_each_by_itself(viewer: Viewer) -> None:
     assert np.array_equal(viewer.pixels("picture"), own) and not np.array_equal(own, lit)
 
 
-@pytest.mark.parametrize(("value", "share"), [("0.5", "half as wide and high"), ("0.25", "a quarter as wide and high")])
-def test_a_share_of_the_window_is_what_its_name_says(viewer: Viewer, value: str, share: str) -> None:
-    """Half of each side was called half the pixels."""
-    assert viewer.page.inner_text(f"[name=size] [value='{value}']") == share
-    whole = viewer.camera
-    viewer.page.select_option("[name=size]", value)
-    viewer.settled("octree")
-    for side in ("w", "h"):
-        assert abs(viewer.camera[side] - float(value) * whole[side]) <= 0.5  # whole pixels
-
-
 @pytest.mark.parametrize(
     ("rate", "said"), [(0.00012, "0.12 k"), (0.0042, "4.20 k"), (0.06, "60.0 k"), (2.5, "2.50 M"), (42, "42.0 M")]
 )
@@ -328,47 +317,6 @@ def test_the_divider_goes_to_its_ends(viewer: Viewer) -> None:
         divider.press(key)
         assert divider.get_attribute("aria-valuenow") == value
     viewer.page.evaluate("() => viewer.proof.move(0.5)")
-
-
-LUMINANCE = """() => {
-    const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
-    const of = (element) => {
-        const [r, g, b] = getComputedStyle(element).backgroundColor.match(/[\\d.]+/g).map((c) => linear(c / 255));
-        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    };
-    return [of(document.querySelector("[name=walk]")), of(document.querySelector("#panel"))];
-}"""
-
-
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_a_switch_that_is_off_stands_out(browser: Any, url: str, scheme: str) -> None:
-    page = Viewer(browser, url, color_scheme=scheme)
-    try:
-        page.page.goto(page.url)
-        off, ground = page.page.evaluate(LUMINANCE)
-        # WCAG 2.2, 1.4.11: 3 to 1 for what is needed to understand a control; its knob is white.
-        assert (max(off, ground) + 0.05) / (min(off, ground) + 0.05) >= 3.0
-        assert 1.05 / (off + 0.05) >= 3.0
-    finally:
-        page.context.close()
-
-
-@pytest.mark.parametrize(("width", "height"), [(320, 640), (390, 844)])
-def test_a_phone_shows_the_modes_whole_and_the_cameras_buttons_at_once(
-    browser: Any, url: str, width: int, height: int
-) -> None:
-    page = Viewer(browser, url, viewport={"width": width, "height": height}, has_touch=True, is_mobile=True)
-    try:
-        page.open()
-        assert page.page.evaluate("() => document.documentElement.scrollWidth") == width
-        cut = """() => [...document.querySelectorAll(".modes span")].filter((span) =>
-            span.scrollWidth > span.clientWidth || span.getBoundingClientRect().right > innerWidth).length"""
-        assert page.page.evaluate(cut) == 0
-        for button in ("#reset-view", "#fit", "#save-picture"):
-            box = page.page.locator(button).bounding_box()
-            assert box["y"] + box["height"] <= height, button
-    finally:
-        page.context.close()
 
 
 def test_settings_on_a_phone_are_folded_and_come_into_view(browser: Any, url: str) -> None:

@@ -9,10 +9,9 @@ from viewer_page import SCENE
 
 pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
 
-from viewer_client import SIZE, Client, Got, looking, rendered
+from viewer_client import Client, Got, looking
 
 import renderer
-from renderer import load_scene
 from renderer.diagnostics.false_color import shades_of
 from renderer.diagnostics.ray_cost import camera_steps
 from renderer.picture.prepare import PreparedScene
@@ -84,23 +83,3 @@ def test_steps_are_counted_in_parts_that_are_the_whole(
     parts = camera_steps(prepared, camera, (64, 48), shares.append)
     assert whole.nodes.shape == (48, 64) and len(shares) == 12 and sum(shares) == pytest.approx(1.0, abs=1e-12)
     assert np.array_equal(parts.nodes, whole.nodes) and np.array_equal(parts.triangles, whole.triangles)
-
-
-@pytest.mark.parametrize(("x", "y"), [(140, 100), (3, 3)])
-def test_a_click_tells_the_whole_tree_of_rays(client: Client, scene: Path, x: int, y: int) -> None:
-    client.send(**{"type": "pick", "seq": 7, "x": x, "y": y, **looking(EYE), **SIZE})
-    got = client.told("pick")
-    image = rendered(load_scene(scene))
-    path = got["path"]
-    # Rounding apart, what the rays bring adds up to the pixel; the picture's sum is of float32.
-    assert np.allclose(sum(np.array(ray["radiance"]) for ray in path), image.radiance[y, x], rtol=0.0, atol=1e-6)
-    for i, ray in enumerate(path):
-        parent = path[ray["parent"]] if i else {"depth": -1}
-        assert ray["parent"] < i and ray["depth"] == parent["depth"] + (ray["kind"] != "shadow")
-        assert (ray["face"] >= 0) == ray["hit"]
-    assert path[0]["weight"] == [1.0, 1.0, 1.0] and path[0]["face"] == image.face[y, x]
-    assert sum(got["levels"]) == got["visited"]
-    assert [got["tested"]["nodes"] >= 0, got["tested"]["triangles"] >= 0] == [True, True]
-
-
-# On the page
