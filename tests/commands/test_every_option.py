@@ -166,8 +166,9 @@ def test_what_is_said_of_cut_pixels_names_the_rays_that_held(
     assert capsys.readouterr().err.startswith(said)
 
 
-@pytest.mark.parametrize("where", [[], ["--cluster"]], ids=["here", "cluster"])
-@pytest.mark.parametrize(("png", "npy", "exr"), [("png", "npy", "exr"), ("PNG", "NPY", "EXR")])
+@pytest.mark.parametrize(
+    ("where", "png", "npy", "exr"), [([], "PNG", "NPY", "EXR"), (["--cluster"], "png", "npy", "exr")]
+)
 def test_each_format_is_read_by_others_as_the_picture(
     folder: Path, tmp_path: Path, asked: list[dict[str, Any]], where: list[str], png: str, npy: str, exr: str
 ) -> None:

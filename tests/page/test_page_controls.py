@@ -5,12 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from viewer_page import CHROMIUM, Viewer
-
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+from viewer_page import Viewer
 
 
 @pytest.mark.parametrize(
@@ -303,10 +298,13 @@ def test_a_ray_is_seen_from_the_side_beside_its_card(viewer: Viewer) -> None:
     viewer.page.click("#card >> text=View from the side")
     card, frame = (viewer.page.locator(name).bounding_box() for name in ("#card", "#frame"))
     left, right = card["x"] + card["width"], frame["x"] + frame["width"]
-    start, end = viewer.page.evaluate("() => [viewer.rays.pick.path[0].start, viewer.rays.pick.path[0].end]")
-    seen = [place(viewer, point)[0] for point in (start, end)]
-    assert left < min(seen) < max(seen) < right and frame["x"] < left
-    middle = place(viewer, ((np.array(start) + end) / 2).tolist())
+    start, end = np.array(viewer.page.evaluate("() => [viewer.rays.pick.path[0].start, viewer.rays.pick.path[0].end]"))
+    x, y = zip(*(place(viewer, point.tolist()) for point in (start, end)), strict=True)
+    assert left < min(x) < max(x) < right and frame["x"] < left
+    assert frame["y"] < min(y) and max(y) < frame["y"] + frame["height"]
+    back = viewer.camera["m"][8:11]
+    assert abs((end - start) @ back) < 0.3 * math.dist(start, end)  # across the view, but for the tilt
+    middle = place(viewer, ((start + end) / 2).tolist())
     assert middle[0] == pytest.approx((left + right) / 2)
 
 
@@ -322,8 +320,7 @@ def test_the_divider_goes_to_its_ends(viewer: Viewer) -> None:
 def test_settings_on_a_phone_are_folded_and_come_into_view(browser: Any, url: str) -> None:
     """They were open below the window, and the first touch hid them."""
     size = {"width": 390, "height": 844}
-    page = Viewer(browser, url, folded=True, viewport=size, has_touch=True, is_mobile=True)
-    try:
+    with Viewer(browser, url, folded=True, viewport=size, has_touch=True, is_mobile=True) as page:
         page.open()
         assert page.page.is_hidden("#panel")
         page.page.tap("#frame")
@@ -331,5 +328,3 @@ def test_settings_on_a_phone_are_folded_and_come_into_view(browser: Any, url: st
         page.page.tap("#toggle-panel")
         page.page.wait_for_function("() => document.querySelector('#panel').getBoundingClientRect().top < 400")
         assert page.page.is_visible("#fold-scene > summary")
-    finally:
-        page.context.close()

@@ -7,11 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import cases
-from viewer_page import SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from viewer_client import Client, Got, rendered
+from viewer_page import SCENE
 
 import renderer
 from renderer import load_scene

@@ -2,18 +2,14 @@
 
 import json
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from viewer_page import SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from PIL import Image as Pillow
 from viewer_client import SIZE, Client, looking
+from viewer_page import SCENE
 
 import renderer
 from renderer import load_scene
@@ -23,25 +19,6 @@ from renderer.viewer.protocol import AskCommand
 from renderer.viewer.shown import open_file
 
 EYE = (0.3, 2.0, 4.0)
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("with space") / "blocks.toml"
-    path.write_text(SCENE)
-    return path
-
-
-@pytest.fixture(scope="module")
-def url(scene: Path) -> Iterator[str]:
-    with renderer.view(scene, browser=False) as viewing:
-        yield viewing.url
-
-
-@pytest.fixture
-def client(url: str) -> Iterator[Client]:
-    with Client(url) as client:
-        yield client
 
 
 @pytest.mark.judges("octree-render render --change")

@@ -1,17 +1,11 @@
 """What a ray costs: heat maps of nodes and triangles, and the whole tree of rays of a clicked pixel."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from viewer_page import SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from viewer_client import Client, Got, looking
 
-import renderer
 from renderer.diagnostics.false_color import shades_of
 from renderer.diagnostics.ray_cost import camera_steps
 from renderer.picture.prepare import PreparedScene
@@ -20,25 +14,6 @@ from renderer.viewer.shown import open_file
 from renderer.viewer.viewpoint import camera_of
 
 EYE = (0.5, 2.6, 5.5)
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("cost") / "blocks.toml"
-    path.write_text(SCENE)
-    return path
-
-
-@pytest.fixture(scope="module")
-def url(scene: Path) -> Iterator[str]:
-    with renderer.view(scene, browser=False) as viewing:
-        yield viewing.url
-
-
-@pytest.fixture
-def client(url: str) -> Iterator[Client]:
-    with Client(url) as client:
-        yield client
 
 
 @pytest.fixture(scope="module")

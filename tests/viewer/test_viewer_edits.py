@@ -11,12 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import cases
-from viewer_page import SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from PIL import Image as Pillow
 from viewer_client import PATIENCE, SIZE, Client, fetched, looking, rendered
+from viewer_page import SCENE
 
 import renderer
 from renderer import DirectionalLight, Mirror, Phong, PointLight, Scene, SceneObject, load_scene
@@ -43,18 +40,6 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("edited") / "blocks.toml"
     path.write_text(COMMENTED)
     return path
-
-
-@pytest.fixture(scope="module")
-def url(scene: Path) -> Iterator[str]:
-    with renderer.view(scene, browser=False) as viewing:
-        yield viewing.url
-
-
-@pytest.fixture
-def client(url: str) -> Iterator[Client]:
-    with Client(url) as client:
-        yield client
 
 
 def described(client: Client, url: str) -> dict[str, Any]:

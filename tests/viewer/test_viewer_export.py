@@ -16,13 +16,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image as Pillow
-from viewer_page import SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from viewer_client import HEAVY, Client, Got, decoded, frames, looking, rendered
 
-import renderer
 from renderer import load_scene
 from renderer.picture.image import srgb
 from renderer.viewer import export, passes
@@ -34,29 +29,8 @@ TURN: dict[str, Any] = {"pivot": [0.0, 0.5, 0.0], "axis": [0.0, 1.0, 0.0], "fram
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("scenes")
-    for name, text in {"blocks": SCENE, "heavy": HEAVY}.items():
-        (folder / f"{name}.toml").write_text(text)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def shown(folder: Path) -> ShownScene:
-    return open_file(folder / "blocks.toml")
-
-
-@pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[str]:
-    with renderer.view(folder / "blocks.toml", browser=False) as viewing:
-        yield viewing.url
-
-
-@pytest.fixture
-def client(server: str, folder: Path) -> Iterator[Any]:
-    with Client(server) as client:
-        client.scene = load_scene(folder / "blocks.toml")
-        yield client
+def shown(scene: Path) -> ShownScene:
+    return open_file(scene)
 
 
 def still(seq: int = 1, w: int = 200, h: int = 150, **changes: Any) -> dict[str, Any]:
@@ -93,17 +67,17 @@ def received(client: Client, asked: dict[str, Any]) -> bytes:
 
 @pytest.mark.parametrize("bands", [False, True])
 def test_a_still_is_the_file_that_the_renderer_saves(
-    client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bands: bool
+    client: Any, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bands: bool
 ) -> None:
     settings = {"samples": 4, "max_depth": 2}
     if bands:
         monkeypatch.setattr(passes, "BAND_PIXELS", 10_000)
-    rendered(client.scene, **settings).save(tmp_path / "expected.png")
+    rendered(load_scene(scene), **settings).save(tmp_path / "expected.png")
     file = received(client, still(settings=settings))
     assert file == (tmp_path / "expected.png").read_bytes()
 
 
-def test_a_view_is_answered_while_a_still_is_made(client: Any) -> None:
+def test_a_view_is_answered_while_a_still_is_made(client: Any, scene: Path) -> None:
     client.send(**still(w=2048, h=2048, settings={"samples": 64}))
     assert client.told("export")["done"] == 0.0
     seq = client.view(w=64, h=48)
@@ -111,7 +85,7 @@ def test_a_view_is_answered_while_a_still_is_made(client: Any) -> None:
         if isinstance(message, Got):
             assert message.kind != FILE  # which takes seconds
             client.acknowledge(message)
-    expected = srgb(rendered(client.scene, resolution=(64, 48)).radiance)
+    expected = srgb(rendered(load_scene(scene), resolution=(64, 48)).radiance)
     assert np.array_equal(message.rgb, expected)
     client.send(type="stop")
 
@@ -264,9 +238,9 @@ def test_a_stopped_file_ends_its_work_and_another_can_be_asked_for(
 
 @pytest.mark.parametrize("asked", LONG)
 def test_a_page_that_leaves_ends_the_work_on_its_file(
-    server: str, given_up: threading.Event, asked: dict[str, Any]
+    url: str, given_up: threading.Event, asked: dict[str, Any]
 ) -> None:
-    with Client(server) as leaving:
+    with Client(url) as leaving:
         begun(leaving, asked)
     assert given_up.wait(30)
 
@@ -276,7 +250,7 @@ def test_nothing_is_stopped_where_nothing_is_made(client: Any) -> None:
     assert decoded(received(client, still(w=16, h=9))).shape == (9, 16, 3)
 
 
-def test_of_several_pages_one_file_is_computed_at_a_time(server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_several_pages_one_file_is_computed_at_a_time(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     make, running, most = export.still, threading.Semaphore(1), []
 
     def watched(*given: Any) -> bytes:
@@ -288,14 +262,15 @@ def test_of_several_pages_one_file_is_computed_at_a_time(server: str, monkeypatc
 
     monkeypatch.setattr(export, "still", watched)
     with ExitStack() as opened:
-        clients = [opened.enter_context(Client(server)) for _ in range(4)]
+        clients = [opened.enter_context(Client(url)) for _ in range(4)]
         for client in clients:
             client.send(**still(w=256, h=256))
         files = {b"".join(piece.payload for piece in pieces(client)[1]) for client in clients}
     assert most == [True] * 4 and len(files) == 1
 
 
-def test_a_file_of_a_scene_is_made_though_another_is_opened(client: Any) -> None:
+def test_a_file_of_a_scene_is_made_though_another_is_opened(client: Any, scene: Path) -> None:
+    scene.with_name("heavy.toml").write_text(HEAVY)
     expected = received(client, still(w=512, h=512))
     client.send(**still(seq=2, w=512, h=512))
     client.send(type="scene", file="heavy.toml")

@@ -1,40 +1,15 @@
 """Pictures of a camera at rest: they grow finer by themselves, and say how much of an error is left."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from viewer_page import SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from viewer_client import Client, Got, rendered
 
-import renderer
 from renderer import load_scene
 from renderer.picture.image import srgb
 from renderer.viewer import passes
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("growth") / "blocks.toml"
-    path.write_text(SCENE)
-    return path
-
-
-@pytest.fixture(scope="module")
-def url(scene: Path) -> Iterator[str]:
-    with renderer.view(scene, browser=False) as viewing:
-        yield viewing.url
-
-
-@pytest.fixture
-def client(url: str) -> Iterator[Client]:
-    with Client(url) as client:
-        yield client
 
 
 def grown(client: Client, samples: int, **settings: Any) -> tuple[list[Got], list[dict[str, Any]]]:

@@ -5,17 +5,13 @@ import os
 import struct
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from viewer_page import SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from PIL import Image as Pillow
 from viewer_client import PATIENCE, Client, Got, looking, rendered, wait_for
 
@@ -65,25 +61,6 @@ def silent(*scene, **options):
     time.sleep(600)
 """
 OFFERED = ("picture", "failing", "ending", "turned", "imaginary", "nan", "infinite", "silent")
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("proof") / "blocks.toml"
-    path.write_text(SCENE)
-    return path
-
-
-@pytest.fixture(scope="module")
-def url(scene: Path) -> Iterator[str]:
-    with renderer.view(scene, browser=False) as viewing:
-        yield viewing.url
-
-
-@pytest.fixture
-def client(url: str) -> Iterator[Client]:
-    with Client(url) as client:
-        yield client
 
 
 @pytest.fixture

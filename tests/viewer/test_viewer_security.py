@@ -15,9 +15,6 @@ from urllib.parse import urlsplit
 import pytest
 from cases import cases
 from viewer_page import SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
@@ -183,12 +180,6 @@ def test_a_refused_socket_is_told_the_rules_too(port: int) -> None:
     assert refused.body == f"Origin: expected 127.0.0.1:{port}, got http://evil.example"
 
 
-def test_a_notebook_of_this_machine_may_frame_the_page(shown: ShownScene) -> None:
-    with ViewerServer(shown, "127.0.0.1", 0, framed=True) as viewing:
-        policy = asked(urlsplit(viewing.url).port, "/").headers["Content-Security-Policy"]
-    assert policy.endswith("; frame-ancestors 'self' http://127.0.0.1:* http://localhost:*")
-
-
 @cases(
     "path",
     [
@@ -234,10 +225,6 @@ def test_only_scene_files_that_were_offered_are_opened(port: int, folder: Path, 
     answer = told(port, json.dumps({"type": "scene", "file": named}))
     assert answer["type"] == "error"
     assert answer["message"].startswith("scene.file: expected one of ['blocks.toml', 'other.toml'], got ")
-
-
-def test_a_scene_file_that_was_offered_is_opened(port: int) -> None:
-    assert told(port, json.dumps({"type": "scene", "file": "other.toml"}))["type"] == "scene"
 
 
 def test_a_message_of_the_largest_size_is_read(port: int) -> None:

@@ -25,11 +25,8 @@ import numpy as np
 import pytest
 import trimesh
 from numpy.typing import NDArray
-from viewer_page import MODELS, SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camera, fetched, looking, rendered, wait_for
+from viewer_page import MODELS, SCENE
 
 import renderer
 from renderer import load_scene
@@ -69,21 +66,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def url(folder: Path) -> Iterator[str]:
-    with renderer.view(folder / "blocks.toml", browser=False) as viewing:
-        yield viewing.url
+def scene(folder: Path) -> Path:
+    return folder / "blocks.toml"
 
 
 @pytest.fixture(scope="module")
 def heavy(folder: Path) -> Iterator[str]:
     with renderer.view(folder / "heavy.toml", browser=False) as viewing:
         yield viewing.url
-
-
-@pytest.fixture
-def client(url: str) -> Iterator[Client]:
-    with Client(url) as client:
-        yield client
 
 
 @pytest.fixture
