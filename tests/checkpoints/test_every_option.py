@@ -1,7 +1,7 @@
 """Each option of ``octree-render study``, given alone: what is asked, what a run of it keeps, and what is written."""
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
@@ -12,6 +12,7 @@ import pytest
 import tomlkit
 from cases import cases
 from scenery import scenery
+from watched import results_here
 
 from renderer import Octree, load_mesh
 from renderer.checkpoints.study import KINDS
@@ -77,12 +78,8 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch, bars: list[bool]) -> None:
 
         return run
 
-    def results(_client: object, function: Callable[..., Any], tasks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
-        for task in tasks:
-            yield task.name, function(task.shared, *task.arguments)
-
     here, there = import_module("renderer.checkpoints.study"), import_module("renderer.cluster.studies")
-    monkeypatch.setattr(there, "results", results)
+    monkeypatch.setattr(there, "results", results_here)
     monkeypatch.setattr(here, "run", told(here.run))
     monkeypatch.setattr("renderer.cluster.run_on", told(there.run_on))
     monkeypatch.setattr("renderer.cli.study.on_cluster", lambda options: nullcontext())

@@ -201,34 +201,6 @@ def test_points_that_see_nothing_are_counted(tmp_path: Path, capsys: pytest.Capt
     assert "see nothing" not in "".join(capsys.readouterr())
 
 
-@cases(
-    "arguments",
-    [
-        ["sky", "m.ply"],
-        ["stars", "m.ply", "-o", "a.npy"],
-        ["sky", "-o", "a.npy"],
-        [],
-        ["sky", "m.ply", "-o", "a.npy", "--faces", "--vertices"],
-        ["sky", "m.ply", "-o", "a.npy", "--grid", "x"],
-        ["sky", "m.ply", "-o", "a.npy", "--grid", "1", "--points", "p.npy"],
-        ["sky", "m.ply", "-o", "a.npy", "--faces", "--grid", "1"],
-        ["sky", "m.ply", "-o", "a.npy", "--vertices", "--points", "p.npy"],
-        ["sky", "m.ply", "-o", "a.npy", "--patches", "x"],
-        ["sky", "m.ply", "-o", "a.npy", "--definition", "x"],
-        ["ao", "m.ply", "-o", "a.npy", "--samples", "x"],
-        ["sky", "m.ply", "-o", "a.npy", "--distance", "x"],
-        ["sky", "m.ply", "-o", "a.png", "--resolution", "x"],
-        ["sky", "m.ply", "-o", "a.npy", "--threads", "x"],
-    ],
-)
-def test_arguments_that_make_no_sense_are_usage_errors(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as stopped:
-        main(["study", *arguments])
-    assert stopped.value.code == 2 and "usage: octree-render study" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(("kind", "option"), [("sky", "--points"), ("sun", "--suns")])
 def test_a_file_that_cannot_be_read_is_told_with_its_option(
     city: Path, tmp_path: Path, kind: str, option: str, capsys: pytest.CaptureFixture[str]

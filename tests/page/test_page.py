@@ -101,23 +101,6 @@ def test_gl_lighting_is_phong(viewer: Viewer, scenes: Path) -> None:
     assert difference.max() <= 1
 
 
-def test_passes_grow_to_the_full_size(viewer: Viewer) -> None:
-    viewer.page.evaluate(
-        """() => {
-            const { picture } = window.viewer, { show } = picture;
-            window.widths = [];
-            picture.show = (arrived) => (window.widths.push(arrived.w), show.call(picture, arrived));
-        }"""
-    )
-    viewer.page.locator("#stage").press("ArrowLeft")
-    viewer.settled("octree")
-    assert viewer.page.evaluate("() => { delete window.viewer.picture.show; return window.widths.slice(-3); }") == [
-        128,
-        256,
-        viewer.camera["w"],
-    ]
-
-
 @pytest.mark.parametrize("size, expected", [("scene", (320, 240)), ("512x512", (512, 512)), ("0.5", None)])
 def test_the_picture_has_the_size_asked_for(viewer: Viewer, size: str, expected: tuple[int, int] | None) -> None:
     width, height = viewer.page.evaluate("() => [window.viewer.stage.clientWidth, window.viewer.stage.clientHeight]")

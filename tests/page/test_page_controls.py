@@ -42,13 +42,6 @@ def test_letters_mean_the_stage_where_a_slider_is_focused_and_arrows_the_slider(
     viewer.settled("phong")
 
 
-def test_who_comes_by_keyboard_stays_on_the_control(viewer: Viewer) -> None:
-    viewer.page.focus("[name=shadows]")
-    viewer.page.keyboard.press("Space")
-    assert not viewer.page.is_checked("[name=shadows]")
-    assert viewer.page.evaluate("() => document.activeElement.name") == "shadows"
-
-
 def picked(viewer: Viewer) -> str:
     """The card of a pixel whose ray goes on, and sends shadow rays."""
     left, top, width, height = (viewer.page.locator("#frame").bounding_box()[k] for k in ("x", "y", "width", "height"))
@@ -283,6 +276,7 @@ def test_a_control_is_pressed_by_keyboard_after_a_click_on_the_picture(viewer: V
     viewer.page.focus("[name=shadows]")
     viewer.page.keyboard.press("Space")
     assert not viewer.page.is_checked("[name=shadows]")
+    assert viewer.page.evaluate("() => document.activeElement.name") == "shadows"
 
 
 def test_two_clicks_on_the_card_turn_about_nothing(viewer: Viewer) -> None:

@@ -57,19 +57,6 @@ def test_the_first_traced_picture_stands_until_a_finer_one_comes(odd: Viewer) ->
     assert drawn[0] == 128 and drawn[-1] == width and None not in drawn and drawn == sorted(drawn)
 
 
-@pytest.mark.parametrize("samples", ["4", "1"])
-def test_a_finished_picture_stands_until_one_of_other_samples_is_finished(odd: Viewer, samples: str) -> None:
-    width = odd.camera["w"]
-    if samples == "1":
-        odd.page.select_option("[name=samples]", "4")
-        odd.settled("octree")
-    odd.page.evaluate(WATCH)
-    odd.page.select_option("[name=samples]", samples)
-    odd.settled("octree")
-    odd.page.evaluate("() => viewer.draw()")
-    assert set(odd.page.evaluate(WATCHED)) == {width}
-
-
 def test_brute_force_begins_with_the_octrees_picture(odd: Viewer) -> None:
     """It is the same one; WebGL's model stood there for the seconds that brute force took."""
     odd.page.evaluate(WATCH)
@@ -164,17 +151,6 @@ def test_a_picture_that_is_not_finished_is_saved_when_it_is(odd: Viewer, tmp_pat
     assert seen.shape[:2] == (odd.camera["h"], odd.camera["w"])
     said = odd.page.inner_text("#notices")
     assert f"blocks.png, {seen.shape[1]} × {seen.shape[0]}" in said and "when it is finished" not in said
-
-
-def test_the_line_over_the_picture_says_that_it_is_not_the_last(odd: Viewer) -> None:
-    odd.page.evaluate(HOLD)
-    odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
-    odd.page.wait_for_function("() => window.acks.some(({ seq, step }) => seq === viewer.seq && step === 0)")
-    width, height = (odd.page.evaluate("() => viewer.size")[k] for k in ("w", "h"))
-    odd.page.wait_for_function(f"() => document.querySelector('#hud').textContent.includes('of {width} × {height}')")
-    odd.page.evaluate(GO_ON)
-    odd.settled("octree")
-    assert odd.page.inner_text("#hud").startswith(f"{width} × {height} ·")
 
 
 # Each drawing, as it is seen: by which of the cameras that the page had, whether traced, how wide, and which answer.

@@ -90,13 +90,6 @@ def test_a_view_is_answered_while_a_still_is_made(client: Any, scene: Path) -> N
     client.send(type="stop")
 
 
-def test_the_share_that_is_done_rises(client: Any) -> None:
-    client.send(**still(w=1024, h=1024, settings={"samples": 4}))
-    shares, _ = pieces(client)
-    assert shares[0] == 0.0 and shares == sorted(shares) and shares[-1] <= 1.0
-    assert len(set(shares)) > 2
-
-
 def test_all_of_the_work_is_counted(shown: ShownScene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(passes, "BAND_PIXELS", 10_000)
     for asked in (read(still()), read(turntable())):
