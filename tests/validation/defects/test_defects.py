@@ -1,10 +1,14 @@
 """The seeded defects break what they name and reach kernels; a defect that is none is not caught."""
 
+import ast
+import inspect
 import json
 import os
 import re
 import subprocess
 import sys
+from functools import reduce
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +75,25 @@ class TestSeam:
             return
         altered = defect.change.altered(PACKAGE)
         assert compile(altered.text, altered.path.name, "exec") != compile(altered.path.read_bytes(), "", "exec")
+
+    @pytest.mark.parametrize(
+        "change", [d.change for d in DEFECTS if isinstance(d.change, Wrapped)], ids=lambda c: c.name
+    )
+    def test_a_wrapper_takes_what_the_sound_function_takes(self, change: Wrapped) -> None:
+        module, name = find_name(PACKAGE, change.name)
+        sound = reduce(getattr, name.split("."), import_module(module))
+        taken = inspect.signature(getattr(sound, "py_func", sound)).parameters.values()
+        required = [p.name for p in taken if p.default is p.empty and p.kind is p.POSITIONAL_OR_KEYWORD]
+        assert inspect.signature(change.wrapper).bind(sound, *required)
+
+    def test_what_wrappers_import_is_there(self) -> None:
+        """They import only when they are called, once a defect is injected."""
+        sources = Path(defects.__file__).parent.joinpath("seeded").glob("*.py")
+        trees = [ast.parse(source.read_text(encoding="utf-8")) for source in sources]
+        inner = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        names = [(node.module, alias.name) for node in inner for alias in node.names]
+        assert len([module for module, _ in names if module and module.startswith("renderer.")]) > 5
+        assert [name for name in names if not hasattr(import_module(str(name[0])), name[1])] == []
 
     def test_each_rule_in_the_sources_is_broken_by_a_defect(self) -> None:
         broken = {defect.change.name for defect in DEFECTS if isinstance(defect.change, Rule)}
