@@ -9,10 +9,10 @@ from validation.defects.edits import argument, call, choice, compare, value
 from validation.defects.seeded.defect import Defect
 
 
-def _first_direction_open(sound: Any, octree: Any, asked: Any, sky: Any, answers: Any) -> Any:
+def _first_direction_open(sound: Any, octree: Any, request: Any, sky: Any, answers: Any) -> Any:
     limits = np.array(sky.limits)
     limits[:1] = 0.0
-    return sound(octree, asked, sky._replace(limits=limits), answers)
+    return sound(octree, request, sky._replace(limits=limits), answers)
 
 
 def _mirrored_bytes(bits: Any) -> Any:
@@ -40,7 +40,7 @@ def _on_first_face(chosen: Any) -> Any:
 _CHANGES: dict[str, Change] = {
     "what lies at a point's horizon is open": Rule("open-above-horizon", compare(">=")),
     "the first direction of all is open": Wrapped("share.run", _first_direction_open),
-    "bits stand the other way round in their bytes": after("share.answer_bits", _mirrored_bytes),
+    "bits stand the other way round in their bytes": after("share.evaluate_bits", _mirrored_bytes),
     "rays of studies leave a face on its other side": Rule("side-of-study-ray", compare("<")),
     "the whole is without what the horizon hides": Rule("cosine-weight", call("abs", "max(_0, 0.0)")),
     "a list of leaves lacks its last one": Rule("end-of-leaf-list", argument(1, "max(_ - 1, 0)")),
