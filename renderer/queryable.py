@@ -20,7 +20,7 @@ from renderer.results.closest_points import ClosestPoints
 from renderer.results.hits import AllHits, Hits, Passage
 from renderer.results.steps import Steps
 from renderer.system.threads import checked_threads
-from renderer.trace.batch import RayBatch, check_rays, moved_off
+from renderer.trace.batch import RayBatch, check_rays, offset_origins
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.error import add_errors
 from renderer.trace.layout import Tree
@@ -175,7 +175,7 @@ class Queries:
         """
         built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        hits = all_hits(built.tree, rays, built.mesh, (contacts, max_hits), shape, self.threads)
+        hits = all_hits(built.tree, rays, built.mesh, contacts, max_hits, shape, self.threads)
         if flag_argument("t_error", t_error):
             add_errors(hits, rays, hits.ray, built.tree.scale, self.threads)
         return hits
@@ -243,7 +243,7 @@ class Queries:
             expect(side is None, "side", "None without leaving", repr(side)[:40])
             return rays, shape
         left = check_leaving(leaving, side, shape, len(built.mesh.faces))
-        return moved_off(rays, left, built.mesh, built.tree.scale, self.threads), shape
+        return offset_origins(rays, left, built.mesh, built.tree.scale, self.threads), shape
 
     def contains(
         self,

@@ -17,6 +17,7 @@ from renderer.all_hits.gather import (
     OUT_T,
     OUT_U,
     OUT_V,
+    Choice,
     gather_chunk,
 )
 from renderer.arguments.arrays import flag_argument
@@ -27,19 +28,11 @@ from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.closest import rays_against_blocks
 from renderer.trace.layout import Tree
-from renderer.trace.traverse import make_memory
+from renderer.trace.traverse import new_scratch
 
 # Hits that a thread gathers before it hands them over, unless one ray has more: 3.5 MB; of few rays, so many a ray.
 _CAPACITY, _OF_A_RAY = 1 << 15, 64
 _ANY_NUMBER = np.iinfo(np.int64).max
-
-
-class Choice(NamedTuple):
-    """Contacts or each hit, how many of a ray at most, and whether they are kept or counted only."""
-
-    contacts: bool
-    most: int
-    keep: bool
 
 
 class _Part(NamedTuple):
@@ -50,10 +43,16 @@ class _Part(NamedTuple):
 
 
 def all_hits(
-    tree: Tree, rays: RayBatch, mesh: Mesh, kept: tuple[bool, int | None], shape: tuple[int, ...], threads: int
+    tree: Tree,
+    rays: RayBatch,
+    mesh: Mesh,
+    contacts: bool,
+    max_hits: int | None,
+    shape: tuple[int, ...],
+    threads: int,
 ) -> AllHits:
-    """All hits of a batch of some dimensions, with ``kept`` = (contacts, max_hits); see ``Octree.all_hits``."""
-    choice = Choice(flag_argument("contacts", kept[0]), _most(kept[1]), True)
+    """All hits of a batch of some dimensions, see ``Octree.all_hits``."""
+    choice = Choice(flag_argument("contacts", contacts), _most(max_hits), True)
     counts, parts = _gathered(tree, rays, choice, threads)
     offsets = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])
@@ -82,9 +81,9 @@ def _gathered(tree: Tree, rays: RayBatch, choice: Choice, threads: int) -> tuple
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
         if bad and bad[0] < begin:
             return
-        memory, scratch = _memory(min(_CAPACITY, _OF_A_RAY * (end - begin))), make_memory(tree.depth, CANDIDATE_WORDS)
+        memory, scratch = _memory(min(_CAPACITY, _OF_A_RAY * (end - begin))), new_scratch(tree.depth, CANDIDATE_WORDS)
         while begin < end:
-            reached, row = gather_chunk(tree.words, rays, (begin, end), choice, counts, *memory, scratch)
+            reached, row = gather_chunk(tree.descriptor, rays, begin, end, choice, counts, *memory, scratch)
             if row >= 0:
                 bad.append(row)
                 return

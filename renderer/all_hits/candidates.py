@@ -10,16 +10,17 @@ import numpy as np
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import at, get, put, smaller
 from renderer.trace.intersect import see_triangles
-from renderer.trace.layout import BLOCK_WORDS, LEAF_BITS
-from renderer.trace.ray_lanes import CHILD, NUMBER, WIDTH, shear_of
-from renderer.trace.stream import begin_rays, clear_lanes, end_ray, leave_leaf, list_lane, meet_nodes, resume
+from renderer.trace.layout import BLOCK_WORDS
+from renderer.trace.ray_lanes import CHILD, NUMBER, WIDTH, Prepared, shear_of
+from renderer.trace.stream import MIN_ACTIVE, LaneCounts, Lanes, Queue, clear_lanes, run_lanes
+from renderer.trace.walk import first_block
 
 # Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
 # meshes meet. A ray that meets more is searched for alone.
 TOGETHER, LISTED = 256, 32
 CANDIDATE_WORDS = TOGETHER * (LISTED + 2)
-# The rounds of sixteen rays after which no further ray begins: some milliseconds, several times what most meshes take.
-_ROUNDS = 1 << 13
+# The rounds of lanes after which no further ray begins: some milliseconds, several times what most meshes take.
+_ROUNDS = 1 << 12
 
 
 class Candidates(NamedTuple):
@@ -38,53 +39,57 @@ def make_candidates(words):
     return Candidates(words, at(words, TOGETHER * LISTED), at(words, TOGETHER * (LISTED + 1)))
 
 
+class _Query(NamedTuple):
+    """Rays in lanes, the number of the first, and where the blocks that they meet are listed."""
+
+    prepared: Prepared
+    lanes: Lanes
+    begin: int
+    found: Candidates
+
+
 @kernel
 def find_blocks(tree, rays, begin, end, scratch, found):
     """List the blocks that the rays from ``begin`` on may hit, at most TOGETHER rays.
 
-    Returns the ray before which it ended, ``end`` unless there was much to do, and the number of rounds.
+    Returns the ray before which it ended, ``end`` unless there was much to do, and the rounds of sixteen rays, about.
     """
-    prepared, lanes, steps = scratch.prepared, scratch.lanes, np.int64(0)
-    count, following = end - begin, np.int64(0)
-    nodes, leaves, ends = 0, 0, 0
-    clear_lanes(lanes)
+    count, query = end - begin, _Query(scratch.prepared, scratch.lanes, begin, found)
+    clear_lanes(scratch.lanes)
     for k in range(count + WIDTH):
         put(found.numbers, k, begin + smaller(k, count - 1))
     for k in range(count):
         put(found.counts, k, 0)
-    while True:
-        if following < count and steps <= _ROUNDS * WIDTH:
-            following, nodes = begin_rays(rays, prepared, lanes, (found.numbers, following, count), (nodes, leaves))
-        if nodes + leaves + ends == 0:
-            return begin + following, steps // WIDTH
-        steps += nodes + leaves
-        meet_nodes(tree, prepared, lanes, nodes)
-        entered, nodes = nodes, 0
-        for k in range(entered):
-            r = get(lanes.at_node, k)
-            nodes, leaves, ends = list_lane(lanes, r, resume(tree, prepared, lanes, r), (nodes, leaves, ends))
-        _see_leaves(tree, prepared, lanes, leaves)
-        entered, leaves = leaves, 0
-        for k in range(entered):
-            r = get(lanes.at_leaf, k)
-            # rule: seen-blocks
-            if get(lanes.bits, k) != 0:
-                block = ~get(prepared.integers, CHILD + r) >> LEAF_BITS
-                _list_block(found, get(prepared.integers, NUMBER + r) - begin, block)
-            nodes, leaves, ends = list_lane(lanes, r, leave_leaf(tree, prepared, lanes, r), (nodes, leaves, ends))
-        for k in range(ends):
-            end_ray(lanes, get(lanes.at_end, k))
-        ends = 0
+    none, queue = LaneCounts(np.int64(0), np.int64(0), np.int64(0)), Queue(found.numbers, np.int64(0), count)
+    following, rounds = run_lanes(
+        tree, rays, scratch.prepared, scratch.lanes, none, queue, _ROUNDS, query, _see_leaves, _list_seen, _finish
+    )
+    return begin + following, rounds * (MIN_ACTIVE // WIDTH)
 
 
 @inlined
-def _see_leaves(tree, rays, lanes, count):
+def _see_leaves(tree, query, lanes, count):
     """Compute of each of ``count`` rays which faces it passes within, in the first block of its leaf."""
     for k in range(count):
         r = get(lanes.at_leaf, k)
-        block = ~get(rays.integers, CHILD + r) >> LEAF_BITS
-        _, seen = see_triangles(tree, block * BLOCK_WORDS, shear_of(rays, r))
+        block = first_block(get(query.prepared.integers, CHILD + r))
+        _, seen = see_triangles(tree, block * BLOCK_WORDS, shear_of(query.prepared, r))
         put(lanes.bits, k, seen)
+
+
+@inlined
+def _list_seen(tree, query, k):
+    """List the block of the k-th ray at a leaf if it passes within a face."""
+    r, integers = get(query.lanes.at_leaf, k), query.prepared.integers
+    # rule: seen-blocks
+    if get(query.lanes.bits, k) != 0:
+        _list_block(query.found, get(integers, NUMBER + r) - query.begin, first_block(get(integers, CHILD + r)))
+    return False
+
+
+@inlined
+def _finish(tree, query, r):
+    return np.int64(0)
 
 
 @inlined

@@ -10,17 +10,17 @@ import numpy as np
 
 from renderer.all_hits.candidates import LISTED, TOGETHER, find_blocks, make_candidates
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, extract, get, is_negative, lowest_bit, pointer, put, smaller
+from renderer.numerics.simd import at, get, is_negative, lowest_bit, pointer, put, smaller
+from renderer.trace.best import NO_FACE, Best
 from renderer.trace.edge_signs import coordinate, exact_sides
-from renderer.trace.intersect import hit_triangles, make_shear
+from renderer.trace.intersect import hit_in, hit_triangles, make_shear
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import NO_FACE, tree_pointers
+from renderer.trace.leaf import resolved_hit, tree_pointers
 from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
-from renderer.trace.resolve import settled
 from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
 from renderer.trace.starts.record import PILE, StartPointers
 from renderer.trace.starts.search import Departure, counted_from_start, depart, meet_near, near_bits, stopped_again
-from renderer.trace.traverse import make_scratch
+from renderer.trace.traverse import scratch_pointers
 from renderer.trace.walk import walk
 
 # Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
@@ -49,44 +49,49 @@ def _row(found, row, i):
     return found.capacity * row + i
 
 
+class Choice(NamedTuple):
+    """Whether hits become contacts, the most of them of a ray, and whether they are kept or counted only."""
+
+    contacts: bool
+    most: int
+    keep: bool
+
+
 @kernel
-def gather_chunk(words, rays, bounds, choice, counts, doubles, integers, memory):
-    """Gather the hits of the rays from bounds[0] to bounds[1]; what they have goes to ``counts``, one int64 a ray.
+def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers, scratch):
+    """Gather the hits of the rays begin:end; how many each has goes to ``counts``, one int64 a ray.
 
-    choice    (merge, most, keep): whether hits become contacts, the most of them of a ray, whether they are kept or
-              counted only
     doubles   (DOUBLE_ROWS, capacity) float64, integers (INTEGER_ROWS, capacity) int64: memory, and what is kept
-    memory    a ``traverse.Memory`` for CANDIDATE_WORDS rays
+    scratch   a ``traverse.Scratch`` for CANDIDATE_WORDS rays
 
-    Returns the ray before which it ended, because the memory was full or after _WORK, or bounds[1]; and the row of a
-    ray out of range, for which nothing is gathered, or -1.
+    Returns the ray before which it ended, because the memory was full or after _WORK, or ``end``; and the row of a ray
+    out of range, for which nothing is gathered, or -1.
     """
-    tree = tree_pointers(words)
+    tree = tree_pointers(descriptor)
     source, found = ray_pointers(rays, tree.scale), Found(pointer(doubles), pointer(integers), doubles.shape[1])
-    bad, kept = first_bad_ray(source, bounds[0], bounds[1]), np.int64(0)
+    bad, kept = first_bad_ray(source, begin, end), np.int64(0)
     if bad >= 0:
-        return bounds[0], bad
-    merge, most, keep = choice
-    scratch = make_scratch(memory)
-    candidates = make_candidates(scratch.waiting)
-    begin, hits, rounds = bounds[0], np.int64(0), np.int64(0)
+        return begin, bad
+    memory = scratch_pointers(scratch)
+    candidates = make_candidates(memory.waiting)
+    hits, rounds = np.int64(0), np.int64(0)
     # Where the candidates of rays were found, they are used: only hits end it between such rays.
-    while begin < bounds[1] and hits + rounds <= _WORK:
-        end, taken = smaller(begin + TOGETHER, bounds[1]), np.int64(0)
+    while begin < end and hits + rounds <= _WORK:
+        reached, taken = smaller(begin + TOGETHER, end), np.int64(0)
         if tree.has_nodes:
-            end, taken = find_blocks(tree, source, begin, end, scratch, candidates)
+            reached, taken = find_blocks(tree, source, begin, reached, memory, candidates)
         rounds += taken
-        for i in range(begin, end):
-            count = _list_all(tree, source, i, candidates, i - begin, found, scratch)
+        for i in range(begin, reached):
+            count = _list_all(tree, source, i, candidates, i - begin, found, memory)
             if kept + count > found.capacity or hits > _WORK:
                 return i, -1
             hits += count
             # rule: max-hits
-            counts[i] = smaller(_ordered(tree, found, count, merge, keep), most)
-            if keep:
+            counts[i] = smaller(_ordered(tree, found, count, choice.contacts, choice.keep), choice.most)
+            if choice.keep:
                 _keep(found, kept, counts[i], tree.scale, make_shear(ray_at(source, i)[0]).direction_z)
                 kept += counts[i]
-        begin = end
+        begin = reached
     return begin, -1
 
 
@@ -124,27 +129,34 @@ def _list_hits(tree, query, first, blocks, count):
     """Add the hits in some blocks to the list."""
     ray, shear, t_max = query.single.ray, query.single.shear, query.t_max
     for block in range(first, first + blocks):
-        base = block * BLOCK_WORDS
-        bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, t_max)
+        hits = hit_triangles(tree, block * BLOCK_WORDS, shear, ray.t_min, t_max)
+        bits = hits.bits
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            hit, edges = (extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)), np.int64(0)
-            if (doubts >> i) & 1 != 0 or hit[1] == 0.0 or hit[2] == 0.0 or hit[1] + hit[2] == hit[3]:
-                edges = _edges_passed(exact_sides(tree, base + i, shear))
-            if (doubts >> i) & 1 != 0:
-                hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-            count = _add_hit(tree, query.found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
+            edges, hit = _edges_at(tree, block, hits, i, shear), resolved_hit(tree, block, hits, i, ray, shear)
+            count = _add_hit(tree, query, count, hit, block, i, edges)
     return count, False
 
 
 @inlined
-def _add_hit(tree, found, count, ray, t_max, hit, number, place, edges):
-    """Add a hit to the list if it is in the ray's interval; returns the number of hits."""
-    if not ray.t_min <= hit[0] <= t_max:
+def _edges_at(tree, block, hits, i, shear):
+    """The edges that a ray passes, as bits, of the i-th of the ``BlockHits`` of a block."""
+    hit, edges = hit_in(hits, i), np.int64(0)
+    if (hits.uncertain >> i) & 1 != 0 or hit.u == 0.0 or hit.v == 0.0 or hit.u + hit.v == hit.w:
+        edges = _edges_passed(exact_sides(tree, block * BLOCK_WORDS + i, shear))
+    return edges
+
+
+@inlined
+def _add_hit(tree, query, count, hit, block, i, edges):
+    """Add a hit on the i-th face of a block to the list if it is in the ray's interval; returns the number of hits."""
+    found = query.found
+    if not query.single.ray.t_min <= hit.t <= query.t_max:
         return count
     if count < found.capacity:
-        _list_hit(found, count, hit, get(tree.faces, number), place, edges)
+        face = np.int64(get(tree.faces, block * BLOCK_FACES + i))
+        _list_hit(found, count, face, hit, block * BLOCK_WORDS + i, edges)
     return count + 1
 
 
@@ -155,15 +167,15 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
     departure, stopped = depart(tree, rays.starts, i, ray, stack, scratch.holders)
     ray, count, pile = departure.ray, np.int64(0), np.int64(get(at(rays.starts.rows, i * rays.starts.step), PILE))
     for _ in range(departure.holders):
-        if stopped[1] == NO_FACE or t_max < 0.0:
+        if stopped.face == NO_FACE or t_max < 0.0:
             break
+        face = np.int64(stopped.face)
         if count < found.capacity:
-            hit = stopped[0], stopped[2], stopped[3], stopped[4]
-            _list_hit(found, count, hit, stopped[1], _FIRST + count, np.int64(0))
+            _list_hit(found, count, face, stopped, _FIRST + count, np.int64(0))
         count += 1
         # The sign of 0 tells the next face of the pile from one that begins another.
-        pile = pile if is_negative(stopped[0]) else np.int64(stopped[1])
-        stopped = stopped_again(tree, departure, np.int64(stopped[1]), pile, scratch.holders)
+        pile = pile if is_negative(stopped.t) else face
+        stopped = stopped_again(tree, departure, face, pile, scratch.holders)
     query = _QueryFrom(departure, prepare_single(ray), t_max, found, rays.starts, i)
     return walk(tree, stack, query, count, _enter, _list_hits_from)
 
@@ -184,43 +196,40 @@ def _list_hits_from(tree, query, first, blocks, count):
     """``_list_hits`` for a ray that leaves the surface."""
     departure, ray, shear, t_max = query.departure, query.single.ray, query.single.shear, query.t_max
     for block in range(first, first + blocks):
-        base = block * BLOCK_WORDS
-        bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, t_max)
-        near = near_bits(tree, block, departure, shear, bits)
-        bits |= near
+        hits = hit_triangles(tree, block * BLOCK_WORDS, shear, ray.t_min, t_max)
+        near = near_bits(tree, block, departure, shear, hits.bits)
+        bits = hits.bits | near
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            if np.float64(get(tree.faces, block * BLOCK_FACES + i)) == ray.leaving:
+            face = get(tree.faces, block * BLOCK_FACES + i)
+            if np.float64(face) == ray.leaving:
                 continue
-            hit, edges = (extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)), np.int64(0)
             if (near >> i) & 1 != 0:
-                hit, edges = meet_near(tree, base + i, departure, shear.direction_z)
+                hit, edges = meet_near(tree, block * BLOCK_WORDS + i, departure, shear.direction_z)
             else:
-                if (doubts >> i) & 1 != 0 or hit[1] == 0.0 or hit[2] == 0.0 or hit[1] + hit[2] == hit[3]:
-                    edges = _edges_passed(exact_sides(tree, base + i, shear))
-                if (doubts >> i) & 1 != 0:
-                    hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-                if ray.t_min <= hit[0] <= t_max:
-                    face = np.int64(get(tree.faces, block * BLOCK_FACES + i))
-                    hit = counted_from_start(tree, query.starts, query.row, ray, query.single.largest, hit, face)
-            count = _add_hit(tree, query.found, count, ray, t_max, hit, block * BLOCK_FACES + i, base + i, edges)
+                edges, hit = _edges_at(tree, block, hits, i, shear), resolved_hit(tree, block, hits, i, ray, shear)
+                if ray.t_min <= hit.t <= t_max:
+                    largest = query.single.largest
+                    hit = counted_from_start(tree, query.starts, query.row, ray, largest, hit, np.int64(face))
+            count = _add_hit(tree, query, count, hit, block, i, edges)
     return count, False
 
 
 @inlined
 def _edges_passed(sides):
     """The edges that a ray passes, as bits: 1 for the edge opposite to the first corner, 2 and 4 for the others."""
-    return np.int64(sides[0] == 0) | (np.int64(sides[1] == 0) << 1) | (np.int64(sides[2] == 0) << 2)
+    first, second, third = sides.opposite0 == 0, sides.opposite1 == 0, sides.opposite2 == 0
+    return np.int64(first) | (np.int64(second) << 1) | (np.int64(third) << 2)
 
 
 @inlined
-def _list_hit(found, i, hit, face, place, edges):
-    put(found.doubles, _row(found, _T, i), hit[0])
-    put(found.doubles, _row(found, _U, i), hit[1])
-    put(found.doubles, _row(found, _V, i), hit[2])
-    put(found.doubles, _row(found, _W, i), hit[3])
-    put(found.integers, _row(found, _FACE, i), np.int64(face))
+def _list_hit(found, i, face, hit, place, edges):
+    put(found.doubles, _row(found, _T, i), hit.t)
+    put(found.doubles, _row(found, _U, i), hit.u)
+    put(found.doubles, _row(found, _V, i), hit.v)
+    put(found.doubles, _row(found, _W, i), hit.w)
+    put(found.integers, _row(found, _FACE, i), face)
     put(found.integers, _row(found, _AT, i), place)
     put(found.integers, _row(found, _EDGES, i), edges)
 
@@ -340,7 +349,7 @@ def _keep(found, kept, count, scale, dz):
     face, side = at(found.integers, _row(found, OUT_FACE, kept)), at(found.integers, _row(found, OUT_SIDE, kept))
     for k in range(count):
         i = get(found.integers, _row(found, _ORDER, k))
-        hit = (
+        hit = Best(
             get(found.doubles, _row(found, _T, i)),
             get(found.integers, _row(found, _FACE, i)),
             get(found.doubles, _row(found, _U, i)),

@@ -4,5 +4,5 @@
 FARTHEST = 2.0**126
 # The range of a direction's largest component. Its product with a determinant stays a normal float64 number: with
 # LONGEST for determinants up to 2^254, the most that FARTHEST allows, and with SHORTEST for those down to 2^-713, a
-# rounding of the least that ``octree._LEAST_SIDE`` allows. What is less is in doubt, and computed in other units.
+# rounding of the least that ``octree._LEAST_SIDE`` allows. What is less is uncertain, and computed in other units.
 SHORTEST, LONGEST = 2.0**-300, 2.0**700

@@ -105,7 +105,7 @@ class Steps:
         """What the ray meets at t, where it hits a face at barycentrics."""
         d, arrays, tree = ray.direction, self.arrays, self.prepared.tree
         stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
-        together = together_of(tree.words, arrays, spot, d, stack, memory)
+        together = together_of(tree.descriptor, arrays, spot, d, stack, memory)
         surface = Surface(*surface_together_of(arrays, together, d))
         inside, row = dot(d, surface.n_s) > 0.0, int(surface.material)
         media, beyond = np.array(ray.media, np.int64), np.zeros(self.media + SPARE, np.int64)
@@ -180,7 +180,7 @@ class Steps:
 
     def _start(self, place: Place, n_g: Vector, direction: Vector, came: Vector) -> Floats:
         """The row of the start of a ray that leaves a surface of normal n_g, where one in direction ``came`` ended."""
-        if not self.offset.bounded:
+        if not self.offset.uses_error_bound:
             return _NO_START
         row = np.empty(ROW)
         start_row(row, place, n_g, direction, came)

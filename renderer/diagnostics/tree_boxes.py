@@ -15,9 +15,10 @@ from renderer.jit.decorators import kernel
 from renderer.numerics.simd import splat8, store
 from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import check_rays
+from renderer.trace.best import NO_FACE, FaceHit, hit_on
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
-from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.trace.leaf import nearest_carefully, tree_pointers
 from renderer.trace.walk import blocks_of
 
 Boxes = NDArray[np.float64]
@@ -88,7 +89,7 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
             continue
         opened.append(Visit(level, box[:3] / scale, box[3:] / scale, child < 0))
         if child < 0:
-            t, face = _best_in_leaf(tree.words, child, ray, t, face)
+            t, face = _best_in_leaf(tree.descriptor, child, ray, t, face)
         else:
             waiting += _met_octants(tree, child, level, ray, t)
     return opened
@@ -143,9 +144,9 @@ def _limit(ray: Ray, t: float) -> float:
 
 
 @kernel
-def _best_in_leaf(words: NDArray[np.int64], leaf: int, ray: Ray, t: float, face: int) -> tuple[float, int]:
+def _best_in_leaf(descriptor: NDArray[np.int64], leaf: int, ray: Ray, t: float, face: int) -> tuple[float, int]:
     """t and face of the best hit so far and those in a leaf."""
-    tree, (first, count) = tree_pointers(words), blocks_of(leaf)
-    best = (t, np.int32(face), 0.0, 0.0, 1.0)
-    t, face, _, _, _ = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
-    return t, int(face)
+    tree, (first, count) = tree_pointers(descriptor), blocks_of(leaf)
+    best = hit_on(np.int32(face), FaceHit(t, 0.0, 0.0, 1.0))
+    best = nearest_carefully(tree, first, count, ray, make_shear(ray), best)
+    return best.t, int(best.face)

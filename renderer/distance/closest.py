@@ -35,7 +35,7 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
         size = stack_size(tree.depth) + LISTED
         integers, doubles, done = np.empty(size, np.int64), np.empty(size + 9), 0
         while done < len(some):
-            done = find_nearest(tree.words, some, rows, limits, out, integers, doubles, done)
+            done = find_nearest(tree.descriptor, some, rows, limits, out, integers, doubles, done)
             yield
 
     least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))

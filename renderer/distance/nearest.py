@@ -27,9 +27,10 @@ from renderer.numerics.simd import (
     store,
 )
 from renderer.numerics.vec3 import three
+from renderer.trace.best import NO_FACE
 from renderer.trace.edge_signs import corner
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import NO_FACE, tree_pointers
+from renderer.trace.leaf import tree_pointers
 from renderer.trace.point import Point
 from renderer.trace.rays import hit_pointers
 from renderer.trace.walk import child_in, walk_nearest_first
@@ -92,7 +93,7 @@ class _Found(NamedTuple):
 
 
 @kernel
-def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
+def find_nearest(descriptor, points, rows, limits, out, integers, doubles, begin):
     """Write distance, u, v and face (or UNDECIDED_FACE) of ``points``, from row ``begin`` on, to ``out[:, rows]``.
 
     out        (4, m) float64
@@ -101,7 +102,7 @@ def find_nearest(words, points, rows, limits, out, integers, doubles, begin):
 
     Returns the row before which it ended: early after WORK, so that Ctrl-C need not wait for long.
     """
-    tree, parts, count = tree_pointers(words), local_doubles(), len(points)
+    tree, parts, count = tree_pointers(descriptor), local_doubles(), len(points)
     found, size = hit_pointers(out, out.shape[1]), len(integers) - LISTED
     children, near = pointer(integers), pointer(doubles)
     scratch = Scratch(

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.arguments.points import check_points, farthest_of
 from renderer.distance.on_surface import SurfacePoints, are_on, check_on, on_surface, places_of
 from renderer.mesh.mesh import Mesh
-from renderer.trace.batch import Leaving, RayBatch, broadcast_shape, check_faces, moved_off
+from renderer.trace.batch import Leaving, RayBatch, broadcast_shape, check_faces, offset_origins
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.layout import Tree
 
@@ -91,7 +91,7 @@ def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) ->
         start.points, directions, t_min, np.where(stop.places.faces < 0, np.maximum(reach - room, 0.0), reach)
     )
     leaving = Leaving(*start.places)
-    return moved_off(rays, leaving, mesh, tree.scale, threads) if (leaving.faces >= 0).any() else rays
+    return offset_origins(rays, leaving, mesh, tree.scale, threads) if (leaving.faces >= 0).any() else rays
 
 
 def _way(start: Floats, stop: Floats) -> tuple[Floats, Floats]:

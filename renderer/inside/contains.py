@@ -67,7 +67,7 @@ def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) 
         # Memory for the deepest tree: a kernel's own frame holds the stack of most trees, not of all.
         stack, done = np.empty(stack_size(tree.depth), np.int64), 0
         while done < len(some):
-            done = count_crossings(tree.words, some, axis, middle, rows, counted, stack, done)
+            done = count_crossings(tree.descriptor, some, axis, middle, rows, counted, stack, done)
             yield
 
     search_in_order(count, points, mesh, axis, _LEAST, threads)

@@ -81,7 +81,7 @@ class _Crossings(NamedTuple):
 
 
 @kernel
-def count_crossings(words, points, axis, middle, rows, out, stack, begin):
+def count_crossings(descriptor, points, axis, middle, rows, out, stack, begin):
     """Winding numbers (or ON_FACE, or UNDECIDED_COUNT) for ``points`` (n, 3), from row ``begin`` on, to
     ``out[rows[i]]``, int32.
 
@@ -89,7 +89,7 @@ def count_crossings(words, points, axis, middle, rows, out, stack, begin):
     ``stack`` is memory for ``walk.stack_size`` int64. Returns the row before which it ended: early after WORK, so
     that Ctrl-C need not wait for long.
     """
-    tree, parts = tree_pointers(words), local_doubles()
+    tree, parts = tree_pointers(descriptor), local_doubles()
     scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
     # Behind the expansion's parts.
     work = at(parts, PARTS)

@@ -79,12 +79,12 @@ def _computed(tree: Tree, threads: int) -> NDArray[np.float64]:
     rows, leaves = cache_aligned(count * MOMENT_WORDS, np.float64), _leaf_count(tree)
 
     def measure(begin: int, end: int) -> None:
-        _measure_octants(tree.words, rows, _scratch(tree, leaves), begin, end)
+        _measure_octants(tree.descriptor, rows, _scratch(tree, leaves), begin, end)
 
     for_chunks(measure, count, _NODES, threads)
     scratch = _scratch(tree, leaves)
     for end in range(count, 0, -_NODES):
-        _join_octants(tree.words, rows, scratch, max(0, end - _NODES), end)
+        _join_octants(tree.descriptor, rows, scratch, max(0, end - _NODES), end)
     return rows
 
 
@@ -101,9 +101,9 @@ def _scratch(tree: Tree, leaves: int) -> Scratch:
 
 
 @kernel
-def _measure_octants(words, rows, scratch, begin, end):
+def _measure_octants(descriptor, rows, scratch, begin, end):
     """Write the centres, radii, sizes and spreads of the octants of some nodes, and the coefficients of leaves."""
-    tree, rows = tree_pointers(words), pointer(rows)
+    tree, rows = tree_pointers(descriptor), pointer(rows)
     for node in range(begin, end):
         for place in range(8):
             base, link = node * MOMENT_WORDS + place, child_in(tree, node, place)
@@ -274,9 +274,9 @@ def _scaled(a, b, unit):
 
 
 @kernel
-def _join_octants(words, rows, scratch, begin, end):
+def _join_octants(descriptor, rows, scratch, begin, end):
     """Write the coefficients of octants that are nodes themselves, last to first: a child comes after its parent."""
-    tree, rows = tree_pointers(words), pointer(rows)
+    tree, rows = tree_pointers(descriptor), pointer(rows)
     for node in range(end - 1, begin - 1, -1):
         for place in range(8):
             child = child_in(tree, node, place)

@@ -45,7 +45,7 @@ def _numbers(tree: Tree, mesh: Mesh, points: Floats, tolerance: float, threads: 
     def find(rows: NDArray[np.int64], some: Floats) -> Iterator[None]:
         stack, found, done = np.empty(stack_size(tree.depth), np.int64), np.empty(len(some)), 0
         while done < len(some):
-            done = find_windings(tree.words, moments, some, tolerance, found, stack, done, len(some))
+            done = find_windings(tree.descriptor, moments, some, tolerance, found, stack, done, len(some))
             yield
         numbers[rows] = found
 

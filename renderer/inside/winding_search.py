@@ -27,7 +27,7 @@ _FIRST_SIDE, _NEXT_SIDE = 1.0, 2.0**-4
 
 
 @kernel
-def find_windings(words, rows, points, tolerance, out, stack, begin, end):
+def find_windings(descriptor, rows, points, tolerance, out, stack, begin, end):
     """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``;
     for SIDE_OF_HALF numbers that are above 1/2 where they are, and else not.
 
@@ -35,7 +35,7 @@ def find_windings(words, rows, points, tolerance, out, stack, begin, end):
     ``moments_of`` has for the tree, ``stack`` memory for ``walk.stack_size`` int64. Returns the row before which it
     ended: early after _WORK.
     """
-    tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
+    tree, rows, stack, parts = tree_pointers(descriptor), pointer(rows), pointer(stack), local_doubles()
     work, first_share = np.int64(0), _FIRST_SIDE if tolerance < 0.0 else _FIRST * tolerance
     for i in range(begin, end):
         row = at(pointer(points), 3 * i)

@@ -110,7 +110,7 @@ class PreparedScene:
             tall, wide = film.radiance.shape[:2]
             tile = Rectangle(x, y, min(x + TILE, wide), min(y + TILE, tall))
             scratch = tile_scratch(self.tree.depth, settings, _bundles_in_a_row(self.tree))
-            while not render_tile(self.tree.words, arrays, settings, rows, samples, film, tile, scratch):
+            while not render_tile(self.tree.descriptor, arrays, settings, rows, samples, film, tile, scratch):
                 yield
             cut[first] = scratch.state[CUT]
 
@@ -198,7 +198,7 @@ def arrays_for(prepared: PreparedScene, camera: Camera, offset: OffsetRule, medi
         arrays = arrays._replace(media=media_around(prepared.scene, camera))
     if media == "normal":
         arrays = arrays._replace(media=arrays.media[:0])
-    if media == "normal" or not offset.bounded:
+    if media == "normal" or not offset.uses_error_bound:
         arrays = arrays._replace(touching=arrays.touching[:0])
     return arrays
 

@@ -23,7 +23,7 @@ def touching_faces(tree: Tree, arrays: SceneArrays, threads: int, every: bool = 
     touching = np.zeros(len(arrays.faces), np.uint8)
 
     def mark(begin: int, end: int) -> None:
-        mark_touching(tree.words, arrays, begin, end, every, np.empty(stack_size(tree.depth), np.int64), touching)
+        mark_touching(tree.descriptor, arrays, begin, end, every, np.empty(stack_size(tree.depth), np.int64), touching)
 
     for_chunks(mark, len(tree.faces), _CHUNK, threads)
     return touching if touching.any() else touching[:0]

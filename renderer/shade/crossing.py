@@ -186,9 +186,9 @@ def _cross_all(scene, members, media, beyond, memory):
 
 
 @kernel
-def together_of(words, arrays, spot, d, stack, memory):
+def together_of(descriptor, arrays, spot, d, stack, memory):
     """``faces_together``, for Python."""
-    return faces_together(tree_pointers(words), scene_pointers(arrays), spot, d, pointer(stack), pointer(memory))
+    return faces_together(tree_pointers(descriptor), scene_pointers(arrays), spot, d, pointer(stack), pointer(memory))
 
 
 @kernel

@@ -71,7 +71,7 @@ def aim(seen, p, n_g, error, offset):
         return ShadowRay(spawn_origin(p, error, n_g, seen.place, offset), seen.place, np.inf)
     o = spawn_origin(p, error, n_g, sub(seen.place, p), offset)
     # Mitsuba stops ten of its epsilons short.
-    t_max = SHORT_OF_LIGHT if offset.bounded else 1.0 - 10.0 * offset.epsilon
+    t_max = SHORT_OF_LIGHT if offset.uses_error_bound else 1.0 - 10.0 * offset.epsilon
     return ShadowRay(o, sub(seen.place, o), t_max)
 
 

@@ -28,7 +28,7 @@ from renderer.shade.whitted import (
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.spawn import put_no_start
-from renderer.trace.traverse import Memory, make_memory, make_scratch
+from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
 # The side in pixels of the squares whose rays become packets.
@@ -211,7 +211,7 @@ class TileScratch(NamedTuple):
     and the number of bundles that are traced per call.
     """
 
-    trace: Memory
+    trace: Scratch
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     hits: NDArray[np.bool_]
@@ -223,7 +223,7 @@ class TileScratch(NamedTuple):
 def tile_scratch(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileScratch:
     """The scratch that ``render_tile`` needs beside its film, for one tile and a tree of ``depth`` levels."""
     doubles, integers = scratch_lengths(settings)
-    trace, hits = make_memory(depth, SIZE), np.empty(SIZE, np.bool_)
+    trace, hits = new_scratch(depth, SIZE), np.empty(SIZE, np.bool_)
     return TileScratch(
         trace, cache_aligned(doubles, np.float64), cache_aligned(integers, np.int64), hits, np.empty(3 * SIZE),
         np.zeros(_STATE, np.int64), bundles,
@@ -244,17 +244,17 @@ def _trace_next(tree, scene, settings, camera, film, tile, scratch, state):
 
 
 @kernel
-def render_tile(words, scene, settings, camera, samples, film, tile, arrays):
+def render_tile(descriptor, scene, settings, camera, samples, film, tile, arrays):
     """Fill the pixels of a ``Rectangle``, the tile; ``camera`` are the rows of the camera's affine map.
 
-    ``words`` are the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
+    ``descriptor`` is the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
     samples, their rays are added up from 0. Returns whether the tile is done. If not, ``arrays.bundles`` bundles were
     traced, and the caller can react to Ctrl-C; called again with the same ``arrays``, a ``TileScratch``, it goes on.
     """
     doubles, integers, hits = pointer(arrays.doubles), pointer(arrays.integers), pointer(arrays.hits)
     state, total = pointer(arrays.state), pointer(arrays.total)
-    scratch = bundle_scratch(doubles, integers, hits, settings, make_scratch(arrays.trace))
-    tree, seen = tree_pointers(words), scene_pointers(scene)
+    scratch = bundle_scratch(doubles, integers, hits, settings, scratch_pointers(arrays.trace))
+    tree, seen = tree_pointers(descriptor), scene_pointers(scene)
     shooting = CameraMap(pointer(camera), pointer(samples), len(samples))
     if get(state, _BLOCK) == 0 and get(state, _BEGUN) == 0:
         begin_bundles(scratch, settings)

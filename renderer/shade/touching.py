@@ -35,11 +35,11 @@ _EDGE_ERROR = 2.0**-50
 
 
 @kernel
-def mark_touching(words, arrays, begin, end, every, stack, touching):
+def mark_touching(descriptor, arrays, begin, end, every, stack, touching):
     """Mark those faces of some places in blocks that pass light, or every one, and may coincide with another face; and
     that one.
     """
-    tree, scene = tree_pointers(words), scene_pointers(arrays)
+    tree, scene = tree_pointers(descriptor), scene_pointers(arrays)
     for slot in range(begin, end):
         face = get(tree.faces, slot)
         if face >= 0 and (every or lets_through(scene.materials, np.int64(get(scene.material, face)))):

@@ -62,7 +62,7 @@ from renderer.trace.rays import HitPointers, RayPointers
 from renderer.trace.spawn import OffsetRule, Place, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
 from renderer.trace.starts.record import ROW, StartPointers
-from renderer.trace.traverse import Scratch
+from renderer.trace.traverse import ScratchPointers
 
 
 class Settings(NamedTuple):
@@ -96,7 +96,7 @@ class BundleScratch(NamedTuple):
     bundles: Any
     bundle_words: Any
     order: Any
-    trace: Scratch
+    trace: ScratchPointers
     found: HitPointers
     zero: Any
     infinity: Any

@@ -143,7 +143,7 @@ def run(octree: Queries, request: StudyRequest, sky: Sky, answers: Answers) -> N
                 first, k, scratch = 0, 0, make_sweep_scratch(tree.depth)
                 while first < len(rows):
                     first, k = sweep(
-                        tree.words, mesh.vertices, mesh.faces, places, sky, answers, rows, jumps, first, k, scratch
+                        tree.descriptor, mesh.vertices, mesh.faces, places, sky, answers, rows, jumps, first, k, scratch
                     )  # fmt: skip
                     yield
 

@@ -18,14 +18,14 @@ from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.parallel_rays import (
-    Parallel,
-    ParallelMemory,
-    make_parallel_memory,
+    ParallelPointers,
+    ParallelScratch,
+    new_parallel_scratch,
     parallel_pointers,
     trace_parallel,
 )
 from renderer.trace.rays import HitPointers, RayPointers, hit_pointers
-from renderer.trace.spawn import LEVEL, has_normal, leave_to_both_sides, put_no_start
+from renderer.trace.spawn import LEVEL, has_normal, offset_to_both_sides, put_no_start
 from renderer.trace.starts.anchor import anchor_of, rounded
 from renderer.trace.starts.cone import make_holders
 from renderer.trace.starts.fan import FAN_HEAD, OPEN, STOPPED, UNSURE, has_fan, size_of_fan, stop_of
@@ -46,7 +46,7 @@ from renderer.trace.starts.record import (
     start_at,
 )
 from renderer.trace.starts.search import take_side
-from renderer.trace.traverse import Memory, Scratch, make_memory, make_scratch, search_blocks, trace
+from renderer.trace.traverse import Scratch, ScratchPointers, new_scratch, scratch_pointers, search_blocks, trace
 
 TILE = 256
 # A tile ends where the curve leaves the largest cell, but not before so many points: else its parts may be far apart,
@@ -128,8 +128,8 @@ class SweepScratch(NamedTuple):
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     hits: NDArray[np.float64]
-    trace: Memory
-    parallel: ParallelMemory
+    trace: Scratch
+    parallel: ParallelScratch
 
 
 class _SweepPointers(NamedTuple):
@@ -150,8 +150,8 @@ class _SweepPointers(NamedTuple):
     vertices: Any
     faces: Any
     found: HitPointers
-    trace: Scratch
-    parallel: Parallel
+    trace: ScratchPointers
+    parallel: ParallelPointers
 
 
 def make_sweep_scratch(depth: int) -> SweepScratch:
@@ -160,8 +160,8 @@ def make_sweep_scratch(depth: int) -> SweepScratch:
         cache_aligned(_POINT_DOUBLES + (8 + ROW) * RAYS + 8, np.float64),
         cache_aligned(_POINT_INTEGERS + RAYS, np.int64),
         cache_aligned(RAYS // 8, np.float64),
-        make_memory(depth, RAYS),
-        make_parallel_memory(depth, TILE),
+        new_scratch(depth, RAYS),
+        new_parallel_scratch(depth, TILE),
     )
 
 
@@ -176,7 +176,7 @@ def _scratch_pointers(arrays, vertices, faces):
     return _SweepPointers(
         doubles, integers, origins, directions, limits, starts, values, zero, at(integers, _POINT_INTEGERS),
         pointer(vertices), pointer(faces),
-        hit_pointers(arrays.hits, 0), make_scratch(arrays.trace), parallel_pointers(arrays.parallel),
+        hit_pointers(arrays.hits, 0), scratch_pointers(arrays.trace), parallel_pointers(arrays.parallel),
     )  # fmt: skip
 
 
@@ -225,7 +225,7 @@ def _begin_on_face(tree, scratch, i, o, face, code, has_horizon):
     starts = StartPointers(start, 0, scratch.vertices, scratch.faces)
     corners, slack = corners_of(starts.vertices, starts.faces, face, tree.scale), EDGE
     if has_normal(corners[0], corners[1], corners[2]):
-        normal, above, below, slack = leave_to_both_sides(corners, o, tree.scale)
+        normal, above, below, slack = offset_to_both_sides(corners, o, tree.scale)
         put3(scratch.points, _FACING + 3 * i, normal)
         put3(scratch.points, _ABOVE + 3 * i, above)
         put3(scratch.points, _BELOW + 3 * i, below)
@@ -387,10 +387,10 @@ def _tile_from(rows, steps, begin):
 
 
 @kernel
-def sweep(words, vertices, faces, places, sky, answers, rows, steps, begin, k, arrays):
+def sweep(descriptor, vertices, faces, places, sky, answers, rows, steps, begin, k, arrays):
     """Let the points in ``rows``, one tile after the other, look in all directions; some rays more with each call.
 
-    words      those of the tree, over ``vertices`` and ``faces``
+    descriptor      those of the tree, over ``vertices`` and ``faces``
     steps      those of the curve to the rows; none where the points are too far apart for their rays to be traced
                together
     begin, k   where the tile under way begins, and its next direction: 0, 0 in the first call, and later what the last
@@ -398,7 +398,7 @@ def sweep(words, vertices, faces, places, sky, answers, rows, steps, begin, k, a
 
     All is done at (len(rows), 0).
     """
-    tree, scratch = tree_pointers(words), _scratch_pointers(arrays, vertices, faces)
+    tree, scratch = tree_pointers(descriptor), _scratch_pointers(arrays, vertices, faces)
     count = _tile_from(rows, steps, begin)
     if k == 0:
         _begin_tile(tree, places, rows, begin, count, scratch)

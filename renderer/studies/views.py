@@ -21,7 +21,7 @@ from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
 from renderer.studies.edge_on import are_edge_on
 from renderer.studies.share import check_directions, lengths_of, limits_of
 from renderer.system.terminal import progress_bar
-from renderer.trace.batch import Leaving, check_rays, moved_off
+from renderer.trace.batch import Leaving, check_rays, offset_origins
 from renderer.trace.closest import closest_hits
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import ANCHOR, CODE, FACE, HEAD, ROW, WAY
@@ -199,7 +199,7 @@ def _first_hits(octree: Queries, place: Floats, directions: Floats, reach: Float
         row = _row_on_side(octree, face, code, anchor, outer)
         count, (face, code) = len(directions), row[[FACE, CODE]].astype(np.int64)
         leaving = Leaving(np.full(count, face), np.full(1, code), np.tile(row[ANCHOR : ANCHOR + 3], (count, 1)))
-        rays = moved_off(rays, leaving, mesh, tree.scale, octree.threads)
+        rays = offset_origins(rays, leaving, mesh, tree.scale, octree.threads)
         rays.starts[HEAD:].view(np.float64).reshape(count, ROW)[:, WAY:] = outer
     return closest_hits(tree, rays, mesh, octree.threads)
 
@@ -210,7 +210,7 @@ def _row_on_side(octree: Queries, face: int, code: int, anchor: Floats, normal: 
     row = np.zeros(ROW)
     row[FACE], row[CODE], row[ANCHOR : ANCHOR + 3] = face, code, anchor
     stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
-    side_taken(tree.words, mesh.vertices, mesh.faces, row, tuple(normal.tolist()), stack, memory)
+    side_taken(tree.descriptor, mesh.vertices, mesh.faces, row, tuple(normal.tolist()), stack, memory)
     return row
 
 

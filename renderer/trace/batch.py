@@ -11,7 +11,7 @@ from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.system.threads import for_chunks
-from renderer.trace.spawn import FARTHEST_START, leave_faces
+from renderer.trace.spawn import FARTHEST_START, offset_from_faces
 from renderer.trace.starts.record import FACE, FACES, HEAD, ROW, ROW_STEP, VERTICES
 
 # The most rays of a chunk: small enough to share 1e5 rays between many threads and to stop within milliseconds on
@@ -178,8 +178,8 @@ def by_faces(faces: NDArray[np.int64]) -> Leaving:
     return Leaving(faces, np.zeros(1, np.int64), np.empty((0, 3)))
 
 
-def moved_off(rays: RayBatch, leaving: Leaving, mesh: Mesh, scale: float, threads: int) -> RayBatch:
-    """The rays with their starts moved off the faces that they leave, see ``spawn.leave_faces``, and with their
+def offset_origins(rays: RayBatch, leaving: Leaving, mesh: Mesh, scale: float, threads: int) -> RayBatch:
+    """The rays with their origins moved off the faces that they leave, see ``spawn.offset_from_faces``, and with their
     ``starts``; ``scale`` is the tree's.
 
     Raises ``ValueError`` naming the argument and the row for an origin out of bounds or not on its face.
@@ -190,10 +190,10 @@ def moved_off(rays: RayBatch, leaving: Leaving, mesh: Mesh, scale: float, thread
         # Rejected before it is moved, so that the message names the numbers as given.
         reject(rays, int((~sound).argmax()), scale)
     origins, starts, bad = np.empty((count, 3)), make_starts(count, mesh), list[int]()
-    rows, ways = starts[HEAD:].view(np.float64).reshape(count, ROW), (rays.origins, rays.directions)
+    rows, corners = starts[HEAD:].view(np.float64).reshape(count, ROW), (mesh.vertices, mesh.faces)
 
     def leave(begin: int, end: int) -> None:
-        row = leave_faces(mesh.vertices, mesh.faces, ways, *leaving, origins, rows, (begin, end, scale))
+        row = offset_from_faces(*corners, rays.origins, rays.directions, leaving, origins, rows, begin, end, scale)
         if row >= 0:
             bad.append(row)
 

@@ -14,7 +14,7 @@ from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HIT_ROWS
 from renderer.trace.single import FEW_DEPTH, trace_few
-from renderer.trace.traverse import Memory, make_memory, search_chunk, trace_chunk
+from renderer.trace.traverse import Progress, Scratch, new_scratch, search_chunk, trace_chunk
 from renderer.trace.walk import stack_size
 
 # Few rays go in smaller chunks, sixteen per thread, so that no thread has much more to do than another.
@@ -23,8 +23,8 @@ _LEAST_CHUNK = 1024
 _BLOCK_TESTS = 1 << 22
 # Fewer rays than a packet holds go one by one, by a kernel that compiles in a fraction of the time.
 FEW = WIDTH - 1
-# The room for the faces that hold a start, where no ray starts on the surface.
-_NO_ROOM = np.empty(1, np.int64)
+# The scratch for the faces that hold a start, where no ray starts on the surface.
+_NO_HOLDERS = np.empty(1, np.int64)
 
 
 def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
@@ -54,14 +54,14 @@ def _are_few(tree: Tree, rays: RayBatch) -> bool:
 
 
 def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
-    """Closest hits of a few rays on the caller's thread, as ``singly.trace_few`` writes them."""
+    """Closest hits of a few rays on the caller's thread, as ``single.trace_few`` writes them."""
     out = np.empty((HIT_ROWS, rays.number))
     if rays.starts is NO_STARTS:
-        row = trace_few(tree.words, rays, out, _NO_ROOM)
+        row = trace_few(tree.descriptor, rays, out, _NO_HOLDERS)
     else:
-        memory = _take_memory(tree.depth)
-        row = trace_few(tree.words, rays, out, memory.holders)
-        _local.memory = memory
+        scratch = _take_scratch(tree.depth)
+        row = trace_few(tree.descriptor, rays, out, scratch.holders)
+        _local.scratch = scratch
     if row >= 0:
         reject(rays, row, tree.scale)
     return out
@@ -86,20 +86,20 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
         if bad and bad[0] < begin:
             return
         if not tree.has_nodes:
-            memory = _take_memory(tree.depth)
-            row = search_chunk(tree.words, rays, out, begin, end, any_hit, memory.holders)
-            _local.memory = memory
+            scratch = _take_scratch(tree.depth)
+            row = search_chunk(tree.descriptor, rays, out, begin, end, any_hit, scratch.holders)
+            _local.scratch = scratch
             if row >= 0:
                 bad.append(row)
             return
-        memory, state = _take_memory(tree.depth), (begin, 0, 0)
-        while state[0] < end or state[1] < state[2]:
-            state, row = trace_chunk(tree.words, rays, out, state, end, any_hit, memory)
+        scratch, progress = _take_scratch(tree.depth), Progress(begin, 0, 0)
+        while progress.begin < end or progress.following < progress.count:
+            progress, row = trace_chunk(tree.descriptor, rays, out, progress, end, any_hit, scratch)
             if row >= 0:
                 bad.append(row)
                 break
             yield
-        _local.memory = memory
+        _local.scratch = scratch
 
     if count <= size:
         for _ in trace(0, count):
@@ -111,17 +111,17 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
 
 
 class _Local(threading.local):
-    """Memory in which a thread traces its next chunk, kept from the last one: 100 kB are used."""
+    """Scratch in which a thread traces its next chunk, kept from the last one: 100 kB are used."""
 
-    memory: Memory | None = None
+    scratch: Scratch | None = None
 
 
 _local = _Local()
 
 
-def _take_memory(depth: int) -> Memory:
-    """The thread's memory, or new: taken, because a handler of a signal may trace rays while a chunk is half done."""
-    memory, _local.memory = _local.memory, None
-    if memory is None or memory.stack_size < stack_size(depth):
-        memory = make_memory(depth, CHUNK)
-    return memory
+def _take_scratch(depth: int) -> Scratch:
+    """The thread's scratch, or new: taken, because a handler of a signal may trace rays while a chunk is half done."""
+    scratch, _local.scratch = _local.scratch, None
+    if scratch is None or scratch.stack_size < stack_size(depth):
+        scratch = new_scratch(depth, CHUNK)
+    return scratch

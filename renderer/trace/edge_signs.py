@@ -4,6 +4,8 @@ Sheared, a corner's place depends on the ray and the corner alone. So the faces 
 passes at one point, and with exact signs it meets exactly the faces whose closed outlines hold that point.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
@@ -28,19 +30,35 @@ def corner(tree, at):
     return coordinate(tree, at), coordinate(tree, at + 4), coordinate(tree, at + 8)
 
 
+@inlined
+def corners_at(tree, at):
+    """The three corners of the face at ``at``, exactly."""
+    return corner(tree, at), corner(tree, at + 12), corner(tree, at + 24)
+
+
+class EdgeSides(NamedTuple):
+    """On which side of each edge of a face a ray passes, -1, 0 or 1: of the edge opposite to each corner."""
+
+    opposite0: int
+    opposite1: int
+    opposite2: int
+
+
 @kernel
 def exact_sides(tree, at, shear):
-    """The signs, -1, 0 or 1, of the three edge functions of the face at ``at``, for its sheared corners as rounded."""
+    """The exact signs of the three edge functions of the face at ``at``, for its sheared corners as rounded."""
     x0, y0 = _sheared(tree, at, shear)
     x1, y1 = _sheared(tree, at + 12, shear)
     x2, y2 = _sheared(tree, at + 24, shear)
-    return products_sign(x2, y1, y2, x1), products_sign(x0, y2, y0, x2), products_sign(x1, y0, y1, x0)
+    return EdgeSides(
+        products_sign(x2, y1, y2, x1), products_sign(x0, y2, y0, x2), products_sign(x1, y0, y1, x0)
+    )  # fmt: skip
 
 
 @kernel
 def passes_within(sides):
     """Whether a ray that passes the edges on these sides meets the closed face. In its plane it does not."""
-    a, b, c = sides
+    a, b, c = sides.opposite0, sides.opposite1, sides.opposite2
     same = (a >= 0 and b >= 0 and c >= 0) or (a <= 0 and b <= 0 and c <= 0)
     return same and (a != 0 or b != 0 or c != 0)
 

@@ -22,8 +22,7 @@ def add_errors(
     own = np.empty(0, np.int64) if rows is None else rows
 
     def bound(begin: int, end: int) -> None:
-        arrays = rays.origins, rays.directions, rays.starts, own
-        bound_errors(mesh.vertices, mesh.faces, arrays, hits.t, hits.face, errors, (begin, end, scale))
+        bound_errors(mesh.vertices, mesh.faces, rays, own, hits.t, hits.face, errors, begin, end, scale)
 
     for_chunks(bound, len(errors), CHUNK, threads)
     hits.t_error = errors

@@ -39,24 +39,21 @@ _LEAST_NORMAL = 2.0**-1022
 
 
 @kernel
-def bound_errors(vertices, faces, rays, t, face, errors, bounds):
+def bound_errors(vertices, faces, rays, rows, t, face, errors, begin, end, unit):
     """Write the bounds of the errors of the hits begin:end to ``errors``; NaN where a ray hits nothing.
 
-    ``rays`` are origins, directions, each with one row for all or one each, starts as of ``RayBatch``, and the ray of
-    each hit, or no row where it is the hit's own. ``bounds`` are begin, end, and the tree's scale, in whose units no
-    product overflows.
+    rows  the ray of each hit, of a ``RayBatch``; empty where it is the hit's own
+    unit  the tree's scale, in whose units no product overflows
     """
-    origins, directions, given, rows = rays
-    starts = start_pointers(given)
-    origin_step, direction_step = 3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1)
-    corners, own = pointer(vertices), len(rows) == 0
-    begin, end, unit = bounds
+    starts, own = start_pointers(rays.starts), len(rows) == 0
+    origin_step, direction_step = 3 * np.int64(len(rays.origins) > 1), 3 * np.int64(len(rays.directions) > 1)
+    origins, directions, corners = pointer(rays.origins), pointer(rays.directions), pointer(vertices)
     for i in range(begin, end):
         error, row = np.nan, get(pointer(face), i)
         if row >= 0:
             ray = i if own else get(pointer(rows), i)
-            o = scale(three(pointer(origins), ray * origin_step), unit)
-            d = three(pointer(directions), ray * direction_step)
+            o = scale(three(origins, ray * origin_step), unit)
+            d = three(directions, ray * direction_step)
             a, b, c = row3(pointer(faces), row)
             p0, p1, p2 = row3(corners, a), row3(corners, b), row3(corners, c)
             p0, p1, p2, at = scale(p0, unit), scale(p1, unit), scale(p2, unit), get(pointer(t), i) * unit

@@ -9,6 +9,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import (
+    extract,
     get,
     is_negative,
     larger,
@@ -24,6 +25,7 @@ from renderer.numerics.simd import (
     unlikely,
     widen,
 )
+from renderer.trace.best import FaceHit
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
@@ -36,15 +38,15 @@ _TINY = np.float32(2.0**-149)
 _MORE = np.float32(1.0 + 2.0**-9)
 # The errors of the triangle test. Let u = 2^-53, A = ``across``, Z = ``along``, D = A + Z and S the spread of z. Then a
 # sheared coordinate errs by 4 u D, the edge functions together by 9 u A D, the determinant by 10 u A D and the
-# numerator of t by 11 u A D Z. Three limits say when a hit is in doubt.
+# numerator of t by 11 u A D Z. Three limits say when a hit is uncertain.
 #
 # DOUBT for the determinant, as a share of A D. Above it the determinant errs by 2^-23 of itself, and the ray passes its
 # plane beside the face by 9 * 2^-26 of the barycentrics at most: by 2^-21.8 of the width of the face's box, which is
 # less than ``face_range`` adds.
 #
 # DOUBT for the numerator, as a share of A D Z. Above it t errs by 21 * 2^-26 = 2^-21.6 of itself, which is less than
-# FAR_PADDING leaves after a slab's own roundings (2^-20.4). So a hit in no doubt lies at or behind the entry of every
-# box around its face, and ``doubt.settled`` moves the others there: the answer is the least t over all faces, whatever
+# FAR_PADDING leaves after a slab's own roundings (2^-20.4). So a certain hit lies at or behind the entry of every box
+# around its face, and ``resolve_uncertain`` moves the others there: the answer is the least t over all faces, whatever
 # the tree, the packet or the order.
 DOUBT = 2.0**-27
 # SLANT for the determinant, as a share of A D S / Z: thin faces, and faces met at small angles, are below it. A hit is
@@ -52,8 +54,8 @@ DOUBT = 2.0**-27
 # 9 sqrt(3) u Z / SLANT, because no determinant exceeds sqrt(3) times twice the area. Let L be the largest component of
 # a corner relative to the origin. Z is at most 3 L, so the distance is at most 47 u L / SLANT, less than 2^-31 L.
 SLANT = 2.0**-16
-# The error of a numerator in doubt, as a share of A D Z: its own 11 u, and the determinant's share of 2^-27. Settling
-# moves t by no more, because the ray meets the plane itself within the face's box.
+# The error of an uncertain numerator, as a share of A D Z: its own 11 u, and the determinant's share of 2^-27. What
+# resolves it moves t by no more, because the ray meets the plane itself within the face's box.
 ERROR = 2.0**-48
 # The error of an edge function as a share of A D, of ``unsure_sides``: 10 u and room.
 SIDE_ERROR = 2.0**-49
@@ -334,9 +336,9 @@ def see_triangles(tree, base, ray):
     """The ``Edges`` of a block's four triangles, and the bits of those whose edges a ray passes on the same side.
 
     Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
-    ab - cd or is 0. 0 counts as inside here. Where rounding may have made it the hit is in doubt, and ``sides`` decides
-    exactly. A triangle whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded edges
-    leave.
+    ab - cd or is 0. 0 counts as inside here. Where rounding may have made it the hit is uncertain, and ``edge_signs``
+    decides exactly. A triangle whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded
+    edges leave.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, ray)
     zero, ox, oy, oz = splat4(0.0), splat4(ray.origin_x), splat4(ray.origin_y), splat4(ray.origin_z)
@@ -353,40 +355,77 @@ def see_triangles(tree, base, ray):
     return Edges(x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, least, most, e0 + e1 + e2), seen
 
 
+class _Sizes(NamedTuple):
+    """Sums of what the corners of four triangles are without signs, as a ray sees them: of x, of y, of both, of z."""
+
+    wide: Any
+    high: Any
+    across: Any
+    along: Any
+
+
+@inlined
+def _sizes_of(edges):
+    wide = magnitude(edges.x0) + magnitude(edges.x1) + magnitude(edges.x2)
+    high = magnitude(edges.y0) + magnitude(edges.y1) + magnitude(edges.y2)
+    along = magnitude(edges.z0) + magnitude(edges.z1) + magnitude(edges.z2)
+    return _Sizes(wide, high, wide + high, along)
+
+
+@inlined
+def _numerator(edges):
+    return edges.e0 * edges.z0 + edges.e1 * edges.z1 + edges.e2 * edges.z2
+
+
+class PlaneHits(NamedTuple):
+    """Where a ray meets the planes of a block's four triangles, and the bits of those for which rounding matters.
+
+    t                      of each triangle
+    uncertain              rounding may have made t, or an edge function
+    determinant_uncertain  rounding may have made the determinant
+    must_resolve           uncertain, and may be hit from t_min to t_max once that is resolved; or near the start of a
+                           ray that leaves a surface. Never the face that it leaves
+    """
+
+    t: Any
+    uncertain: int
+    determinant_uncertain: int
+    must_resolve: int
+
+
 @inlined
 def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
-    """t of the four triangles of a block, and of those ``seen`` the bits of three kinds: in doubt, blurred and due.
-
-    In doubt is a triangle whose t rounding may have made, or an edge of which the ray may pass; blurred, one whose
-    determinant rounding may have made. Due is one in doubt that may be hit from t_min to t_max once that is resolved:
-    also one that is near the start of a ray that leaves a surface. The face that it leaves is never due.
-    """
-    x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, least, most, determinant = edges
-    zero, wide = splat4(0.0), magnitude(x0) + magnitude(x1) + magnitude(x2)
-    high = magnitude(y0) + magnitude(y1) + magnitude(y2)
-    across = wide + high
-    along = magnitude(z0) + magnitude(z1) + magnitude(z2)
-    numerator, product = e0 * z0 + e1 * z1 + e2 * z2, across * (across + along)
-    denominator = determinant * splat4(ray.direction_z)
-    t, height, base_t = numerator / denominator, magnitude(numerator), magnitude(denominator)
-    limit, reach = product * along * splat4(DOUBT), product * splat4(ray.slack)
-    slant = product * (magnitude(z1 - z0) + magnitude(z2 - z0)) * splat4(SLANT)
-    blurred = magnitude(determinant) * along <= larger(limit, slant)
-    low = height <= limit + reach
+    """The ``PlaneHits`` of the triangles of the block at ``base``; only those ``seen`` have bits."""
+    sizes, numerator = _sizes_of(edges), _numerator(edges)
+    denominator = edges.determinant * splat4(ray.direction_z)
+    t, height = numerator / denominator, magnitude(numerator)
+    product = sizes.across * (sizes.across + sizes.along)
+    limit, reach = product * sizes.along * splat4(DOUBT), product * splat4(ray.slack)
+    slant = product * (magnitude(edges.z1 - edges.z0) + magnitude(edges.z2 - edges.z0)) * splat4(SLANT)
+    determinant_uncertain = magnitude(edges.determinant) * sizes.along <= larger(limit, slant)
+    near, zero = height <= limit + reach, splat4(0.0)
     # Of those seen, an edge function is 0 where the least or the most is.
-    doubts = seen & movemask(blurred | low | (least == zero) | (most == zero))
-    blurs, dues = np.int64(0), np.int64(0)
-    # What only this needs is computed here: doubts are rare, and one branch costs less than they would in each block.
-    if unlikely(doubts != 0):
+    some = seen & movemask(determinant_uncertain | near | (edges.least == zero) | (edges.most == zero))
+    # What only these need is computed here: they are rare, and one branch costs less than that would in each block.
+    if unlikely(some != 0):
         left = _left(tree, base, edges, ray) if ray.slack != 0.0 else np.int64(0)
         # Most often the face that the ray leaves is the only one.
-        if doubts & ~left != 0:
-            doubt = blurred | low | _may_be_on_edge(edges)
-            t_within, error = (t, t_min, t_max), product * along * splat4(ERROR)
-            due = _are_due(edges, (wide, high), (height, base_t, error), doubt, blurred, t_within)
-            doubts, blurs = (seen & movemask(doubt)) | (doubts & left), seen & movemask(blurred)
-            dues = seen & movemask(due | (height < reach)) & ~left
-    return t, doubts, blurs, dues
+        if some & ~left != 0:
+            uncertain = determinant_uncertain | near | _may_be_on_edge(edges)
+            # Whether the numerator, with its error, may make a t from t_min to t_max. A t that rounding made negative
+            # may be 0.
+            base_t, error = magnitude(denominator), product * sizes.along * splat4(ERROR)
+            within = (height + error >= splat4(t_min) * base_t) & (height - error <= splat4(t_max) * base_t)
+            ahead, extended = (t >= zero) | (height <= error), _is_extended(edges, sizes)
+            # rule: must-resolve
+            due = (determinant_uncertain | (uncertain & ahead & within)) & extended
+            return PlaneHits(
+                t,
+                (seen & movemask(uncertain)) | (some & left),
+                seen & movemask(determinant_uncertain),
+                seen & movemask(due | (height < reach)) & ~left,
+            )
+    return PlaneHits(t, some, np.int64(0), np.int64(0))
 
 
 @inlined
@@ -394,9 +433,9 @@ def _left(tree, base, edges, ray):
     """The bits of the faces of the block at ``base`` that a ray leaves: its own, and where it starts at a corner those
     that have it, which it meets nowhere else.
     """
-    place, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
+    slot, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
     for i in range(BLOCK_FACES):
-        bits |= np.int64(np.float64(get(tree.faces, place + i)) == ray.leaving) << i
+        bits |= np.int64(np.float64(get(tree.faces, slot + i)) == ray.leaving) << i
     if ray.slack == CORNER:
         zero = splat4(0.0)
         at0 = (edges.x0 == zero) & (edges.y0 == zero) & (edges.z0 == zero)
@@ -406,14 +445,33 @@ def _left(tree, base, edges, ray):
 
 
 @inlined
+def _is_extended(edges, sizes):
+    """The mask of triangles that a ray does not see as a point or as a piece of an axis: it meets none of these. They
+    are found here, because rays along walls would all be uncertain.
+    """
+    zero = splat4(0.0)
+    apart = (edges.x0 != edges.x1) | (edges.x1 != edges.x2) | (edges.y0 != edges.y1) | (edges.y1 != edges.y2)
+    return apart & (sizes.wide > zero) & (sizes.high > zero)
+
+
+@inlined
+def _may_be_on_edge(edges):
+    """The mask of triangles with an edge function that is 0 as rounded, though its products are not."""
+    zero, e0, e1, e2 = splat4(0.0), edges.e0, edges.e1, edges.e2
+    x0, x1, x2 = edges.x0 != zero, edges.x1 != zero, edges.x2 != zero
+    y0, y1, y2 = edges.y0 != zero, edges.y1 != zero, edges.y2 != zero
+    # rule: rounded-edge
+    on0 = (e0 == zero) & ((x2 & y1) | (y2 & x1))
+    on1 = (e1 == zero) & ((x0 & y2) | (y0 & x2))
+    return on0 | on1 | ((e2 == zero) & ((x1 & y0) | (y1 & x0)))
+
+
+@inlined
 def near_planes(edges, slack):
     """The bits of the triangles whose planes are within a ray's ``slack`` of its origin, or of rounding."""
-    x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, _, _, _ = edges
-    wide = magnitude(x0) + magnitude(x1) + magnitude(x2)
-    across = wide + (magnitude(y0) + magnitude(y1) + magnitude(y2))
-    along = magnitude(z0) + magnitude(z1) + magnitude(z2)
-    height = magnitude(e0 * z0 + e1 * z1 + e2 * z2)
-    return movemask(height <= across * (across + along) * (splat4(slack) + along * splat4(ERROR)))
+    sizes, height = _sizes_of(edges), magnitude(_numerator(edges))
+    error = splat4(slack) + sizes.along * splat4(ERROR)
+    return movemask(height <= sizes.across * (sizes.across + sizes.along) * error)
 
 
 @inlined
@@ -422,59 +480,42 @@ def unsure_sides(edges, slack):
 
     With D as above a sheared coordinate errs by 4 u D and the slack, so an edge function by 2 A times that and 2 u A^2.
     """
-    x0, x1, x2, y0, y1, y2, z0, z1, z2, _, _, _, least, most, _ = edges
-    wide = magnitude(x0) + magnitude(x1) + magnitude(x2)
-    across = wide + (magnitude(y0) + magnitude(y1) + magnitude(y2))
-    along = magnitude(z0) + magnitude(z1) + magnitude(z2)
-    error, zero = across * ((across + along) * splat4(SIDE_ERROR) + splat4(slack)), splat4(0.0)
-    may = (least >= zero - error) | (most <= error)
-    return movemask(may) & ~movemask((least > error) | (most < zero - error))
+    sizes, zero = _sizes_of(edges), splat4(0.0)
+    error = sizes.across * ((sizes.across + sizes.along) * splat4(SIDE_ERROR) + splat4(slack))
+    may = (edges.least >= zero - error) | (edges.most <= error)
+    return movemask(may) & ~movemask((edges.least > error) | (edges.most < zero - error))
 
 
-@inlined
-def _are_due(edges, sizes, fraction, doubt, blurred, t_within):
-    """The mask of triangles that are due, see ``meet_planes``.
-
-    sizes     the sums of the corners' |x| and of their |y|
-    fraction  the magnitudes of t's numerator and denominator, and the numerator's error where it is in doubt
-    t_within  t, t_min and t_max
+class BlockHits(NamedTuple):
+    """What one ray hits of the four triangles of a block: the bits of those hit, those of ``PlaneHits``, t, and the
+    barycentrics' numerators and denominator.
     """
-    x0, x1, x2, y0, y1, y2, _, _, _, _, _, _, _, _, _ = edges
-    height, base, error = fraction
-    t, t_min, t_max = t_within
-    zero = splat4(0.0)
-    # No ray meets a triangle that it sees as a point or as a piece of an axis. These are told here, because rays along
-    # walls would all be in doubt.
-    extended = ((x0 != x1) | (x1 != x2) | (y0 != y1) | (y1 != y2)) & (sizes[0] > zero) & (sizes[1] > zero)
-    within = (height + error >= splat4(t_min) * base) & (height - error <= splat4(t_max) * base)
-    # A t that rounding made negative may be 0.
-    ahead = (t >= zero) | (height <= error)
-    # rule: must-resolve
-    return (blurred | (doubt & ahead & within)) & extended
 
-
-@inlined
-def _may_be_on_edge(edges):
-    """The mask of triangles with an edge function that is 0 as rounded, though its products are not."""
-    x0, x1, x2, y0, y1, y2, _, _, _, e0, e1, e2, _, _, _ = edges
-    zero = splat4(0.0)
-    x0, x1, x2, y0, y1, y2 = x0 != zero, x1 != zero, x2 != zero, y0 != zero, y1 != zero, y2 != zero
-    # rule: rounded-edge
-    on0 = (e0 == zero) & ((x2 & y1) | (y2 & x1))
-    on1 = (e1 == zero) & ((x0 & y2) | (y0 & x2))
-    return on0 | on1 | ((e2 == zero) & ((x1 & y0) | (y1 & x0)))
+    bits: int
+    uncertain: int
+    determinant_uncertain: int
+    must_resolve: int
+    t: Any
+    u: Any
+    v: Any
+    w: Any
 
 
 @inlined
 def hit_triangles(tree, base, ray, t_min, t_max):
-    """Watertight test of one ray and the four triangles of a block.
-
-    Returns the bits of those hit, those of the three kinds of ``meet_planes``, t, the numerators of u and v, and their
-    denominator. ``doubt.settled`` decides about a hit in doubt.
-    """
+    """The ``BlockHits`` of the block at ``base``: a watertight test. ``resolve`` decides about those uncertain."""
     edges, bits = see_triangles(tree, base, ray)
     if bits == 0:
         zero = splat4(0.0)
-        return bits, bits, bits, bits, zero, zero, zero, zero
-    t, doubts, blurs, dues = meet_planes(tree, base, edges, bits, ray, t_min, t_max)
-    return bits, doubts, blurs, dues, t, edges.e1, edges.e2, edges.determinant
+        return BlockHits(bits, bits, bits, bits, zero, zero, zero, zero)
+    planes = meet_planes(tree, base, edges, bits, ray, t_min, t_max)
+    return BlockHits(
+        bits, planes.uncertain, planes.determinant_uncertain, planes.must_resolve, planes.t,
+        edges.e1, edges.e2, edges.determinant,
+    )  # fmt: skip
+
+
+@inlined
+def hit_in(hits, i):
+    """The i-th of some ``BlockHits``, as ``FaceHit``."""
+    return FaceHit(extract(hits.t, i), extract(hits.u, i), extract(hits.v, i), extract(hits.w, i))

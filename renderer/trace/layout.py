@@ -29,8 +29,8 @@ MAX_LEAF_BLOCKS = 1 << LEAF_BITS
 # hit is on a face of the mesh.
 UNUSED = -1
 
-# A block is nine rows of four values, one value per triangle: p0 x, p0 y, p0 z, p1 x, ... p2 z. An unused place of a
-# block has face -1 and three equal vertices, a triangle that no ray hits.
+# A block is nine rows of four values, one value per triangle: p0 x, p0 y, p0 z, p1 x, ... p2 z. An unused slot of a
+# block has face -1 and NaN for all its coordinates, a triangle that no ray hits: every comparison with NaN is false.
 BLOCK_FACES = 4
 BLOCK_WORDS = 36
 
@@ -45,7 +45,7 @@ class Tree:
 
     nodes   (N * NODE_WORDS,) float32, rounded outwards from the float64 vertices; without nodes, every block is tested
     blocks  (B * BLOCK_WORDS,) float32 when every vertex is exactly a float32, else float64
-    faces   (B * BLOCK_FACES,) int32, the face in each place of each block, -1 where unused
+    faces   (B * BLOCK_FACES,) int32, the face in each slot of each block, -1 where unused
     depth   the levels of nodes, 0 without nodes
     scale   the power of two by which the vertices were multiplied
     """
@@ -67,7 +67,7 @@ class Tree:
         return self.nodes.view(np.int32)
 
     @lazy
-    def words(self) -> NDArray[np.int64]:
+    def descriptor(self) -> NDArray[np.int64]:
         """(TREE_WORDS,) int64: the tree as kernels read it. It holds addresses, valid as long as the tree is kept."""
         words = np.zeros(TREE_WORDS, np.int64)
         words[NODES], words[BLOCKS], words[FACES] = (a.ctypes.data for a in (self.nodes, self.blocks, self.faces))

@@ -1,4 +1,4 @@
-"""The triangles of a leaf's blocks, or of all blocks, against one ray; ``doubt`` settles the hits in doubt."""
+"""The triangles of a leaf's blocks, or of all blocks, against one ray."""
 
 from typing import Any, NamedTuple
 
@@ -19,7 +19,8 @@ from renderer.numerics.simd import (
     smaller,
     splat8,
 )
-from renderer.trace.intersect import hit_triangles, make_shear, room_of, round_both
+from renderer.trace.best import NO_FACE, Best, hit_on, is_better, no_hit
+from renderer.trace.intersect import hit_in, hit_triangles, make_shear, room_of, round_both
 from renderer.trace.layout import (
     BLOCK_COUNT,
     BLOCK_FACES,
@@ -32,7 +33,7 @@ from renderer.trace.layout import (
     SCALE,
     WIDE,
 )
-from renderer.trace.resolve import settled
+from renderer.trace.resolve import resolve_uncertain
 
 
 class TreePointers(NamedTuple):
@@ -53,9 +54,9 @@ class TreePointers(NamedTuple):
 
 
 @inlined
-def tree_pointers(words):
-    """The pointers in ``Tree.words``, whose tree the caller must keep alive."""
-    at = pointer(words)
+def tree_pointers(descriptor):
+    """The pointers in ``Tree.descriptor``, whose tree the caller must keep alive."""
+    at = pointer(descriptor)
     nodes, blocks = get(at, NODES), get(at, BLOCKS)
     return TreePointers(
         float32_pointer(nodes),
@@ -82,70 +83,66 @@ def octants_around(tree, node, low, high):
     return bits
 
 
-NO_FACE = np.iinfo(np.int32).max
 # After each run of so many blocks a search of all blocks for any hit checks whether it has one.
 _BLOCKS_AT_ONCE = 16
 
 
 @inlined
 def nearest_in_blocks(tree, first, count, t_min, shear, best):
-    """The better of ``best`` = (t, face, u, v, w) and the sure hits in ``count`` blocks: smallest t, then lowest face.
+    """The better of ``best`` and the certain hits in ``count`` blocks; and whether an uncertain one must be resolved.
 
-    The barycentrics are u / w and v / w; only those of the final hit are divided. Also returns whether a hit was in
-    doubt. A call here that settles it would cost every ray its registers, so that is left to ``nearest_carefully``.
+    A call here that resolves it would cost every ray its registers, so that is left to ``nearest_carefully``.
     """
-    t, face, u, v, w = best
-    doubtful = np.int64(0)
+    t, face, u, v, w = best.t, best.face, best.u, best.v, best.w
+    unresolved = np.int64(0)
     for block in range(first, first + count):
-        bits, doubts, _, due, t4, u4, v4, w4 = hit_triangles(tree, block * BLOCK_WORDS, shear, t_min, t)
-        doubtful |= due
-        bits &= ~doubts
+        hits = hit_triangles(tree, block * BLOCK_WORDS, shear, t_min, t)
+        unresolved |= hits.must_resolve
+        bits = hits.bits & ~hits.uncertain
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            ti = extract(t4, i)
+            ti = extract(hits.t, i)
             fi = get(tree.faces, block * BLOCK_FACES + i)
             # rule: tie-in-blocks
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
-                t, face, u, v, w = ti, fi, extract(u4, i), extract(v4, i), extract(w4, i)
-    return t, face, u, v, w, doubtful
+                t, face, u, v, w = ti, fi, extract(hits.u, i), extract(hits.v, i), extract(hits.w, i)
+    return Best(t, face, u, v, w), unresolved != 0
 
 
 @kernel
 def nearest_carefully(tree, first, count, ray, shear, best):
-    """``nearest_in_blocks`` with the hits in doubt too, as ``settled`` makes them."""
+    """``nearest_in_blocks`` with the uncertain hits too, as ``resolve_uncertain`` makes them."""
     for block in range(first, first + count):
-        base = block * BLOCK_WORDS
-        bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, best[0])
+        hits = hit_triangles(tree, block * BLOCK_WORDS, shear, ray.t_min, best.t)
+        bits = hits.bits
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            face = get(tree.faces, block * BLOCK_FACES + i)
-            hit = extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)
-            if (doubts >> i) & 1 != 0:
-                hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-            if is_better(hit[0], face, ray, best):
-                best = hit[0], face, hit[1], hit[2], hit[3]
+            face, hit = get(tree.faces, block * BLOCK_FACES + i), resolved_hit(tree, block, hits, i, ray, shear)
+            if is_better(hit.t, face, ray.t_min, best):
+                best = hit_on(face, hit)
     return best
 
 
 @inlined
-def is_better(t, face, ray, best):
-    """Whether a hit counts and is before the best one: a smaller t, or a lower face."""
-    return t >= ray.t_min and (t < best[0] or (t == best[0] and face < best[1]))
+def resolved_hit(tree, block, hits, i, ray, shear):
+    """The i-th of the ``BlockHits`` of a block, resolved where it is uncertain."""
+    hit = hit_in(hits, i)
+    if (hits.uncertain >> i) & 1 != 0:
+        determinant_uncertain = (hits.determinant_uncertain >> i) & 1 != 0
+        hit = resolve_uncertain(tree, block * BLOCK_WORDS + i, ray, shear, hit, determinant_uncertain)
+    return hit
 
 
 @kernel
 def search_all_blocks(tree, ray, t_max, any_hit):
-    """The best hit (t, face, u, v, w) over all blocks, and whether one was in doubt; with ``any_hit`` it may be any
-    hit.
-    """
-    shear, best, doubtful = make_shear(ray), (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(0)
+    """The best hit over all blocks, and whether an uncertain one must be resolved; with ``any_hit`` it may be any."""
+    shear, best, unresolved = make_shear(ray), no_hit(t_max), False
     for first in range(0, tree.count, _BLOCKS_AT_ONCE):
         count = smaller(_BLOCKS_AT_ONCE, tree.count - first)
-        t, face, u, v, w, doubts = nearest_in_blocks(tree, first, count, ray.t_min, shear, best)
-        best = t, face, u, v, w
-        doubtful |= doubts
-        if any_hit and face != NO_FACE:
+        best, some = nearest_in_blocks(tree, first, count, ray.t_min, shear, best)
+        unresolved = unresolved or some
+        if any_hit and best.face != NO_FACE:
             return best, False
-    return best, doubtful != 0
+    return best, unresolved

@@ -12,10 +12,8 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
-    bits_float,
     count_bits,
     extract,
-    float_bits,
     get,
     larger,
     least,
@@ -32,6 +30,7 @@ from renderer.trace.intersect import FAR_PADDING
 from renderer.trace.layout import CHILDREN, NODE_WORDS
 from renderer.trace.ray_lanes import (
     BLOCK_ROW,
+    CHILD,
     DIRECTION_Z,
     FAR_INVERSE,
     FAR_ORIGIN,
@@ -44,12 +43,12 @@ from renderer.trace.ray_lanes import (
     WIDTH,
     nearest_in_leaf,
 )
+from renderer.trace.stack_entry import distance_of, make_entry, octant_of
 
 # A beam's slopes widen by 2^-18 of their size, four times the padding of a single ray's boxes, which covers that and
 # the five roundings between the two forms of the test; and by what a slope loses below the normal float32.
 _WIDER = np.float32(2.0**-18)
 _LEAST_SLOPE = np.float32(2.0**-140)
-_LOW_WORD = 0xFFFFFFFF
 # A packet gives up after this many octants, and its rays go on as lanes. Most packets of a dense picture end after 40;
 # where faces are smaller than the distance of neighbouring rays, they share the upper levels only. Of 16 to 512, 48 was
 # within 5 % of the best on meshes of 1e5, 1e6 and 5e6 faces.
@@ -58,6 +57,18 @@ BUDGET = 48
 
 class Beam(NamedTuple):
     """The bounds of sixteen rays that share their dominant axis w and the sign along it.
+
+        u                                     .  '
+        |                               .  '         high_u + most_u t
+        |    high_u  +------+     .  '
+        |            |      |  '    +-----+
+        |            |      |       | box |          t: how far along w, from near_origin for where a box is
+        |     low_u  +------+  .    +-----+             entered, from far_origin for where it is left
+        |                         '  .
+        |           far    near         '  .         low_u + least_u t
+        +------------------------------------------> w, in the direction of ``sign``
+
+    A box is met where it is within these lines somewhere from its entry to its exit, and so along v.
 
     Rows of a node, then ranges of float32: near and far origins along w, origins along u and v, slopes along u and v;
     the sign, and the least distance that counts.
@@ -197,7 +208,7 @@ def push_sorted(node, bits, t0, key, stack, top):
         k = splat8(extract(key, i))
         before, after = movemask(key >= k) & ((1 << i) - 1), movemask(key > k) & (0xFF << (i + 1))
         place = count_bits((before | after) & bits) if (bits >> i) & 1 else 8
-        put(stack, top + place, (float_bits(extract(t0, i)) << 32) | (node * 8 + i))
+        put(stack, top + place, make_entry(extract(t0, i), node * 8 + i))
     return top + count_bits(bits)
 
 
@@ -206,7 +217,7 @@ def _push_all(node, bits, t0, stack, top):
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        put(stack, top, (float_bits(extract(t0, i)) << 32) | (node * 8 + i))
+        put(stack, top, make_entry(extract(t0, i), node * 8 + i))
         top += 1
     return top
 
@@ -217,8 +228,8 @@ def _next_octant(stack, top, limit):
     while top > 0:
         top -= 1
         entry = get(stack, top)
-        if bits_float(entry >> 32) <= limit:
-            return entry & _LOW_WORD, top
+        if distance_of(entry) <= limit:
+            return octant_of(entry), top
     return -1, top
 
 
@@ -240,11 +251,11 @@ def trace_packet(tree, rays, stack, any_hit):
     """Search for hits of sixteen prepared rays with one dominant axis and sign; the results stay in ``rays``.
 
     With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns the number of octants left on the
-    stack, 0 unless the packet gave up, and the bits of the rays in doubt. ``stack`` is scratch of ``walk.stack_size``
-    entries.
+    stack, 0 unless the packet gave up, and the bits of the rays with hits to resolve. ``stack`` has
+    ``walk.stack_size`` entries.
     """
     beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes
-    limit, doubtful, top, node, left = _most(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET
+    limit, unresolved, top, node, left = _most(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET
     while True:
         # Push the octants of the node that the beam meets.
         base = node * NODE_WORDS
@@ -257,31 +268,35 @@ def trace_packet(tree, rays, stack, any_hit):
         # Take octants off the stack and test their leaves, until one leads to a node.
         while True:
             if left == 0:
-                return top, doubtful
+                return top, unresolved
             left -= 1
             octant, top = _next_octant(stack, top, limit)
             if octant < 0:
-                return top, doubtful
+                return top, unresolved
             node, at = child_of(tree, octant)
             if node >= 0:
                 break
             meeting = meet_octant(tree, rays, at)
             if meeting != 0:
-                doubtful |= test_leaf(tree, rays, meeting, node, any_hit)
+                unresolved |= test_leaf(tree, rays, meeting, node, any_hit)
                 # rule: packet-limit
                 limit = _most(floats, LIMIT)
 
 
 @inlined
 def test_leaf(tree, rays, meeting, leaf, any_hit):
-    """Test the rays in ``meeting`` against a leaf. Returns the bits of those in doubt."""
-    doubtful = np.int64(0)
+    """Test the rays in ``meeting`` against a leaf; with ``any_hit`` it ends those it hits, and is their CHILD.
+
+    Returns the bits of those with hits to resolve.
+    """
+    unresolved = np.int64(0)
     while meeting != 0:
         r = lowest_bit(meeting)
         meeting &= meeting - 1
-        hit, doubts = nearest_in_leaf(tree, rays, r, leaf)
-        doubtful |= np.int64(doubts != 0) << r
+        hit, must_resolve = nearest_in_leaf(tree, rays, r, leaf)
+        unresolved |= np.int64(must_resolve) << r
         if any_hit and hit:
             # A limit that no box lies within: the ray meets no further one.
             put(rays.floats, LIMIT + r, np.float32(-np.inf))
-    return doubtful
+            put(rays.integers, CHILD + r, leaf)
+    return unresolved

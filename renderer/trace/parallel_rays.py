@@ -28,10 +28,11 @@ from renderer.numerics.simd import (
     splat8,
     store,
 )
+from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import Shear, box_limit, largest_of, room_of, round_both
 from renderer.trace.layout import CACHE_LINE, CHILDREN, NODE_WORDS, UNUSED, cache_aligned
-from renderer.trace.leaf import NO_FACE, nearest_in_blocks
-from renderer.trace.packet import Beam, enter_beam, highest_origin, lowest_origin, make_beam, meet_box
+from renderer.trace.leaf import nearest_in_blocks
+from renderer.trace.packet import Beam, enter_beam, highest_origin, lowest_origin, make_beam, meet_box, test_leaf
 from renderer.trace.ray_lanes import (
     BLOCK_ROW,
     CHILD,
@@ -46,7 +47,6 @@ from renderer.trace.ray_lanes import (
     SLACK,
     WIDTH,
     T,
-    nearest_in_leaf,
     prepare_eight,
     shear_of,
 )
@@ -65,17 +65,21 @@ _MOST_NODES = 2
 _LINE = CACHE_LINE // 4
 
 
-class ParallelMemory(NamedTuple):
-    """The arrays behind a ``Parallel``."""
+class ParallelScratch(NamedTuple):
+    """Memory in which a thread traces parallel rays: the arrays behind ``ParallelPointers``."""
 
     nodes: NDArray[np.float32]
     integers: NDArray[np.int64]
     rays: int
 
 
-class Parallel(NamedTuple):
-    """Memory of one thread, as pointers: the listed leaves as nodes, and their links; the nodes that wait; and the
-    numbers of the rays that have hit nothing yet; and for each ray a leaf that may hide it, or 0.
+class ParallelPointers(NamedTuple):
+    """What lies where in a ``ParallelScratch``, as pointers.
+
+    nodes, links  the listed leaves, as nodes
+    waiting       the nodes that wait
+    live          the numbers of the rays that have hit nothing yet
+    hiders        for each ray a leaf that may hide it, or 0
     """
 
     nodes: Any
@@ -85,18 +89,18 @@ class Parallel(NamedTuple):
     hiders: Any
 
 
-def make_parallel_memory(depth: int, rays: int) -> ParallelMemory:
+def new_parallel_scratch(depth: int, rays: int) -> ParallelScratch:
     """Memory for up to ``rays`` rays against a tree of ``depth`` levels."""
     nodes = cache_aligned(LISTED // 8 * NODE_WORDS, np.float32)
-    return ParallelMemory(nodes, cache_aligned(stack_size(depth) + 2 * rays, np.int64), rays)
+    return ParallelScratch(nodes, cache_aligned(stack_size(depth) + 2 * rays, np.int64), rays)
 
 
 @inlined
-def parallel_pointers(memory):
-    """Pointers into a ``ParallelMemory``."""
-    nodes, integers = address(memory.nodes), pointer(memory.integers)
-    return Parallel(
-        float32_pointer(nodes), int32_pointer(nodes), at(integers, 2 * memory.rays), integers, at(integers, memory.rays)
+def parallel_pointers(scratch):
+    """The ``ParallelPointers`` into a ``ParallelScratch``."""
+    nodes, integers, rays = address(scratch.nodes), pointer(scratch.integers), scratch.rays
+    return ParallelPointers(
+        float32_pointer(nodes), int32_pointer(nodes), at(integers, 2 * rays), integers, at(integers, rays)
     )
 
 
@@ -112,14 +116,11 @@ def _prepare_direction(rays, prepared):
 
 
 @inlined
-def _prepare_origins(rays, prepared, sixteen, limits):
-    """Let the prepared rays be sixteen of those that are live, the last one again where there are fewer.
-
-    sixteen  their numbers, which one is the first, and how many are live
-    limits   T and LIMIT of a ray that has hit nothing
+def _prepare_origins(rays, prepared, live, first, count, t_max, limit):
+    """Let the prepared rays be sixteen of the ``count`` that are live, from ``first`` on, the last one again where
+    there are fewer. ``t_max`` and ``limit`` are T and LIMIT of a ray that has hit nothing.
     """
-    floats, doubles, integers = prepared
-    live, first, count = sixteen
+    floats, doubles, integers = prepared.floats, prepared.doubles, prepared.integers
     w = get(integers, BLOCK_ROW + 2 * WIDTH) >> 2
     for r in range(WIDTH):
         put(integers, NUMBER + r, get(live, smaller(first + r, count - 1)))
@@ -137,8 +138,8 @@ def _prepare_origins(rays, prepared, sixteen, limits):
             store(doubles, ORIGIN + (axis + 2 - w) % 3 * WIDTH + half, o)
         store(doubles, SLACK + half, slack)
         store(doubles, LEAVING + half, leaving)
-        store(doubles, T + half, alike(limits[0], o))
-        store(floats, LIMIT + half, splat8(limits[1]))
+        store(doubles, T + half, alike(t_max, o))
+        store(floats, LIMIT + half, splat8(limit))
         store(integers, FACE + half, alike(np.int64(NO_FACE), o))
 
 
@@ -230,26 +231,10 @@ def _list_leaves(tree, beam, limit, parallel, top):
     return top, listed, entered
 
 
-@inlined
-def _test_listed_leaf(tree, prepared, meeting, leaf):
-    """Test the rays in ``meeting`` against a leaf, which hides those it hits. Returns the bits of those in doubt."""
-    doubtful = np.int64(0)
-    while meeting != 0:
-        r = lowest_bit(meeting)
-        meeting &= meeting - 1
-        hit, doubts = nearest_in_leaf(tree, prepared, r, leaf)
-        doubtful |= np.int64(doubts != 0) << r
-        if hit:
-            # A limit that no box lies within: the ray meets no further one.
-            put(prepared.floats, LIMIT + r, np.float32(-np.inf))
-            put(prepared.integers, CHILD + r, leaf)
-    return doubtful
-
-
 @kernel
 def _test_list(tree, prepared, parallel, listed, beam):
-    """Test sixteen prepared rays against the leaves of the list; returns the bits of the rays in doubt."""
-    beam, floats, doubtful = _beam_of_sixteen(prepared.floats, beam), prepared.floats, np.int64(0)
+    """Test sixteen prepared rays against the leaves of the list; returns the bits of those with hits to resolve."""
+    beam, floats, unresolved = _beam_of_sixteen(prepared.floats, beam), prepared.floats, np.int64(0)
     limit = get(floats, LIMIT)
     for base in range(0, (listed + 7) // 8 * NODE_WORDS, NODE_WORDS):
         _, bits = enter_beam(parallel.nodes, base, beam, limit)
@@ -258,38 +243,44 @@ def _test_list(tree, prepared, parallel, listed, beam):
             bits &= bits - 1
             meeting = meet_box(parallel.nodes, octant, floats, 0) | (meet_box(parallel.nodes, octant, floats, 8) << 8)
             if meeting != 0:
-                doubtful |= _test_listed_leaf(tree, prepared, meeting, np.int64(get(parallel.links, octant + CHILDREN)))
-    return doubtful
+                leaf = np.int64(get(parallel.links, octant + CHILDREN))
+                unresolved |= test_leaf(tree, prepared, meeting, leaf, True)
+    return unresolved
 
 
 @inlined
-def _keep_live(tree, rays, found, scratch, parallel, state, doubtful):
-    """Note which of sixteen rays are hidden, and keep the numbers of the others; returns how many are kept."""
-    first, count, kept = state
+def _keep_live(tree, rays, found, scratch, parallel, some, unresolved, kept):
+    """Note which of the first ``some`` prepared rays are hidden, and put the numbers of the others behind the ``kept``
+    ones; returns how many are kept then.
+    """
     integers = scratch.prepared.integers
-    for r in range(smaller(count - first, np.int64(WIDTH))):
+    for r in range(some):
         i = get(integers, NUMBER + r)
         hidden, sure = get(integers, FACE + r) != NO_FACE, False
         if hidden:
             put(parallel.hiders, i, get(integers, CHILD + r))
-        elif (doubtful >> r) & 1 != 0:
-            best, _ = search_carefully(tree, rays, i, scratch.packet_stack, scratch.holders, True)
-            hidden, sure = best[1] != NO_FACE, True
+        elif (unresolved >> r) & 1 != 0:
+            hidden, sure = _is_hidden(tree, rays, scratch, i), True
         put(found.hit, i, hidden)
         put(parallel.live, kept, i)
         kept += np.int64(not (hidden or sure))
     return kept
 
 
+@inlined
+def _is_hidden(tree, rays, scratch, i):
+    """Whether ray ``i`` hits anything, by a careful search."""
+    return search_carefully(tree, rays, i, scratch.packet_stack, scratch.holders, True).best.face != NO_FACE
+
+
 @kernel
-def _test_rays(tree, rays, found, scratch, parallel, counts, beam, limits):
-    """Test all rays that have hit nothing yet against the list, sixteen at a time; returns how many are left."""
+def _test_rays(tree, rays, found, scratch, parallel, count, listed, beam, t_max, limit):
+    """Test the rays that have hit nothing yet against the list, sixteen at a time; returns how many are left."""
     prepared, kept = scratch.prepared, np.int64(0)
-    count, listed = counts
     for first in range(0, count, WIDTH):
-        _prepare_origins(rays, prepared, (parallel.live, first, count), limits)
-        doubtful = _test_list(tree, prepared, parallel, listed, beam)
-        kept = _keep_live(tree, rays, found, scratch, parallel, (first, count, kept), doubtful)
+        _prepare_origins(rays, prepared, parallel.live, first, count, t_max, limit)
+        unresolved, some = _test_list(tree, prepared, parallel, listed, beam), smaller(count - first, np.int64(WIDTH))
+        kept = _keep_live(tree, rays, found, scratch, parallel, some, unresolved, kept)
     return kept
 
 
@@ -299,33 +290,34 @@ def _try_hiders(tree, rays, found, scratch, parallel, count, t_max):
     surface; returns how many are not hidden.
     """
     shear, kept = shear_of(scratch.prepared, 0), np.int64(0)
-    w = shear.row_z >> 2
-    x, y = (w + 1) % 3, (w + 2) % 3
     for i in range(count):
-        leaf, face = get(parallel.hiders, i), np.int32(NO_FACE)
-        row = at(rays.starts.rows, i * rays.starts.step)
-        slack, leaving = get(row, START_SLACK), get(row, START_FACE)
-        if slack == EDGE:
-            best, _ = search_carefully(tree, rays, i, scratch.packet_stack, scratch.holders, True)
-            put(found.hit, i, best[1] != NO_FACE)
+        leaf, hidden = get(parallel.hiders, i), False
+        if get(rays.starts.rows, i * rays.starts.step + START_SLACK) == EDGE:
+            put(found.hit, i, _is_hidden(tree, rays, scratch, i))
             continue
         if leaf < 0:
-            o = at(rays.origins, i * rays.origin_step)
-            own = Shear(
-                shear.row_x, shear.row_y, shear.row_z, get(o, x) * rays.scale, get(o, y) * rays.scale,
-                get(o, w) * rays.scale, shear.shear_x, shear.shear_y, shear.direction_z, slack, leaving,
-            )  # fmt: skip
             first, blocks = blocks_of(leaf)
-            none = t_max, face, 0.0, 0.0, 1.0
+            best, _ = nearest_in_blocks(tree, first, blocks, 0.0, _shear_from(rays, i, shear), no_hit(t_max))
             # rule: hider-is-tested
-            _, face, _, _, _, _ = nearest_in_blocks(tree, first, blocks, 0.0, own, none)
-        hidden = face != NO_FACE
+            hidden = best.face != NO_FACE
         # Asked once more only where it hid the last ray: elsewhere that would cost open rays more than it saves.
         put(parallel.hiders, i, leaf if hidden else np.int64(0))
         put(found.hit, i, hidden)
         put(parallel.live, kept, i)
         kept += np.int64(not hidden)
     return kept
+
+
+@inlined
+def _shear_from(rays, i, shear):
+    """The ``Shear`` of ray ``i``, which has the direction of another one."""
+    o, row = at(rays.origins, i * rays.origin_step), at(rays.starts.rows, i * rays.starts.step)
+    w = shear.row_z >> 2
+    x, y, z = get(o, (w + 1) % 3) * rays.scale, get(o, (w + 2) % 3) * rays.scale, get(o, w) * rays.scale
+    return Shear(
+        shear.row_x, shear.row_y, shear.row_z, x, y, z, shear.shear_x, shear.shear_y, shear.direction_z,
+        get(row, START_SLACK), get(row, START_FACE),
+    )  # fmt: skip
 
 
 @kernel
@@ -336,18 +328,18 @@ def trace_parallel(tree, rays, found, count, scratch, parallel):
     ``parallel.hiders`` has a leaf for each ray that is asked first, or 0; afterwards the one that hid it, or 0.
     Returns whether that is answered: it gives up where the rays are too far apart to share their way.
     """
-    prepared = scratch.prepared
-    beam = _prepare_direction(rays, prepared)
+    beam = _prepare_direction(rays, scratch.prepared)
     ray, t_max = ray_at(rays, 0)
-    limits = t_max, box_limit(t_max, largest_of(ray))
+    limit = box_limit(t_max, largest_of(ray))
     left = _try_hiders(tree, rays, found, scratch, parallel, count, t_max)
+    # As long as nodes wait: list the next leaves, and test the rays that are left against them.
     put(parallel.waiting, 0, 0)
     top, entered = np.int64(1), np.int64(0)
     while top > 0 and left > 0:
         if entered > _MOST_NODES * count:
             return False
         around = _beam_around(rays, beam, parallel.live, left)
-        top, listed, more = _list_leaves(tree, around, limits[1], parallel, top)
+        top, listed, more = _list_leaves(tree, around, limit, parallel, top)
         entered += more
-        left = _test_rays(tree, rays, found, scratch, parallel, (left, listed), beam, limits)
+        left = _test_rays(tree, rays, found, scratch, parallel, left, listed, beam, t_max, limit)
     return True

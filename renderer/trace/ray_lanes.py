@@ -6,13 +6,28 @@ import numpy as np
 
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import alike, get, narrow, put, select, store
+from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.layout import LEAF_BITS, MAX_LEAF_BLOCKS
-from renderer.trace.leaf import NO_FACE, nearest_in_blocks
+from renderer.trace.leaf import nearest_in_blocks
 from renderer.trace.rays import eight_rays_at
 from renderer.trace.starts.record import EDGE
+from renderer.trace.walk import blocks_of
 
 WIDTH = 16
+
+# Rays are prepared in groups of sixteen lanes. In each of three arrays a group is GROUP_STRIDE values: sixteen rows, of
+# which each has one value a lane. So what is the same of neighbouring rays is side by side, as vectors want it.
+#
+#              row 0           row 1 (WIDTH)              row 15
+#           +----------------+----------------+--   --+----------------+
+#   group 0 | lane 0 ... 15  | lane 0 ... 15  |  ...  | lane 0 ... 15  |
+#           +----------------+----------------+--   --+----------------+
+#   group 1 | lane 256 ..271 | ...               from GROUP_STRIDE on
+#           +----------------+--
+#
+# A lane r is named by the place of its value in row 0: GROUP_STRIDE times its group and 0 to 15 in it. So the value of
+# any row is at row + r. ``lane_index`` counts lanes without the gaps.
+GROUP_STRIDE = 16 * WIDTH
 
 # Rows of float32: the origins and reciprocals of ``Slabs``, three axes each; the least and the farthest distance that
 # count, in units in which the largest component of the direction is 1; and the slopes along the two other axes in these
@@ -25,16 +40,15 @@ LOWER, LIMIT, SLOPE_U, SLOPE_V = 12 * WIDTH, 13 * WIDTH, 14 * WIDTH, 15 * WIDTH
 ORIGIN, SHEAR, DIRECTION_Z, T_MIN, T = 0, 3 * WIDTH, 5 * WIDTH, 6 * WIDTH, 7 * WIDTH
 LARGEST, U, V, W = 8 * WIDTH, 9 * WIDTH, 10 * WIDTH, 11 * WIDTH
 SLACK, LEAVING = 12 * WIDTH, 13 * WIDTH
-# Rows of int64: the near rows of a node and the rows of a block, three axes each; the best hit's face; for a stream the
-# ray's next child, the top of its stack, its number, and whether a hit was in doubt.
+# Rows of int64: the near rows of a node and the rows of a block, three axes each; the best hit's face; the ray's next
+# child, or the leaf that it hit; for a stream the top of its stack; its number; and whether an uncertain hit must be
+# resolved.
 NEAR_ROW, BLOCK_ROW, FACE = 0, 3 * WIDTH, 6 * WIDTH
-CHILD, TOP, NUMBER, DOUBTFUL = 7 * WIDTH, 8 * WIDTH, 9 * WIDTH, 10 * WIDTH
-# The words of sixteen rays in each of the three: a lane ``r`` of the next sixteen is so much larger.
-SIXTEEN = 16 * WIDTH
+CHILD, TOP, NUMBER, UNRESOLVED = 7 * WIDTH, 8 * WIDTH, 9 * WIDTH, 10 * WIDTH
 
 
 class Prepared(NamedTuple):
-    """Pointers to the rows, SIXTEEN words each for sixteen rays: float32, float64 and int64."""
+    """Pointers to groups of rays: float32, float64 and int64."""
 
     floats: Any
     doubles: Any
@@ -42,9 +56,21 @@ class Prepared(NamedTuple):
 
 
 @inlined
+def lane_of(group, k):
+    """The k-th lane of a group."""
+    return group * GROUP_STRIDE + k
+
+
+@inlined
+def lane_index(r):
+    """How many lanes there are before lane ``r``."""
+    return (r // GROUP_STRIDE) * WIDTH + r % WIDTH
+
+
+@inlined
 def prepare_ray(rays, r, ray, t_max):
     """Write ``ray``, which has met nothing yet, to lane ``r``; or eight rays, vectors, to the lanes from ``r`` on."""
-    floats, doubles, integers = rays
+    floats, doubles, integers = rays.floats, rays.doubles, rays.integers
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
     _put_axes(floats, NEAR_ORIGIN + r, slabs.near_origin_x, slabs.near_origin_y, slabs.near_origin_z)
@@ -90,7 +116,7 @@ def _put_axes(base, first, x, y, z):
 @inlined
 def slabs_of(rays, r):
     """The ray's ``Slabs``."""
-    floats, _, integers = rays
+    floats, integers = rays.floats, rays.integers
     row = NEAR_ROW + r
     nx, ny, nz = get(integers, row), get(integers, row + WIDTH), get(integers, row + 2 * WIDTH)
     return Slabs(
@@ -104,7 +130,7 @@ def slabs_of(rays, r):
 
 @inlined
 def shear_of(rays, r):
-    _, doubles, integers = rays
+    doubles, integers = rays.doubles, rays.integers
     return Shear(
         get(integers, BLOCK_ROW + r), get(integers, BLOCK_ROW + WIDTH + r), get(integers, BLOCK_ROW + 2 * WIDTH + r),
         get(doubles, ORIGIN + r), get(doubles, ORIGIN + WIDTH + r), get(doubles, ORIGIN + 2 * WIDTH + r),
@@ -115,44 +141,30 @@ def shear_of(rays, r):
 
 @inlined
 def best_of(rays, r):
-    """(t, face, u, v, w) of the best hit so far: barycentrics u / w and v / w, face = NO_FACE for none."""
-    _, doubles, integers = rays
-    return (
-        get(doubles, T + r),
-        np.int32(get(integers, FACE + r)),
-        get(doubles, U + r),
-        get(doubles, V + r),
-        get(doubles, W + r),
-    )
+    """The ``Best`` hit so far."""
+    doubles, face = rays.doubles, np.int32(get(rays.integers, FACE + r))
+    return Best(get(doubles, T + r), face, get(doubles, U + r), get(doubles, V + r), get(doubles, W + r))
 
 
 @inlined
 def put_best(rays, r, best):
-    _, doubles, integers = rays
-    t, face, u, v, w = best
-    put(doubles, T + r, t)
-    put(integers, FACE + r, np.int64(face))
-    put(doubles, U + r, u)
-    put(doubles, V + r, v)
-    put(doubles, W + r, w)
+    put(rays.doubles, T + r, best.t)
+    put(rays.integers, FACE + r, np.int64(best.face))
+    put(rays.doubles, U + r, best.u)
+    put(rays.doubles, V + r, best.v)
+    put(rays.doubles, W + r, best.w)
 
 
 @inlined
 def nearest_in_leaf(tree, rays, r, leaf):
     """Test a leaf, a negative child, for a better hit of ray ``r``.
 
-    Returns whether the ray has any hit now, and whether one was in doubt.
+    Returns whether the ray has any hit now, and whether an uncertain one must be resolved.
     """
-    code = ~leaf
-    t, face, u, v, w, doubts = nearest_in_blocks(
-        tree,
-        code >> LEAF_BITS,
-        (code & (MAX_LEAF_BLOCKS - 1)) + 1,
-        get(rays.doubles, T_MIN + r),
-        shear_of(rays, r),
-        best_of(rays, r),
-    )
+    first, count = blocks_of(leaf)
+    t_min = get(rays.doubles, T_MIN + r)
+    best, unresolved = nearest_in_blocks(tree, first, count, t_min, shear_of(rays, r), best_of(rays, r))
     # rule: weights-of-hit
-    put_best(rays, r, (t, face, u, v, w))
-    put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
-    return face != NO_FACE, doubts
+    put_best(rays, r, best)
+    put(rays.floats, LIMIT + r, box_limit(best.t, get(rays.doubles, LARGEST + r)))
+    return best.face != NO_FACE, unresolved

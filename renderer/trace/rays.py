@@ -23,8 +23,8 @@ from renderer.numerics.simd import (
     select,
     smaller,
 )
+from renderer.trace.best import NO_FACE
 from renderer.trace.intersect import Ray
-from renderer.trace.leaf import NO_FACE
 from renderer.trace.starts.record import FACE, SLACK, StartPointers, start_pointers
 
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
@@ -183,11 +183,11 @@ def _scaled(origin, direction, t_min, t_max, scale, slack, leaving):
 
 @inlined
 def write_hit(found, i, scale, best, dz, any_hit):
-    """Write the best hit (t, face, u, v, w) of ray ``i``, or with ``any_hit`` only whether there is one.
+    """Write the ``Best`` hit of ray ``i``, or with ``any_hit`` only whether there is one.
 
     ``dz`` is the ray's ``Shear.direction_z``: with the sign of w it tells the side of the face that the ray came from.
     """
-    t, face, u, v, w = best
+    t, face, u, v, w = best.t, best.face, best.u, best.v, best.w
     hit = face != NO_FACE
     if any_hit:
         put(found.hit, i, hit)

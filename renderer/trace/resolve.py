@@ -1,8 +1,8 @@
-"""Settles hits in doubt: those whose t or determinant rounding may have made, and those at an edge.
+"""Resolves uncertain hits: those whose t or determinant rounding may have made, and those at an edge.
 
 Three rules hold afterwards. At an edge the exact signs decide whether the ray meets a face. No t lies outside the
 stretch in which the ray is within its face's own box, so the search for it leaves out no box on its way. And a hit
-whose determinant was in doubt is computed anew with twice the digits: it counts where the ray comes within ROUNDING of
+whose determinant was uncertain is computed anew with twice the digits: it counts where the ray comes within ROUNDING of
 the face.
 """
 
@@ -25,7 +25,8 @@ from renderer.numerics.double_double import (
 from renderer.numerics.predicates import UNDECIDED, lies_within, slope_sign, volume_sign
 from renderer.numerics.simd import larger, local_doubles, smaller
 from renderer.numerics.vec3 import add, cross, dot, largest_component, largest_of_three, length, normalized, scale, sub
-from renderer.trace.edge_signs import coordinate, corner, exact_sides, passes_within
+from renderer.trace.best import FaceHit
+from renderer.trace.edge_signs import coordinate, corners_at, exact_sides, passes_within
 from renderer.trace.intersect import (
     FAR_PADDING,
     LARGEST_FLOAT,
@@ -59,13 +60,12 @@ _SLACK = 2.0**-50
 
 
 @kernel
-def settled(tree, at, ray, shear, hit, blurred):
-    """The hit (t, u, v, w) that a hit in doubt of the face at ``at`` counts as. t is NaN where it counts as none.
+def resolve_uncertain(tree, at, ray, shear, hit, determinant_uncertain):
+    """The ``FaceHit`` that an uncertain one on the face at ``at`` counts as.
 
-    A ray that begins exactly on the face hits it at t = 0. ``blurred`` says that the determinant is in doubt, not t or
-    an edge alone. t lies where the ray is within the face's own box, in the arithmetic of ``enter_boxes``. That is
-    monotone: the ray enters no box around this one later, and leaves none earlier. The result depends on the ray and
-    the face alone, not on t_min, so every search gets the same.
+    A ray that begins exactly on the face hits it at t = 0. t is clamped to the ray's interval inside the face's own
+    box, in the arithmetic of ``enter_boxes``. That is monotone: the ray enters no box around this one later, and leaves
+    none earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
     """
     height = _height_sign(tree, at, ray)
     if height == 0:
@@ -73,18 +73,15 @@ def settled(tree, at, ray, shear, hit, blurred):
         if holds:
             return begun
     if not passes_within(exact_sides(tree, at, shear)):
-        return np.nan, 0.0, 0.0, 1.0
+        return FaceHit(np.nan, 0.0, 0.0, 1.0)
     # From the ray itself: to keep its ``Slabs`` for this would cost every ray.
     largest = largest_of(ray)
-    t0, t1 = np.float32(0.0), np.float32(np.inf)
-    t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
-    t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
-    t0, t1 = _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
+    t0, t1 = _own_box(tree, at, ray, largest)
     first, last = np.float64(t0) * _BEFORE, np.float32(t1 * FAR_PADDING)
-    t, u, v, w = hit
+    t, u, v, w = hit.t, hit.u, hit.v, hit.w
     # rule: uncertain-determinant
-    if blurred:
-        t, u, v, w = _meet_face(tree, at, ray, first / largest, np.float64(last) / largest)
+    if determinant_uncertain:
+        t, u, v = _meet_face(tree, at, ray, first / largest, np.float64(last) / largest)
         w = -1.0 if _slope(tree, at, ray) * shear.direction_z > 0.0 else 1.0
         u, v = u * w, v * w
     elif height != _FAR and height != 0:
@@ -92,24 +89,19 @@ def settled(tree, at, ray, shear, hit, blurred):
         slope = _slope(tree, at, ray)
         t = height * abs(_exact_t(tree, at, ray)) * (1.0 if slope > 0 else -1.0)
     if not (t0 <= last and t0 <= LARGEST_FLOAT and t >= 0.0):
-        return np.nan, u, v, w
+        return FaceHit(np.nan, u, v, w)
     if round_down(t * largest) > last:
         t = np.float64(last) / largest
     if t0 > box_limit(t, largest):
         # rule: t-within-box
         t = first / largest
-    return t, u, v, w
-
-
-@inlined
-def _corners(tree, at):
-    return corner(tree, at), corner(tree, at + 12), corner(tree, at + 24)
+    return FaceHit(t, u, v, w)
 
 
 @kernel
 def _height_sign(tree, at, ray):
     """The exact sign of normal . (p0 - origin) where the origin is near the plane of a face, 0 in it; else _FAR."""
-    (p0, p1, p2), o = _corners(tree, at), (ray.ox, ray.oy, ray.oz)
+    (p0, p1, p2), o = corners_at(tree, at), _origin(ray)
     one, other, way = sub(p1, p0), sub(p2, p0), sub(p0, o)
     normal = cross(one, other)
     size = largest_component(one) * largest_component(other) * largest_component(way)
@@ -123,10 +115,15 @@ def _height_sign(tree, at, ray):
 @kernel
 def _scaled_normal(tree, at, ray):
     """The normal of a face as pairs, its sides scaled by a power of two."""
-    p0, p1, p2 = _corners(tree, at)
+    p0, p1, p2 = corners_at(tree, at)
     side = larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
     unit = 1.0 / power_below(side)
     return cross_pairs(scaled_difference(p1, p0, unit), scaled_difference(p2, p0, unit))
+
+
+@inlined
+def _origin(ray):
+    return ray.ox, ray.oy, ray.oz
 
 
 @inlined
@@ -140,14 +137,14 @@ def _direction(ray):
 @kernel
 def _slope(tree, at, ray):
     """The sign of normal . direction of a face and a ray."""
-    (p0, p1, p2), (d, _) = _corners(tree, at), _direction(ray)
+    (p0, p1, p2), (d, _) = corners_at(tree, at), _direction(ray)
     return slope_sign(p0, p1, p2, d, local_doubles())
 
 
 @kernel
 def _exact_t(tree, at, ray):
     """Where a ray meets the plane of a face, with twice the digits."""
-    (p0, _, _), o, (d, d_unit) = _corners(tree, at), (ray.ox, ray.oy, ray.oz), _direction(ray)
+    (p0, _, _), o, (d, d_unit) = corners_at(tree, at), _origin(ray), _direction(ray)
     way = sub(p0, o)
     unit = power_below(larger(largest_component(way), _LEAST_NORMAL))
     normal = _scaled_normal(tree, at, ray)
@@ -160,14 +157,23 @@ def _met_at_start(tree, at, ray, shear):
     """Whether a ray that begins in the plane of a face begins on it, and then its hit: at t = 0, unless it runs in the
     plane.
     """
-    (p0, p1, p2), o, slope = _corners(tree, at), (ray.ox, ray.oy, ray.oz), _slope(tree, at, ray)
+    (p0, p1, p2), o, slope = corners_at(tree, at), _origin(ray), _slope(tree, at, ray)
     holds = lies_within(p0, p1, p2, o, local_doubles()) == 1
     if not holds or slope == 0:
-        return holds, (np.nan, 0.0, 0.0, 1.0)
+        return holds, FaceHit(np.nan, 0.0, 0.0, 1.0)
     a, b, c = sub(p0, o), sub(p1, o), sub(p2, o)
     e0, e1, e2 = length(cross(b, c)), length(cross(c, a)), length(cross(a, b))
     turn, whole = (-1.0 if slope * shear.direction_z > 0.0 else 1.0), e0 + e1 + e2
-    return holds, (0.0, turn * (e1 / whole), turn * (e2 / whole), turn)
+    return holds, FaceHit(0.0, turn * (e1 / whole), turn * (e2 / whole), turn)
+
+
+@inlined
+def _own_box(tree, at, ray, largest):
+    """The interval in which a ray is within a face's own box, as ``enter_boxes`` has it."""
+    t0, t1 = np.float32(0.0), np.float32(np.inf)
+    t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
+    t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
+    return _meet_slab(tree, at, 2, ray.oz, ray.dz, largest, t0, t1)
 
 
 @kernel
@@ -211,7 +217,7 @@ class _Face(NamedTuple):
 
 @kernel
 def _meet_face(tree, at, ray, least, most):
-    """The hit (t, u, v, w) of a face, with twice the digits; NaN for t where the ray passes it by.
+    """t, u and v of a face, with twice the digits; NaN for t where the ray passes it by.
 
     From least to most the ray is within the face's box.
     """
@@ -221,20 +227,18 @@ def _meet_face(tree, at, ray, least, most):
     o, d = turned(axis, ray.ox, ray.oy, ray.oz), turned(axis, ray.dx, ray.dy, ray.dz)
     l0, l1, l2 = length(sub(p2, p1)), length(sub(p0, p2)), length(sub(p1, p0))
     if l2 >= l0 and l2 >= l1:
-        t, second, apex = _meet_side(p0, p1, p2, o, d, (least, most))
-        return t, second, apex, 1.0
+        return _meet_side(p0, p1, p2, o, d, least, most)
     if l1 >= l0:
-        t, second, apex = _meet_side(p2, p0, p1, o, d, (least, most))
-        return t, apex, larger(1.0 - second - apex, 0.0), 1.0
-    t, second, apex = _meet_side(p1, p2, p0, o, d, (least, most))
-    return t, larger(1.0 - second - apex, 0.0), second, 1.0
+        t, second, apex = _meet_side(p2, p0, p1, o, d, least, most)
+        return t, apex, larger(1.0 - second - apex, 0.0)
+    t, second, apex = _meet_side(p1, p2, p0, o, d, least, most)
+    return t, larger(1.0 - second - apex, 0.0), second
 
 
 @kernel
-def _meet_side(a, b, c, o, d, bounds):
-    """t, within bounds, and the weights of b and c of a face whose longest side is from a to b."""
-    qa, qb, qc = sub(a, o), sub(b, o), sub(c, o)
-    reach = largest_of_three(qa, qb, qc)
+def _meet_side(a, b, c, o, d, least, most):
+    """t, from least to most, and the weights of b and c of a face whose longest side is from a to b."""
+    reach = largest_of_three(sub(a, o), sub(b, o), sub(c, o))
     far, d_unit, side = power_below(reach), power_below(largest_component(d)), power_below(largest_component(sub(b, a)))
     face = _Face(
         scaled_difference(a, o, 1.0 / far),
@@ -246,11 +250,11 @@ def _meet_side(a, b, c, o, d, bounds):
         far / d_unit,
         far / side,
     )
-    normal = cross_pairs(face.along, face.other)
+    normal, low, high = cross_pairs(face.along, face.other), least / face.t_unit, most / face.t_unit
     if largest_component(heads(normal)) <= LINE:
-        t, second, apex = _meet_line(face, bounds[0] / face.t_unit, bounds[1] / face.t_unit)
+        t, second, apex = _meet_line(face, low, high)
     else:
-        t, second, apex = _meet_plane(face, normal, bounds[0] / face.t_unit, bounds[1] / face.t_unit)
+        t, second, apex = _meet_plane(face, normal, low, high)
     return t * face.t_unit, second, apex
 
 
@@ -297,32 +301,50 @@ def _beyond(inward, corner, d, low, high):
 
 @kernel
 def _weights(face, normal, t):
-    """The weights of the second corner and the apex at t, from its place along the longest side and above it.
+    """The weights of the second corner and the apex at t: of the point x where the ray is then.
 
-    The height errs most, of thin faces, so it keeps to what the face has at that place.
+                      apex
+                     . |  .
+                  . x  |     .
+               .    |  |        .
+            first--------------second
+                 along foot             both as shares of the longest side
+
+    The apex's weight is the height of x as a share of the apex's. It errs most, of thin faces, so it keeps to what the
+    face has above ``along``.
     """
-    along, other = heads(face.along), heads(face.other)
+    side, other = heads(face.along), heads(face.other)
     point = scale(sub(scale(face.direction, t), heads(face.first)), face.ratio)
-    square = dot(along, along)
-    place, foot = smaller(larger(dot(along, point) / square, 0.0), 1.0), dot(along, other) / square
+    square = dot(side, side)
+    along, foot = _clamped(dot(side, point) / square, 0.0, 1.0), dot(side, other) / square
     # The place errs by some roundings, which are much of it near the ends.
-    before, behind = place + _SLACK * larger(face.ratio, 1.0), 1.0 - place + _SLACK * larger(face.ratio, 1.0)
-    most = smaller(before / foot if before < foot else 1.0, behind / (1.0 - foot) if behind < 1.0 - foot else 1.0)
-    apex = smaller(larger(dot(cross(normal, along), point) / dot(normal, normal), 0.0), most)
-    return smaller(larger(place - apex * foot, 0.0), 1.0 - apex), apex
+    room = _SLACK * larger(face.ratio, 1.0)
+    before, behind = along + room, 1.0 - along + room
+    rising = before / foot if before < foot else 1.0
+    falling = behind / (1.0 - foot) if behind < 1.0 - foot else 1.0
+    height = dot(cross(normal, side), point) / dot(normal, normal)
+    apex = _clamped(height, 0.0, smaller(rising, falling))
+    return _clamped(along - apex * foot, 0.0, 1.0 - apex), apex
+
+
+@inlined
+def _clamped(x, low, high):
+    return smaller(larger(x, low), high)
 
 
 @kernel
 def _meet_line(face, low, high):
     """t and weights of a face whose corners lie on a line: where the ray passes its longest side."""
     d = face.direction
+    # Where the ray is nearest to the line. Of a ray along the side every place is as near as another.
     across = cross_pairs(as_pairs(d), face.along)
-    # Of a ray along the side every place is as near as another.
     square = larger(dot(heads(across), heads(across)), np.finfo(np.float64).tiny)
-    t = dot_pairs(cross_pairs(face.first, face.along), across)[0] / square
-    # Where the line is nearest beyond an end of the side, or out of the box, the nearest there counts.
-    t = smaller(larger(dot(_place(face, t), d) / dot(d, d), low), high)
+    on_line = dot_pairs(cross_pairs(face.first, face.along), across)[0] / square
+    # Where that is beyond an end of the side, or out of the box, the nearest there counts.
+    nearest = _place(face, on_line)
+    t = _clamped(dot(nearest, d) / dot(d, d), low, high)
     second = _second(face, t)
+    # It is a hit within ROUNDING of the side; NaN is none.
     if not length(sub(_place(face, t), scale(d, t))) <= ROUNDING:
         return np.nan, 0.0, 0.0
     # rule: t-on-line
@@ -334,7 +356,7 @@ def _second(face, t):
     """The weight of the second corner at the place of the longest side that is nearest to the ray at t."""
     along = heads(face.along)
     way = dot(sub(scale(face.direction, t), heads(face.first)), along) / dot(along, along) * face.ratio
-    return smaller(larger(way, 0.0), 1.0)
+    return _clamped(way, 0.0, 1.0)
 
 
 @inlined

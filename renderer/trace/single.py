@@ -1,11 +1,12 @@
-"""Rays traced one by one: those of small batches, and those whose hits are in doubt."""
+"""Rays traced one by one: those of small batches, and those with uncertain hits."""
 
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import LOCAL_WORDS, at, get, is_negative, local_words, pointer, put
+from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
-from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.trace.leaf import nearest_carefully, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.single_ray import Found, enter_node, prepare_single
 from renderer.trace.starts.record import EDGE, PILE
@@ -18,20 +19,19 @@ FEW_DEPTH = (LOCAL_WORDS - stack_size(0)) // 7
 
 @kernel
 def search_singly(tree, ray, t_max, stack):
-    """The closest hit (t, face, u, v, w) of one ray, with every doubt settled; face = NO_FACE for none. Also returns
-    the number of nodes and blocks that it took.
+    """The closest hit of one ray, with every uncertain hit resolved, as ``Found``.
 
     The octants of a node are visited from the last to the first, not by their distance. That suits few rays and
     compiles in a fraction of the time that packets and streams take.
     """
     # rule: first-limit
-    best = (t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
+    best = no_hit(t_max)
     return walk(tree, stack, prepare_single(ray), Found(best, np.int64(0)), _enter, _visit)
 
 
 @inlined
 def _enter(tree, single, node, found):
-    _, bits = enter_node(tree, node, single, found.best[0])
+    _, bits = enter_node(tree, node, single, found.best.t)
     return Found(found.best, found.steps + 1), bits
 
 
@@ -52,43 +52,42 @@ def search_carefully(tree, rays, i, stack, holders, any_hit):
 
 
 @inlined
-def write_best(tree, rays, found, i, best, start, dz, any_hit):
-    """Write the best hit (t, face, u, v, w) of ray ``i``, see ``write_hit``; t counts from its exact start.
+def write_best(tree, rays, found, i, best, slack, largest, dz, any_hit):
+    """Write the best hit of ray ``i``, see ``write_hit``; t counts from its exact start.
 
-    ``start`` is (the ray's slack, its largest component): where the hit is near, the way that its origin was moved is a
-    part of t.
+    ``slack`` is the ray's, ``largest`` the largest component of its direction: where the hit is near, the way that its
+    origin was moved is a part of t.
     """
-    slack, largest = start
-    if not any_hit and 0.0 < slack < EDGE and best[0] * largest < NEAR_HIT * slack:
+    if not any_hit and 0.0 < slack < EDGE and best.t * largest < NEAR_HIT * slack:
         best = count_from_start(tree, rays, i, best)
     write_hit(found, i, rays.scale, best, dz, any_hit)
-    if slack > 0.0 and not any_hit and best[0] == 0.0 and is_negative(best[0]):
+    if slack > 0.0 and not any_hit and best.t == 0.0 and is_negative(best.t):
         put(found.pile, i, np.int64(get(at(rays.starts.rows, i * rays.starts.step), PILE)))
 
 
 @kernel
 def count_from_start(tree, rays, i, best):
     """A hit with t counted from the exact start of ray ``i``."""
-    t, face, u, v, w = best
-    if face != NO_FACE:
-        t = t_from(tree, rays.starts, i, ray_at(rays, i)[0], np.int64(face), t)
-    return t, face, u, v, w
+    if best.face == NO_FACE:
+        return best
+    t = t_from(tree, rays.starts, i, ray_at(rays, i)[0], np.int64(best.face), best.t)
+    return Best(t, best.face, best.u, best.v, best.w)
 
 
 @kernel
-def trace_few(words, rays, out, holders):
+def trace_few(descriptor, rays, out, holders):
     """Closest hits of a few rays, one by one, into the rows t, u, v, face and side of ``out``.
 
     Bounds and return value are those of ``trace_chunk``. The tree has at most FEW_DEPTH levels.
     """
-    tree, count = tree_pointers(words), out.shape[1]
+    tree, count = tree_pointers(descriptor), out.shape[1]
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
     bad = first_bad_ray(source, 0, count)
     if bad >= 0:
         return bad
     stack = local_words()
     for i in range(count):
-        best, _ = search_carefully(tree, source, i, stack, pointer(holders), False)
+        best = search_carefully(tree, source, i, stack, pointer(holders), False).best
         ray, _ = ray_at(source, i)
-        write_best(tree, source, found, i, best, (ray.slack, largest_of(ray)), make_shear(ray).direction_z, False)
+        write_best(tree, source, found, i, best, ray.slack, largest_of(ray), make_shear(ray).direction_z, False)
     return -1

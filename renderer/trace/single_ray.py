@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import splat8
+from renderer.trace.best import Best
 from renderer.trace.intersect import (
     Ray,
     Shear,
@@ -32,9 +33,9 @@ class SingleRay(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The best hit so far, (t, face, u, v, w), and the number of nodes and blocks that it took."""
+    """The best hit so far, and the number of nodes and blocks that it took."""
 
-    best: Any
+    best: Best
     steps: int
 
 

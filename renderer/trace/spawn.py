@@ -53,15 +53,16 @@ _GAMMA7 = 7.0 * _ROUNDOFF / (1.0 - 7.0 * _ROUNDOFF)
 # errs by 56 u L^2; the sum of the three e z errs by 3 (56 + 8 + 24) u L^3. Divided by the determinant, which is
 # |cross(p1 - p0, p2 - p0) . d| / |d_z|, and projected onto the normal, the direction drops out: 264 u L^3 / |cross|.
 _GAMMA264 = 264.0 * _ROUNDOFF / (1.0 - 264.0 * _ROUNDOFF)
-# The same for the distance of a point from a face's plane as ``leave_faces`` finds it: the cross product's components
-# err by 32 u L^2, its product with the point by 192 u L^3, and dividing by its length adds 6 u of at most 24 L^3.
+# The same for the distance of a point from a face's plane as ``offset_from_faces`` finds it: the cross product's
+# components err by 32 u L^2, its product with the point by 192 u L^3, and dividing by its length adds 6 u of at most
+# 24 L^3.
 _GAMMA336 = 336.0 * _ROUNDOFF / (1.0 - 336.0 * _ROUNDOFF)
-# And never more than 47 u / SLANT of L, where a hit lies whose determinant is not in doubt (see ``intersect``).
+# And never more than 47 u / SLANT of L, where a hit lies whose determinant is certain (see ``intersect``).
 _MOST = 50.0 * _ROUNDOFF / SLANT
-# Of a face thinner than this share of its longest side every determinant is in doubt: it is at most 3 |cross| / side^2
+# Of a face thinner than this share of its longest side every determinant is uncertain: it is at most 3 |cross| / side^2
 # of A D, because A is at least the side as the ray sees it, and D at least side / sqrt(3).
 _THIN = DOUBT / 4.0
-# A hit whose determinant is in doubt counts within ROUNDING of the face: twice that from its plane is off it, and four
+# A hit whose determinant is uncertain counts within ROUNDING of the face: twice that from its plane is off it, and four
 # times that from a line, which the face may be LINE wide.
 _LEAST = 2.0 * ROUNDING
 _SMALLEST = 2.0**-1074
@@ -83,7 +84,7 @@ MITSUBA_EPSILON = 1500.0 * 2.0**-24
 class OffsetRule(NamedTuple):
     """The distance from its surface at which a ray starts: the bound of roundings, or (1 + max|p|) ``epsilon``."""
 
-    bounded: bool
+    uses_error_bound: bool
     epsilon: float
 
 
@@ -176,7 +177,7 @@ def offset_distance(p, p0, p1, p2, u, v, facet):
     The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
     matters where the first vanishes (on a plane through the origin) and for slivers.
     """
-    n_g, double_area, side = facet
+    n_g, double_area, side = facet.normal, facet.double_area, facet.side
     w, distance, reach = 1.0 - u - v, 0.0, 0.0
     for k in range(3):
         distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
@@ -216,7 +217,7 @@ def spawn_origin(p, error, n_g, w, offset):
     Mitsuba does, by its epsilon.
     """
     side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
-    if not offset.bounded:
+    if not offset.uses_error_bound:
         distance = (1.0 + largest_component(p)) * offset.epsilon
         return add(p, scale(n_g, side * distance))
     # rule: spawn-offset
@@ -234,8 +235,8 @@ def put_start(row, place, n_g, w, d, offset):
     side = 1.0 if slope >= 0.0 else -1.0
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0.0 else 0) | (THROUGH if side != place.came else BACK)
     slack = place.slack if abs(slope) > LEVEL * largest_component(w) else EDGE
-    put(row, SLACK, slack if offset.bounded else 0.0)
-    put(row, FACE, place.face if offset.bounded else -1.0)
+    put(row, SLACK, slack if offset.uses_error_bound else 0.0)
+    put(row, FACE, place.face if offset.uses_error_bound else -1.0)
     put(row, CODE, np.float64(code))
     put(row, ANCHOR, place.u)
     put(row, ANCHOR + 1, place.v)
@@ -314,9 +315,9 @@ def _side_of(slope, w, code):
 
 
 @inlined
-def leave_face(corners, o, w, unit, code):
-    """Where a ray from the point o near a face starts in direction w: off the face, see ``leave_faces``; and its slack,
-    EDGE where the start is near an edge or the face stops the ray. Then it starts at o.
+def offset_from_face(corners, o, w, unit, code):
+    """Where a ray from the point o near a face starts in direction w: off the face, see ``offset_from_faces``; and its
+    slack, EDGE where the start is near an edge or the face stops the ray. Then it starts at o.
 
     ``corners`` are ``corners_of`` the face; o comes and goes in the mesh's own units, the slack is in those of corners.
     """
@@ -329,8 +330,8 @@ def leave_face(corners, o, w, unit, code):
 
 
 @kernel
-def leave_to_both_sides(corners, o, unit):
-    """``leave_face`` for all directions w at once, of a face that ``has_normal``.
+def offset_to_both_sides(corners, o, unit):
+    """``offset_from_face`` for all directions w at once, of a face that ``has_normal``.
 
     Returns that normal, the start for each w with normal . w >= 0, and the start for all others, and the slack of both.
     """
@@ -374,29 +375,27 @@ def _at_corner(start, o, unit):
 
 
 @kernel
-def leave_faces(vertices, faces, rays, leaving, code, anchors, starts, rows, bounds):
-    """Write to ``starts`` (n, 3) where the rays begin:end start that leave the faces ``leaving``, -1 for none.
+def offset_from_faces(vertices, faces, origins, directions, leaving, starts, rows, begin, end, unit):
+    """Write the origins of the rays begin:end to ``starts`` (n, 3), moved off the faces that they leave.
 
-    rays     origins and directions, each with one row a ray or one for all
-    code     (n,) or (1,) int64, the bits of ``starts.record``
-    anchors  (n, 3) float64 of barycentrics, where the code says so, or no row; else origins are the anchors
-    rows     (n, starts.record.ROW) float64, which is written too
-    bounds   begin, end, and the tree's scale, in whose units no product overflows or vanishes
+    origins     one row a ray or one for all, as ``directions``
+    leaving     a ``batch.Leaving``
+    rows        (n, starts.record.ROW) float64, which is written too
+    unit        the tree's scale, in whose units no product overflows or vanishes
 
     A start moves along its face's normal only, by no more than its distance from the plane and some roundings, so that
     the ray meets neither that face nor another in its plane. Returns the row of the first origin that is too far from
     its face, or -1.
     """
-    corners, points, step = pointer(vertices), pointer(rays[0]), 3 * np.int64(len(rays[0]) > 1)
-    ways, way_step, code_step = pointer(rays[1]), 3 * np.int64(len(rays[1]) > 1), np.int64(len(code) > 1)
-    begin, end, unit = bounds
+    corners, code_step = pointer(vertices), np.int64(len(leaving.code) > 1)
+    step, way_step = 3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1)
     for i in range(begin, end):
-        face, o, w = leaving[i], three(points, i * step), three(ways, i * way_step)
-        own, slack, bits = o, 0.0, code[i * code_step]
-        anchor = row3(pointer(anchors), i) if bits & BARYCENTRIC != 0 else o
+        face, o, w = leaving.faces[i], three(pointer(origins), i * step), three(pointer(directions), i * way_step)
+        own, slack, bits = o, 0.0, leaving.code[i * code_step]
+        anchor = row3(pointer(leaving.anchors), i) if bits & BARYCENTRIC != 0 else o
         if face >= 0:
             around = corners_of(corners, pointer(faces), face, unit)
-            own, slack = leave_face(around, o, w, unit, bits)
+            own, slack = offset_from_face(around, o, w, unit, bits)
             if bits & BARYCENTRIC != 0:
                 if not _lies_at(around, anchor, o, unit):
                     return i

@@ -10,14 +10,15 @@ from renderer.numerics.simd import at, get, lowest_bit, pointer, put, store
 from renderer.results.steps import Steps
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
+from renderer.trace.best import Best, no_hit
 from renderer.trace.intersect import box_limit
 from renderer.trace.layout import BLOCK_FACES, Tree
-from renderer.trace.leaf import NO_FACE, nearest_carefully, tree_pointers
+from renderer.trace.leaf import nearest_carefully, tree_pointers
 from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
 from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
+from renderer.trace.stack_entry import order_of
 from renderer.trace.walk import child_in, stack_size, walk_nearest_first
 
-_WORD = 0xFFFFFFFF
 # The nodes and triangles that a call tests, beside those of one ray: some milliseconds, so that Ctrl-C need not wait
 # for long.
 _WORK = 1 << 18
@@ -31,7 +32,7 @@ def count_steps(tree: Tree, rays: RayBatch, shape: tuple[int, ...], threads: int
         size = stack_size(tree.depth)
         stack, near = np.empty(size, np.int64), np.empty(size + 8, np.float32)
         while begin < end:
-            begin, row = _count_chunk(tree.words, rays, counts, stack, near, begin, end)
+            begin, row = _count_chunk(tree.descriptor, rays, counts, stack, near, begin, end)
             if row >= 0:
                 bad.append(row)
                 return
@@ -46,7 +47,7 @@ def count_steps(tree: Tree, rays: RayBatch, shape: tuple[int, ...], threads: int
 
 
 @kernel
-def _count_chunk(words, rays, counts, stack, near, begin, end):
+def _count_chunk(descriptor, rays, counts, stack, near, begin, end):
     """Write nodes and triangles of the rays begin:end to ``counts`` (2, n).
 
     stack  memory for ``walk.stack_size`` int64
@@ -54,7 +55,7 @@ def _count_chunk(words, rays, counts, stack, near, begin, end):
 
     Returns the ray before which it ended, early after _WORK; and the row of a ray out of range, or -1.
     """
-    tree, source = tree_pointers(words), ray_pointers(rays, tree_pointers(words).scale)
+    tree, source = tree_pointers(descriptor), ray_pointers(rays, tree_pointers(descriptor).scale)
     bad, work = first_bad_ray(source, begin, end), np.int64(0)
     if bad < 0 and tree.has_nodes:
         waiting = _Waiting(pointer(stack), pointer(near), at(pointer(near), len(stack)))
@@ -82,10 +83,10 @@ class _Query(NamedTuple):
     waiting: _Waiting
 
 
-class _Counted(NamedTuple):
+class TraversalCounts(NamedTuple):
     """The best hit so far, and the nodes and triangles that it took."""
 
-    best: Any
+    best: Best
     nodes: int
     triangles: int
 
@@ -94,7 +95,7 @@ class _Counted(NamedTuple):
 def _count(tree, ray, t_max, waiting):
     """Nodes and triangles of one ray."""
     put(waiting.near, 0, np.float32(0.0))
-    nothing = _Counted((t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(0), np.int64(0))
+    nothing = TraversalCounts(no_hit(t_max), np.int64(0), np.int64(0))
     query = _Query(prepare_single(ray), waiting)
     found = walk_nearest_first(tree, waiting.stack, query, nothing, _reaches, _enter, _visit)
     return found.nodes, found.triangles
@@ -103,21 +104,21 @@ def _count(tree, ray, t_max, waiting):
 @inlined
 def _reaches(query, k, found):
     # Nothing is beyond a limit of NaN.
-    return not get(query.waiting.near, k) > box_limit(found.best[0], query.single.largest)
+    return not get(query.waiting.near, k) > box_limit(found.best.t, query.single.largest)
 
 
 @inlined
 def _enter(tree, query, node, found, top):
-    t0, bits = enter_node(tree, node, query.single, found.best[0])
+    t0, bits = enter_node(tree, node, query.single, found.best.t)
     store(query.waiting.distances, 0, t0)
     top = _push_sorted(tree, node, bits, query.waiting, top)
-    return _Counted(found.best, found.nodes + 1, found.triangles), top
+    return TraversalCounts(found.best, found.nodes + 1, found.triangles), top
 
 
 @inlined
 def _visit(tree, query, first, count, found):
     best = nearest_carefully(tree, first, count, query.single.ray, query.single.shear, found.best)
-    return _Counted(best, found.nodes, found.triangles + _faces_in(tree, first, count)), False
+    return TraversalCounts(best, found.nodes, found.triangles + _faces_in(tree, first, count)), False
 
 
 @kernel
@@ -149,4 +150,4 @@ def _push_sorted(tree, node, bits, waiting, top):
 @inlined
 def _precedes(distance, child, other_distance, other):
     """Whether a box is nearer than another; of equal ones nodes come before leaves."""
-    return distance < other_distance or (distance == other_distance and (child & _WORD) < (other & _WORD))
+    return distance < other_distance or (distance == other_distance and order_of(child) < order_of(other))

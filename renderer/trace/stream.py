@@ -12,7 +12,6 @@ import numpy as np
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import (
     at,
-    bits_float,
     count_bits,
     farthest_first,
     get,
@@ -25,32 +24,35 @@ from renderer.numerics.simd import (
     splat8,
     store,
 )
+from renderer.trace.best import Best
 from renderer.trace.intersect import box_limit, meet_boxes, meet_planes, see_triangles
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.trace.ray_lanes import (
     CHILD,
-    DOUBTFUL,
     LARGEST,
     LIMIT,
     LOWER,
     NUMBER,
-    SIXTEEN,
     T_MIN,
     TOP,
+    UNRESOLVED,
     WIDTH,
     T,
     best_of,
+    lane_index,
+    lane_of,
     prepare_eight,
     put_best,
     shear_of,
     slabs_of,
 )
+from renderer.trace.stack_entry import child_of_entry, distance_of, with_child
+from renderer.trace.walk import first_block
 
-_LOW_WORD = 0xFFFFFFFF
 # The entry at the bottom of each ray's stack. END is the code of no leaf. The distance -inf is beyond no limit, not
 # even beyond NaN, so no ray goes below its stack.
 END = -(1 << 31)
-_BOTTOM = (-0x800000 << 32) | (END & _LOW_WORD)
+_BOTTOM = (-0x800000 << 32) | (END & 0xFFFFFFFF)
 _LINE = CACHE_LINE // 4
 
 
@@ -62,18 +64,20 @@ def _prefetch_child(tree, child):
             prefetch(tree.nodes, child * NODE_WORDS + line * _LINE)
     else:
         # A float64 block is twice as long: every second line is asked for, the hardware fetches the next one by itself.
-        first = (~child >> LEAF_BITS) * BLOCK_WORDS
+        first = first_block(child) * BLOCK_WORDS
         for line in range(3):
             prefetch(tree.blocks, (first + line * _LINE) << tree.wide)
 
 
 class Lanes(NamedTuple):
-    """Rays under way, as pointers: their stacks; the lists of the rays at a node, at a leaf and at END; of a round, for
-    each ray in the list of leaves, the bits of the triangles met, those in doubt, and t, u, v, w; and which lanes are
-    free.
+    """Rays under way, as pointers.
 
-    The lanes of eight rays are taken together. ``left`` is the number of each eight's rays that are under way, and in
-    its last word the bits of the eights that are free.
+    stacks, stack_size        the stacks of all lanes, and the entries of one
+    at_node, at_leaf, at_end  lists of the lanes of rays at a node, at a leaf and at END
+    bits, must_resolve, hits  of a round, for each ray in the list of leaves: the bits of the triangles hit, of those
+                              uncertain that must be resolved, and t, u, v and w
+    left                      of each eight lanes the number of rays under way; in the last word the bits of the eights
+                              that are free: eight lanes are taken together
     """
 
     stacks: Any
@@ -82,19 +86,37 @@ class Lanes(NamedTuple):
     at_leaf: Any
     at_end: Any
     bits: Any
-    doubts: Any
+    must_resolve: Any
     hits: Any
     left: Any
 
 
+class LaneCounts(NamedTuple):
+    """The lengths of the lists of lanes at a node, at a leaf and at END."""
+
+    nodes: int
+    leaves: int
+    ends: int
+
+
+class Queue(NamedTuple):
+    """Rays that wait for lanes: their numbers, with seven more that may be read; the first that has not begun; and how
+    many they are.
+    """
+
+    numbers: Any
+    following: int
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
+
+
 # The lanes. Eight are free again when all their rays have ended, so there are more lanes than rays under way. Eight
-# more begin where no more than ENOUGH are. With 32 instead of 16, random rays take 5 % less time on a mesh of 1e5
+# more begin where no more than MIN_ACTIVE are. With 32 instead of 16, random rays take 5 % less time on a mesh of 1e5
 # faces, 10 % on one of 1e6 and 14 % on one of 5e6; with 48 or 64, within 5 % of that.
-SIXTEENS = 8
-_EIGHTS, _LANES = 2 * SIXTEENS, SIXTEENS * WIDTH
-ENOUGH = 2 * WIDTH
+GROUPS = 8
+HALF_GROUPS, _LANES = 2 * GROUPS, GROUPS * WIDTH
+MIN_ACTIVE = 2 * WIDTH
 # The numbers of int64 (without the stacks) and float64 in ``Lanes``.
-LANE_INTEGERS, LANE_DOUBLES = 5 * _LANES + _EIGHTS + 1, 4 * BLOCK_FACES * _LANES
+LANE_INTEGERS, LANE_DOUBLES = 5 * _LANES + HALF_GROUPS + 1, 4 * BLOCK_FACES * _LANES
 
 
 @inlined
@@ -109,32 +131,28 @@ def make_lanes(integers, doubles, stack_size):
 @inlined
 def clear_lanes(lanes):
     """Let all lanes be free."""
-    put(lanes.left, _EIGHTS, (1 << _EIGHTS) - 1)
+    put(lanes.left, HALF_GROUPS, (1 << HALF_GROUPS) - 1)
 
 
 @inlined
-def begin_rays(rays, prepared, lanes, waiting, lists):
-    """Let rays begin, eight at a time, while few are under way and lanes are free.
+def begin_rays(rays, prepared, lanes, queue, counts):
+    """Let rays of a queue begin, eight at a time, while few are under way and lanes are free.
 
-    waiting  the numbers of rays that wait, with seven more to be read; the first that has not begun; and their number
-    lists    the lengths of the lists of nodes and leaves
-
-    Returns the first ray that still waits, and the length of the list of nodes.
+    Returns the first ray that still waits, and the ``LaneCounts``.
     """
-    numbers, following, count = waiting
-    nodes, leaves = lists
-    while following < count and nodes + leaves <= ENOUGH and get(lanes.left, _EIGHTS) != 0:
-        free = get(lanes.left, _EIGHTS)
-        eight = lowest_bit(free)
-        put(lanes.left, _EIGHTS, free & (free - 1))
-        some, r = smaller(count - following, 8), (eight >> 1) * SIXTEEN + 8 * (eight & 1)
-        prepare_eight(rays, prepared, r, at(numbers, following))
-        put(lanes.left, eight, some)
+    following, nodes = queue.following, counts.nodes
+    while following < queue.count and nodes + counts.leaves <= MIN_ACTIVE and get(lanes.left, HALF_GROUPS) != 0:
+        free = get(lanes.left, HALF_GROUPS)
+        half = lowest_bit(free)
+        put(lanes.left, HALF_GROUPS, free & (free - 1))
+        some, r = smaller(queue.count - following, 8), lane_of(half >> 1, 8 * (half & 1))
+        prepare_eight(rays, prepared, r, at(queue.numbers, following))
+        put(lanes.left, half, some)
         for k in range(some):
-            begin_ray(prepared, lanes, r + k, get(numbers, following + k))
+            begin_ray(prepared, lanes, r + k, get(queue.numbers, following + k))
             put(lanes.at_node, nodes + k, r + k)
         following, nodes = following + some, nodes + some
-    return following, nodes
+    return following, LaneCounts(nodes, counts.leaves, counts.ends)
 
 
 @inlined
@@ -144,30 +162,30 @@ def begin_ray(prepared, lanes, r, number):
     put(integers, CHILD + r, 0)
     put(integers, TOP + r, bottom + 1)
     put(integers, NUMBER + r, number)
-    put(integers, DOUBTFUL + r, 0)
+    put(integers, UNRESOLVED + r, 0)
     put(lanes.stacks, bottom, _BOTTOM)
 
 
 @inlined
 def stack_of(lanes, r):
     """Where the stack of lane ``r`` begins in ``stacks``."""
-    return ((r // SIXTEEN) * WIDTH + r % WIDTH) * lanes.stack_size
+    return lane_index(r) * lanes.stack_size
 
 
 @inlined
 def end_ray(lanes, r):
     """Count a ray as ended; its eight lanes are free when it is the last of them."""
-    eight = 2 * (r // SIXTEEN) + r % WIDTH // 8
-    left = get(lanes.left, eight) - 1
-    put(lanes.left, eight, left)
-    put(lanes.left, _EIGHTS, get(lanes.left, _EIGHTS) | (np.int64(left == 0) << eight))
+    half = lane_index(r) // 8
+    left = get(lanes.left, half) - 1
+    put(lanes.left, half, left)
+    put(lanes.left, HALF_GROUPS, get(lanes.left, HALF_GROUPS) | (np.int64(left == 0) << half))
 
 
 @inlined
 def wait_octant(prepared, lanes, r, entry, child):
     """Push an octant onto the stack of ray ``r``: the distance of ``entry``, and its child."""
     top = get(prepared.integers, TOP + r)
-    put(lanes.stacks, top, ((entry >> 32) << 32) | (child & _LOW_WORD))
+    put(lanes.stacks, top, with_child(entry, child))
     put(prepared.integers, TOP + r, top + 1)
 
 
@@ -192,10 +210,10 @@ def resume(tree, rays, lanes, r):
     # rule: resume-limit
     limit, top = get(rays.floats, LIMIT + r), get(rays.integers, TOP + r) - 1
     entry = get(lanes.stacks, top)
-    while bits_float(entry >> 32) > limit:
+    while distance_of(entry) > limit:
         top -= 1
         entry = get(lanes.stacks, top)
-    child = np.int64(np.int32(entry & _LOW_WORD))
+    child = child_of_entry(entry)
     put(rays.integers, CHILD + r, child)
     put(rays.integers, TOP + r, top)
     _prefetch_child(tree, child)
@@ -207,14 +225,15 @@ def meet_leaves(tree, rays, lanes, count):
     """Compute what each of ``count`` rays hits in the first block of its leaf."""
     for k in range(count):
         r = get(lanes.at_leaf, k)
-        block, shear = ~get(rays.integers, CHILD + r) >> LEAF_BITS, shear_of(rays, r)
-        edges, seen = see_triangles(tree, block * BLOCK_WORDS, shear)
+        base, shear = first_block(get(rays.integers, CHILD + r)) * BLOCK_WORDS, shear_of(rays, r)
+        edges, seen = see_triangles(tree, base, shear)
         t_min, t_max = get(rays.doubles, T_MIN + r), get(rays.doubles, T + r)
-        t, doubts, _, dues = meet_planes(tree, block * BLOCK_WORDS, edges, seen, shear, t_min, t_max)
-        put(lanes.bits, k, seen & ~doubts & movemask((t >= splat4(t_min)) & (t <= splat4(t_max))))
-        put(lanes.doubts, k, dues)
+        planes = meet_planes(tree, base, edges, seen, shear, t_min, t_max)
+        within = movemask((planes.t >= splat4(t_min)) & (planes.t <= splat4(t_max)))
+        put(lanes.bits, k, seen & ~planes.uncertain & within)
+        put(lanes.must_resolve, k, planes.must_resolve)
         hits = 4 * BLOCK_FACES * k
-        store(lanes.hits, hits, t)
+        store(lanes.hits, hits, planes.t)
         store(lanes.hits, hits + BLOCK_FACES, edges.e1)
         store(lanes.hits, hits + 2 * BLOCK_FACES, edges.e2)
         store(lanes.hits, hits + 3 * BLOCK_FACES, edges.determinant)
@@ -222,16 +241,16 @@ def meet_leaves(tree, rays, lanes, count):
 
 @inlined
 def take_hits(tree, rays, lanes, k):
-    """Keep the best hit of the first block that the ``k``-th ray at a leaf met, and whether one was in doubt.
+    """Keep the best hit of the first block that the ``k``-th ray at a leaf met, and whether one must be resolved.
 
     Returns whether there is a hit.
     """
     r, bits, hits = get(lanes.at_leaf, k), get(lanes.bits, k), at(lanes.hits, 4 * BLOCK_FACES * k)
-    put(rays.integers, DOUBTFUL + r, get(rays.integers, DOUBTFUL + r) | get(lanes.doubts, k))
+    put(rays.integers, UNRESOLVED + r, get(rays.integers, UNRESOLVED + r) | get(lanes.must_resolve, k))
     if bits == 0:
         return False
-    block = ~get(rays.integers, CHILD + r) >> LEAF_BITS
-    t, face, u, v, w = best_of(rays, r)
+    block, best = first_block(get(rays.integers, CHILD + r)), best_of(rays, r)
+    t, face, u, v, w = best.t, best.face, best.u, best.v, best.w
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
@@ -240,7 +259,7 @@ def take_hits(tree, rays, lanes, k):
         if ti < t or (ti == t and fi < face):
             t, face = ti, fi
             u, v, w = get(hits, BLOCK_FACES + i), get(hits, 2 * BLOCK_FACES + i), get(hits, 3 * BLOCK_FACES + i)
-    put_best(rays, r, (t, face, u, v, w))
+    put_best(rays, r, Best(t, face, u, v, w))
     put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
     return True
 
@@ -259,14 +278,52 @@ def leave_leaf(tree, rays, lanes, r):
 
 
 @inlined
-def list_lane(lanes, r, child, lists):
-    """Put lane ``r`` into the list of nodes, of leaves or of ends, as its next child is.
+def list_lane(lanes, r, child, counts):
+    """Put lane ``r`` into the list of nodes, of leaves or of ends, as its next child is; returns the ``LaneCounts``.
 
-    ``lists`` are the lengths of the three; returns them anew. It takes no branch: the lane is written to all three.
+    It takes no branch: the lane is written to all three.
     """
-    nodes, leaves, ends = lists
+    nodes, leaves, ends = counts.nodes, counts.leaves, counts.ends
     put(lanes.at_node, nodes, r)
     put(lanes.at_leaf, leaves, r)
     put(lanes.at_end, ends, r)
     at_node, at_end = np.int64(child >= 0), np.int64(child == END)
-    return nodes + at_node, leaves + (1 - at_node - at_end), ends + at_end
+    return LaneCounts(nodes + at_node, leaves + (1 - at_node - at_end), ends + at_end)
+
+
+@inlined
+def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, meet, take, finish):
+    """Take the rays in lanes to their ends, and those of a queue, of which none begins after ``most_rounds`` rounds.
+
+    query   what the three kernels read
+    meet    meet(tree, query, lanes, count): compute what each ray at a leaf meets in the first block of its leaf
+    take    take(tree, query, k): take what the k-th of them met; returns whether the ray ends
+    finish  finish(tree, query, r): what is left to do at the end of the ray in lane r; returns the rounds that it took
+
+    Returns the first ray that still waits, and the number of rounds.
+    """
+    rounds, following = np.int64(0), queue.following
+    while True:
+        if following < queue.count and rounds <= most_rounds:
+            waiting = Queue(queue.numbers, following, queue.count)
+            following, counts = begin_rays(rays, prepared, lanes, waiting, counts)
+        if counts.nodes + counts.leaves + counts.ends == 0:
+            return following, rounds
+        rounds += 1
+        # Take the rays at nodes one step on.
+        entered, counts = counts.nodes, LaneCounts(np.int64(0), counts.leaves, counts.ends)
+        meet_nodes(tree, prepared, lanes, entered)
+        for k in range(entered):
+            r = get(lanes.at_node, k)
+            counts = list_lane(lanes, r, resume(tree, prepared, lanes, r), counts)
+        # Take the rays at leaves one block on.
+        entered, counts = counts.leaves, LaneCounts(counts.nodes, np.int64(0), counts.ends)
+        meet(tree, query, lanes, entered)
+        for k in range(entered):
+            r, ends = get(lanes.at_leaf, k), take(tree, query, k)
+            counts = list_lane(lanes, r, END if ends else leave_leaf(tree, prepared, lanes, r), counts)
+        for k in range(counts.ends):
+            r = get(lanes.at_end, k)
+            rounds += finish(tree, query, r)
+            end_ray(lanes, r)
+        counts = LaneCounts(counts.nodes, counts.leaves, np.int64(0))

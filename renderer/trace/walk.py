@@ -17,9 +17,15 @@ def stack_size(depth: int) -> int:
 
 
 @inlined
+def first_block(leaf):
+    """The first block of a leaf."""
+    return ~leaf >> LEAF_BITS
+
+
+@inlined
 def blocks_of(leaf):
     """The first block of a leaf, and how many it has."""
-    return ~leaf >> LEAF_BITS, (~leaf & (MAX_LEAF_BLOCKS - 1)) + 1
+    return first_block(leaf), (~leaf & (MAX_LEAF_BLOCKS - 1)) + 1
 
 
 @inlined

@@ -128,7 +128,7 @@ def test_the_deepest_tree_has_a_stack_that_holds_its_column():
     tree = Tree(nodes.ravel(), flat.blocks, flat.faces, levels)
     counted, rows = np.zeros(1, np.int32), np.zeros(1, np.int64)
     stack = np.full(stack_size(levels) + 8, -7, np.int64)
-    assert count_crossings(tree.words, np.zeros((1, 3)), 2, -1.0, rows, counted, stack, 0) == 1
+    assert count_crossings(tree.descriptor, np.zeros((1, 3)), 2, -1.0, rows, counted, stack, 0) == 1
     assert counted.tolist() == [7 * levels + 1]
     assert (stack[-8:] == -7).all() and (stack[500:-8] != -7).any()
 

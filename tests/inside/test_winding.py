@@ -272,9 +272,9 @@ def test_far_away_it_is_0_at_any_coordinates():
 
 
 @kernel
-def search_all(words, rows, points, share, out, stack):
+def search_all(descriptor, rows, points, share, out, stack):
     """The winding number and its bound of each point, in the rows of ``out`` (n, 2)."""
-    tree, rows, stack, parts = tree_pointers(words), pointer(rows), pointer(stack), local_doubles()
+    tree, rows, stack, parts = tree_pointers(descriptor), pointer(rows), pointer(stack), local_doubles()
     for i in range(len(points)):
         point = _point_at(tree, at(pointer(points), 3 * i))
         out[i, 0], out[i, 1], _ = _search(tree, _Query(rows, point, share, parts), stack)
@@ -282,7 +282,7 @@ def search_all(words, rows, points, share, out, stack):
 
 def errors_and_bounds(mesh, points, share):
     tree, out = Octree.from_mesh(mesh).tree, np.empty((len(points), 2))
-    search_all(tree.words, moments_of(tree, 1), points, share, out, np.empty(stack_size(tree.depth), np.int64))
+    search_all(tree.descriptor, moments_of(tree, 1), points, share, out, np.empty(stack_size(tree.depth), np.int64))
     return np.abs(np.float64(out[:, 0] - reference(mesh, points))), out[:, 1]
 
 
@@ -318,7 +318,7 @@ def test_a_search_whose_bound_exceeds_the_tolerance_is_not_the_answer():
     points = around(mesh, np.random.default_rng(3), 300) * 3
     tree, out = Octree.from_mesh(mesh).tree, np.empty((len(points), 2))
     stack = np.empty(stack_size(tree.depth), np.int64)
-    search_all(tree.words, moments_of(tree, 1), points, _FIRST * tolerance, out, stack)
+    search_all(tree.descriptor, moments_of(tree, 1), points, _FIRST * tolerance, out, stack)
     good = out[:, 1] <= tolerance
     numbers = Octree.from_mesh(mesh).winding_number(points, tolerance)
     assert good.any() and (~good).any()

@@ -205,19 +205,19 @@ from renderer import Octree
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.batch import check_rays
 from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
-from renderer.trace.traverse import make_memory, make_scratch, trace
+from renderer.trace.traverse import new_scratch, scratch_pointers, trace
 
 @njit(error_model="numpy")
-def mine(words, rays, out, memory):
-    tree = tree_pointers(words)
+def mine(descriptor, rays, out, memory):
+    tree = tree_pointers(descriptor)
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
-    trace(tree, source, found, 0, len(rays[1]), make_scratch(memory), False)
+    trace(tree, source, found, 0, len(rays[1]), scratch_pointers(memory), False)
 
 octree, rays = Octree.load(sys.argv[1]), np.random.default_rng(0).normal(size=(50, 3)) * 3
 expected = octree.closest_hit(rays, -rays)
 octree.any_hit(rays, -rays)
 out = np.zeros((HIT_ROWS, 50))
-mine(octree.tree.words, check_rays(rays, -rays, np.zeros(50), np.inf)[0], out, make_memory(octree.tree.depth, 50))
+mine(octree.tree.descriptor, check_rays(rays, -rays, np.zeros(50), np.inf)[0], out, new_scratch(octree.tree.depth, 50))
 print((out[0] == expected.t).all())
 """
 

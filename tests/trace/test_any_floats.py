@@ -30,7 +30,7 @@ from renderer.trace.batch import NO_STARTS, RayBatch
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
 from renderer.trace.stream import _BOTTOM
-from renderer.trace.traverse import make_memory, make_scratch, search_blocks, trace
+from renderer.trace.traverse import new_scratch, scratch_pointers, search_blocks, trace
 from renderer.trace.walk import stack_size
 
 # What arithmetic may end in, or begin with when nobody looked.
@@ -41,24 +41,24 @@ GUARD = 0x7EADBEEF
 
 
 @kernel
-def unchecked(words, rays, out, any_hit, memory, by_blocks):
+def unchecked(descriptor, rays, out, any_hit, memory, by_blocks):
     """``trace_chunk`` without its check of the rays."""
-    tree = tree_pointers(words)
+    tree = tree_pointers(descriptor)
     count = len(rays[1])
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
     if by_blocks:
-        search_blocks(tree, source, found, 0, count, make_scratch(memory).holders, any_hit)
+        search_blocks(tree, source, found, 0, count, scratch_pointers(memory).holders, any_hit)
     else:
-        trace(tree, source, found, 0, count, make_scratch(memory), any_hit)
+        trace(tree, source, found, 0, count, scratch_pointers(memory), any_hit)
 
 
 def answers(octree, rays, any_hit, by_blocks=False):
     """t, u, v, face and side of rays that nobody checked, or hit; the words around the scratch are as they were."""
-    count, memory = len(rays[1]), make_memory(octree.tree.depth, len(rays[1]))
+    count, memory = len(rays[1]), new_scratch(octree.tree.depth, len(rays[1]))
     padded = np.full(len(memory.integers) + 128, GUARD, np.int64)
     memory = memory._replace(integers=padded[64:-64])
     out = np.full((HIT_ROWS, count), -7.0)
-    unchecked(octree.tree.words, rays, out, any_hit, memory, by_blocks)
+    unchecked(octree.tree.descriptor, rays, out, any_hit, memory, by_blocks)
     assert (padded[:64] == GUARD).all()
     assert (padded[-64:] == GUARD).all()
     return out.view(np.bool_)[0, :count] if any_hit else out

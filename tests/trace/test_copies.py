@@ -51,7 +51,7 @@ def test_a_copied_tree_has_memory_of_its_own(way: str) -> None:
     tree = used(Octree).tree
     copied = COPIES[way](tree)
     assert not np.shares_memory(tree.nodes, copied.nodes)
-    assert copied.words[0] == copied.nodes.ctypes.data != tree.words[0]
+    assert copied.descriptor[0] == copied.nodes.ctypes.data != tree.descriptor[0]
     assert copied.nodes.ctypes.data % CACHE_LINE == copied.blocks.ctypes.data % CACHE_LINE == 0
 
 

@@ -105,7 +105,7 @@ def plane_distance(vertices, face, point):
 
 
 def test_starts_are_beyond_the_plane_by_no_more_than_roundings_and_above_the_nearest_point_of_it():
-    from renderer.trace.batch import by_faces, check_rays, moved_off
+    from renderer.trace.batch import by_faces, check_rays, offset_origins
 
     ball = icosphere(2)
     for offset in OFFSETS:
@@ -114,7 +114,7 @@ def test_starts_are_beyond_the_plane_by_no_more_than_roundings_and_above_the_nea
         face, points, directions = on_faces(vertices, ball.faces, 5, 300)
         # Some lie off the plane, on either side, by more than rounding.
         points[::3] += 1e-6 * ball.face_normals()[face[::3]] * np.random.default_rng(0).choice([-1, 1], (100, 1))
-        rays = moved_off(check_rays(points, directions, 0.0, np.inf)[0], by_faces(face), octree.mesh, 1.0, 1)
+        rays = offset_origins(check_rays(points, directions, 0.0, np.inf)[0], by_faces(face), octree.mesh, 1.0, 1)
         normals = ball.face_normals()[face]
         slack = rays.starts[HEAD:].view(np.float64).reshape(-1, ROW)[:, SLACK]
         edge = slack == EDGE
@@ -218,14 +218,14 @@ def test_a_ray_along_a_face_on_a_line_leaves_it(accelerator, toward):
 def test_no_kernel_is_compiled_for_other_arrays(monkeypatch):
     """Directions had come as an array that cannot be written, for which Numba compiles the kernel again."""
     seen = []
-    kernel = batch.leave_faces
+    kernel = batch.offset_from_faces
 
     def noted(*arguments):
         origins, directions = arguments[2]
         seen.append([array.flags.writeable for array in (origins, directions, *arguments[3:8])])
         return kernel(*arguments)
 
-    monkeypatch.setattr(batch, "leave_faces", noted)
+    monkeypatch.setattr(batch, "offset_from_faces", noted)
     octree, directions = Octree.from_mesh(icosphere(1)), np.eye(3)
     starts = octree.mesh.triangles[:3].mean(axis=1)
     for ways in (directions, directions[0], np.broadcast_to(directions[0], (3, 3))):

@@ -17,10 +17,11 @@ from renderer.jit.decorators import kernel
 from renderer.numerics.simd import extract
 from renderer.octree import BruteForce, Octree
 from renderer.results.hits import Hits
+from renderer.trace.best import FaceHit
 from renderer.trace.intersect import FAR_PADDING, Ray, box_limit, hit_triangles, largest_of, make_shear, round_down
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import tree_pointers
-from renderer.trace.resolve import _meet_slab, settled
+from renderer.trace.resolve import _meet_slab, resolve_uncertain
 from validation.oracle import exact
 
 SIDE = 100
@@ -185,22 +186,23 @@ def within_own_box(tree, at, ray, t):
 
 
 @kernel
-def judged(words, origins, directions, out):
-    """Of ray i at face i: 0 for a miss, 1 for a hit, 2 where t is in doubt, 3 where the determinant is; then t, t
-    settled, and 1 where t, or that of a hit in doubt settled, is within the face's own box.
+def judged(descriptor, origins, directions, out):
+    """Of ray i at face i: 0 for a miss, 1 for a hit, 2 where t is uncertain, 3 where the determinant is; then t, t
+    resolved, and 1 where t, or that of an uncertain hit resolved, is within the face's own box.
     """
-    tree = tree_pointers(words)
+    tree = tree_pointers(descriptor)
     for i in range(len(origins)):
         o, d = origins[i], directions[i]
         ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0, 0.0, -1.0)
         base, place = (i // BLOCK_FACES) * BLOCK_WORDS, i % BLOCK_FACES
-        bits, doubts, blurred, _, t4 = hit_triangles(tree, base, make_shear(ray), 0.0, np.inf)[:5]
-        t = extract(t4, place)
-        if (bits >> place) & 1 == 1 and t >= 0.0:
-            out[i, 0], out[i, 1] = 1 + ((doubts >> place) & 1) + ((blurred >> place) & 1), t
-            # A sure hit is settled too, to see that its t stays.
-            hit, is_blurred = (t, 0.0, 0.0, 1.0), (blurred >> place) & 1 != 0
-            out[i, 2] = settled(tree, base + place, ray, make_shear(ray), hit, is_blurred)[0]
+        hits = hit_triangles(tree, base, make_shear(ray), 0.0, np.inf)
+        t = extract(hits.t, place)
+        if (hits.bits >> place) & 1 == 1 and t >= 0.0:
+            of_determinant = (hits.determinant_uncertain >> place) & 1
+            out[i, 0], out[i, 1] = 1 + ((hits.uncertain >> place) & 1) + of_determinant, t
+            # A certain hit is resolved too, to see that its t stays.
+            hit = FaceHit(t, 0.0, 0.0, 1.0)
+            out[i, 2] = resolve_uncertain(tree, base + place, ray, make_shear(ray), hit, of_determinant != 0).t
             out[i, 3] = within_own_box(tree, base + place, ray, t if out[i, 0] == 1 else out[i, 2])
 
 
@@ -227,13 +229,13 @@ def test_a_hit_beyond_doubt_lies_within_its_own_box_and_so_within_all(seed):
     assert brute.tree.scale == 1.0
     np.testing.assert_array_equal(brute.tree.faces[: len(corners)], np.arange(len(corners)))
     found = np.zeros((len(corners), 4))
-    judged(brute.tree.words, origins, directions, found)
+    judged(brute.tree.descriptor, origins, directions, found)
     sure, doubtful = found[:, 0] == 1, found[:, 0] == 2
     assert sure.sum() > 50_000
     assert doubtful.sum() > 2_000
     assert (found[:, 0] == 3).sum() > 20_000
     assert found[sure, 3].all()
-    # A sure hit that is settled all the same stays, but where its t is counted with twice the digits.
+    # A certain hit that is resolved all the same stays, but where its t is counted with twice the digits.
     for row in np.flatnonzero(sure & (found[:, 1] != found[:, 2])):
         u, v, w, t = exact.determinants(corners[row], origins[row], directions[row])
         assert found[row, 2] == float(t / (u + v + w))

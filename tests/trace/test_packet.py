@@ -14,7 +14,7 @@ from renderer.trace.batch import RayBatch
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
 from renderer.trace.layout import NODE_WORDS
 from renderer.trace.packet import enter_beam, make_beam
-from renderer.trace.ray_lanes import SIXTEEN, WIDTH, Prepared, prepare_eight, prepare_ray
+from renderer.trace.ray_lanes import GROUP_STRIDE, WIDTH, Prepared, prepare_eight, prepare_ray
 from renderer.trace.rays import ray_at, ray_pointers
 from renderer.trace.traverse import are_coherent
 
@@ -105,7 +105,7 @@ def test_eight_rays_are_prepared_as_each_is_alone(seed):
     directions = rng.choice([0.0, -0.0, 1.0, -1.0, 1e-200, -1e200, *rng.normal(size=9)], (20, 3))
     t_max = rng.choice([0.0, 1e-320, 3.0, 1e308, np.inf], 20)
     rays = RayBatch(origins, directions, rng.choice([0.0, 1e-320, 0.5], 20), t_max)
-    together, alone = ([np.zeros(SIXTEEN, kind) for kind in (np.float32, float, np.int64)] for _ in range(2))
+    together, alone = ([np.zeros(GROUP_STRIDE, kind) for kind in (np.float32, float, np.int64)] for _ in range(2))
     _prepare_both(rays, rng.integers(0, 20, 8), tuple(together), tuple(alone))
     for one, other in zip(together, alone, strict=True):
         assert one.tobytes() == other.tobytes() and one.reshape(16, 16)[:, 8:].any()
@@ -149,7 +149,7 @@ def _meet_beam_and_rays(nodes, origins, directions, t_max, room):
 
 def _beam_and_rays(nodes, origins, directions, t_max):
     """The bits of the octants that the beam of sixteen rays meets, and those that any of them meets alone."""
-    room = np.empty(SIXTEEN, np.float32), np.empty(SIXTEEN), np.empty(SIXTEEN, np.int64)
+    room = np.empty(GROUP_STRIDE, np.float32), np.empty(GROUP_STRIDE), np.empty(GROUP_STRIDE, np.int64)
     return _meet_beam_and_rays(nodes, origins, directions, t_max, room)
 
 

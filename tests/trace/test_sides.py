@@ -7,7 +7,7 @@ from cases import cases
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from renderer.trace.edge_signs import passes_within, products_sign
+from renderer.trace.edge_signs import EdgeSides, passes_within, products_sign
 
 # Products of these may vanish or be denormal, but none overflows, as no product of a ray's and a face's does.
 NUMBERS = st.floats(-(2.0**500), 2.0**500)
@@ -50,4 +50,4 @@ def test_products_that_rounding_makes_one(seed, scale):
     ],
 )
 def test_a_face_is_closed_and_has_no_side_in_its_plane(sides, within):
-    assert passes_within(sides) == bool(within)
+    assert passes_within(EdgeSides(*sides)) == bool(within)

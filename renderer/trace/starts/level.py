@@ -12,7 +12,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import as_pairs, dot_pairs, quotient
 from renderer.numerics.simd import get, larger, smaller
 from renderer.numerics.vec3 import add, barycentric, cross, dot, largest_component, largest_of_three, length, sub
-from renderer.trace.edge_signs import corner
+from renderer.trace.edge_signs import corners_at
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import octants_around
 from renderer.trace.starts.anchor import anchor_of
@@ -48,7 +48,7 @@ class Members(NamedTuple):
     far: Spot
 
 
-class _Met(NamedTuple):
+class _SurfacePoint(NamedTuple):
     """A point that a ray meets: the corners of the face, the barycentrics, the point as rounded, and the direction of
     the ray, scaled to about 1.
     """
@@ -83,12 +83,6 @@ def are_level(p, q):
     """Whether two faces are in one plane, but for the rounding of their corners."""
     error = CORNER_ERROR * larger(largest_of_three(*p), largest_of_three(*q))
     return _is_below(p, q, error) and _is_below(q, p, error)
-
-
-@inlined
-def corners_at(tree, place):
-    """The corners of the face at a place of a block."""
-    return corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
 
 
 @kernel
@@ -157,7 +151,7 @@ def list_members(tree, surfaces, spot, d, holders, count):
     """
     corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
-    met = _Met(corners, spot, o, unit_direction(d)[0])
+    met = _SurfacePoint(corners, spot, o, unit_direction(d)[0])
     count = _keep_members(tree, met, holders, count)
     near, far, least, most, holds_own = NO_MEMBER, NO_MEMBER, 0.0, 0.0, False
     for k in range(count):

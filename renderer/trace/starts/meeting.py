@@ -22,7 +22,7 @@ from renderer.numerics.double_double import (
 from renderer.numerics.predicates import UNDECIDED, slope_sign, volume_sign
 from renderer.numerics.simd import larger, local_doubles
 from renderer.numerics.vec3 import largest_component, largest_of_three, scale, sub
-from renderer.trace.edge_signs import corner
+from renderer.trace.edge_signs import corners_at
 from renderer.trace.starts.anchor import from_anchor
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
@@ -86,7 +86,7 @@ def _way_error(anchor, p, factor):
 @kernel
 def seen_from(tree, place, anchor):
     """The face at a place of a block, as ``SeenFace``."""
-    p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
+    p0, p1, p2 = corners_at(tree, place)
     o = anchor.base
     reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o))
     factor = 1.0 / power_below(larger(reach, _LEAST_NORMAL))

@@ -10,9 +10,10 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.numerics.simd import extract, get, larger, local_doubles, lowest_bit, pointer, put, smaller
+from renderer.numerics.simd import get, larger, local_doubles, lowest_bit, pointer, put, smaller
 from renderer.numerics.vec3 import add, largest_component, sub
-from renderer.trace.edge_signs import corner
+from renderer.trace.best import NO_FACE, Best, FaceHit, hit_on, is_better, no_hit
+from renderer.trace.edge_signs import corners_at
 from renderer.trace.intersect import (
     CORNER,
     Ray,
@@ -23,8 +24,7 @@ from renderer.trace.intersect import (
     unsure_sides,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import NO_FACE, is_better, octants_around, tree_pointers
-from renderer.trace.resolve import settled
+from renderer.trace.leaf import octants_around, resolved_hit, tree_pointers
 from renderer.trace.single_ray import Found, SingleRay, enter_node, prepare_single
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
@@ -67,13 +67,12 @@ AHEAD = -0.0
 _LEAST_T = 2.0**-900
 # A hit that is farther than so often its slack errs by less than 2^-20 of t by where the ray starts.
 NEAR_HIT = 2.0**20
-_NOTHING = (np.inf, np.int32(NO_FACE), 0.0, 0.0, 1.0)
 
 
 @inlined
 def _box_holds(tree, place, o):
     """Whether the box of a face, with _ROOM, holds a point."""
-    p0, p1, p2 = corner(tree, place), corner(tree, place + 12), corner(tree, place + 24)
+    p0, p1, p2 = corners_at(tree, place)
     holds, room = True, largest_component(o) * _ROOM
     for k in range(3):
         low, high = smaller(p0[k], smaller(p1[k], p2[k])), larger(p0[k], larger(p1[k], p2[k]))
@@ -126,13 +125,13 @@ def _add_holders(tree, query, first, blocks, count):
 
 @kernel
 def _stopped(tree, behind, anchor, count, d, slope, dz, holders):
-    """The hit (t, face, u, v, w) that stops a ray at its start, which ``count`` faces hold; NO_FACE for none."""
+    """The ``Best`` hit that stops a ray at its start, which ``count`` faces hold."""
     arcs, number, nodes = arcs_of(tree, anchor, holders, count)
     k, ahead = stopping_holder(tree, anchor, arcs, number, nodes, behind, d)
     if k == NOT_STOPPED:
-        return _NOTHING
+        return no_hit(np.inf)
     met = meet_face(seen_from(tree, holder(arcs, k, PLACE), anchor), anchor, d, slope, dz)
-    return AHEAD if ahead else 0.0, np.int32(holder(arcs, k, NUMBER)), met.u, met.v, met.w
+    return Best(AHEAD if ahead else 0.0, np.int32(holder(arcs, k, NUMBER)), met.u, met.v, met.w)
 
 
 class Departure(NamedTuple):
@@ -152,7 +151,7 @@ class Departure(NamedTuple):
 
 @kernel
 def depart(tree, starts, i, ray, stack, memory):
-    """The ``Departure`` of ray ``i``, and the hit that stops it at its start, of NO_FACE for none.
+    """The ``Departure`` of ray ``i``, and the ``Best`` hit that stops it at its start.
 
     ``ray`` is as ``rays.ray_at`` has it. ``stack`` is memory for ``walk.stack_size`` int64, and ``memory`` for
     ``cone.HOLDERS_WORDS``.
@@ -163,7 +162,7 @@ def depart(tree, starts, i, ray, stack, memory):
     at_corner = ray.slack == CORNER
     if at_corner or ray.slack == EDGE:
         ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, slack_of(o, 0.0), ray.leaving)
-    stopped, slope, count = _NOTHING, slope_there(anchor, d), 0
+    stopped, slope, count = no_hit(np.inf), slope_there(anchor, d), 0
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
         dz, holders = make_shear(ray).direction_z, make_holders(memory)
         count = list_holders(tree, anchor, d, slope, dz, stack, holders)
@@ -201,11 +200,11 @@ def near_bits(tree, block, departure, shear, seen):
 
 @inlined
 def meet_near(tree, place, departure, dz):
-    """The hit (t, u, v, w) of a face that is met from the exact start, t = NaN for none, and its ``Meeting.zeros``."""
+    """The ``FaceHit`` of a face that is met from the exact start, and its ``Meeting.zeros``."""
     met = meet_face(seen_from(tree, place, departure.anchor), departure.anchor, departure.d, departure.slope, dz)
     # rule: met-once
     t = larger(met.t / departure.unit, _LEAST_T) if met.kind == IS_HIT else np.nan
-    return (t, met.u, met.v, met.w), met.zeros
+    return FaceHit(t, met.u, met.v, met.w), met.zeros
 
 
 @kernel
@@ -213,10 +212,9 @@ def _nearest_from(tree, first, count, departure, shear, best):
     """``leaf.nearest_carefully`` for a ray that leaves the surface."""
     ray = departure.ray
     for block in range(first, first + count):
-        base = block * BLOCK_WORDS
-        bits, doubts, blurred, _, t4, u4, v4, w4 = hit_triangles(tree, base, shear, ray.t_min, best[0])
-        near = near_bits(tree, block, departure, shear, bits)
-        bits |= near
+        hits = hit_triangles(tree, block * BLOCK_WORDS, shear, ray.t_min, best.t)
+        near = near_bits(tree, block, departure, shear, hits.bits)
+        bits = hits.bits | near
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
@@ -224,13 +222,11 @@ def _nearest_from(tree, first, count, departure, shear, best):
             if np.float64(face) == ray.leaving:
                 continue
             if (near >> i) & 1 != 0:
-                hit, _ = meet_near(tree, base + i, departure, shear.direction_z)
+                hit, _ = meet_near(tree, block * BLOCK_WORDS + i, departure, shear.direction_z)
             else:
-                hit = extract(t4, i), extract(u4, i), extract(v4, i), extract(w4, i)
-                if (doubts >> i) & 1 != 0:
-                    hit = settled(tree, base + i, ray, shear, hit, (blurred >> i) & 1 != 0)
-            if is_better(hit[0], face, ray, best):
-                best = hit[0], face, hit[1], hit[2], hit[3]
+                hit = resolved_hit(tree, block, hits, i, ray, shear)
+            if is_better(hit.t, face, ray.t_min, best):
+                best = hit_on(face, hit)
     return best
 
 
@@ -244,28 +240,27 @@ class _Query(NamedTuple):
 
 @kernel
 def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
-    """The closest hit (t, face, u, v, w) of ray ``i`` from its start, NO_FACE for none; with ``any_hit`` any one.
+    """The closest hit of ray ``i`` from its start, or with ``any_hit`` any one, as ``Found``.
 
-    Arguments as for ``depart``; ``t_max`` is the ray's own. Also returns the number of nodes and blocks that it took.
+    Arguments as for ``depart``; ``t_max`` is the ray's own.
     """
     departure, stopped = depart(tree, starts, i, ray, stack, memory)
-    if stopped[1] != NO_FACE:
+    if stopped.face != NO_FACE:
         return Found(stopped, np.int64(1))
     query = _Query(departure, prepare_single(departure.ray), any_hit)
-    found = Found((t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0), np.int64(1))
-    return walk(tree, stack, query, found, _enter, _visit)
+    return walk(tree, stack, query, Found(no_hit(t_max), np.int64(1)), _enter, _visit)
 
 
 @inlined
 def _enter(tree, query, node, found):
-    _, bits = enter_node(tree, node, query.single, found.best[0])
+    _, bits = enter_node(tree, node, query.single, found.best.t)
     return Found(found.best, found.steps + 1), bits
 
 
 @inlined
 def _visit(tree, query, first, count, found):
     best = _nearest_from(tree, first, count, query.departure, query.single.shear, found.best)
-    return Found(best, found.steps + count), query.any_hit and best[1] != NO_FACE
+    return Found(best, found.steps + count), query.any_hit and best.face != NO_FACE
 
 
 @kernel
@@ -283,11 +278,11 @@ def t_from(tree, starts, i, ray, face, t):
 
 @inlined
 def counted_from_start(tree, starts, i, ray, largest, hit, face):
-    """A hit (t, u, v, w) with t counted from the exact start of ray ``i``: where it is near, the way that the origin
+    """A ``FaceHit`` with t counted from the exact start of ray ``i``: where it is near, the way that the origin
     was moved is a part of t.
     """
-    if 0.0 < ray.slack < EDGE and face != NO_FACE and hit[0] * largest <= NEAR_HIT * ray.slack:
-        return t_from(tree, starts, i, ray, face, hit[0]), hit[1], hit[2], hit[3]
+    if 0.0 < ray.slack < EDGE and hit.t * largest <= NEAR_HIT * ray.slack:
+        return FaceHit(t_from(tree, starts, i, ray, face, hit.t), hit.u, hit.v, hit.w)
     return hit
 
 
@@ -323,7 +318,7 @@ def take_side(tree, starts, n, stack, memory, table, room):
 
 
 @kernel
-def side_taken(words, vertices, faces, row, n, stack, memory):
+def side_taken(descriptor, vertices, faces, row, n, stack, memory):
     """For Python: ``take_side`` of the start in a row of ``starts.record``."""
     starts = StartPointers(pointer(row), 0, pointer(vertices), pointer(faces))
-    take_side(tree_pointers(words), starts, n, pointer(stack), pointer(memory), local_doubles(), 0)
+    take_side(tree_pointers(descriptor), starts, n, pointer(stack), pointer(memory), local_doubles(), 0)

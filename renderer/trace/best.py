@@ -1,0 +1,48 @@
+"""Hits as kernels pass them: the best one of a search, and one on a face that is known."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from renderer.jit.decorators import inlined
+
+NO_FACE = np.iinfo(np.int32).max
+
+
+class FaceHit(NamedTuple):
+    """A hit on a face: t, NaN for none, and the barycentrics u / w and v / w."""
+
+    t: float
+    u: float
+    v: float
+    w: float
+
+
+class Best(NamedTuple):
+    """The best hit of a search so far: the smallest t, then the lowest face. NO_FACE says that there is none, and t how
+    far the search goes. The barycentrics are u / w and v / w; only those of the final hit are divided.
+    """
+
+    t: float
+    face: int
+    u: float
+    v: float
+    w: float
+
+
+@inlined
+def no_hit(t_max):
+    """The ``Best`` of a search that has found nothing up to ``t_max``."""
+    return Best(t_max, np.int32(NO_FACE), 0.0, 0.0, 1.0)
+
+
+@inlined
+def hit_on(face, hit):
+    """The ``Best`` that a ``FaceHit`` on a face makes."""
+    return Best(hit.t, face, hit.u, hit.v, hit.w)
+
+
+@inlined
+def is_better(t, face, t_min, best):
+    """Whether a hit counts and is before the best one: a smaller t, or a lower face."""
+    return t >= t_min and (t < best.t or (t == best.t and face < best.face))

@@ -1,0 +1,44 @@
+"""An entry of a stack of octants, int64: the distance at which a ray enters one above 32 bits that say which it is."""
+
+import numpy as np
+
+from renderer.jit.decorators import inlined
+from renderer.numerics.simd import bits_float, float_bits
+
+_LOW_WORD = 0xFFFFFFFF
+
+
+@inlined
+def make_entry(distance, octant):
+    """The entry of a float32 distance and the number of an octant."""
+    return (float_bits(distance) << 32) | octant
+
+
+@inlined
+def distance_of(entry):
+    """The distance, float32."""
+    return bits_float(entry >> 32)
+
+
+@inlined
+def octant_of(entry):
+    """The number of the octant, 0 or more."""
+    return entry & _LOW_WORD
+
+
+@inlined
+def child_of_entry(entry):
+    """The child, where the entry has one in place of a number: int32, and so perhaps negative."""
+    return np.int64(np.int32(entry & _LOW_WORD))
+
+
+@inlined
+def with_child(entry, child):
+    """The entry with a child in place of its number."""
+    return ((entry >> 32) << 32) | order_of(child)
+
+
+@inlined
+def order_of(child):
+    """A child as entries of one distance compare it: nodes before leaves."""
+    return child & _LOW_WORD
