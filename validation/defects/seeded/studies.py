@@ -9,10 +9,10 @@ from validation.defects.edits import argument, call, choice, compare, value
 from validation.defects.seeded.defect import Defect
 
 
-def _first_direction_open(sound: Any, octree: Any, asked: Any, sky: Any, answers: Any) -> Any:
+def _first_direction_open(sound: Any, octree: Any, request: Any, sky: Any, answers: Any) -> Any:
     limits = np.array(sky.limits)
     limits[:1] = 0.0
-    return sound(octree, asked, sky._replace(limits=limits), answers)
+    return sound(octree, request, sky._replace(limits=limits), answers)
 
 
 def _mirrored_bytes(bits: Any) -> Any:
