@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from renderer.cli.main.scene import add_scene
+from renderer.cli.scene import add_scene
 from renderer.errors import expect
 from renderer.system.terminal import say
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from renderer.cli.cluster import add_cluster, render_on_cluster
-from renderer.cli.main.scene import add_scene, write_scene_of
+from renderer.cli.scene import add_scene, write_scene_of
 from renderer.errors import expect
 from renderer.system.terminal import say
 

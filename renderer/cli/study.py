@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from renderer.cli.cluster import add_cluster, on_cluster
-from renderer.cli.main.render import resolution
+from renderer.cli.render import resolution
 from renderer.errors import expect
 from renderer.system.terminal import say
 

@@ -4,7 +4,7 @@ import argparse
 from contextlib import suppress
 from typing import Any
 
-from renderer.cli.main.scene import add_scene, write_scene_of
+from renderer.cli.scene import add_scene, write_scene_of
 from renderer.system.terminal import say
 
 

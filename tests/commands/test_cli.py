@@ -13,7 +13,7 @@ import pytest
 from cases import cases
 
 import renderer
-from renderer.cli.main.compiling import choose_processor
+from renderer.cli.compiling import choose_processor
 from renderer.cli.main import main
 from renderer.picture.render import render
 from renderer.precompile import compile_ahead

@@ -275,6 +275,6 @@ def test_kernels_are_compiled_that_are_named_where_they_are_to_be(
 def test_a_level_is_chosen_before_anything_is_compiled(monkeypatch: pytest.MonkeyPatch, level: str) -> None:
     asked: list[Any] = []
     monkeypatch.setattr("renderer.cli.main.choose_processor", lambda *told: asked.append(told))
-    monkeypatch.setattr("renderer.cli.main.compiling._compile", lambda options: asked.append(options.what))
+    monkeypatch.setattr("renderer.cli.compiling._compile", lambda options: asked.append(options.what))
     assert main(["compile", "--level", level, "-o", "kernels"]) == 0
     assert asked == [(level, Path("kernels")), "all"]

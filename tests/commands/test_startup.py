@@ -132,7 +132,7 @@ def test_the_command_line_shows_what_is_compiled_unless_quiet(capsys, monkeypatc
     log = logging.getLogger("renderer.jit")
     monkeypatch.setattr(log, "level", logging.CRITICAL)
     before = logging.CRITICAL, list(log.handlers)
-    monkeypatch.setattr("renderer.cli.main.render._render", lambda _options: log.warning("renderer: compiling %s", "it"))
+    monkeypatch.setattr("renderer.cli.render._render", lambda _options: log.warning("renderer: compiling %s", "it"))
     assert main(["render", "any.toml", *(["--quiet"] if quiet else [])]) == 0
     assert capsys.readouterr() == ("", "" if quiet else "octree-render: compiling it\n")
     assert (log.level, log.handlers) == before

@@ -672,7 +672,7 @@ def test_control_c_ends_the_command_well_once_its_address_stands_there(
         print(line, flush=flush)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("renderer.cli.main.view.say", interrupted)
+    monkeypatch.setattr("renderer.cli.view.say", interrupted)
     assert main(["view", str(folder / "blocks.toml"), "--no-browser"]) == 0
     out, err = capsys.readouterr()
     assert "is shown at" in out and err == ""

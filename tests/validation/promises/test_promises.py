@@ -15,9 +15,9 @@ from renderer.mesh import ears, obj, polygons
 from renderer.octree import Octree
 from renderer.picture import image, pack, prepare
 from renderer.queryable import Queries
+from renderer.results import hits
 from renderer.scene import scene
 from renderer.scene.camera import PerspectiveCamera
-from renderer.trace import hits
 from renderer.trace.layout import Tree
 from renderer.tree import refit
 from validation.promises.hits import (
