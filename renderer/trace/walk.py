@@ -17,15 +17,16 @@ def stack_size(depth: int) -> int:
 
 
 @inlined
-def first_block(leaf):
-    """The first block of a leaf."""
-    return ~leaf >> LEAF_BITS
+def blocks_of(leaf):
+    """The first block of a leaf, and how many it has."""
+    return ~leaf >> LEAF_BITS, (~leaf & (MAX_LEAF_BLOCKS - 1)) + 1
 
 
 @inlined
-def blocks_of(leaf):
-    """The first block of a leaf, and how many it has."""
-    return first_block(leaf), (~leaf & (MAX_LEAF_BLOCKS - 1)) + 1
+def first_block(leaf):
+    """The first block of a leaf."""
+    first, _ = blocks_of(leaf)
+    return first
 
 
 @inlined
