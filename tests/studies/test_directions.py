@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from cases import cases
 
-from renderer.studies import Pattern, cosine_hemisphere, fibonacci_hemisphere, fibonacci_sphere, reinhart, tregenza
+from renderer.studies import cosine_hemisphere, fibonacci_hemisphere, fibonacci_sphere, reinhart, tregenza
 from renderer.studies.directions import turned
 
 pytestmark = pytest.mark.judges(
@@ -115,8 +115,3 @@ def test_numbers_of_directions_that_are_none(make, bad):
     name = "subdivision" if make is reinhart else "count"
     with pytest.raises(ValueError, match=f"^{name}: expected an integer from 1 to .*, got "):
         make(bad)
-
-
-def test_patterns_are_tuples_of_directions_and_weights():
-    directions, weights = tregenza()
-    assert Pattern(directions, weights).weights is weights

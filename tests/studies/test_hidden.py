@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from meshes import make_mesh, meshes
 
-from renderer import BruteForce, Mesh, Octree
+from renderer import BruteForce, Octree
 from renderer.mesh.heightfield import heightfield_mesh
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.studies import face_points, fibonacci_sphere, occlusion, tregenza
@@ -93,21 +93,6 @@ def test_a_point_may_look_in_more_directions_than_are_listed_at_once():
     assert 0 < expected[0].mean() < 1 and expected[1].all()
 
 
-@pytest.mark.parametrize("weighted", [False, True])
-def test_shares_are_sums_in_the_order_of_directions(weighted):
-    octree, rng = Octree.from_mesh(torus()), np.random.default_rng(5)
-    points, directions = rng.uniform(-1.5, 1.5, (700, 3)), rng.normal(size=(53, 3))
-    weights = rng.random(53) if weighted else None
-    expected = np.zeros(700)
-    counted = np.ones(53) if weights is None else weights
-    hidden = written_down(octree, points, None, directions)
-    for k in range(53):
-        expected += np.where(hidden[:, k], counted[k], 0.0)
-    share = occlusion(octree, points, None, directions, weights=weights)
-    np.testing.assert_array_equal(share, expected / np.cumsum(counted)[-1])
-    assert share.dtype == np.float64 and 0.0 < share.mean() < 1.0
-
-
 def test_bits_depend_neither_on_threads_nor_on_the_other_points():
     octree, rng = Octree.from_mesh(torus()), np.random.default_rng(6)
     points, normals = rng.uniform(-1.5, 1.5, (2000, 3)), rng.normal(size=(2000, 3))
@@ -139,19 +124,6 @@ def test_bits_stay_where_mesh_and_points_are_shifted_exactly(shift):
             occlusion(far, points + shift, None, directions, leaving=leaving, packed=True), seen
         )
         assert 0.0 < np.unpackbits(seen).mean() < 1.0
-
-
-def test_points_on_faces_are_not_hidden_by_their_own():
-    ball = icosphere(3)
-    octree, place = Octree.from_mesh(ball), face_points(ball)
-    directions = fibonacci_sphere(200).directions
-    hidden = occlusion(octree, place.points, place.normals, directions, leaving=place.faces, packed=True)
-    below = ~(place.normals @ directions.T > 0.0)
-    np.testing.assert_array_equal(unpacked(hidden, 200), below)
-    from_inside = occlusion(octree, place.points, -place.normals, directions, leaving=place.faces)
-    np.testing.assert_array_equal(from_inside, 1.0)
-    found = occlusion(octree, place.points, place.normals, directions, packed=True)
-    np.testing.assert_array_equal(found, hidden)
 
 
 def test_whether_points_lie_on_the_surface_is_found_out_and_their_normals_say_the_side():
@@ -193,26 +165,6 @@ def test_nothing_hides_beyond_the_distance():
     assert occlusion(octree, points, None, ways, distance=2.0).tolist() == [1.0]
     assert occlusion(octree, points, None, ways, distance=np.nextafter(2.0, 0.0)).tolist() == [0.0]
     assert occlusion(octree, points, None, ways, distance=0).tolist() == [0.0]
-
-
-def test_leading_dimensions_are_kept():
-    octree = Octree.from_mesh(box())
-    points = np.random.default_rng(8).normal(size=(4, 5, 3))
-    ways = np.eye(3)
-    share = occlusion(octree, points, None, ways)
-    assert share.shape == (4, 5)
-    np.testing.assert_array_equal(share.ravel(), occlusion(octree, points.reshape(-1, 3), None, ways))
-    assert occlusion(octree, points, None, ways, packed=True).shape == (4, 5, 1)
-    assert occlusion(octree, points[0, 0], [0, 0, 1], ways).shape == ()
-    assert occlusion(octree, np.empty((0, 3)), None, ways).shape == (0,)
-    assert occlusion(Octree.from_mesh(Mesh([], [])), points, None, ways).sum() == 0.0
-
-
-def test_one_normal_and_one_face_stand_for_all_points():
-    octree = Octree.from_mesh(torus())
-    points, ways = np.random.default_rng(9).normal(size=(30, 3)), fibonacci_sphere(40).directions
-    one = occlusion(octree, points, [0, 3, 0], ways, leaving=-1)
-    np.testing.assert_array_equal(one, occlusion(octree, points, np.tile([0.0, 0.5, 0.0], (30, 1)), ways))
 
 
 def test_faces_without_a_plane_are_left_as_any_hit_leaves_them():

@@ -97,16 +97,6 @@ def test_arrays_of_scans_faces_and_depths_have_their_types_and_dimensions() -> N
     assert (depth.dtype, depth.shape) == (np.float64, (3, 4))
 
 
-@pytest.mark.parametrize("study", ONE)
-def test_answers_are_float64_in_the_dimensions_of_the_points(study: str) -> None:
-    octree = Octree.from_mesh(torus())
-    whole = ONE[study](octree)
-    assert (whole.dtype, whole.shape) == (np.float64, (40,))
-    again = ONE[study](octree, POINTS.reshape(5, 4, 2, 3))
-    assert again.shape == (5, 4, 2)
-    np.testing.assert_array_equal(again.ravel(), whole)
-
-
 def test_a_scanner_on_the_surface_meets_what_leads_through_it_at_once_and_none_beyond_its_reach() -> None:
     floor = Octree.from_mesh(grid(2, 2))
     ways = [[0, -1, 0], [0, 2, 0], [0.5, -0.5, 0]]

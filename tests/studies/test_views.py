@@ -46,15 +46,6 @@ def test_all_faces_are_seen_from_inside_a_convex_body_and_sheets_from_behind():
         assert visible_faces(Octree.from_mesh(grid(3, 3)), [0.1, y, 0.0]).all()
 
 
-def test_more_points_a_face_find_what_is_seen_in_part():
-    """A floor face whose middle is hidden by a plate above it."""
-    plate = Mesh([[-0.2, -0.2, 0.5], [0.2, -0.2, 0.5], [0.0, 0.3, 0.5]], [[0, 1, 2]])
-    floor = Mesh([[-3, -3, 0], [3, -3, 0], [0, 6, 0]], [[0, 1, 2]])
-    octree = Octree.from_mesh(Mesh.concatenate([floor, plate]))
-    assert visible_faces(octree, [0.0, 0.0, 9.0]).tolist() == [False, True]
-    assert visible_faces(octree, [0.0, 0.0, 9.0], cuts=4).tolist() == [True, True]
-
-
 def test_an_edge_on_face_is_not_seen_however_the_body_is_turned():
     """The eye in the planes of one, two and three walls of a box, which is then turned exactly and by any angle."""
     corner, turns = (
@@ -102,14 +93,6 @@ def test_faces_without_area_are_not_seen_and_blocks_change_nothing(monkeypatch):
         np.testing.assert_array_equal(ours, theirs)
 
 
-@pytest.mark.parametrize("cuts", [1, 2, 5])
-def test_the_points_of_a_cut_face_are_the_centroids_of_equal_parts(cuts):
-    places = np.array(list(views._centroids(cuts)))
-    assert len(places) == cuts**2 == len(np.unique(places.round(12), axis=0))
-    assert (places > 0.0).all() and (places.sum(axis=1) < 1.0).all()
-    np.testing.assert_allclose(places.mean(axis=0), 1.0 / 3.0, rtol=1e-14)
-
-
 @cases("samples", [1, 4, 9])
 @cases("camera", CAMERAS)
 def test_depths_have_the_bits_of_pictures(camera, samples):
@@ -118,26 +101,6 @@ def test_depths_have_the_bits_of_pictures(camera, samples):
     depth = depth_map(Octree.from_mesh(body), camera, 61, 47)
     np.testing.assert_array_equal(depth, render(scene, resolution=(61, 47), samples=samples).depth)
     assert depth.shape == (47, 61) and 0.1 < np.isfinite(depth).mean() < 0.9
-
-
-def test_a_scan_has_the_hits_of_its_rays():
-    octree, pattern = Octree.from_mesh(torus()), fibonacci_sphere(3000)
-    cloud = scan(octree, [0.0, 2.0, 0.5], pattern)
-    hits = octree.closest_hit([0.0, 2.0, 0.5], pattern.directions)
-    np.testing.assert_array_equal(cloud.rays, np.flatnonzero(hits.hit))
-    np.testing.assert_array_equal(cloud.points, hits.points[hits.hit])
-    np.testing.assert_array_equal(cloud.faces, hits.face[hits.hit])
-    np.testing.assert_array_equal(cloud.normals, hits.normals[hits.hit])
-    np.testing.assert_allclose(cloud.distances, np.linalg.norm(cloud.points - [0.0, 2.0, 0.5], axis=1), rtol=1e-13)
-    for same in (3000, 5.0 * pattern.directions):
-        np.testing.assert_array_equal(scan(octree, [0.0, 2.0, 0.5], same).rays, cloud.rays)
-    assert 0 < len(cloud.rays) < 3000
-    # Between two of them, so that no rounding matters.
-    reach = np.sort(cloud.distances)[[50, 51]].mean()
-    near = scan(octree, [0.0, 2.0, 0.5], 2.0 * pattern.directions, distance=reach)
-    np.testing.assert_array_equal(near.rays, cloud.rays[cloud.distances <= reach])
-    assert 0 < len(near.rays) < len(cloud.rays)
-    assert len(scan(octree, [0.0, 2.0, 0.5], [[0, 1, 0]]).points) == 0
 
 
 @cases("integer", [np.int64, np.int16, np.uint16, np.uint64])

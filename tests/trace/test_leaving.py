@@ -87,15 +87,6 @@ def test_a_flat_wall_of_many_faces_is_left_whole():
     assert not octree.any_hit(points[steep], directions[steep], leaving=face[steep]).any()
 
 
-def test_out_of_a_closed_body_nothing_is_met_and_into_it_something_is():
-    ball = icosphere(4)
-    octree = Octree.from_mesh(ball)
-    face, points, directions = on_faces(ball.vertices, ball.faces, 3, 5000)
-    outwards = np.einsum("ij,ij->i", directions, ball.face_normals()[face]) > 0
-    hit = octree.any_hit(points, directions, leaving=face)
-    assert not hit[outwards].any() and hit[~outwards].all()
-
-
 def plane_distance(vertices, face, point):
     """Exact sign and square of the distance of a point from a face's plane, with the plane's squared normal."""
     p0, p1, p2, p = ([Fraction(float(x)) for x in vertex] for vertex in (*vertices[face], point))
@@ -164,14 +155,6 @@ def test_faces_that_are_not_there_are_errors(bad, told):
         octree.any_hit([[0, 0, 0], [1, 1, 1]], [[0, 0, 1], [0, 0, 1]], leaving=bad)
 
 
-def test_rays_that_are_no_good_are_errors_all_the_same():
-    octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    with pytest.raises(ValueError, match=r"^origins: expected finite"):
-        octree.closest_hit([[np.nan, 0, 0]], [[0, 0, 1]], leaving=0)
-    with pytest.raises(ValueError, match=r"^directions: expected finite, non-zero"):
-        octree.closest_hit([[0, 0, 0]], [[0, 0, 0]], leaving=0)
-
-
 @pytest.mark.parametrize("origin", [[1e30, 0.0, 1e300], [np.inf, 0.0, 0.0], [0.0, np.nan, 0.0]])
 def test_an_origin_out_of_bounds_is_told_as_it_was_given(origin):
     octree = Octree.from_mesh(icosphere(1))
@@ -236,24 +219,6 @@ def test_no_kernel_is_compiled_for_other_arrays(monkeypatch):
     for left in (hits, hits.through()):
         octree.any_hit(hits.points, -starts, leaving=left)
     assert len(seen) == 6 and all(all(row) for row in seen)
-
-
-@cases("accelerator", [Octree, BruteForce])
-@cases("count", [7, 3000])
-def test_hits_know_the_side_of_the_face_that_their_ray_came_from(accelerator, count):
-    queries, rng = accelerator(*make_mesh("soup", 4, 300)), np.random.default_rng(6)
-    origins, directions = rng.normal(size=(2, count, 3))
-    hits, every = queries.closest_hit(origins, directions), queries.all_hits(origins, directions)
-    assert hits.side.dtype == every.side.dtype == np.int64 and hits.hit.any() and not hits.hit.all()
-    came = -np.sign(np.einsum("ij,ij->i", directions, np.nan_to_num(hits.normals)))
-    np.testing.assert_array_equal(hits.side, came)
-    assert (hits.side[~hits.hit] == 0).all() and {-1, 1} <= set(hits.side[hits.hit])
-    np.testing.assert_array_equal(every.side, -np.sign(np.einsum("ij,ij->i", directions[every.ray], every.normals)))
-    np.testing.assert_array_equal(queries.closest_hit(origins[:, None], directions[:, None]).side[:, 0], hits.side)
-    # Those made by hand know none, and neither do places beyond their faces.
-    none = Hits(hits.t, hits.face, hits.u, hits.v, queries.mesh)
-    assert none.side is None and none.through().side is None
-    np.testing.assert_array_equal(hits.through().side, -hits.side)
 
 
 ABOVE, BELOW, UP, DOWN = 1, -1, (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)

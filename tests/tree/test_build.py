@@ -44,13 +44,6 @@ def test_the_tree_does_not_depend_on_the_threads(kind, split):
 
 
 @SPLIT
-@pytest.mark.parametrize("kind", sorted(KINDS))
-def test_trees_of_many_subtrees_are_sound(kind, split):
-    octree = Octree(*make_mesh(kind, 6, MANY), split=split, threads=2)
-    assert faults(octree.tree, octree.mesh) == []
-
-
-@SPLIT
 @pytest.mark.parametrize("max_depth", [1, 32])
 def test_faces_that_nothing_separates_are_shared_out(split, max_depth):
     # All centres are one point, in boxes of two sizes.

@@ -112,14 +112,6 @@ def test_extreme_scales_are_brought_near_one_as_at_a_build(accelerator, exponent
     assert moved.tree.scale == 1.0
 
 
-def test_brute_force_refits_too():
-    vertices, faces = make_mesh("soup", 1, 50)
-    brute, moved = BruteForce(vertices, faces), moved_vertices(vertices, 2)
-    brute.refit(moved)
-    rays = rays_at(moved, faces, 3)
-    assert_same_hits(brute.closest_hit(*rays), BruteForce(moved, faces).closest_hit(*rays))
-
-
 def test_empty_meshes_refit():
     for octree in (Octree(np.empty((0, 3)), np.empty((0, 3), int)), Octree(np.zeros((2, 3)), np.empty((0, 3), int))):
         octree.refit(octree.mesh.vertices + 1.0)
