@@ -88,6 +88,19 @@ def test_npy_holds_the_radiance(tmp_path: Path) -> None:
     assert loaded.dtype == np.float32 and loaded.tobytes() == picture.radiance.tobytes()
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+@cases("name", ["a.npy", "a.exr"])
+def test_a_pipe_gets_the_whole_file(tmp_path: Path, name: str) -> None:
+    """numpy.save asks for a position in the file: a pipe got the header, and the message blamed the disk."""
+    picture = image()
+    picture.save(tmp_path / f"file{name}")
+    os.mkfifo(tmp_path / name)
+    reader = os.open(tmp_path / name, os.O_RDONLY | os.O_NONBLOCK)
+    picture.save(tmp_path / name)
+    assert os.read(reader, 1 << 16) == (tmp_path / f"file{name}").read_bytes()
+    os.close(reader)
+
+
 def test_exr_holds_the_radiance_and_its_layers(tmp_path: Path, mitsuba: Any) -> None:
     """Read back by Mitsuba's reader, which is not the package that wrote it."""
     picture = image()

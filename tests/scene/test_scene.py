@@ -157,76 +157,39 @@ def with_key(table: str, line: str) -> str:
     return f"{head}{found}{line}\n{own}{gap}{rest}"
 
 
+# One of each kind of fault and of place; what each field refuses is in test_fields.py.
 FAULTS = [
     # table, line, the key's path, what the message must say besides
     ("", "speed = 3", "speed", ["unknown key", "3"]),
     ("[render]", "speed = 3", "render.speed", ["unknown key", "3"]),
-    ("[camera]", "speed = 3", "camera.speed", ["unknown key", "3"]),
     ("[camera]", "height = 3", "camera.height", ["unknown key", "3"]),
-    ("[materials.clay]", "speed = 3", "materials.clay.speed", ["unknown key", "3"]),
     ("[materials.glass]", "diffuse = 3", "materials.glass.diffuse", ["unknown key", "3"]),
-    ("[materials.mirror]", "speed = 3", "materials.mirror.speed", ["unknown key", "3"]),
     ("[[lights]]", "speed = 3", "lights.0.speed", ["unknown key", "3"]),
     ("[[objects]]", "speed = 3", "objects.0.speed", ["unknown key", "3"]),
     ("[floor]", "speed = 3", "floor.speed", ["unknown key", "3"]),
     ("", "ambient = -0.5", "ambient", ["greater than or equal to 0", "-0.5"]),
-    ("", "ambient = [1, 2]", "ambient", ["[1, 2]"]),
     ("", "ambient = nan", "ambient", ["finite", "nan"]),
-    ("", "ambient = inf", "ambient", ["finite", "inf"]),
-    ("", 'ambient = "bright"', "ambient", ["bright"]),
-    ("", "background = {}", "background", []),
-    ("[render]", "resolution = [0, 6]", "render.resolution.0", ["1", "0"]),
+    ("", "ambient = true", "ambient", []),
     ("[render]", "resolution = [8, 1000000]", "render.resolution.1", ["16384", "1000000"]),
-    ("[render]", "resolution = 8", "render.resolution", ["8"]),
-    ("[render]", "resolution = [8, 6, 4]", "render.resolution", ["[8, 6, 4]"]),
-    ("[render]", "resolution = [8.5, 6]", "render.resolution.0", ["8.5"]),
     ("[render]", "samples = 3", "render", ["samples", "square number", "got 3"]),
-    ("[render]", "samples = 0", "render", ["samples", "got 0"]),
-    ("[render]", "samples = -4", "render", ["samples", "got -4"]),
-    ("[render]", "max_depth = -1", "render.max_depth", ["-1"]),
-    ("[render]", "max_depth = 65", "render.max_depth", ["64", "65"]),
-    ("[render]", "min_weight = 1.0", "render.min_weight", ["1.0"]),
-    ("[render]", "min_weight = nan", "render.min_weight", ["nan"]),
     ("[camera]", 'type = "fisheye"', "camera", ["fisheye", "perspective", "orthographic"]),
-    ("[camera]", "type = 3", "camera", ["3"]),
     ("[camera]", "type = [3]", "camera", ["3"]),
     ("[camera]", "eye = [0, 0]", "camera.eye", ["[0, 0]"]),
-    ("[camera]", "eye = [0, 0, inf]", "camera.eye.2", ["inf"]),
     ("[camera]", "target = [0, 1, 5]", "camera", ["target != eye"]),
     ("[camera]", "up = [0, 1, 5]", "camera", ["up not parallel"]),
-    ("[camera]", "up = [0, 0, 0]", "camera", ["up not parallel"]),
-    ("[camera]", "fov = 180", "camera.fov", ["180"]),
-    ("[camera]", "fov = 0", "camera.fov", ["0"]),
-    ("[camera]", "fov = nan", "camera.fov", ["nan"]),
+    ("[camera]", 'fov = "45"', "camera.fov", []),
     ("[camera]", "fov = 1979-05-27", "camera.fov", ["1979"]),
     ("[materials.clay]", 'type = "gold"', "materials.clay", ["gold", "phong", "mirror", "dielectric"]),
     ("[materials.clay]", "diffuse = [0.1, 0.2, -0.3]", "materials.clay.diffuse.2", ["-0.3"]),
-    ("[materials.clay]", "shininess = -1", "materials.clay.shininess", ["-1"]),
-    ("[materials.clay]", "ior = 0", "materials.clay.ior", ["0"]),
-    ("[materials.glass]", "ior = inf", "materials.glass.ior", ["inf"]),
-    ("[materials.mirror]", "reflectance = nan", "materials.mirror.reflectance", ["nan"]),
     ("[[lights]]", 'type = "spot"', "lights.0", ["spot", "directional", "point"]),
     ("[[lights]]", "direction = [0, 0, 0]", "lights.0.direction", ["non-zero"]),
-    ("[[lights]]", "direction = [0, nan, 0]", "lights.0.direction.1", ["nan"]),
-    ("[[lights]]", "irradiance = -1", "lights.0.irradiance", ["-1"]),
-    ("[[objects]]", "mesh = 3", "objects.0.mesh", ["3"]),
     ("[[objects]]", 'mesh = "models/none.ply"', "objects", ["none.ply", "No such file"]),
     ("[[objects]]", 'mesh = "models"', "objects", ["models", "suffix"]),
     ("[[objects]]", 'mesh = "models/broken.ply"', "objects", ["broken.ply"]),
-    ("[[objects]]", 'mesh = "models/box.abc"', "objects", ["box.abc", "suffix"]),
     ("[[objects]]", 'mesh = "models/bo\\u0000x.ply"', "objects", ["null byte"]),
     ("[[objects]]", 'material = "gold"', "objects.0.material", ["clay", "glass", "mirror", "'gold'"]),
-    ("[[objects]]", "material = 3", "objects.0.material", ["3"]),
     ("[[objects]]", 'normals = "soft"', "objects.0.normals", ["flat", "smooth", "soft"]),
-    ("[[objects]]", "scale = [1, 2]", "objects.0.scale", ["[1, 2]"]),
-    ("[[objects]]", "scale = nan", "objects.0.scale", ["nan"]),
-    ("[[objects]]", "rotate = 30", "objects.0.rotate", ["30"]),
-    ("[[objects]]", "translate = [0, inf, 0]", "objects.0.translate.1", ["inf"]),
     ("[floor]", "min = [4, -4]", "floor", ["min < max"]),
-    ("[floor]", "max = [nan, 4]", "floor", ["finite"]),
-    ("[floor]", "squares = [0, 1]", "floor.squares.0", ["0"]),
-    ("[floor]", "squares = [1, 1001]", "floor.squares.1", ["1000", "1001"]),
-    ("[floor]", "materials = []", "floor.materials", ["at least 1"]),
     ("[floor]", 'materials = ["clay", "glass", "clay"]', "floor.materials", ["at most 2"]),
     ("[floor]", 'materials = ["gold"]', "floor.materials", ["clay", "'gold'"]),
 ]
@@ -324,43 +287,11 @@ def test_mesh_paths_are_relative_to_the_scene_file(folder: Path, monkeypatch: py
 
 # Values that a number, vector, string or table of the file may be replaced with.
 STRANGE: list[str] = [
-    "1e308",
-    "-1e308",
-    "1e-320",
-    "1e160",
-    "1e-200",
-    "0",
-    "-0.0",
-    "-1",
-    "1",
-    "2.5",
-    "nan",
-    "inf",
-    "-inf",
-    "true",
-    '""',
-    '"\\u0000"',
-    '"a\\nb"',
-    "{}",
-    "[[]]",
-    "{a=1}",
-    "1979-05-27",
-    "07:32:00",
-    "99999999999999999999",
-    "[1e308,1e308,1e308]",
-    "[1e-200,0,0]",
-    "[0,0,0]",
-    "[1,2]",
-    "[true,1,1]",
-    '["clay"]',
-    '"clay"',
-    '"models/box.ply"',
-    '"models"',
-    '"mirror"',
-    '"dielectric"',
-    '"point"',
-    "[]",
-]
+    "1e308", "-1e308", "1e-320", "1e160", "1e-200", "0", "-0.0", "-1", "1", "2.5", "nan", "inf", "-inf", "true",
+    '""', '"\\u0000"', '"a\\nb"', "{}", "[[]]", "{a=1}", "1979-05-27", "07:32:00", "99999999999999999999",
+    "[1e308,1e308,1e308]", "[1e-200,0,0]", "[0,0,0]", "[1,2]", "[true,1,1]", '["clay"]', '"clay"',
+    '"models/box.ply"', '"models"', '"mirror"', '"dielectric"', '"point"', "[]",
+]  # fmt: skip
 STRANGE += ["9" * 4400, "0x" + "f" * 4400]
 LINES = FULL.splitlines()
 
@@ -390,7 +321,7 @@ def mutated(draw: Any) -> str:
     return "\n".join(lines)
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=mutated())
 @example(FULL.replace("translate = [1, 0, 0]", "translate = [1e308, 0, 0]").replace("scale = 0.5", "scale = 1e308"))
 @example(FULL.replace("translate = [1, 0, 0]", "translate = [1e300, 0, 0]"))
@@ -480,7 +411,6 @@ def turned(degrees: Any, points: np.ndarray) -> np.ndarray:
 
 
 class TestPlacing:
-
     def place(self, mesh: Mesh, **how: Any) -> Mesh:
         camera = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
         objects = (SceneObject(mesh=mesh, material="a", **how),)
@@ -538,6 +468,7 @@ class TestFloor:
             along, across = (np.unique(mesh.vertices[:, axis]) for axis in (0, 2))
             np.testing.assert_allclose(along, low[0] + np.arange(11), rtol=0, atol=1e-9)
             np.testing.assert_allclose(across, low[1] + np.arange(11), rtol=0, atol=1e-8)
+
 
 def test_packed_rows_follow_the_instances(folder: Path) -> None:
     scene = load(folder, FULL)

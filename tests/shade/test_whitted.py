@@ -333,6 +333,7 @@ class TestRecursion:
             image = one(what, max_depth=depth)
             assert image.rays[0, 0] == 2 ** (depth + 1) - 1 and image.radiance[0, 0, 0] == 2 ** (depth + 1) - 1
 
+
 def reflectance(angle: float, n1: float, n2: float) -> float:
     """Fresnel by the sine and tangent of the angles' sum and difference."""
     other = math.asin(n1 / n2 * math.sin(angle))

@@ -1,5 +1,9 @@
 """Which directions are hidden: the bits of rays that are written down, whatever the tiles, threads and places."""
 
+import io
+import tracemalloc
+from typing import Any
+
 import numpy as np
 import pytest
 from cases import cases
@@ -10,7 +14,17 @@ from meshes import make_mesh, meshes
 from renderer import BruteForce, Octree
 from renderer.mesh.heightfield import heightfield_mesh
 from renderer.mesh.shapes import box, icosphere, torus
-from renderer.studies import face_points, fibonacci_sphere, occlusion, tregenza
+from renderer.studies import (
+    ambient_occlusion,
+    face_points,
+    fibonacci_sphere,
+    occlusion,
+    openness,
+    sky_view_factor,
+    sun_hours,
+    tregenza,
+)
+from renderer.studies.share import check_request
 from renderer.studies.sweep import RAYS, TILE
 
 pytestmark = pytest.mark.judges("studies.FacePoints", "studies.occlusion", "studies.openness", "studies.sun_hours")
@@ -257,3 +271,49 @@ def test_bits_over_many_small_faces(spread):
     expected = written_down(octree, points, np.tile([0.0, 0.0, 1.0], (1600, 1)), directions)
     np.testing.assert_array_equal(unpacked(bits, 145), expected)
     assert 0.1 < expected.mean() < 0.95
+
+
+POINTS = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 3))
+
+
+ONE: dict[str, Any] = {
+    "occlusion": lambda octree, points=POINTS, **options: occlusion(octree, points, None, np.eye(3), **options),
+    "sky_view_factor": lambda octree, points=POINTS, **options: sky_view_factor(octree, points, **options),
+    "sun_hours": lambda octree, points=POINTS, **options: sun_hours(octree, points, None, np.eye(3), **options),
+    "ambient_occlusion": lambda octree, points=POINTS, **options: ambient_occlusion(
+        octree, points, [0, 0, 1], **options
+    ),
+    "openness": lambda octree, points=POINTS, **options: openness(octree, points, **options),
+}
+
+
+@cases("study", ONE)
+def test_a_bar_is_drawn_on_a_terminal_and_nowhere_else(study: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    octree = Octree.from_mesh(torus())
+    for stream, progress in ((Terminal(), True), (Terminal(), False), (io.StringIO(), True)):
+        monkeypatch.setattr("sys.stderr", stream)
+        ONE[study](octree, progress=progress)
+        assert bool(stream.getvalue()) == (stream.isatty() and progress)
+
+
+def test_threads_are_those_of_the_octree_unless_others_are_asked_for() -> None:
+    octree = Octree.from_mesh(torus(), threads=3)
+    for threads, used in ((None, 3), (1, 1), (7, 7)):
+        assert check_request(octree, POINTS, None, None, threads, False).threads == used
+
+
+def test_nothing_of_the_size_of_points_times_directions_is_made() -> None:
+    """An array of bools would have 40 megabytes; 15 are reserved for the faces at a corner, on two threads."""
+    octree, directions = Octree.from_mesh(box()), fibonacci_sphere(2000).directions
+    points = np.random.default_rng(3).uniform(2.0, 3.0, (20_000, 3))
+    occlusion(octree, points[:300], None, directions, threads=2)
+    tracemalloc.start()
+    try:
+        occlusion(octree, points, None, directions, threads=2)
+        assert tracemalloc.get_traced_memory()[1] < 15e6 + 6e6
+    finally:
+        tracemalloc.stop()

@@ -6,7 +6,7 @@ from cases import cases
 
 from renderer import Octree
 from renderer.mesh.shapes import box
-from renderer.studies import Pattern, fibonacci_sphere, sky_view_factor, sun_hours
+from renderer.studies import Pattern, fibonacci_sphere, reinhart, sky_view_factor, sun_hours
 
 pytestmark = pytest.mark.judges("studies.sky_view_factor", "studies.sun_hours")
 
@@ -131,3 +131,16 @@ def test_bad_hours_are_named(bad):
         sun_hours(Octree.from_mesh(box()), np.zeros((4, 3)), None, np.eye(3), bad)
     with pytest.raises(ValueError, match=r"^sun_directions: expected .* in row 1"):
         sun_hours(Octree.from_mesh(box()), np.zeros((4, 3)), None, [[0, 0, 1], [0, 0, 0]])
+
+
+def test_walls_have_half_of_an_even_sky_with_patches_in_opposite_pairs() -> None:
+    """To rounding, of sums over up to 577 patches; a level point has 1 with any patches."""
+    octree = Octree([[0, 0, -9], [1, 0, -9], [0, 1, -9]], [[0, 1, 2]])
+    for patches in (145, 577, reinhart(3)):
+        for normal in ([1, 0, 0], [0, -2, 0], [0.6, 0.8, 0.0]):
+            seen = sky_view_factor(octree, [[0, 0, 0]], [normal], patches=patches)
+            assert abs(seen[0] - 0.5) < 577 * 2.0**-52
+    for patches in (1, 3, 50, 145):
+        for definition in ("cosine", "geometric"):
+            seen = sky_view_factor(octree, [[0, 0, 0]], patches=patches, definition=definition)  # type: ignore[arg-type]
+            assert abs(seen[0] - 1.0) < 577 * 2.0**-52

@@ -21,7 +21,7 @@ TWICE = Mesh.concatenate([box(), Mesh(box().vertices, box().faces[:, ::-1])])
 
 
 @cases("queries", [Octree.from_mesh(TWICE), BruteForce.from_mesh(TWICE)])
-@cases("shape", [(4, 6), (24, 1), (1, 2, 12)])
+@cases("shape", [(4, 6), (1, 2, 12)])
 def test_rays_of_any_dimensions_go_on_through_coinciding_faces(queries, shape):
     """Through two faces at each wall, and out."""
     directions = np.array([0.5, 0.25, 0.5]) - ORIGINS

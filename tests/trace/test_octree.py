@@ -144,6 +144,7 @@ def test_stats_count_what_is_there():
     used = int((tree.nodes.reshape(stats.nodes, -1)[:, :8] < np.inf).sum())
     assert used == stats.leaves + stats.nodes - 1
     assert np.log(stats.leaves) / np.log(8) <= stats.depth <= 12
+    assert Octree([], []).stats.references == 0 and Octree([], []).stats.fill == 1
     brute = BruteForce.from_mesh(mesh).stats
     assert (brute.nodes, brute.leaves, brute.depth, brute.blocks, brute.references) == (0, 0, 0, 320, 1280)
 

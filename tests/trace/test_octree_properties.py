@@ -29,7 +29,7 @@ def intervals(seed, count):
     return rng.uniform(0, 1, count), np.where(rng.random(count) < 0.3, np.inf, rng.uniform(0, 2, count))
 
 
-@settings(max_examples=1000)
+@settings(max_examples=400)
 @given(meshes, options, SEEDS)
 def test_octree_equals_brute_force_bit_for_bit(mesh, chosen, seed):
     octree, brute = Octree(*mesh, **chosen), BruteForce(*mesh, threads=1)

@@ -3,7 +3,6 @@
 Rays beside planes and edge-on to faces, where the t of a hit errs by more than a box is wide.
 """
 
-
 import numpy as np
 import pytest
 from cases import cases
@@ -23,7 +22,7 @@ from renderer.trace.leaf import tree_pointers
 from renderer.trace.resolve import _meet_slab, resolve_uncertain
 from validation.oracle import exact
 
-SIDE = 100
+SIDE = 60
 
 
 def flat_overlapping(count):
@@ -51,35 +50,25 @@ def expected(flat):
     octree = Octree(*flat, threads=1)
     origins, directions = beside(1e-12)
     rows = [octree.closest_hit(origins[i : i + 1], directions[i : i + 1]) for i in range(SIDE**2)]
-    return Hits(
-        *(np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "face", "u", "v")), octree.mesh
-    )
+    columns = [np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "face", "u", "v")]
+    hits = Hits(*columns, octree.mesh)
+    assert hits.hit.mean() > 0.5 and abs(hits.t[hits.hit] - 1e-11).max() < 1e-15
+    return hits
 
 
-@pytest.mark.judges("Octree.closest_hit")
-@cases("threads", [1, 2, 3])
-@cases("split", ["midpoint", "sah"])
-def test_rays_beside_a_plane_hit_the_same_with_any_threads(flat, expected, threads, split):
-    assert_same_hits(Octree(*flat, split=split, threads=threads).closest_hit(*beside(1e-12)), expected)
-
-
-@pytest.mark.judges("BruteForce")
+@pytest.mark.judges("BruteForce", "Octree.closest_hit")
 def test_rays_beside_a_plane_hit_the_same_by_brute_force(flat, expected):
-    assert_same_hits(BruteForce(*flat).closest_hit(*beside(1e-12)), expected)
-
-
-def test_rays_beside_a_plane_hit_the_same_after_a_refit(flat, expected):
+    """And by any rule of splitting, with any threads, after a refit, and without the first eight rays."""
     vertices, faces = flat
-    octree = Octree(vertices[:, [0, 2, 1]] * [1.0, 3.0, 0.5], faces)
-    octree.refit(vertices)
-    assert_same_hits(octree.closest_hit(*beside(1e-12)), expected)
-
-
-def test_rays_beside_a_plane_hit_the_same_without_the_first_eight(flat, expected):
+    refitted = Octree(vertices[:, [0, 2, 1]] * [1.0, 3.0, 0.5], faces)
+    refitted.refit(vertices)
+    octrees = [Octree(*flat, split=split, threads=threads) for split in ("midpoint", "sah") for threads in (2, 3)]
     origins, directions = beside(1e-12)
-    hits = Octree(*flat).closest_hit(origins[8:], directions[8:])
-    for name in ("t", "face", "u", "v"):
-        np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name)[8:])
+    for queries in (BruteForce(*flat), refitted, *octrees):
+        assert_same_hits(queries.closest_hit(origins, directions), expected)
+        hits = queries.closest_hit(origins[8:], directions[8:])
+        for name in ("t", "face", "u", "v"):
+            np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name)[8:])
 
 
 @cases("factor", [1 - 1e-6, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-6])
@@ -136,7 +125,7 @@ def flattened(seed, count, kind):
     return vertices, faces
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(
     st.sampled_from(["soup", "soup_float32", "lattice", "duplicates", "sizes", "flat", "far_away", "scaled"]),
     st.integers(0, 2**20),

@@ -36,6 +36,7 @@ def test_the_tree_does_not_depend_on_the_threads(kind, split):
     mesh = Mesh(*make_mesh(kind, 5, MANY))
     rule = Rule(SPLITS[split], 4, 32)
     expected = build_tree(mesh.vertices, mesh.faces, rule, threads=1)
+    assert faults(expected, mesh) == []
     for threads in (2, 3, 7):
         tree = build_tree(mesh.vertices, mesh.faces, rule, threads=threads)
         assert tree.depth == expected.depth
