@@ -83,15 +83,3 @@ def test_what_cannot_be_read_or_written_is_told_before_anything_is_measured(
         (tmp_path / output).mkdir()
     assert command.main(["--mesh", "nowhere.ply", "--output", str(tmp_path)]) == 2
     assert (output or "--mesh: expected a file, got 'nowhere.ply'") in capsys.readouterr().err
-
-
-def test_other_records_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "benchmark.json"
-    for text, told in (
-        ("{", "expected JSON"),
-        ('{"schema": 7}', f"schema {record.SCHEMA}, got 7"),
-        (f'{{"schema": {record.SCHEMA}}}', "expected the keys"),
-    ):
-        path.write_text(text)
-        with pytest.raises(ValueError, match=told):
-            record.read(path)

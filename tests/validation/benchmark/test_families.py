@@ -5,7 +5,7 @@ import pytest
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation.benchmark.measures.families import cosine_distributed, families, points
+from validation.benchmark.measures.families import cosine_distributed, points
 from validation.benchmark.measures.meshes import displaced_spheres
 from validation.benchmark.peers.contender import Family, Points
 
@@ -58,22 +58,6 @@ def test_bounce_rays_follow_the_cosine() -> None:
     # E[cos] = 2/3, E[cos^2] = 1/2; five standard errors of 20,000 samples are 0.009 and 0.011.
     assert abs(cosine.mean() - 2 / 3) < 0.009
     assert abs((cosine**2).mean() - 1 / 2) < 0.011
-
-
-def test_misses_are_repeated_where_there_are_few_and_a_flat_mesh_has_some(
-    octree: Octree, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    whole = families(octree, 500)[4]
-    assert len(np.unique(whole.origins, axis=0)) == 500
-    monkeypatch.setattr("validation.benchmark.measures.families._BATCHES", 1)
-    few = families(octree, 500)[4]
-    distinct = len(np.unique(few.origins, axis=0))
-    assert len(few) == 500 and 50 < distinct < 500
-    assert np.array_equal(few.origins[distinct:], few.origins[: 500 - distinct])
-    # Seen from above, a tilted square is flat in no axis and hides nothing; a level one is flat in y.
-    corners = np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
-    level = families(Octree(corners, np.array([[0, 2, 1], [0, 3, 2]])), 300)
-    assert np.ptp(level[4].origins[:, 1]) > 0.05 and len(level[4]) == 300
 
 
 def test_fewer_rays_are_spread_over_the_family() -> None:

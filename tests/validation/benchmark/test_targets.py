@@ -84,11 +84,6 @@ def test_first_hits_are_judged_on_every_row_and_aimed_at_by_their_mean(targets: 
     assert threads["where"].startswith("middle")
 
 
-def test_an_aim_without_a_mean_is_not_judged_by_the_worst() -> None:
-    alone = Target("s", "times", "above", 1.0, 1.5, 2.0, "w", "r", None, of_mean=True).record()
-    assert alone["met"] is True and alone["aimed"] is None
-
-
 def test_points_take_the_worst_of_the_meshes_that_count(targets: dict[str, dict[str, Any]]) -> None:
     near = targets["near points, closest point, against open3d"]
     assert (near["measured"], near["where"], near["met"], near["aimed"]) == (1.5, "middle", True, False)
@@ -99,36 +94,3 @@ def test_points_take_the_worst_of_the_meshes_that_count(targets: dict[str, dict[
     for (what, peer), least in asked.items():
         target = targets[f"{what}, against {peer}"]
         assert (target["at_least"], target["aim"], target["met"]) == (least, 2 * least, None)
-
-
-def test_builds_refits_and_memory_are_shares_of_the_peers(targets: dict[str, dict[str, Any]]) -> None:
-    build = targets["build, of Embree's build time (Open3D's first query)"]
-    assert (build["measured"], build["where"], build["met"]) == (1.0, "large", False)
-    assert (build["at_least"], build["aim"], build["mean"]) == (0.5, 0.3, pytest.approx(0.5)) and not build["aimed"]
-    refit = targets["refit, of Embree's build time (Open3D's first query)"]
-    assert (refit["measured"], refit["met"]) == (0.5, True)
-    assert refit["mean"] == pytest.approx(0.25) and refit["aimed"]
-    rest = targets["memory at rest, of Embree's (Open3D)"]
-    assert (rest["measured"], rest["at_least"], rest["aim"], rest["met"]) == (0.75, 0.7, 0.5, False)
-
-
-def test_studies_take_the_worst_mesh(targets: dict[str, dict[str, Any]]) -> None:
-    name = "145 directions from each point"
-    beside = targets[f"{name}, against open3d"]
-    assert (beside["measured"], beside["where"], beside["met"], beside["aimed"]) == (2.0, "city", True, False)
-    memory = targets[f"{name}, memory, of rays that are written down"]
-    assert (memory["measured"], memory["where"], memory["met"]) == (0.2, "terrain", False)
-    rate = targets[f"{name}, rays a second, of shadow rays of a picture"]
-    assert (rate["measured"], rate["where"], rate["met"]) == (0.5, "terrain", False)
-
-
-def test_single_things_are_judged_by_themselves(targets: dict[str, dict[str, Any]]) -> None:
-    one, ten = (targets[f"a call of {count}, against embree"] for count in ("1 ray", "10 rays"))
-    assert (one["at_least"], one["aim"], one["met"], one["aimed"]) == (1.0, 2.0, True, True)
-    assert (ten["measured"], ten["met"]) == (0.75, False)
-    assert targets["a call of 100 rays, against open3d"]["met"] is None
-    assert targets["call of 1 ours"]["measured"] == 4.5 and targets["call of 1 ours"]["met"]
-    frame = targets[f"frame against {frames.LABELS[frames.LISTS]}"]
-    assert (frame["at_least"], frame["aim"], frame["met"], frame["aimed"]) == (1.5, 2.5, True, False)
-    assert targets["import renderer"]["met"] is False and targets["render warm"]["met"] is False
-    assert targets["first hit"]["met"] is False and targets["first picture"]["met"] is None

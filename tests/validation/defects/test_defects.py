@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import cases
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from validation.defects import run as defects
@@ -64,7 +65,7 @@ def python(program: str, cache: Path) -> subprocess.CompletedProcess[str]:
 
 
 class TestSeam:
-    @pytest.mark.parametrize("defect", DEFECTS, ids=lambda defect: defect.name)
+    @cases("defect", DEFECTS)
     def test_each_name_is_there_once_and_the_broken_text_compiles(self, defect: Defect) -> None:
         if isinstance(defect.change, Wrapped):
             assert find_name(PACKAGE, defect.change.name)

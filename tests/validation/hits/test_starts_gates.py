@@ -122,31 +122,6 @@ def test_a_gate_for_each_family_and_quantity(monkeypatch):
     assert all(gate.passed for gate in gates)
 
 
-def test_closed_bodies_are_closed():
-    """Each edge is passed once in each direction, and the faces look outwards."""
-    for body in bodies.bodies():
-        corners = body.mesh.vertices[body.mesh.faces]
-        if not body.closed:
-            continue
-        _, at = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-        edges = [(a, b) for face in at.reshape(-1, 3).tolist() for a, b in zip(face, [*face[1:], face[0]], strict=True)]
-        assert len(set(edges)) == len(edges) and {(b, a) for a, b in edges} == set(edges)
-        a, b, c = (corners - corners[0, 0]).transpose(1, 0, 2)
-        assert (a * np.cross(b, c)).sum() > 0
-
-
-def test_signs_are_exact():
-    rng = np.random.default_rng(2)
-    normals = [tuple(row) for row in rng.integers(-(2**60), 2**60, (20, 3)).tolist()]
-    across = np.array([[float(b), -float(a), 0.0] for a, b, _ in normals])
-    ways = np.concatenate([across, rng.normal(size=(20, 3))])
-    found = starts.exact_signs(normals, ways)
-    for ray, way in enumerate(ways.tolist()):
-        for k, normal in enumerate(normals):
-            value = sum(int(x * 2.0**60) * n for x, n in zip(way, normal, strict=True))
-            assert found[ray, k] == (value > 0) - (value < 0)
-
-
 def test_mirrors_reflect_for_ever(monkeypatch):
     monkeypatch.setattr(mirrors, "BOUNCES", 12)
     _, gates = mirrors.check_mirrors(job(), 12, Lawful)

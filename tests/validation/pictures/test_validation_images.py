@@ -214,24 +214,6 @@ def test_a_mesh_that_mitsuba_cannot_hold_is_not_passed(tmp_path: Path) -> None:
     assert "float32" in record["fault"] and failing(gates) and "aovs" not in record
 
 
-def test_a_picture_of_nothing_is_not_passed(tmp_path: Path) -> None:
-    up = stairs().camera.model_copy(update={"eye": (6.0, 70.0, 8.0), "target": (6.0, 80.0, 0.0)})
-    away = stairs().altered(camera=up)
-    assert any("ssim_foreground is nan" in line for line in failing(check(tmp_path, away)[1]))
-
-
-def test_a_users_scene_keeps_its_shape_and_climbs_the_ladder(tmp_path: Path) -> None:
-    wide = stairs().altered(render=stairs().render.model_copy(update={"resolution": (1000, 500)}))
-    record, gates = check(tmp_path, wide, PictureEffort(64, 32))
-    assert failing(gates) == []
-    sizes = {rung["name"]: rung["size"] for rung in record["rungs"]}
-    assert sizes == {"diffuse": [32, 16], "everything": [64, 32]}
-    files = tuple(SCENES / f"{name}.toml" for name in ("stairs", "mirrors"))
-    job = Job(True, Thresholds(), tmp_path, lambda _: None, files)
-    assert [scene[0] for scene in images.scenes_of(job)] == ["stairs", "mirrors"]
-    assert images.steps(job) > 0
-
-
 def test_both_sides_draw_the_meshes_as_float32_holds_them_where_that_keeps_their_shapes() -> None:
     near, far = (SceneObject(mesh=box(), material="red", translate=(0.0, 0.0, z)) for z in (0.3, 1e6 + 0.3))
     scene = Scene(camera=balls().camera, materials=balls().materials, objects=(near, far))
