@@ -69,20 +69,6 @@ def test_constants_compile_a_kernel_once():
     assert len(power.piece.overloads) == 1
 
 
-def test_what_python_does_not_call_is_not_compiled_for_it():
-    @kernel
-    def below(x):
-        return x + 1
-
-    @kernel
-    def above(x):
-        return below(x) + 1
-
-    assert above(1) == 3
-    assert "entry" not in vars(below) and "piece" in vars(above)
-    assert below(1) == 2 and below.__name__ == "below"
-
-
 def test_plain_kernels_of_numba_may_call_ours():
     @kernel
     def low(x):
@@ -180,12 +166,6 @@ def test_kernels_work_without_our_compiler_where_numba_has_changed(tmp_path, cha
     (line,) = done.stderr.splitlines()
     assert line.startswith("renderer: Numba 0.99.0 is not one of those that this version was made for (0.68.*): ")
     assert not list(tmp_path.rglob("*.kernel"))
-
-
-def test_only_the_first_of_several_kernels_is_told_of():
-    script = "from renderer.jit.notice import compiling\nfor name in 'ab':\n    with compiling(name, None): pass\n"
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stderr.count("compiling kernels") == 1 == len(done.stderr.splitlines())
 
 
 def test_another_numba_that_fits_is_used_without_a_word_and_keeps_its_kernels(tmp_path):

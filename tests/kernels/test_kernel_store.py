@@ -4,15 +4,14 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import llvmlite.binding as llvm
 import pytest
 from cases import cases
-from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, copy_package, run, start, write_package
+from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, run, start, write_package
 
-from renderer.jit.cache import _user_cache, _versions, runnable_levels
-from renderer.jit.levels import FEATURES, LEVELS, lacking
+from renderer.jit.cache import runnable_levels
+from renderer.jit.levels import FEATURES, LEVELS
 
 TELL = """
 import logging, sys
@@ -50,23 +49,6 @@ def test_an_edit_below_a_kernel_shows_and_an_edit_beside_it_keeps_the_cache(pack
     assert run(package) == ["37", "1", "0"]
 
 
-def test_an_edit_of_the_real_triangle_test_shows(tmp_path):
-    # The whole package, where the kernel that runs is two modules above the one edited; what is compiled comes along.
-    folder = copy_package(tmp_path)
-    script = """
-from renderer.octree import BruteForce
-brute = BruteForce([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], threads=1)
-print(brute.any_hit([[0.25, 0.25, 1]], [[0, 0, -1]])[0])
-"""
-    assert run(folder, script) == ["True"]
-    path = folder / "trace" / "intersect.py"
-    source = path.read_text(encoding="utf-8")
-    edited = source.replace("(least >= zero) | (most <= zero)", "(least >= zero) & (most <= zero)")
-    assert edited != source
-    path.write_text(edited)
-    assert run(folder, script) == ["False"]
-
-
 @pytest.mark.parametrize("pretend", ["import llvmlite\nllvmlite.__version__ = '99.0'\n", "import numba\n"
                          "numba.__version__ = '0.68.99'\n"])  # fmt: skip
 def test_another_compiler_version_shows(package, pretend):
@@ -74,14 +56,6 @@ def test_another_compiler_version_shows(package, pretend):
     assert run(package, pretend + RUN) == COMPILED
     assert run(package, pretend + RUN) == LOADED
     # And does not take what it made from the first one, which may be used in turn.
-    assert run(package) == LOADED
-
-
-def test_another_processor_shows(package):
-    assert run(package) == COMPILED
-    generic = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-    assert run(package, **generic) == COMPILED
-    assert run(package, **generic) == LOADED
     assert run(package) == LOADED
 
 
@@ -171,13 +145,6 @@ def test_what_cannot_be_written_is_still_read(package, tmp_path, own):
         assert run(package, READ_ONLY + RUN, **chosen, **home) == LOADED
 
 
-def test_without_a_home_kernels_are_compiled(package, tmp_path):
-    (package / "__pycache__").touch()
-    script = "import os\nos.environ.pop('HOME', None)\nimport pathlib\n"
-    script += "def no(*a): raise RuntimeError('Could not determine home directory.')\npathlib.Path.home = no\n"
-    assert run(package, script + RUN, XDG_CACHE_HOME="") == COMPILED
-
-
 def test_a_full_disk_stops_nothing_and_is_said_once(package):
     full = """
 import errno, renderer.jit.cache as store
@@ -190,13 +157,6 @@ assert doubled(3) == 16
     assert done.stdout.split() == [*COMPILED, "2"]
     said = [line for line in done.stderr.splitlines() if "cannot be kept" in line]
     assert len(said) == 1 and said[0].endswith("No space left on device") and "__pycache__" in said[0]
-
-
-def test_what_is_compiled_is_logged_and_what_is_loaded_is_not(package):
-    kept = f"(once, kept in {package / '__pycache__'})"
-    first = f"renderer: compiling kernels, which takes some seconds {kept} compiling answer {kept} 17 0 1"
-    assert " ".join(run(package, TELL + RUN)) == first
-    assert run(package, TELL + RUN) == LOADED
 
 
 @pytest.mark.parametrize(
@@ -243,20 +203,6 @@ def test_a_machine_runs_the_levels_whose_features_it_has(monkeypatch, lacks, tri
     assert runnable_levels.__wrapped__() == levels
 
 
-@cases(
-    ("has", "level", "lacks"),
-    [
-        ("x86-64-v2", "x86-64-v2", []),
-        ("x86-64-v2", "x86-64-v3", ["avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"]),
-        ("x86-64-v3", "x86-64-v4", ["avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"]),
-        ("x86-64-v4", "aarch64", ["neon"]),
-    ],
-)
-def test_a_level_lacks_what_the_psabi_has_in_it_beyond_the_machine(monkeypatch, has, level, lacks):
-    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: dict.fromkeys(FEATURES[has], True))
-    assert lacking(level) == lacks
-
-
 @pytest.fixture(scope="module")
 def ahead(tmp_path_factory):
     """The kernels of the package for a level that this machine runs, compiled once where another copy of it is."""
@@ -295,12 +241,6 @@ class TestAhead:
         pretend = "import renderer.jit.cache as store\nstore.runnable_levels = tuple\n"
         assert run(package, pretend + RUN, OCTREE_RENDERER_KERNELS=str(folder)) == COMPILED
 
-    def test_they_are_never_written(self, package, folder):
-        before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-        bottom_of(package).write_text("STEP = 20\n")
-        assert run(package, OCTREE_RENDERER_KERNELS=str(folder)) == ["27", "0", "1"]
-        assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
-
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
 def test_a_pipe_in_the_place_of_a_kernel_is_not_waited_for(package):
@@ -309,18 +249,3 @@ def test_a_pipe_in_the_place_of_a_kernel_is_not_waited_for(package):
     path.unlink()
     os.mkfifo(path)
     assert run(package) == COMPILED
-
-
-@pytest.mark.parametrize(
-    ("system", "folder"), [("linux", ".cache"), ("darwin", "Library/Caches"), ("win32", "AppData/Local")]
-)
-def test_the_user_s_own_folder_is_where_each_system_has_it(monkeypatch, tmp_path, system, folder):
-    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(sys, "platform", system)
-    monkeypatch.setattr(Path, "home", lambda: tmp_path)
-    assert _user_cache() == tmp_path / folder
-
-
-def test_kernels_of_one_python_are_not_those_of_another():
-    assert sys.implementation.cache_tag and sys.implementation.cache_tag in _versions()

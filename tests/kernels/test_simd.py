@@ -10,7 +10,6 @@ from renderer.numerics.simd import (
     bits_float,
     double_of,
     every8,
-    extract,
     farthest_first,
     float32_pointer,
     float64_pointer,
@@ -34,7 +33,6 @@ from renderer.numerics.simd import (
     splat8,
     square_root,
     store,
-    unlikely,
     widen,
 )
 
@@ -130,22 +128,6 @@ def test_square_roots_are_rounded_as_numpy_rounds_them():
 
 
 @njit
-def lanes_of(a8, a4, out8, out4):
-    for i in range(8):
-        out8[i] = extract(load8(a8, 0), i)
-    for i in range(4):
-        out4[i] = extract(load4(a4, 0), i)
-
-
-def test_lanes_may_be_chosen_at_run_time():
-    a8, a4 = np.arange(8, dtype=np.float32) + 0.5, np.arange(4) / 3
-    out8, out4 = np.zeros(8, np.float32), np.zeros(4)
-    lanes_of(a8, a4, out8, out4)
-    np.testing.assert_array_equal(out8, a8)
-    np.testing.assert_array_equal(out4, a4)
-
-
-@njit
 def bit_operations(value, bits):
     return float_bits(value), bits_float(bits), lowest_bit(bits)
 
@@ -162,15 +144,6 @@ def test_bits():
     for k in range(63):
         assert bit_operations(np.float32(0), 1 << k)[2] == k
         assert bit_operations(np.float32(0), (1 << k) | (1 << 62))[2] == k
-
-
-@njit
-def _said(a, b):
-    return unlikely(a > b)
-
-
-def test_what_is_unlikely_may_still_be_true():
-    assert _said(2.0, 1.0) is True and _said(1.0, 2.0) is False and _said(np.nan, 2.0) is False
 
 
 @njit

@@ -103,13 +103,6 @@ def test_the_fan_is_wrong_for_each_of_these(name: str) -> None:
             assert_right(points, fan(len(points)))
 
 
-def test_a_concave_polygon_that_its_first_corner_sees_whole_keeps_its_fan() -> None:
-    points = np.roll(placed(DART), 2, axis=0)  # from the notch's bottom
-    assert cut(points) == fan(4)
-    assert_right(points, fan(4))
-    assert cut(placed(DART)) == fan(4) and cut(np.roll(placed(DART), 1, axis=0)) != fan(4)
-
-
 @settings(deadline=None, max_examples=300)
 @given(st.integers(3, 12), st.integers(0, 10**6), st.booleans(), st.sampled_from([1.0, 1e-30, 1e200]))
 def test_convex_polygons_keep_their_fan(corners: int, seed: int, single: bool, size: float) -> None:
@@ -121,18 +114,6 @@ def test_convex_polygons_keep_their_fan(corners: int, seed: int, single: bool, s
     for points in (ring, np.concatenate([ring, [in_line]]), np.concatenate([[in_line], ring]), ring.repeat(2, axis=0)):
         points = points.astype(np.float32).astype(np.float64) if single else points
         assert cut(points * size) == fan(len(points))
-
-
-@settings(deadline=None, max_examples=300)
-@given(st.integers(4, 24), st.integers(0, 10**6))
-def test_random_stars_are_covered_once(corners: int, seed: int) -> None:
-    """A point sees every corner, so the outline does not cross itself."""
-    rng = np.random.default_rng(seed)
-    angles = (np.arange(corners) + rng.uniform(0, 0.8, corners)) * (2 * np.pi / corners)
-    radii = rng.uniform(0.2, 1.0, corners)
-    outline = np.stack([np.cos(angles) * radii, np.sin(angles) * radii, np.zeros(corners)], axis=1)
-    points = outline @ FRAMES["tilted"].T
-    assert_right(points, cut(points))
 
 
 def untangled(points: Outline) -> Outline:
@@ -163,20 +144,6 @@ def untangled(points: Outline) -> Outline:
 def test_random_outlines_are_covered_once(corners: int, seed: int) -> None:
     points = placed(untangled(np.random.default_rng(seed).random((corners, 2)).tolist()), FRAMES["tilted"])
     assert_right(points, cut(points))
-
-
-def test_detail_finer_than_what_counts_as_flat_is_cut_as_it_is() -> None:
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        detail = placed(untangled(rng.random((6, 2)).tolist())) * 1e-8
-        points = np.concatenate([placed(L_SHAPE)[:4], detail, placed(L_SHAPE)[5:]])
-        triangles = cut(points)
-        if triangles != fan(len(points)):
-            parts = doubled_areas(points, triangles)[:, 2]
-            assert parts.min() > 0 and parts.sum() == pytest.approx(6, rel=1e-6)
-            break
-    else:
-        pytest.fail("none was cut")
 
 
 PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
@@ -222,12 +189,6 @@ def test_an_outline_that_folds_back_onto_its_edge_is_not_simple() -> None:
             outline = np.ascontiguousarray(outline[:, ::-1] * [-1.0, 1.0])
         order = np.argsort(np.minimum(outline, np.roll(outline, -1, axis=0))[:, 0])
         assert not ears.is_simple(outline, order)
-
-
-def test_bent_polygons_keep_their_fan_slightly_bent_ones_are_cut() -> None:
-    for height, kept in [(0.02, False), (0.9, True)]:
-        points = placed(L_SHAPE) + np.outer([0, 1, 0, 1, 0, 1], [0, 0, height])
-        assert (cut(points) == fan(6)) == kept
 
 
 @cases("index", [-1, 6, 2**62, -(2**62)])
