@@ -42,7 +42,6 @@ SHORT = {
     "settings": (100, {"refused", "hit"}),
     "query": (400, {"refused", "hit"}),
     "output": (150, {"refused", "written"}),
-    "cache": (3, {"compiled"}),
 }
 
 
