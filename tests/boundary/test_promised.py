@@ -573,10 +573,10 @@ def test_compile_compiles_what_it_is_told_and_all_by_default(what: str | None, m
 @pytest.mark.judges("octree-render compile --quiet")
 def test_compile_is_quiet_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     from renderer import precompile
-    from renderer.cli import main as cli
+    from renderer.cli import compiling
 
     monkeypatch.setattr(precompile, "compile_ahead", lambda what, began: [began(str(part)) for part in "ab"])
-    monkeypatch.setattr(cli, "on_terminal", lambda: True)
+    monkeypatch.setattr(compiling, "on_terminal", lambda: True)
     assert main(["compile", "--quiet"]) == 0
     assert capfd.readouterr() == ("", "")
     assert main(["compile"]) == 0

@@ -13,7 +13,7 @@ import pytest
 from cases import cases
 
 from renderer import load_scene, render
-from renderer.cli import main as cli
+from renderer.cli import render as rendering
 from renderer.cli.main import main
 from renderer.picture.image import PLANES, Image
 from renderer.system import files
@@ -168,7 +168,7 @@ def test_whether_a_folder_can_be_written_is_found_out_before_the_work(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(files.Path, "touch", refuse)
-    monkeypatch.setattr(cli, "_save", lambda *a: pytest.fail("rendered in vain"))
+    monkeypatch.setattr(rendering, "_save", lambda *a: pytest.fail("rendered in vain"))
     with pytest.raises(PermissionError, match="Permission denied"):
         check_writable(tmp_path / "a.png")
     assert main(["render", str(STAIRS), "-o", str(tmp_path / "a.png"), "--resolution", "8x8"]) == 2
