@@ -381,16 +381,6 @@ def test_no_faces_are_missed_by_all(accelerator: Any, vertices: Any) -> None:
 # --- Hits, Mesh and their sizes -------------------------------------------------------------------------------
 
 
-@cases("exponent", [-1000, -700, -200, -60, 0, 60, 200, 700, 1000])
-@cases("accelerator", [Octree, BruteForce])
-def test_a_hit_has_a_point_and_a_normal_at_any_size(accelerator: Any, exponent: int) -> None:
-    vertices = np.ldexp([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], exponent)
-    hits = accelerator(vertices, [[0, 1, 2]]).closest_hit(np.ldexp([[0.25, 0.25, 1.0]], exponent), [[0, 0, -1.0]])
-    assert hits.hit.tolist() == [True] and hits.t.tolist() == [2.0**exponent]
-    assert hits.points.tolist() == np.ldexp([[0.25, 0.25, 0.0]], exponent).tolist()
-    assert hits.normals.tolist() == [[0, 0, 1]]
-
-
 NOT_MESHES = [None, "x", 3, np.ones((3, 3)), [BOX], Mesh, {"vertices": []}]
 
 
@@ -491,20 +481,6 @@ def test_settings_of_render(name: str, bad: Any) -> None:
     with pytest.raises(ValueError, match=name) as caught:
         render(SCENE, **{"resolution": (4, 4), name: bad})
     assert "ambiguous" not in str(caught.value)
-
-
-@cases("bad", [None, "scene.toml", 3, {"camera": {}}, BOX, np.ones(3)])
-def test_render_takes_scenes(bad: Any) -> None:
-    with pytest.raises(ValueError, match=r"^scene: expected a Scene or a PreparedScene, got"):
-        render(bad, resolution=(4, 4))
-    with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
-        needs_of(bad)
-
-
-@cases("bad", [-1, 1.5, "1", True, np.nan, [1]])
-def test_bounces_of_needs_of(bad: Any) -> None:
-    with pytest.raises(ValueError, match=r"^max_depth: expected an integer >= 0 or None, got"):
-        needs_of(SCENE, bad)
 
 
 PREPARED = renderer.prepare(SCENE)

@@ -41,7 +41,7 @@ from renderer import (
     render,
 )
 from renderer.cli.main import main
-from renderer.mesh.shapes import grid, icosphere
+from renderer.mesh.shapes import icosphere
 from renderer.picture import prepare as preparing
 from renderer.shade import records
 from renderer.system.threads import available_threads
@@ -173,28 +173,6 @@ def test_the_examples_of_all_docstrings_hold() -> None:
             for example in finder.find(documented, name, globs=own) if inspect.getdoc(documented) else ():
                 runner.run(example)
     assert runner.tries > 50 and runner.failures == 0
-
-
-@pytest.mark.judges("Octree.visible")
-def test_what_is_seen_at_the_least_angles_does_not_hide_its_own_points() -> None:
-    """Points of a plain of many faces, turned at random, each with an eye that barely stands above it."""
-    rng, plain = np.random.default_rng(6), grid(12, 12)
-    for far in 10.0 ** rng.uniform(-3, 4, 60):
-        mesh = Mesh(plain.vertices @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T, plain.faces)
-        points, normals = mesh.triangles.mean(axis=1), mesh.face_normals()
-        along = np.cross(normals, rng.normal(size=points.shape))
-        along *= far / np.linalg.norm(along, axis=1)[:, None]
-        eyes = points + along + normals * far * 10.0 ** rng.uniform(-8, -3, (len(points), 1))
-        octree, faces = Octree.from_mesh(mesh), np.arange(len(points))
-        assert octree.visible(points, eyes).all() and octree.visible(eyes, points).all()
-        assert octree.visible(points, eyes, leaving=faces).all() and octree.visible(eyes, points, reaching=faces).all()
-
-
-@pytest.mark.judges("AllHits.ray")
-def test_rays_of_several_dimensions_are_counted_in_c_order() -> None:
-    origins = np.array([[[0.0, 0.0, 3.0], [9.0, 0.0, 3.0]], [[0.1, 0.0, 3.0], [0.2, 0.0, 3.0]]])
-    found = Octree.from_mesh(icosphere(2)).all_hits(origins, [0.0, 0.0, -1.0], max_hits=1)
-    assert found.ray.tolist() == [0, 2, 3] and found.counts.tolist() == [[1, 0], [1, 1]]
 
 
 @pytest.mark.judges("Octree.all_hits")
@@ -453,21 +431,6 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
     for options, said in zip(told, expected, strict=True):
         assert {name: options[name] for name in said} == said
     assert [path.name for path in tmp_path.iterdir()] == ["out.png"]
-
-
-@pytest.mark.judges("octree-render view --host", "octree-render view --port", "octree-render view scene")
-def test_the_command_shows_a_scene_on_this_machine_at_any_free_port(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    told: list[dict[str, Any]] = []
-
-    def noting(scene: Any, **options: Any) -> Any:
-        told.append(options)
-        raise ValueError("enough is known")
-
-    monkeypatch.setattr(import_module("renderer.viewer.view"), "view", noting)
-    assert main(["view", str(STAIRS)]) == main(["view", str(STAIRS), "--host", "::1", "--port", "8123"]) == 2
-    assert [(options["host"], options["port"]) for options in told] == [("127.0.0.1", 0), ("::1", 8123)]
 
 
 @pytest.mark.judges("octree-render info --split")

@@ -7,12 +7,11 @@ import sys
 from pathlib import Path
 
 import numba
-import numpy as np
 import pytest
 
 from renderer import Octree
 from renderer.jit import compiler
-from renderer.jit.notice import Stopwatch, compile_seconds
+from renderer.jit.notice import compile_seconds
 from renderer.mesh.shapes import icosphere
 
 ROOT = Path(__file__).parents[2]
@@ -69,26 +68,6 @@ def test_constants_compile_a_kernel_once():
     assert len(power.piece.overloads) == 1
 
 
-def test_plain_kernels_of_numba_may_call_ours():
-    @kernel
-    def low(x):
-        return x + 1.0
-
-    @kernel
-    def high(x):
-        return low(x) * 2.0
-
-    @numba.njit
-    def theirs(values):
-        total = np.zeros(1)
-        for value in values:
-            total[0] += high(value)
-        return total[0]
-
-    assert theirs(np.array([1.0, 2.0])) == 10.0
-    assert high(1.0) == 4.0
-
-
 def test_a_kernel_that_cannot_be_compiled_says_so_each_time():
     @kernel
     def wrong(x):
@@ -111,22 +90,6 @@ def test_compiling_leaves_the_garbage_collector_as_it_was():
     finally:
         gc.enable()
     assert once(1.0) == 42.0 and gc.isenabled()
-
-
-def test_a_stopwatch_does_not_count_compiling():
-    @kernel
-    def timed(x):
-        return x * x
-
-    clock, before = Stopwatch(), compile_seconds()
-    timed(3)
-    compiled = compile_seconds() - before
-    assert compiled > 0.0
-    again = compile_seconds()
-    timed(4)
-    assert compile_seconds() == again
-    # What is left is the call, less than a wall clock would say by what was compiled.
-    assert 0.0 <= clock.seconds() < compiled + 10.0
 
 
 def test_the_probe_finds_a_numba_that_fits_and_one_that_does_not(monkeypatch):

@@ -81,15 +81,6 @@ print(make(2)(10), make(3)(10), make(2)(10))
     assert not list(package.parent.glob("__pycache__/mine.*.kernel"))
 
 
-def test_kernels_of_no_file_are_not_kept(package):
-    """Every ``python -c`` is called <string>."""
-    for step in (1, 200):
-        script = "from renderer.jit.decorators import _decorated as d\n"
-        script += f"exec('def f(x): return x + {step}')\nprint(d(f, False)(1))"
-        assert run(package, script) == [str(1 + step)]
-    assert not list(package.parent.rglob("*.kernel"))
-
-
 @pytest.mark.parametrize("folder", ["locked/cache", "n" * 300])
 @pytest.mark.parametrize("variable", ["HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "OCTREE_RENDERER_KERNELS"])
 def test_a_folder_that_may_not_be_looked_at_counts_as_absent(package, tmp_path, variable, folder):

@@ -320,6 +320,19 @@ def test_obj_faces_may_stand_before_their_vertices(tmp_path: Path, text: str, fa
     assert mesh.vertices.tolist() == SQUARE and mesh.faces.tolist() == faces
 
 
+def test_obj_vertex_colors(tmp_path: Path) -> None:
+    mesh = load_bytes(tmp_path, b"v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\nf 1 2 3\n", "a.obj")
+    assert mesh.colors is not None and mesh.colors.tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 0.5]]
+    mixed = load_bytes(tmp_path, b"v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj")
+    assert mixed.colors is None
+
+
+def test_obj_statements_may_end_in_a_comment(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0 # a corner\nv 1 0 0\nv 0 1 0 #\nf 1 2 3 # 4 5_6\n#f 9\n")
+    assert load_mesh(path).faces.tolist() == [[0, 1, 2]]
+
+
 def test_obj_attributes_may_stand_after_their_faces(tmp_path: Path) -> None:
     for head in ("f 1/2/1 2/1/1 3/2/1\n", "f 1/2/1 2/1/1 \\\n3/2/1\n"):
         mesh = load_bytes(tmp_path, (head + V + "vt 1 2\nvt 3 4\nvn 0 0 1\n").encode(), "a.obj")

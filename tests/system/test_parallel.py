@@ -32,18 +32,6 @@ def test_every_item_is_worked_on_once(count, size, threads):
     assert (times == 1).all() and sum(ends) == count and len(ends) == -(-count // size)
 
 
-def test_finished_is_called_by_one_thread_at_a_time():
-    inside = [0]
-
-    def finished(items):
-        inside[0] += 1
-        time.sleep(0.0005)
-        assert inside[0] == 1
-        inside[0] -= 1
-
-    for_chunks(lambda begin, end: None, 40, 1, 5, finished)
-
-
 @cases("threads", [1, 2, 5])
 @cases("error", [ZeroDivisionError, KeyboardInterrupt, SystemExit])
 def test_an_exception_comes_out_and_stops_the_rest(error, threads):

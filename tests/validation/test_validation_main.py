@@ -36,6 +36,7 @@ pytestmark = pytest.mark.judges(
 
 
 SCENE = Path(__file__).parents[2] / "scenes" / "stairs.toml"
+MESH = SCENE.parent / "models" / "stairs.ply"
 
 
 class Fake:
@@ -118,6 +119,11 @@ class TestUserFiles:
         assert left_out.keys() == set(NAMES) - {"images"}
         page = (tmp_path / "index.html").read_text(encoding="utf-8")
         assert all(reason in page for reason in left_out.values())
+
+    def test_scene_and_mesh(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
+        assert command.main(["--scene", str(SCENE), "--mesh", str(MESH), "--output", str(tmp_path)]) == 0
+        assert sections["hits"].jobs[0].meshes == (MESH,)
+        assert metrics(tmp_path)["left_out"].keys() == set(NAMES) - {"images", "hits"}
 
     def test_the_seed_of_random_scenes_is_theirs_alone(
         self, tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]

@@ -6,8 +6,7 @@ import pytest
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.benchmark.measures.families import cosine_distributed, points
-from validation.benchmark.measures.meshes import displaced_spheres
-from validation.benchmark.peers.contender import Family, Points
+from validation.benchmark.peers.contender import Family
 
 
 def test_every_family_hits_and_shadow_rays_end_at_one_light(octree: Octree, rays: tuple[Family, ...]) -> None:
@@ -58,24 +57,3 @@ def test_bounce_rays_follow_the_cosine() -> None:
     # E[cos] = 2/3, E[cos^2] = 1/2; five standard errors of 20,000 samples are 0.009 and 0.011.
     assert abs(cosine.mean() - 2 / 3) < 0.009
     assert abs((cosine**2).mean() - 1 / 2) < 0.011
-
-
-def test_fewer_rays_are_spread_over_the_family() -> None:
-    family = Family("f", np.arange(30.0).reshape(10, 3), np.ones((10, 3)), 1.0)
-    few = family.at_most(4)
-    assert few.origins[:, 0].tolist() == [0.0, 9.0, 18.0, 27.0]
-    assert few.t_max == 1.0
-    assert family.at_most(10) is family
-    at = Points("p", np.arange(30.0).reshape(10, 3))
-    assert at.at_most(4).points[:, 0].tolist() == [0.0, 9.0, 18.0, 27.0] and at.at_most(10) is at
-
-
-def test_the_meshes_have_the_size_that_was_asked_for_and_their_hills_do_not_depend_on_it() -> None:
-    small, large = displaced_spheres(10_000), displaced_spheres(40_000)
-    assert abs(len(small.faces) / 10_000 - 1) < 0.1 and abs(len(large.faces) / 40_000 - 1) < 0.1
-    assert small.is_float32
-    assert np.allclose(small.bounds, large.bounds, atol=0.03)
-    centres = 1.05 * np.sign(small.triangles.mean(axis=1))
-    outward = np.einsum("ij,ij->i", small.face_normals(), small.triangles.mean(axis=1) - centres)
-    assert (outward > 0).all()
-    assert not len(small.open_edges) and not len(large.open_edges)

@@ -24,7 +24,7 @@ def areas(mesh: Mesh) -> np.ndarray:
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
-@pytest.mark.parametrize("faces", [1, 7, 100, 5_000, 30_000])
+@pytest.mark.parametrize("faces", [1, 100, 5_000])
 @pytest.mark.parametrize("name", FORMS)
 def test_a_form_has_about_the_faces_asked_for_and_is_the_same_again(name: str, faces: int) -> None:
     mesh, again = FORMS[name](faces), FORMS[name](faces)
@@ -34,15 +34,6 @@ def test_a_form_has_about_the_faces_asked_for_and_is_the_same_again(name: str, f
     # Whole numbers of rows and blocks cannot make few faces.
     assert 1 <= len(mesh.faces) <= 14 or abs(len(mesh.faces) / faces - 1) < 0.4
     assert mesh.name == f"{name}_{faces // 1_000}k" if faces >= 1_000 else mesh.name == f"{name}_{faces}"
-
-
-@pytest.mark.parametrize("name", ["scan", "thin"])
-def test_scan_and_tube_are_closed_and_face_outward(name: str) -> None:
-    for faces in (1, 100, 5_000):
-        mesh = FORMS[name](faces)
-        assert not len(mesh.open_edges)
-        a, b, c = mesh.triangles.transpose(1, 0, 2)
-        assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0.0
 
 
 @pytest.mark.parametrize("name", FORMS)

@@ -7,14 +7,13 @@ from cases import cases
 from lawful import Lawful
 
 from renderer.mesh.mesh import Mesh
-from renderer.mesh.shapes import box
 from validation import meshes
 from validation.hits import bodies, mirrors, starts, walks
 from validation.hits.bodies import Body
 from validation.job import Job
 from validation.thresholds import Thresholds
 
-EFFORT = starts.StartEffort(rays=900, exact=200)
+EFFORT = starts.StartEffort(rays=300, exact=60)
 
 
 def job() -> Job:
@@ -27,10 +26,8 @@ def checked(body, make=Lawful, effort=EFFORT):
 
 SAMPLES = {
     "tetrahedron": Body("", meshes.tetrahedron(), True),
-    "turned box": Body("", meshes.turned(box()), True),
     "notched": Body("", meshes.hilly(1), True),
     "reflex prism": Body("", meshes.prism(300.0), True),
-    "flat prism": Body("", meshes.turned(meshes.prism(0.1)), True),
     "raster": Body("", bodies.raster(5), False),
     "soup": Body("", meshes.loose(meshes.prism(60.0).triangles), True),
     "needle": Body("", bodies.needle(2.0**-40), True),
@@ -43,7 +40,7 @@ SAMPLES = {
 @cases("name", SAMPLES)
 def test_who_keeps_the_law_is_never_wrong(name):
     found = checked(SAMPLES[name])
-    assert found.rays > 600 and found.exact > 100
+    assert found.rays > 200 and found.exact > 30
     assert found[2:] == (0, 0, 0, 0)
 
 

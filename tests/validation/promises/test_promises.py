@@ -16,7 +16,6 @@ from renderer.queryable import Queries
 from renderer.results import hits
 from renderer.scene import scene
 from renderer.trace.layout import Tree
-from renderer.tree import refit
 from validation.promises.hits import (
     alone,
     batches,
@@ -93,12 +92,6 @@ def broken(name: str) -> set[str]:
     return {" ".join(row["promise"].split()[:2]) for row in CHECKS[name]() if row["broken"]}
 
 
-def test_points_a_little_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = hits.points_on
-    monkeypatch.setattr(hits, "points_on", lambda *given: sound(*given) * (1.0 + 1e-9))
-    assert broken("places") == {"points are"}
-
-
 def test_bounds_that_are_open_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = Octree.closest_hit
 
@@ -107,18 +100,6 @@ def test_bounds_that_are_open_are_found(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr(Octree, "closest_hit", shrunk)
     assert "[t_min, t_max]" in broken("bounds")
-
-
-def test_a_bound_without_the_last_rounding_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Octree.all_hits
-
-    def narrow(self: Octree, *given: Any, **options: Any) -> Any:
-        found = sound(self, *given, **options)
-        found.t_error[:] = np.where(found.t < 2.0**-1000, found.t * 2.0**-50, found.t_error)
-        return found
-
-    monkeypatch.setattr(Octree, "all_hits", narrow)
-    assert broken("errors") == {"t_error bounds"}
 
 
 def test_a_start_on_its_face_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -134,11 +115,6 @@ def test_a_start_on_its_face_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_refit_that_does_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Octree, "refit", lambda self, vertices: None)
     assert broken("refits") == {"a refit"}
-
-
-def test_leaves_that_a_refit_forgets_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(refit, "_fit_leaves", lambda *given: None)
-    assert "a leaf's" in broken("trees")
 
 
 def altered(tree: Tree, change: Callable[[Any, Any, Any], None]) -> Tree:
@@ -254,21 +230,6 @@ def test_counts_of_places_and_of_padding_are_found(monkeypatch: pytest.MonkeyPat
     assert broken("counts") == {"stats counts", "brute force"}
 
 
-def test_a_direction_that_is_refused_and_a_hit_at_infinity_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Octree.closest_hit
-
-    def strict(self: Any, origins: Any, directions: Any) -> Any:
-        if np.abs(directions).max() == 2.0**-300:
-            raise ValueError("directions: too short")
-        return sound(self, origins, directions)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Octree, "closest_hit", strict)
-        assert broken("limits") == {"directions are"}
-    monkeypatch.setattr(Octree, "any_hit", lambda self, origins, directions: np.ones(len(origins), np.bool_))
-    assert broken("limits") == {"a face"}
-
-
 def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = image.srgb
     monkeypatch.setattr(codes, "srgb", lambda linear: sound(np.asarray(linear, np.float64) * (1.0 + 1e-9)))
@@ -276,28 +237,6 @@ def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(codes, "srgb", lambda linear: sound(np.asarray(linear, np.float64) * (
         1.0 + 1e-7 * (getattr(linear, "dtype", None) == np.float32))))  # fmt: skip
     assert broken("codes") == {"float32 numbers"}
-
-
-def test_errors_of_another_ray_and_rays_too_many_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound, first, drawn = Octree.all_hits, Octree.closest_hit, bounces.render
-
-    def other(self: Any, *given: Any, **options: Any) -> Any:
-        found = sound(self, *given, **options)
-        return replace(found, t_error=found.t_error[::-1])
-
-    monkeypatch.setattr(Octree, "all_hits", other)
-    assert "t_error is" in broken("errors")
-
-    def wider(self: Any, *given: Any, **options: Any) -> Any:
-        found = first(self, *given, **options)
-        found.t_error = 2.0 * found.t_error + 1.0
-        return found
-
-    monkeypatch.setattr(Octree, "closest_hit", wider)
-    assert "t_error of" in broken("errors")
-    monkeypatch.setattr(bounces, "render", lambda *given, **options: replace(
-        drawn(*given, **options), rays=drawn(*given, **options).rays + 1))  # fmt: skip
-    assert broken("bounces") == {"rays are"}
 
 
 def test_a_cosine_without_its_last_digits_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,20 +72,6 @@ def test_the_verdict_comes_first_and_names_what_fails(metrics: dict[str, Any], t
     assert "Mitsuba &lt;3&gt;" in page and "not named by --only" in page and "There is none." in page
 
 
-def test_an_extreme_case_is_found_by_its_number(
-    metrics: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The site links to it, see docs/case_links.py."""
-    monkeypatch.setitem(report.FIGURES, "stability_figures", lambda record: [])
-    said = dict.fromkeys(
-        ("construct", "expected", "ours", "embree_default", "embree_robust", "mitsuba", "tolerance"), "x"
-    )
-    cases = [said | {"number": number, "judges": ["exact"], "holds": True} for number in (3, 12)]
-    none: dict[str, list[object]] = {"meshes": [], "places": [], "builds": []}
-    page = report.page(metrics | {"stability": {"cases": cases, "watertight": none, "curves": {}}}, tmp_path)
-    assert re.findall(r'<tr id="([^"]*)"><td>(\d+)</td>', page) == [("case-3", "3"), ("case-12", "12")]
-
-
 @pytest.mark.parametrize(
     ("key", "value", "where"),
     [

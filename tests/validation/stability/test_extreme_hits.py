@@ -97,15 +97,6 @@ def test_bad_meshes_must_be_refused(monkeypatch, row):
     assert not ROWS[row].run(True).holds
 
 
-@cases("row", [21, 22, 23, 32])
-def test_builds_that_copy_references_fail(monkeypatch, row):
-    right = Octree.stats.fget
-    monkeypatch.setattr(
-        Octree, "stats", property(lambda self: replace(right(self), references=8 * len(self.mesh.faces)))
-    )
-    assert not ROWS[row].run(True).holds
-
-
 @cases("query", ["contains", "count_hits", "all_hits", "winding_number", "signed_distance"])
 def test_row_54_fails_on_a_wrong_answer_at_the_corner_of_many_faces(monkeypatch, query):
     right = getattr(Octree, query)

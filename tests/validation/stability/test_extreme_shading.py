@@ -216,7 +216,7 @@ def scenes(draw: Any) -> Scene:
     )
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(scenes(), st.integers(0, 64), st.sampled_from([0.01, 0.1]), st.sampled_from(["bounded", "mitsuba", 0.0]))
 def test_no_picture_holds_a_nan_or_inf(scene: Scene, max_depth: int, min_weight: float, offset: Any) -> None:
     expect_finite(
