@@ -46,7 +46,7 @@ def test_an_edit_of_the_layout_changes_the_kernels_over_it_alone(whole):
     assert not changed & {"numerics/simd.py", "jit/decorators.py", "errors.py", "mesh/mesh.py", "system/threads.py"}
 
 
-@pytest.mark.parametrize("edited", ["cli/main.py", "viewer/session.py", "scene/needs.py", "scene/material.py"])
+@pytest.mark.parametrize("edited", ["viewer/session.py", "scene/material.py"])
 def test_an_edit_beside_the_kernels_changes_none_of_them(whole, edited):
     kernels = {
         "trace/single.py", "tree/build.py", "tree/subtree.py", "tree/refit.py", "tree/blocks.py",

@@ -47,21 +47,6 @@ def test_files_are_apart_unless_links_lead_to_one(tmp_path: Path) -> None:
     assert not are_apart([b, a], [link]) and not are_apart([loop], [loop])
 
 
-def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:
-    (tmp_path / "there").mkdir()
-    target, link = tmp_path / "there" / "a.bin", tmp_path / "link.bin"
-    target.write_bytes(b"old")
-    link.symlink_to(target)
-    write_atomically(link, lambda file: file.write(b"new"))
-    assert link.is_symlink()
-    assert target.read_bytes() == b"new"
-    assert sorted(p.name for p in tmp_path.rglob("*")) == ["a.bin", "link.bin", "there"]
-    # One that leads nowhere yet, too.
-    (tmp_path / "other").symlink_to(tmp_path / "there" / "b.bin")
-    write_atomically(tmp_path / "other", lambda file: file.write(b"b"))
-    assert (tmp_path / "there" / "b.bin").read_bytes() == b"b"
-
-
 _WRITER = """
 import sys, time
 from renderer.system.files import write_atomically
@@ -139,24 +124,6 @@ def test_without_locks_files_are_written_and_nothing_is_found_left(
     left.write_bytes(b"half")
     write_atomically(tmp_path / "a.bin", lambda file: file.write(b"new"))
     assert left.exists() and (tmp_path / "a.bin").read_bytes() == b"new"
-
-
-@pytest.mark.parametrize("failing", ["write", "replace"])
-def test_an_error_names_the_file_and_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
-) -> None:
-    path = tmp_path / "a.bin"
-    path.write_bytes(b"old")
-
-    def refuse(*arguments: Any) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    if failing == "replace":
-        monkeypatch.setattr(files.os, "replace", refuse)
-    with pytest.raises(OSError, match="No space left on device") as told:
-        write_atomically(path, refuse if failing == "write" else lambda file: file.write(b"new"))
-    assert told.value.filename == str(path)
-    assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"old"]
 
 
 def test_whether_a_folder_can_be_written_is_found_out_before_the_work(

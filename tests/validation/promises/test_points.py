@@ -121,7 +121,7 @@ def test_the_other_sign_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_ball_that_hides_itself_and_one_that_hides_nothing_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         changed(patch, "visible", lambda found: found & False)
-        assert broken("views") == {"a ball's centre", "what is in", "a point sees", "each pair of"}
+        assert broken("views") == {"a ball's centre", "what is in", "what is nearer", "a point sees", "each pair of"}
     changed(monkeypatch, "visible", lambda found: found | True)
     assert broken("views") == {"nothing is seen", "what is in", "a point sees", "each pair of"}
 
